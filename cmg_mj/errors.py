@@ -8,7 +8,7 @@ from datetime import date, time
 from typing import TypeAlias
 
 TomlValue: TypeAlias = "bool | int | float | str | date | time | Sequence[TomlValue] | Mapping[str, TomlValue] | None"
-"""What a TOML file can hold."""
+"""A value that a TOML file can hold."""
 LONGEST_SHOWN = 80  # characters of a value in a message
 
 

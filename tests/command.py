@@ -19,8 +19,8 @@ HANGS_AFTER_S = 900.0
 
 
 @dataclass(frozen=True)
-class Said:
-    """What a command left behind: its exit status and what it wrote."""
+class CommandOutcome:
+    """The outcome of a command: its exit status and its output."""
 
     status: int
     out: str
@@ -47,7 +47,7 @@ class Said:
         return line.removeprefix("cmg-mj: ")
 
 
-def cmg_mj(*arguments: object) -> Said:
+def cmg_mj(*arguments: object) -> CommandOutcome:
     """Run the command in this process. An exception that is no exit is a traceback to the user, and fails the test."""
     out, err = io.StringIO(), io.StringIO()
     status: object = 0
@@ -57,18 +57,20 @@ def cmg_mj(*arguments: object) -> Said:
         except SystemExit as exit:
             status = exit.code
     assert isinstance(status, int)
-    return Said(status, out.getvalue(), err.getvalue())
+    return CommandOutcome(status, out.getvalue(), err.getvalue())
 
 
-def environment(**others: str) -> dict[str, str]:
+def environment(**variables: str) -> dict[str, str]:
     """The environment for a process of its own: without colours, with the tests' package importable."""
-    kept = {name: value for name, value in os.environ.items() if name not in ("FORCE_COLOR", "COLUMNS", "PYTHONPATH")}
-    return {**kept, "PYTHONPATH": str(ROOT), "TERM": "xterm", **others}
+    inherited = {
+        name: value for name, value in os.environ.items() if name not in ("FORCE_COLOR", "COLUMNS", "PYTHONPATH")
+    }
+    return {**inherited, "PYTHONPATH": str(ROOT), "TERM": "xterm", **variables}
 
 
-def cmg_mj_process(*arguments: object, cwd: Path) -> Said:
+def cmg_mj_process(*arguments: object, cwd: Path) -> CommandOutcome:
     """Run the command in a process of its own."""
-    done = subprocess.run(
+    process = subprocess.run(
         [*COMMAND, *map(str, arguments)],
         cwd=cwd,
         env=environment(),
@@ -76,4 +78,4 @@ def cmg_mj_process(*arguments: object, cwd: Path) -> Said:
         text=True,
         timeout=HANGS_AFTER_S,
     )
-    return Said(done.returncode, done.stdout, done.stderr)
+    return CommandOutcome(process.returncode, process.stdout, process.stderr)

@@ -14,7 +14,7 @@ FOLDERS = ("cmg_mj", "docs", "examples", "models", "scenarios", "tests", "typing
 
 
 class Footprint:
-    """What lies in the folders of a repository.
+    """The contents of the folders of a repository.
 
     A folder's time of change tells whether an entry came or went, so a look at it costs a call for each folder.
 
@@ -26,24 +26,26 @@ class Footprint:
     def __init__(self, root: Path) -> None:
         self.root = root
         self.entries: dict[str, tuple[int, frozenset[str]]] = {}
-        below = (top for name in FOLDERS for top, *_ in os.walk(root / name) if "__pycache__" not in top)
-        for folder in (str(root), *below):
+        subfolders = (top for name in FOLDERS for top, *_ in os.walk(root / name) if "__pycache__" not in top)
+        for folder in (str(root), *subfolders):
             self.entries[folder] = (os.stat(folder).st_mtime_ns, visible(folder))
 
     def additions(self) -> list[str]:
         """Return what has come since the last look, relative to the root."""
-        found = []
-        for folder, (changed, names) in list(self.entries.items()):
+        new_names = []
+        for folder, (last_mtime_ns, names) in list(self.entries.items()):
             try:
-                now = os.stat(folder).st_mtime_ns
+                mtime_ns = os.stat(folder).st_mtime_ns
             except FileNotFoundError:
                 del self.entries[folder]
                 continue
-            if now != changed:
-                here = visible(folder)
-                found += [os.path.relpath(os.path.join(folder, name), self.root) for name in sorted(here - names)]
-                self.entries[folder] = (now, here)
-        return found
+            if mtime_ns != last_mtime_ns:
+                present = visible(folder)
+                new_names += [
+                    os.path.relpath(os.path.join(folder, name), self.root) for name in sorted(present - names)
+                ]
+                self.entries[folder] = (mtime_ns, present)
+        return new_names
 
 
 def visible(folder: str) -> frozenset[str]:

@@ -1,4 +1,4 @@
-"""What tests of run folders write into them and read out of them."""
+"""Writing and reading run folders in tests."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def write(text: str, path: str = "my.toml") -> str:
 
 
 def names(place: str) -> list[str]:
-    """What is in a folder, but for cmg_mj's own list of it."""
+    """List the contents of a folder, but for cmg_mj's own list of it."""
     return sorted(path.name for path in Path(place).iterdir() if path.name != HIDDEN)
 
 

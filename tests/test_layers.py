@@ -20,16 +20,16 @@ ROOT = PACKAGE.parent
 
 ARCHITECTURE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 TABLE = ARCHITECTURE.split("## The packages")[1].split("\n\n| library |")[0]
-ABOVE, BELOW = (
+UPPER_PACKAGES, LOWER_PACKAGES = (
     re.findall(r"^\| `(\w+)` \|", part, re.MULTILINE) for part in TABLE.split("nothing above this line imports MuJoCo")
 )
 """The packages from top to bottom, as docs/architecture.md lists them."""
-ORDER = [*ABOVE, *BELOW]
+ORDER = [*UPPER_PACKAGES, *LOWER_PACKAGES]
 MOST_ENTRIES = 18
 
 HEAVY = dict(re.findall(r"^\| ([\w.]+) \| `([\w/]+)` \|$", ARCHITECTURE, re.MULTILINE))
 """Library -> the only sub-package or module that imports it, because it costs time."""
-AT_ONCE = ("cmg_mj.visualization.recording", "cmg_mj.replay.recording", "cmg_mj.simulation.gymnasium_env")
+EAGER = ("cmg_mj.visualization.recording", "cmg_mj.replay.recording", "cmg_mj.simulation.gymnasium_env")
 """These import theirs when they are imported; the others when they need it."""
 
 
@@ -45,29 +45,33 @@ def package_of(module: str) -> str:
     return module.split(".")[1] if "." in module else ""
 
 
-def of_package(package: str) -> list[str]:
+def modules_of(package: str) -> list[str]:
     return [name for name in modules() if package_of(name) == package]
 
 
-def imported_names(tree: ast.AST, where: str) -> Iterator[tuple[int, str]]:
+def imported_names(tree: ast.AST, place: str) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{where}:{node.lineno}: write the whole name"
+            assert node.level == 0, f"{place}:{node.lineno}: write the whole name"
             yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+
+
+@cache
+def syntax_tree(module: str) -> ast.Module:
+    return ast.parse(modules()[module].read_text(encoding="utf-8"))
 
 
 @cache
 def imports(module: str) -> list[tuple[int, str]]:
     """Line and full name of everything that a module imports, inside functions too."""
-    return list(imported_names(ast.parse(modules()[module].read_text(encoding="utf-8")), module))
+    return list(imported_names(syntax_tree(module), module))
 
 
-def at_import(module: str) -> Iterator[str]:
+def import_time_names(module: str) -> Iterator[str]:
     """Modules of the package that a module imports when it is imported itself."""
-    tree = ast.parse(modules()[module].read_text(encoding="utf-8"))
-    outside = [node for node in tree.body if not _is_for_types(node)]
+    outside = [node for node in syntax_tree(module).body if not _is_for_types(node)]
     for _, name in imported_names(ast.Module([node for node in outside if not _defines(node)], []), module):
         yield from _module_in(name)
 
@@ -87,7 +91,7 @@ def _module_in(name: str) -> Iterator[str]:
         yield name
 
 
-def in_a_fresh_interpreter(code: str) -> list[str]:
+def run_in_a_fresh_interpreter(code: str) -> list[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
 
 
@@ -114,59 +118,66 @@ def test_a_package_says_its_job_in_a_sentence(package: str) -> None:
 @pytest.mark.parametrize("package", ORDER)
 def test_imports_run_upward_only(package: str) -> None:
     depth = ORDER.index(package)
-    below = [
+    downward_imports = [
         f"{module}:{line} imports {name}"
-        for module in of_package(package)
+        for module in modules_of(package)
         for line, name in imports(module)
         if name.startswith("cmg_mj.") and (other := package_of(name)) in ORDER and ORDER.index(other) > depth
     ]
-    assert not below
+    assert not downward_imports
 
 
 def test_a_downward_import_would_be_seen() -> None:
     """The order is not trivially held: the loop does use the controller, the command line the scenario."""
-    used = {
-        package: {package_of(name) for module in of_package(package) for _, name in imports(module)}
+    dependencies = {
+        package: {package_of(name) for module in modules_of(package) for _, name in imports(module)}
         for package in ORDER
     }
-    assert "controllers" in used["simulation"]
-    assert "scenario" in used["cli"]
+    assert "controllers" in dependencies["simulation"]
+    assert "scenario" in dependencies["cli"]
     assert ORDER.index("controllers") < ORDER.index("scenario") < ORDER.index("simulation") < ORDER.index("cli")
 
 
 def test_no_circle_of_modules() -> None:
     """Among the imports that are made when a module is imported; those inside functions are made later."""
-    graph = {module: set(at_import(module)) - {module} for module in modules()}
-    done: set[str] = set()
-    while ready := {module for module, used in graph.items() if module not in done and used <= done | {module}}:
-        done |= ready
-    assert not {module: used - done for module, used in graph.items() if module not in done}
+    graph = {module: set(import_time_names(module)) - {module} for module in modules()}
+    finished: set[str] = set()
+    while ready := {
+        module
+        for module, dependencies in graph.items()
+        if module not in finished and dependencies <= finished | {module}
+    }:
+        finished |= ready
+    assert not {module: dependencies - finished for module, dependencies in graph.items() if module not in finished}
 
 
 @pytest.mark.slow
 def test_nothing_above_the_line_imports_mujoco() -> None:
     """One package after the other: the first that brings MuJoCo, or what is as heavy, is named."""
     code = "import importlib, sys\n"
-    light = [name for package in ABOVE for name in of_package(package) if not uses_casadi(name)]
+    light = [name for package in UPPER_PACKAGES for name in modules_of(package) if not uses_casadi(name)]
     for name in light:
         code += f"importlib.import_module({name!r})\n"
         for heavy in ("mujoco", "control", "pyarrow", *HEAVY):
             code += f"if {heavy!r} in sys.modules: print({name!r}, {heavy!r})\n"
     code += "print('done')"
-    assert in_a_fresh_interpreter(code) == ["done"]
+    assert run_in_a_fresh_interpreter(code) == ["done"]
 
 
 def uses_casadi(module: str) -> bool:
     return module.startswith("cmg_mj.codegen.export.")
 
 
-@pytest.mark.parametrize("package", ABOVE)
+@pytest.mark.parametrize("package", UPPER_PACKAGES)
 def test_upper_packages_do_not_name_mujoco(package: str) -> None:
     """Not even inside a function."""
-    named = [
-        f"{name}:{line}" for name in of_package(package) for line, used in imports(name) if used.startswith("mujoco")
+    places = [
+        f"{name}:{line}"
+        for name in modules_of(package)
+        for line, import_name in imports(name)
+        if import_name.startswith("mujoco")
     ]
-    assert not named
+    assert not places
 
 
 def test_every_observer_works_without_mujoco() -> None:
@@ -181,13 +192,15 @@ for kind in OBSERVERS:
     observer.step(observer.init(Measurement(0.0, 0.0, 0.0)), Measurement(0.01, 0.0, 1.0), 0.0)
 print("mujoco" in sys.modules)
 """
-    assert in_a_fresh_interpreter(code) == ["False"]
+    assert run_in_a_fresh_interpreter(code) == ["False"]
 
 
 @pytest.mark.parametrize("library", sorted(HEAVY))
 def test_only_one_place_knows_a_heavy_library(library: str) -> None:
     place = f"cmg_mj.{HEAVY[library].replace('/', '.')}"
-    users = {name for name in modules() for _, used in imports(name) if f"{used}.".startswith(f"{library}.")}
+    users = {
+        name for name in modules() for _, import_name in imports(name) if f"{import_name}.".startswith(f"{library}.")
+    }
     assert users
     assert {name for name in users if not f"{name}.".startswith(f"{place}.")} == set()
 
@@ -195,13 +208,13 @@ def test_only_one_place_knows_a_heavy_library(library: str) -> None:
 @pytest.mark.slow
 def test_heavy_libraries_are_imported_where_they_are_used() -> None:
     """All modules but these leave them out: nothing imports matplotlib before a plot is drawn."""
-    inner = ("cmg_mj.codegen.export.", "cmg_mj.visualization.studio.", "cmg_mj.studies.sweeps.dask_", *AT_ONCE)
+    inner = ("cmg_mj.codegen.export.", "cmg_mj.visualization.studio.", "cmg_mj.studies.sweeps.dask_", *EAGER)
     code = "import importlib, sys\n"
     for name in modules():
         if not name.startswith(inner):
             code += f"importlib.import_module({name!r})\n"
     code += f"print(*[name for name in {sorted(HEAVY)} if name in sys.modules], 'done')"
-    assert in_a_fresh_interpreter(code) == ["done"]
+    assert run_in_a_fresh_interpreter(code) == ["done"]
 
 
 @pytest.mark.slow
@@ -214,7 +227,7 @@ def test_public_names_are_what_they_say() -> None:
 
 def test_type_checkers_know_the_public_names() -> None:
     """What `cmg_mj/__init__.py` imports for type checkers is what it hands out."""
-    tree = ast.parse(modules()["cmg_mj"].read_text(encoding="utf-8"))
+    tree = syntax_tree("cmg_mj")
     imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 0]
     names = {
         (f"{node.module}".removeprefix("cmg_mj."), alias.asname)

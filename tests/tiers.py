@@ -34,47 +34,49 @@ def tier(item: pytest.Item) -> str:
     Raises:
         pytest.UsageError: It would be in two.
     """
-    in_papers = PAPERS in item.path.parents
-    if in_papers and item.get_closest_marker("slow"):
+    is_papers = PAPERS in item.path.parents
+    if is_papers and item.get_closest_marker("slow"):
         raise pytest.UsageError(f"{item.nodeid}: is of the papers, and cannot be slow as well")
-    return "papers" if in_papers else "slow" if item.get_closest_marker("slow") else "daily"
+    return "papers" if is_papers else "slow" if item.get_closest_marker("slow") else "daily"
 
 
 def named_tests(config: pytest.Config) -> list[tuple[Path, str]]:
     """Tests that the command line names: file, and what follows `::`."""
-    splits = (argument.partition("::") for argument in config.args)
-    return [(config.invocation_params.dir / file, name) for file, colons, name in splits if colons]
+    parts = (argument.partition("::") for argument in config.args)
+    return [(config.invocation_params.dir / file, name) for file, colons, name in parts if colons]
 
 
 def is_named(item: pytest.Item, tests: list[tuple[Path, str]]) -> bool:
     """Return whether a test is one of those named, or a case of one."""
-    own = item.nodeid.partition("::")[2]
-    return any(path.resolve() == item.path and own.partition("[")[0] == name.partition("[")[0] for path, name in tests)
+    own_name = item.nodeid.partition("::")[2]
+    return any(
+        path.resolve() == item.path and own_name.partition("[")[0] == name.partition("[")[0] for path, name in tests
+    )
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Leave the papers' folder alone where none of its tests can run: it takes a second to import."""
-    asked = "papers" in named_tiers(config.option.markexpr) or any(
+    is_needed = "papers" in named_tiers(config.option.markexpr) or any(
         PAPERS in (path := config.invocation_params.dir / argument.partition("::")[0]).parents or path == PAPERS
         for argument in config.args
     )
-    return True if collection_path == PAPERS and not asked else None
+    return True if collection_path == PAPERS and not is_needed else None
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark each test with its tier, before pytest reads `-m`; drop those whose tier nobody named."""
-    wanted = {"daily", *named_tiers(config.option.markexpr)}
+    tier_names = {"daily", *named_tiers(config.option.markexpr)}
     tests = named_tests(config)
-    dropped = []
+    deselected = []
     for item in items:
         its_tier = tier(item)
         item.add_marker(its_tier)
-        if its_tier not in wanted and not is_named(item, tests):
-            dropped.append(item)
-    if dropped:
-        config.hook.pytest_deselected(items=dropped)
-        items[:] = [item for item in items if item not in set(dropped)]
+        if its_tier not in tier_names and not is_named(item, tests):
+            deselected.append(item)
+    if deselected:
+        config.hook.pytest_deselected(items=deselected)
+        items[:] = [item for item in items if item not in set(deselected)]
 
 
 @pytest.hookimpl(optionalhook=True)

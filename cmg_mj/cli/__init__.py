@@ -27,7 +27,7 @@ A scenario is a bundled one's name (cmg-mj list scenarios) or the path of a TOML
   cmg-mj compare push_recovery --observers all
   rerun runs/push_recovery-homogeneous-0/recording.rrd
 
-Ctrl-C ends a run early and keeps its results; a second one ends it at once.
+Ctrl-C ends a run early and keeps its results; a second Ctrl-C ends it at once.
 
 Exit status: 0 done (also if the plant fell), 2 wrong input or a run that could not continue, 130 interrupted.
 """

@@ -7,10 +7,9 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 from cmg_mj.errors import InputError, nearest
 
@@ -21,7 +20,8 @@ if TYPE_CHECKING:
     from cmg_mj.simulation.experiment import Experiment
 
 
-R = TypeVar("R")
+Command = Callable[..., None]
+Decorator = Callable[[Command], Command]
 
 MOST_WORLDS = 10_000
 """Most worlds of a batch; one takes about 0.1 MB of memory."""
@@ -57,11 +57,8 @@ class RunArguments:
         self, label: str, names: Sequence[str], experiment: Experiment, driver: Driver = "native", world: int = 0
     ) -> RunFolder:
         """Claim the folder for files: --out, or one in runs/ named for the scenario, the label and the settings."""
-        from cmg_mj.results.run_folder import unused_folder
         from cmg_mj.scenario.differences import folder_suffix, safe_name
 
-        if self.out is not None:
-            return claim_folder(output_path(self.out), names)
         label = safe_name(label) + ("-board" if driver == "board" else "")
         parts = (
             safe_name(Path(self.name).stem),
@@ -70,7 +67,7 @@ class RunArguments:
             *([f"world{world}"] if world else []),
         )
         name = "-".join(parts) + folder_suffix(experiment.differences)
-        return released_at_the_end(unused_folder(Path("runs"), name, names, experiment.as_toml(driver, world)))
+        return claim_output(self.out, name, names, experiment.as_toml(driver, world))
 
 
 def _as_utf8(argument: str) -> str:
@@ -81,97 +78,142 @@ def _as_utf8(argument: str) -> str:
         return argument
 
 
-def run_options(command: Callable[..., R]) -> Callable[..., R]:
+def run_options(command: Command) -> Command:
     """Add the arguments of every command that runs a scenario, which it takes as one `RunArguments`."""
 
     @functools.wraps(command)
     def with_arguments(
         scenario: str, settings: tuple[str, ...], seed: int | None, out: str | None, as_json: bool, **others: Any
-    ) -> R:
-        return command(RunArguments(scenario, settings, seed, out, as_json), **others)
+    ) -> None:
+        command(RunArguments(scenario, settings, seed, out, as_json), **others)
 
-    for decorate in reversed((click.argument("scenario"), with_settings, with_seed, with_out, with_json)):
-        with_arguments = decorate(with_arguments)
-    return with_arguments
+    return all_of(click.argument("scenario"), settings_option(), with_seed, with_out, with_json)(with_arguments)
 
 
-with_settings = click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="FIELD=VALUE",
-    help="Set a field of the scenario, such as plant.initial_tilt_deg=2.0. May be given again.",
-)
-with_seed = click.option("--seed", type=click.IntRange(0, 2**128 - 1), metavar="N", help="Seed of the sensors' noise.")
-with_out = click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: a new one in runs/]")
+def all_of(*decorators: Decorator) -> Decorator:
+    """Make one decorator of several; `--help` lists their options in this order."""
+
+    def decorate(command: Command) -> Command:
+        for decorator in reversed(decorators):
+            command = decorator(command)
+        return command
+
+    return decorate
+
+
+def number_option(name: str, help: str, largest: int, default: int | None = None) -> Decorator:
+    """Make an option for a number from 0 on; `--help` does not show the largest one."""
+
+    def check(context: click.Context, parameter: click.Parameter, number: int | None) -> int | None:
+        if number is not None and not 0 <= number <= largest:
+            raise click.BadParameter(f"{number} is not in the range 0<=x<={largest}.")
+        return number
+
+    return click.option(name, type=int, metavar="N", default=default, callback=check, help=f"{help}  [x>=0]")
+
+
+def settings_option(
+    help: str = "Set a field of the scenario, such as plant.initial_tilt_deg=2.0.", metavar: str = "FIELD=VALUE"
+) -> Decorator:
+    """Make the option `--set`."""
+    return click.option("--set", "settings", multiple=True, metavar=metavar, help=f"{help} May be given again.")
+
+
+def worlds_option(help: str, default: int | None = None, range: tuple[int, int] = (1, MOST_WORLDS)) -> Decorator:
+    """Make the option `--worlds`."""
+    kind = click.IntRange(*range)
+    return click.option("--worlds", type=kind, default=default, show_default=True, metavar="N", help=help)
+
+
+def observer_option(role: str = "in the loop", default: str | None = None, *, required: bool = False) -> Decorator:
+    """Make the option `--observer`, which refuses an observer that does not exist."""
+    option = functools.partial(
+        click.option,
+        "--observer",
+        metavar="NAME",
+        callback=lambda context, parameter, name: None if name is None else check_observer("--observer", name),
+        help=f"Observer {role}: a name, or your own as package.module:Class.",
+    )
+    return option(required=True) if required else option(default=default, show_default=True)  # None is a default, too
+
+
+def observers_option(otherwise: str = "", *, distinct: bool = True) -> Decorator:
+    """Make the option `--observers`, whose value is a list of names.
+
+    Args:
+        otherwise: The default in words, for the value None; without them it is all observers.
+        distinct: Whether a repeated name counts once.
+    """
+
+    def parse(context: click.Context, parameter: click.Parameter, text: str | None) -> list[str] | None:
+        if text is None:
+            return None
+        names = observer_names(text)
+        return list(dict.fromkeys(names)) if distinct else names
+
+    default = f"  [default: {otherwise}]" if otherwise else ""
+    return click.option(
+        "--observers",
+        default=None if otherwise else "all",
+        show_default=True,
+        metavar="NAMES",
+        callback=parse,
+        help=f"Observers separated by commas, or all; your own as package.module:Class.{default}",
+    )
+
+
+with_seed = number_option("--seed", "Seed of the sensors' noise.", 2**128 - 1)
+with_out = click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: one in runs/]")
 with_json = click.option("--json", "as_json", is_flag=True, help="Print only the figures, as JSON, on standard output.")
-with_observer = click.option(
-    "--observer", metavar="NAME", help="Observer in the loop: a name, or your own as package.module:Class."
-)
-with_observers = click.option(
-    "--observers",
-    default="all",
-    show_default=True,
-    metavar="NAMES",
-    help="Observers separated by commas, or all; your own as package.module:Class.",
-)
+with_markdown = click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 
 
-def claim_folder(path: Path, names: Sequence[str] = ()) -> RunFolder:
-    """Claim a folder for a command's files; no other may write to it until the command is done."""
-    from cmg_mj.results.run_folder import RunFolder
+def claim_output(out: str | None, default: str, names: Sequence[str], *request: str) -> RunFolder:
+    """Claim the folder that `--out` names, or by default one in runs/, until the command is done.
 
-    return released_at_the_end(RunFolder(path, names))
+    Args:
+        out: `--out`.
+        default: Name of the folder in runs/.
+        names: The files that the command may write.
+        request: TOML of the request, and the file that holds it. With them a folder in runs/ that another request has
+            written is not taken.
 
+    Returns:
+        The folder, to which no other command may write; a new one without files is removed in the end.
+    """
+    from cmg_mj.results.run_folder import RunFolder, unused_folder
 
-def released_at_the_end(folder: RunFolder) -> RunFolder:
-    """Release a folder when the command is done; a new folder without files is removed then."""
+    if out == "":
+        raise InputError("--out '': name a folder, . for the current one")
+    if out is None and request:
+        folder = unused_folder(Path("runs"), default, names, *request)
+    else:
+        folder = RunFolder(Path("runs") / default if out is None else Path(out), names)
     click.get_current_context().call_on_close(folder.release)
     return folder
 
 
-def refuse_unused(names: Sequence[str], why: str) -> None:
-    """Refuse options of the current command that are on the command line and would be ignored.
-
-    Args:
-        names: Names of the command's parameters.
-        why: The purpose of these options, for the message.
-    """
-    context = click.get_current_context()
-    for parameter in context.command.params:
-        if parameter.name in names and context.get_parameter_source(parameter.name) == ParameterSource.COMMANDLINE:
-            raise InputError(f"{max(parameter.opts, key=len)}: {why}")
+def names_in(text: str) -> list[str]:
+    """Parse names separated by commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
 
 
-def output_path(out: str) -> Path:
-    """Return the folder that `--out` names."""
-    if out == "":
-        raise InputError("--out '': name a folder, . for the current one")
-    return Path(out)
-
-
-def names_of(observers: str) -> list[str]:
-    """Parse observers separated by commas, or `all`; a repeated name counts once."""
-    return list(dict.fromkeys(named_observers(observers)))
-
-
-def named_observers(observers: str) -> list[str]:
+def observer_names(text: str) -> list[str]:
     """Parse observers separated by commas, or `all`; repeated names stay."""
     from cmg_mj.observers import OBSERVERS
 
-    names = list(OBSERVERS) if observers == "all" else [name.strip() for name in observers.split(",") if name.strip()]
+    names = list(OBSERVERS) if text == "all" else names_in(text)
     if not names:
-        raise InputError(f"--observers {observers!r}: give names separated by commas, or all")
-    for name in names:
-        check_observer("--observers", name)
-    return names
+        raise InputError(f"--observers {text!r}: give names separated by commas, or all")
+    return [check_observer("--observers", name) for name in names]
 
 
-def check_observer(option: str, name: str) -> None:
-    """Refuse an observer that does not exist."""
+def check_observer(option: str, name: str) -> str:
+    """Refuse an observer that does not exist, or return its name."""
     from cmg_mj.observers import OBSERVERS
 
     if ":" not in name and name not in OBSERVERS:
         raise InputError(
             f"{option} {name!r}: no such observer; {nearest(name, OBSERVERS)}, or your own as package.module:Class"
         )
+    return name

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Literal
 
 import click
 
-from cmg_mj.cli.arguments import RunArguments, check_observer, claim_folder, output_path
+from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, settings_option, with_json, with_out
 from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
 
 
 @click.command(short_help="Write an observer and the control law around it as C code.")
-@click.argument("observer")
-@click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: one in runs/]")
+@click.argument("observer", callback=lambda context, parameter, name: check_observer("OBSERVER", name))
+@with_out
 @click.option(
     "--precision",
     type=click.Choice(["double", "single"]),
@@ -21,12 +20,7 @@ from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
     show_default=True,
     help="Precision of all numbers in the C code.",
 )
-@click.option(
-    "--name",
-    "name",
-    metavar="NAME",
-    help="Prefix of files, types and functions.  [default: OBSERVER's name]",
-)
+@click.option("--name", metavar="NAME", help="Prefix of files, types and functions.  [default: OBSERVER's name]")
 @click.option(
     "--scenario",
     default="push_recovery",
@@ -34,14 +28,8 @@ from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
     metavar="NAME",
     help="Scenario that gives the plant, the gains and the rates.",
 )
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="FIELD=VALUE",
-    help="Set a field of the scenario, such as observer.k1=25 or controller.rate_hz=400. May be given again.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print only the figures, as JSON, on standard output.")
+@settings_option("Set a field of the scenario, such as observer.k1=25 or controller.rate_hz=400.")
+@with_json
 @users_code()
 def export(
     observer: str,
@@ -67,15 +55,13 @@ def export(
     from cmg_mj.codegen.export.pipeline import export_table
     from cmg_mj.simulation.experiment import prepare
 
-    check_observer("OBSERVER", observer)
     check_installed()
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
     note_hints(experiment.hints)
     experiment.require_single_axis("export")
     controller = experiment.axis_controller()
     name = name_of(controller.observer, name)
-    place = Path("runs") / f"export-{name}-{precision}" if out is None else output_path(out)
-    with claim_folder(place, export_files(name)) as folder:
+    with claim_output(out, f"export-{name}-{precision}", export_files(name)) as folder:
         code = generate_code(controller, precision, name)
         files = write_code(folder, code)
     figures = code.figures

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
-from cmg_mj.cli.arguments import refuse_unused
+from cmg_mj.cli.arguments import all_of
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,29 +21,24 @@ DEFAULT_ADDRESS = "127.0.0.1:9876"
 """Rerun's default address."""
 
 
-def live_options(command: Callable) -> Callable:
-    """Add the options `live`, `connect` and `pace` of a run that a viewer can show."""
-    for decorate in reversed(
-        (
-            click.option("--live", is_flag=True, help="Show the run in a rerun viewer while it goes on."),
-            click.option(
-                "--connect",
-                metavar="[ADDRESS]",
-                is_flag=False,
-                flag_value=DEFAULT_ADDRESS,
-                help=f"Show the run in a viewer that runs already, at PORT or HOST:PORT.  [default: {DEFAULT_ADDRESS}]",
-            ),
-            click.option(
-                "--pace",
-                metavar="FACTOR",
-                default="1",
-                show_default=True,
-                help="Speed with --live or --connect, in multiples of real time; max for no limit.",
-            ),
-        )
-    ):
-        command = decorate(command)
-    return command
+live_options = all_of(
+    click.option("--live", is_flag=True, help="Show the run in a rerun viewer while it goes on."),
+    click.option(
+        "--connect",
+        metavar="[ADDRESS]",
+        is_flag=False,
+        flag_value=DEFAULT_ADDRESS,
+        help=f"Show the run in a viewer that runs already, at PORT or HOST:PORT.  [default: {DEFAULT_ADDRESS}]",
+    ),
+    click.option(
+        "--pace",
+        metavar="FACTOR",
+        default="1",
+        show_default=True,
+        help="Speed with --live or --connect, in multiples of real time; max for no limit.",
+    ),
+)
+"""The options of a run that a viewer can show."""
 
 
 def factor_of(pace: str) -> float:
@@ -68,7 +63,8 @@ def live_run(
         InputError: There is no viewer, or the options exclude each other.
     """
     if not live and connect is None:
-        refuse_unused(["pace"], "goes with --live or --connect; without a viewer a run goes as fast as it can")
+        if click.get_current_context().get_parameter_source("pace") == ParameterSource.COMMANDLINE:
+            raise InputError("--pace: goes with --live or --connect; without a viewer a run goes as fast as it can")
         return None
     if live and connect is not None:
         raise InputError("--live starts a viewer, --connect takes one that runs already: give one of them")

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import functools
-import inspect
 import math
-import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from cmg_mj.cli.arguments import claim_folder, names_of, output_path, released_at_the_end, with_observers
-from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, final_path, note, progress, say_written, show, users_code
+from cmg_mj.cli.arguments import (
+    Command,
+    all_of,
+    claim_output,
+    observers_option,
+    settings_option,
+    with_json,
+    with_markdown,
+    with_out,
+)
+from cmg_mj.cli.terminal import CtrlC, end_interrupted, final_path, progress, say_written, show, users_code
 from cmg_mj.errors import InputError
 from cmg_mj.results.summary_keys import finite
 
 if TYPE_CHECKING:
-    from cmg_mj.replay.log_replays import LogReplays
     from cmg_mj.replay.logs import ReadOptions
-    from cmg_mj.results.run_folder import RunFolder
 
-R = TypeVar("R")
-
-LOG_OPTIONS = (
+LOG_OPTIONS = all_of(
     click.option(
         "--columns",
         multiple=True,
@@ -57,53 +58,47 @@ with_noise = click.option(
     default="",
     metavar="NAME=VALUE,...",
     help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of one "
-    "sample.  [default: 400; 0.1, 1]",
+    "sample.  [default: accelerometer=400, or tilt=0.1,acceleration=1]",
 )
 
 
-def takes_log_options(command: Callable[..., R]) -> Callable[..., R]:
+def takes_log_options(command: Command) -> Command:
     """Add the options of every command that reads logs, which it takes as one `ReadOptions`."""
 
     @functools.wraps(command)
-    def with_options(**arguments: Any) -> R:
-        names = inspect.signature(_read_options).parameters
-        return command(options=_read_options(**{name: arguments.pop(name) for name in names}), **arguments)
+    def with_options(
+        columns: tuple[str, ...],
+        units: tuple[str, ...],
+        scale: tuple[str, ...],
+        offset: tuple[str, ...],
+        rate: float | None,
+        max_gap: float | None,
+        delay: float,
+        radii: str | None,
+        time_range: str | None,
+        **others: Any,
+    ) -> None:
+        from cmg_mj.replay.logs import ReadOptions
+        from cmg_mj.replay.logs.columns import assignments
 
-    for decorate in reversed(LOG_OPTIONS):
-        with_options = decorate(with_options)
-    return with_options
+        if rate is not None and not 0.1 <= rate <= 1e6:
+            raise InputError(f"--rate {rate:g}: must be from 0.1 to 1e6 Hz")
+        if max_gap is not None and not 0.0 <= max_gap < math.inf:
+            raise InputError(f"--max-gap {max_gap:g}: must be a number of seconds not below 0")
+        options = ReadOptions(
+            columns=assignments(columns, "--columns"),
+            units=assignments(units, "--units"),
+            scale=_numbers(assignments(scale, "--scale"), "--scale"),
+            offset=_numbers(assignments(offset, "--offset"), "--offset"),
+            rate_hz=rate,
+            max_gap_s=max_gap,
+            delay_s=delay,
+            radii_m=None if radii is None else _pair(radii, ",", "--radii", "INNER,OUTER, such as 0.05,0.15"),
+            time_range_s=None if time_range is None else span(time_range, "--time-range"),
+        )
+        command(options=options, **others)
 
-
-def _read_options(
-    columns: tuple[str, ...],
-    units: tuple[str, ...],
-    scale: tuple[str, ...],
-    offset: tuple[str, ...],
-    rate: float | None,
-    max_gap: float | None,
-    delay: float,
-    radii: str | None,
-    time_range: str | None,
-) -> ReadOptions:
-    """Parse the options of a log."""
-    from cmg_mj.replay.logs import ReadOptions
-    from cmg_mj.replay.logs.columns import assignments
-
-    if rate is not None and not 0.1 <= rate <= 1e6:
-        raise InputError(f"--rate {rate:g}: must be from 0.1 to 1e6 Hz")
-    if max_gap is not None and not 0.0 <= max_gap < math.inf:
-        raise InputError(f"--max-gap {max_gap:g}: must be a number of seconds not below 0")
-    return ReadOptions(
-        columns=assignments(columns, "--columns"),
-        units=assignments(units, "--units"),
-        scale=_numbers(assignments(scale, "--scale"), "--scale"),
-        offset=_numbers(assignments(offset, "--offset"), "--offset"),
-        rate_hz=rate,
-        max_gap_s=max_gap,
-        delay_s=delay,
-        radii_m=None if radii is None else _pair(radii, ",", "--radii", "INNER,OUTER, such as 0.05,0.15"),
-        time_range_s=None if time_range is None else span(time_range, "--time-range"),
-    )
+    return LOG_OPTIONS(with_options)
 
 
 def _numbers(texts: dict[str, str], option: str) -> dict[str, float]:
@@ -140,8 +135,8 @@ def span(text: str, option: str) -> tuple[float, float]:
 @takes_log_options
 @click.option("--window", "windows", multiple=True, metavar="START:END", help="Also score this part separately [s].")
 @with_pendulum
-@with_observers
-@click.option("--set", "settings", multiple=True, metavar="OBSERVER.NAME=VALUE", help="Set an observer's parameter.")
+@observers_option()
+@settings_option("Set an observer's parameter.", "OBSERVER.NAME=VALUE")
 @with_noise
 @click.option(
     "--settle-s",
@@ -149,16 +144,16 @@ def span(text: str, option: str) -> tuple[float, float]:
     metavar="SECONDS",
     help="Seconds to ignore at the start of each part of a log.  [default: 1; 0 for a run's recording]",
 )
-@click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: a new one in runs/]")
-@click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
-@click.option("--json", "as_json", is_flag=True, help="Print only the figures, as JSON, on standard output.")
+@with_out
+@with_markdown
+@with_json
 @users_code()
 def replay(
     options: ReadOptions,
     logs: tuple[str, ...],
     windows: tuple[str, ...],
     model: str | None,
-    observers: str,
+    observers: list[str],
     settings: tuple[str, ...],
     noise: str,
     settle_s: float | None,
@@ -180,15 +175,14 @@ def replay(
     from dataclasses import replace
 
     from cmg_mj.replay import report
-    from cmg_mj.replay.log_replays import LogReplays, ReplayRequest
+    from cmg_mj.replay.log_replays import LogReplays
     from cmg_mj.replay.parameter_options import parameters_of
+    from cmg_mj.replay.save import SETTINGS
     from cmg_mj.replay.user_noise import noise_numbers
 
-    names = names_of(observers)
     options = replace(options, windows_s=tuple(span(text, "--window") for text in windows))
-    request = ReplayRequest(logs, names, options, model, noise_numbers(noise), parameters_of(settings), settle_s)
-    replays = LogReplays(request)
-    folder = _folder(replays, out)
+    replays = LogReplays(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)
+    folder = claim_output(out, replays.folder_name, replays.files, replays.as_toml(), SETTINGS)
     total = len(replays.logs)
     with CtrlC() as ctrl_c:
         try:
@@ -196,8 +190,7 @@ def replay(
                 replays.run(on_progress)
         except KeyboardInterrupt:
             if not replays.results:
-                note("interrupted before the first log was done; nothing was written")
-                sys.exit(INTERRUPTED)
+                end_interrupted("interrupted before the first log was done; nothing was written")
         try:
             place = replays.save(folder)
         finally:
@@ -206,16 +199,4 @@ def replay(
             show(finite(report.replay_figures(results)), table, as_json)
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", as_json)
     if ctrl_c.noted or not replays.complete:
-        note(f"interrupted; {len(replays.results)} of {total} logs are in {final_path(folder, place)}")
-        sys.exit(INTERRUPTED)
-
-
-def _folder(replays: LogReplays, out: str | None) -> RunFolder:
-    """Claim the folder that `--out` names, or a new one named for the logs."""
-    from cmg_mj.replay.save import SETTINGS
-    from cmg_mj.results.run_folder import unused_folder
-
-    if out is not None:
-        return claim_folder(output_path(out), replays.files)
-    toml = replays.request.as_toml()
-    return released_at_the_end(unused_folder(Path("runs"), replays.folder_name, replays.files, toml, SETTINGS))
+        end_interrupted(f"interrupted; {len(replays.results)} of {total} logs are in {final_path(folder, place)}")

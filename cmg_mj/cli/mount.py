@@ -2,18 +2,38 @@
 
 from __future__ import annotations
 
-import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from cmg_mj.cli.arguments import check_observer
-from cmg_mj.cli.terminal import note, note_hints, own_stdout, users_code
+from cmg_mj.cli.arguments import observer_option, with_json
+from cmg_mj.cli.terminal import note, note_hints, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.plant.mounting.axes import AxisLike
-    from cmg_mj.plant.mounting.held_joints import Hold
+
+
+def _hinge_or_direction(context: click.Context, option: click.Parameter, axis: str) -> AxisLike:
+    parts = axis.split()
+    if len(parts) != 3:
+        return axis
+    try:
+        return [float(part) for part in parts]
+    except ValueError:
+        return axis
+
+
+def _point(context: click.Context, option: click.Parameter, position: str | None) -> list[float] | None:
+    if position is None:
+        return None
+    try:
+        point = [float(part) for part in position.replace(",", " ").split()]
+    except ValueError:
+        point = []
+    if len(point) != 3:
+        raise InputError(f"--position {position}: must be three numbers, such as '0 0 0.1' [m]")
+    return point
 
 
 @click.command(short_help="Mount a scissored pair on your own robot, with a scenario.")
@@ -24,6 +44,7 @@ if TYPE_CHECKING:
     default="y",
     show_default=True,
     metavar="HINGE|DIRECTION",
+    callback=_hinge_or_direction,
     help="Tilt axis: a hinge name, or a direction in the body frame (x, y, or '0.1 1 0'). A direction selects the "
     "hinge parallel to it, or, for a free body, the contact line.",
 )
@@ -38,6 +59,7 @@ if TYPE_CHECKING:
 @click.option(
     "--position",
     metavar="'X Y Z'",
+    callback=_point,
     help="Middle of the row of modules in the body frame [m].  [default: the body's centre of mass]",
 )
 @click.option("--modules", default=2, show_default=True, metavar="N", help="Number of modules.")
@@ -52,77 +74,29 @@ if TYPE_CHECKING:
     help="Hold the other joints by constraints, or by the robot's own servos where a joint has one.",
 )
 @click.option("--release", multiple=True, metavar="JOINT", help="Joint that nothing holds. May be given again.")
-@click.option("--free-base", is_flag=True, help="Replace the joints of the robot's root by a free joint.")
-@click.option("--observer", default="homogeneous", show_default=True, metavar="NAME", help="Observer in the loop.")
-@click.option("--json", "as_json", is_flag=True, help="Print the limits as JSON, and nothing else.")
+@click.option(
+    "--free-base",
+    "base",
+    flag_value="free",
+    default="as_is",
+    help="Replace the joints of the robot's root by a free joint.",
+)
+@observer_option(default="homogeneous")
+@with_json
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount.")
 @users_code()
-def mount(
-    robot: str,
-    body: str,
-    axis: str,
-    out: str,
-    position: str | None,
-    modules: int,
-    scale: float,
-    name: str,
-    keyframe: str | None,
-    hold: Hold,
-    release: tuple[str, ...],
-    free_base: bool,
-    observer: str,
-    as_json: bool,
-    overwrite: bool,
-) -> None:
+def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, **request: Any) -> None:
     """Mount control moment gyroscopes on a robot, and print the largest pushes it recovers from.
 
-    Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario scales
-    the gains of the papers' Table 2 to the robot. It pushes with 0.6 of the largest push that its controller recovers
-    from.
+    Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario has the
+    gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest push that its controller
+    recovers from.
     """
     from cmg_mj.plant.mounting.request import MountRequest
-    from cmg_mj.studies.push_limits.mount_files import mount_and_write
-    from cmg_mj.studies.push_limits.mount_report import mount_report_lines
+    from cmg_mj.studies.push_limits.mount_files import mount_and_write, mount_report_lines
 
-    request = MountRequest(
-        body,
-        _hinge_or_direction(axis),
-        _point(position),
-        modules,
-        scale,
-        name,
-        keyframe,
-        hold,
-        release,
-        "free" if free_base else "as_is",
-    )
-    check_observer("--observer", observer)
-    result = mount_and_write(robot, request, out, observer, overwrite=overwrite)
-    if as_json:
-        click.echo(json.dumps(result.figures(), indent=2), file=own_stdout())
-        return
-    click.echo("\n".join(mount_report_lines(result)), file=own_stdout())
-    note_hints(result.prospects.hints)
-    note(f"wrote {result.path} and {result.scenario_path}; try: cmg-mj run {result.scenario_path}")
-
-
-def _hinge_or_direction(axis: str) -> AxisLike:
-    parts = axis.split()
-    if len(parts) != 3:
-        return axis
-    try:
-        return [float(part) for part in parts]
-    except ValueError:
-        return axis
-
-
-def _point(position: str | None) -> list[float] | None:
-    if position is None:
-        return None
-    try:
-        point = [float(part) for part in position.replace(",", " ").split()]
-    except ValueError:
-        point = []
-    if len(point) != 3:
-        raise InputError(f"--position {position}: must be three numbers, such as '0 0 0.1' [m]")
-    return point
+    result = mount_and_write(robot, MountRequest(**request), out, observer, overwrite=overwrite)
+    show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
+    if not as_json:
+        note_hints(result.prospects.hints)
+        note(f"wrote {result.path} and {result.scenario_path}; try: cmg-mj run {result.scenario_path}")

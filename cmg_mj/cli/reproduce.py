@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import click
 
-from cmg_mj.cli.arguments import claim_folder, output_path, with_json, with_out
-from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, final_path, note, progress, say_written, show
+from cmg_mj.cli.arguments import claim_output, with_json, with_out
+from cmg_mj.cli.terminal import CtrlC, end_interrupted, final_path, progress, say_written, show
 from cmg_mj.errors import InputError, nearest
 
 
@@ -19,7 +16,7 @@ from cmg_mj.errors import InputError, nearest
 def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     """Reproduce PAPER (aranovskiy2020, sokolov2019, dao2023, andrieu2009), or all of them.
 
-    PAPER may also be beyond, which is in no paper and takes some minutes: every observer, 100 seeds each, in one table.
+    PAPER may also be beyond: a table of every observer over 100 seeds, which is in no paper and takes some minutes.
 
     Writes a folder: report.md, its plots, and figures.json. The report compares every claim of the paper with the
     figures obtained here. The verdicts are reproduced, reproduced within stated conditions, or not reproduced and why.
@@ -33,7 +30,7 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
         raise InputError(f"{paper!r}: no such paper; {nearest(paper, names)}")
     papers = list(PAPERS) if paper == "all" else [paper]
     check_installed(papers)  # before a folder is made
-    folder = claim_folder(output_path(out) if out is not None else Path("runs") / f"reproduce-{paper}", REPORT_FILES)
+    folder = claim_output(out, f"reproduce-{paper}", REPORT_FILES)
     with CtrlC() as ctrl_c:
         with progress(f"reproduce {paper}", 1.0, ctrl_c) as on_progress:
             entries = reproduce_papers(papers, lambda now, done: on_progress(done, now))
@@ -41,5 +38,4 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
         show(figures_of(entries), verdict_table(entries), as_json)
     say_written(folder, place, f"Read {place / 'report.md'}", as_json)
     if ctrl_c.noted:
-        note(f"interrupted; what was obtained until then is in {final_path(folder, place)}")
-        sys.exit(INTERRUPTED)
+        end_interrupted(f"interrupted; what was obtained until then is in {final_path(folder, place)}")

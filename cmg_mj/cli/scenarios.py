@@ -9,12 +9,21 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import MOST_WORLDS, RunArguments, check_observer, names_of, run_options, with_observer
+from cmg_mj.cli.arguments import (
+    RunArguments,
+    check_observer,
+    number_option,
+    observer_option,
+    observers_option,
+    run_options,
+    with_markdown,
+    worlds_option,
+)
 from cmg_mj.cli.live import live_options, live_run
 from cmg_mj.cli.terminal import (
-    INTERRUPTED,
     WRONG_INPUT,
     CtrlC,
+    end_interrupted,
     final_path,
     note,
     note_hints,
@@ -29,27 +38,23 @@ from cmg_mj.errors import InputError, RunStopped
 if TYPE_CHECKING:
     from cmg_mj.results.result import Driver
 
-LAST_WORLD = 2**63 - 1
-"""Largest number of a world; tables hold it in 64 bits."""
-
 
 @click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
-@with_observer
+@observer_option()
 @run_options
 @click.option(
     "--driver",
     type=click.Choice(["native", "callback", "board"]),
     default="native",
     show_default=True,
-    help="Caller of the controller: the runner (native) or MuJoCo's control callback; with board the controller runs "
-    "as C on an emulated Cortex-M7 (docs/board.md).",
+    help="Run the controller in the simulation loop (native), in MuJoCo's control callback, or as C on an emulated "
+    "Cortex-M7 (board; see docs/board.md).",
 )
-@click.option(
+@number_option(
     "--world",
-    type=click.IntRange(0, LAST_WORLD),
+    "Number of the world: the run has the noise of world N in a comparison or a sweep.  [default: 0]",
+    largest=2**63 - 1,  # tables hold it in 64 bits
     default=0,
-    metavar="N",
-    help="World of the seed; world N has the noise of world N in a comparison or a sweep.  [default: 0]",
 )
 @click.option("--plot", is_flag=True, help="Also write plot.png.")
 @live_options
@@ -79,8 +84,6 @@ def run(
     from cmg_mj.simulation.simulate import SimulationOptions
     from cmg_mj.studies import save as runs
 
-    if observer is not None:
-        check_observer("--observer", observer)
     scenario = arguments.scenario(observer)
     experiment = prepare(scenario)
     note_hints(experiment.hints)
@@ -103,39 +106,32 @@ def run(
             place = runs.save_run(folder, report, plot=plot)
         finally:
             show(report.summary, tables.summary_table(report.summary), arguments.as_json)
-    if live_view is not None and live_view.lost:
-        note(f"the viewer missed a part: {live_view.lost}; the run and its files are complete")
+    if live_view is not None and live_view.failure:
+        note(f"the viewer missed a part: {live_view.failure}; the run and its files are complete")
     say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", arguments.as_json)
     outcome = result.outcomes[0]
     if outcome.kind == "stopped":
         raise RunStopped(f"{outcome.reason}; what was recorded until then is in {final_path(folder, place)}")
     if outcome.kind == "interrupted":
-        note(f"interrupted at {outcome.time_s:g} s; what was recorded until then is in {final_path(folder, place)}")
-        sys.exit(INTERRUPTED)
+        recorded = f"what was recorded until then is in {final_path(folder, place)}"
+        end_interrupted(f"interrupted at {outcome.time_s:g} s; {recorded}")
     if ctrl_c.noted:
-        note(f"interrupted at the end; the complete run is in {final_path(folder, place)}")
-        sys.exit(INTERRUPTED)
+        end_interrupted(f"interrupted at the end; the complete run is in {final_path(folder, place)}")
 
 
 @click.command(short_help="Run several observers on the same plant, pushes and noise.")
-@click.option(
-    "--observers",
-    metavar="NAMES",
-    help="Observers separated by commas, or all; your own as package.module:Class.  "
-    "[default: the scenario's [compare], or all]",
-)
+@observers_option("the scenario's [compare], or all")
 @run_options
-@click.option(
-    "--worlds",
-    type=click.IntRange(1, MOST_WORLDS),
-    metavar="N",
-    help="Worlds of each observer, each with its own noise, which is the same for all observers.  "
-    "[default: the scenario's [compare], or 20]",
+@worlds_option(
+    "Worlds of each observer, each with its own noise, which is the same for all observers.  "
+    "[default: the scenario's [compare], or 20]"
 )
-@click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
+@with_markdown
 @click.option("--plot", is_flag=True, help="Also write plot.png with the figures of all worlds.")
 @users_code()
-def compare(arguments: RunArguments, observers: str | None, worlds: int | None, markdown: bool, plot: bool) -> None:
+def compare(
+    arguments: RunArguments, observers: list[str] | None, worlds: int | None, markdown: bool, plot: bool
+) -> None:
     """Run several observers on the same plant, pushes and noise.
 
     Prints a table: means over the worlds that stood to the end, with 95 % intervals, and the paired differences to the
@@ -155,10 +151,9 @@ def compare(arguments: RunArguments, observers: str | None, worlds: int | None, 
     from cmg_mj.studies.compare import comparison
     from cmg_mj.studies.compare.statistics import standings
 
-    names = None if observers is None else names_of(observers)
     scenario = arguments.scenario()
     settings = scenario.compare or CompareSettings()
-    names, worlds = names or settings.names(), worlds or settings.worlds
+    names, worlds = observers or settings.names(), worlds or settings.worlds
     for name in names:
         check_observer("compare.observers:", name)
     for setting in arguments.settings:
@@ -178,8 +173,7 @@ def compare(arguments: RunArguments, observers: str | None, worlds: int | None, 
         with progress(f"{scenario.title or arguments.name}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
             compared = comparison.compare(experiments, worlds, on_progress)
         if not compared:
-            note("interrupted before the first observer was done; nothing was written")
-            sys.exit(INTERRUPTED)
+            end_interrupted("interrupted before the first observer was done; nothing was written")
         summaries = standings(compared)
         try:
             place = runs.save_comparison(folder, rerun, compared, plot=plot, complete=len(compared) == len(names))
@@ -193,8 +187,8 @@ def compare(arguments: RunArguments, observers: str | None, worlds: int | None, 
         if entry.stopped:
             note(f"{entry.kind}: {len(entry.stopped)} of {worlds} worlds stopped: {entry.stopped[0].reason}")
     if ctrl_c.noted or len(compared) < len(names):
-        note(f"interrupted; {len(compared)} of {len(names)} observers are in {final_path(folder, place)}")
-        sys.exit(INTERRUPTED)
+        done = f"{len(compared)} of {len(names)} observers"
+        end_interrupted(f"interrupted; {done} are in {final_path(folder, place)}")
     if any(entry.stopped for entry in compared):
         sys.exit(WRONG_INPUT)
 
@@ -206,18 +200,16 @@ def list_names(what: str | None) -> None:
 
     Parameters are shown with their defaults; change them with --set observer.NAME=VALUE or controller.NAME=VALUE.
     """
+    from cmg_mj.controllers.laws import LAW_CLASSES
+    from cmg_mj.observers import OBSERVER_CLASSES
     from cmg_mj.results import terminal_tables as report
 
-    if what in (None, "scenarios"):
-        click.echo(report.scenario_list())
-    if what is None:
-        click.echo()
-    if what in (None, "observers"):
-        click.echo(report.observer_list())
-    if what is None:
-        click.echo()
-    if what in (None, "laws"):
-        click.echo(report.law_list())
+    lists = {
+        "scenarios": report.scenario_list,
+        "observers": lambda: report.class_list(OBSERVER_CLASSES),
+        "laws": lambda: report.class_list(LAW_CLASSES),
+    }
+    click.echo("\n\n".join(lists[name]() for name in ([what] if what else lists)))
 
 
 @click.command(short_help="Check a scenario file, or a model file, without running it.")

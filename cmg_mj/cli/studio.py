@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import RunArguments, check_observer, with_observer, with_seed, with_settings
+from cmg_mj.cli.arguments import RunArguments, observer_option, settings_option, with_seed
 from cmg_mj.cli.terminal import note_hints, users_code
 from cmg_mj.errors import InputError
 
@@ -19,8 +19,8 @@ VIEWERS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_softw
 
 @click.command(short_help="Open a scenario in MuJoCo Studio, its controller running.")
 @click.argument("scenario")
-@with_observer
-@with_settings
+@observer_option()
+@settings_option()
 @with_seed
 @click.option(
     "--viewer",
@@ -49,14 +49,12 @@ def studio(
 ) -> None:
     """Open SCENARIO in MuJoCo Studio, its controller running, until the viewer is closed or Ctrl-C.
 
-    Without user actions the trajectory is that of cmg-mj run. A panel pushes the plant, switches the observer, the
+    Without user actions the trajectory equals that of cmg-mj run. A panel pushes the plant, switches the observer, the
     gains and the feedback, and sets the bias and the accelerometers' noise. Studio pauses, steps, resets, and goes
     back in time (docs/studio.md).
     """
     from cmg_mj.simulation.experiment import prepare
 
-    if observer is not None:
-        check_observer("--observer", observer)
     arguments = RunArguments(scenario, settings, seed, None, False)
 
     def prepare_now(model: str) -> Experiment:

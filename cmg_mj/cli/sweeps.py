@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from cmg_mj.cli.arguments import MOST_WORLDS, RunArguments, claim_folder, named_observers, output_path, run_options
-from cmg_mj.cli.pace import ProgressRate, duration_text
-from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, note, progress, say_written, show, users_code
+from cmg_mj.cli.arguments import RunArguments, claim_output, observers_option, run_options, worlds_option
+from cmg_mj.cli.terminal import (
+    CtrlC,
+    ProgressRate,
+    duration_text,
+    end_interrupted,
+    note,
+    progress,
+    say_written,
+    show,
+    users_code,
+)
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.results.summary_keys import SummaryValue
     from cmg_mj.studies.sweeps.file import SweepFields
-    from cmg_mj.studies.sweeps.plan import Cost
     from cmg_mj.studies.sweeps.report import SweepTables
     from cmg_mj.studies.sweeps.study import SweepStudy
 
 
-@click.command(short_help="Vary fields over many worlds: every observer, with intervals.")
+@click.command(short_help="Run a scenario with varied fields, observers and noise.")
 @run_options
 @click.option(
     "--vary",
@@ -34,8 +41,8 @@ if TYPE_CHECKING:
     "log:first:last:count. With --sample or --sobol also low:high. Fields joined by + take the same values. May be "
     "given again; every combination is run.",
 )
-@click.option("--observers", metavar="NAMES", help="Observers separated by commas, or all.  [default: the scenario's]")
-@click.option("--worlds", type=click.IntRange(1, MOST_WORLDS), metavar="N", help="Worlds of each cell.  [default: 20]")
+@observers_option("the scenario's", distinct=False)
+@worlds_option("Worlds of each cell.  [default: 20]")
 @click.option(
     "--sample", type=click.IntRange(1), metavar="N", help="Run N points of a quasi-random design instead of a grid."
 )
@@ -51,21 +58,11 @@ if TYPE_CHECKING:
 )
 @click.option("--yes", is_flag=True, help="Run the sweep even if it is very large.")
 @users_code()
-def sweep(
-    arguments: RunArguments,
-    varied: tuple[str, ...],
-    observers: str | None,
-    worlds: int | None,
-    sample: int | None,
-    sobol: int | None,
-    order: str | None,
-    dry_run: bool,
-    cluster: str | None,
-    yes: bool,
-) -> None:
-    """Run SCENARIO, or the study file of a sweep, at every point with every observer: a cell for each.
+def sweep(arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool, **design: Any) -> None:
+    """Run SCENARIO, or the study file of a sweep, in many worlds with every observer at every varied value.
 
-    World i has the same noise in every cell. An interrupted sweep resumes when the same command runs again.
+    World i has the same noise for every observer and value. An interrupted sweep resumes when the same command runs
+    again.
 
     \b
     Writes a folder:
@@ -84,7 +81,7 @@ def sweep(
         from cmg_mj.studies.sweeps.dask_cluster import local_workers
 
         local_workers(cluster)
-    study = _study(arguments, varied, observers, worlds, sample, sobol, order)
+    study = _study(arguments, **design)
     check_values(study)
     if dry_run:
         cost = estimate_cost(study)
@@ -95,10 +92,9 @@ def sweep(
             f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; beyond {MOST_TRIALS} say "
             "--yes (--dry-run prints the time and memory)"
         )
-    place = Path("runs") / f"sweep-{Path(arguments.name).stem}" if arguments.out is None else output_path(arguments.out)
     with _runner(cluster) as run:
-        folder = claim_folder(place, FILES)
-        store = Store(place, study)
+        folder = claim_output(arguments.out, f"sweep-{Path(arguments.name).stem}", FILES)
+        store = Store(folder.path, study)
         before = store.open(on_damage=note)
         if before:
             note(f"{before} of {study.trials} trials are there from before")
@@ -108,8 +104,8 @@ def sweep(
                 with progress(f"sweep {arguments.name}", study.trials, ctrl_c, pace) as on_progress:
                     run(store, on_progress)
             except KeyboardInterrupt:
-                note(f"interrupted; what is finished is kept in {place}, and the same command goes on from there")
-                sys.exit(INTERRUPTED)
+                kept = f"what is finished is kept in {folder.path}"
+                end_interrupted(f"interrupted; {kept}, and the same command goes on from there")
             tables = tables_of(Trials(study, store.tables(COLUMNS)))
             written = save(folder, store, tables)
     show(_as_json(tables) if arguments.as_json else None, summary(tables), arguments.as_json)
@@ -133,19 +129,19 @@ def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
 def _study(
     arguments: RunArguments,
     varied: tuple[str, ...],
-    observers: str | None,
+    observers: list[str] | None,
     worlds: int | None,
     sample: int | None,
     sobol: int | None,
     order: str | None,
 ) -> SweepStudy:
+    """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
     from cmg_mj.studies.sweeps.file import axes_of, design_of, scenario_of, study_file
-    from cmg_mj.studies.sweeps.study import SweepStudy
+    from cmg_mj.studies.sweeps.study import SweepStudy, sampling
 
-    if sample is not None and sobol is not None:
-        raise InputError("--sample and --sobol: one of them")
+    design = sampling(sample, sobol)
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
     fields = study_file(arguments.name)
     settings: SweepFields = {}
@@ -157,15 +153,11 @@ def _study(
             scenario = scenario.model_copy(update={"seed": arguments.seed})
         settings = fields.get("sweep", {})
         axes = axes or axes_of(arguments.name, fields)
-    design, n = design_of(arguments.name, settings)
-    if sample is not None or sobol is not None:
-        design, n = ("sample", sample or 0) if sample is not None else ("sobol", sobol or 0)
-    names = settings.get("observers", [scenario.observer.kind])
-    if observers is not None:
-        names = named_observers(observers)
+    names = observers or settings.get("observers", [scenario.observer.kind])
     expected = settings.get("order", []) if order is None else [name.strip() for name in order.split(",")]
     worlds_per_cell = worlds or settings.get("worlds", WORLDS)
-    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, design, n, tuple(expected))
+    design = design or design_of(arguments.name, settings)
+    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *design, tuple(expected))
 
 
 def _split(setting: str) -> tuple[str, str]:
@@ -186,7 +178,7 @@ def _as_json(tables: SweepTables) -> SummaryValue:
     }
 
 
-def _cost_text(cost: Cost) -> str:
+def _cost_text(cost: dict[str, float]) -> str:
     from cmg_mj.studies.sweeps.study import counted
 
     def count(key: str) -> str:

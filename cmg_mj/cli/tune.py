@@ -3,63 +3,54 @@
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import click
 
 from cmg_mj.cli.arguments import (
     MOST_WORLDS,
     RunArguments,
-    check_observer,
-    claim_folder,
-    output_path,
+    all_of,
+    claim_output,
+    names_in,
+    observer_option,
     run_options,
+    settings_option,
     with_json,
     with_out,
+    worlds_option,
 )
 from cmg_mj.cli.logs import takes_log_options, with_noise, with_pendulum
-from cmg_mj.cli.terminal import INTERRUPTED, CtrlC, final_path, note, progress, say_written, show, users_code
+from cmg_mj.cli.terminal import CtrlC, end_interrupted, final_path, progress, say_written, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.replay.logs import ReadOptions
 
-C = TypeVar("C", bound=Callable[..., None])
-
-
-def takes_parameters(command: C) -> C:
-    """Add the options that select the parameters to tune."""
-    for decorate in (
-        click.option(
-            "--range",
-            "ranges",
-            multiple=True,
-            metavar="NAME=LOW:HIGH",
-            help="Range in which to search for a parameter. May be given again.",
-        ),
-        click.option(
-            "--parameters", default="", metavar="NAMES", help="Parameters to tune, separated by commas.  [default: all]"
-        ),
-    ):
-        command = decorate(command)
-    return command
+parameter_options = all_of(
+    click.option(
+        "--parameters", default="", metavar="NAMES", help="Parameters to tune, separated by commas.  [default: all]"
+    ),
+    click.option(
+        "--range",
+        "ranges",
+        multiple=True,
+        metavar="NAME=LOW:HIGH",
+        help="Range in which to search for a parameter. May be given again.",
+    ),
+)
+"""The options that select the parameters to tune."""
 
 
 @click.command(short_help="Fit an observer's parameters to the gyro of a scenario.")
-@click.option("--observer", metavar="NAME", help="Observer to tune: a name, or your own as package.module:Class.")
+@observer_option("to tune")
 @run_options
-@click.option(
-    "--worlds",
-    type=click.IntRange(2, MOST_WORLDS // 10),  # whose trajectories are kept
+@worlds_option(
+    "Worlds to fit; as many more are held out for scoring.",
     default=20,
-    show_default=True,
-    metavar="N",
-    help="Worlds to fit; as many more are held out for scoring.",
+    range=(2, MOST_WORLDS // 10),  # whose trajectories are kept
 )
-@takes_parameters
+@parameter_options
 @click.option(
     "--noise-levels",
     default="",
@@ -75,12 +66,13 @@ def tune(
     ranges: tuple[str, ...],
     noise_levels: str,
 ) -> None:
-    """Fit an observer's parameters to the gyro, as section V of aranovskiy2020 does; observer_tuning is its experiment.
+    """Fit an observer's parameters to the gyro of a scenario, as section V of aranovskiy2020 does.
 
-    The loop is closed on the gyro, whatever the scenario says, and its recording is replayed through the observer. The
-    score is the RMS of the estimated rate less the gyro's, from each push to one second after it, on held-out worlds.
-    It is compared with the score of the observer's parameters as given (by default, the paper's). With several noise
-    levels the command reports at which one the given parameters are best.
+    The bundled scenario observer_tuning is the experiment of that paper. The loop is closed on the gyro, whatever the
+    scenario says, and its recording is replayed through the observer. The score is the RMS of the estimated rate less
+    the gyro's, from each push to one second after it, on held-out worlds. It is compared with the score of the
+    observer's parameters as given (by default, the paper's). With several noise levels the command reports at which
+    one the given parameters are best.
 
     Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
     """
@@ -88,18 +80,16 @@ def tune(
     from cmg_mj.studies.tuning import figures_of, files_of_study, save_study, tuning_table
     from cmg_mj.studies.tuning import tune as fit
 
-    if observer is not None:
-        check_observer("--observer", observer)
     scenario = arguments.scenario(observer)
-    default = Path("runs") / f"tune-{file_name(scenario.observer.kind)}-{scenario.seed}"
+    default = f"tune-{file_name(scenario.observer.kind)}-{scenario.seed}"
     densities = _densities(noise_levels)
-    folder = claim_folder(default if arguments.out is None else output_path(arguments.out), files_of_study(densities))
+    folder = claim_output(arguments.out, default, files_of_study(densities))
     with CtrlC() as ctrl_c:
         with progress(f"{scenario.title or arguments.name}: {scenario.observer.kind}", 1.0, ctrl_c) as on_progress:
             study = fit(
                 scenario,
                 worlds=worlds,
-                parameters=_names(parameters),
+                parameters=names_in(parameters),
                 ranges=_ranges(ranges),
                 noise_ug_rthz=densities,
                 on_share=on_progress,
@@ -110,15 +100,14 @@ def tune(
     place = files[0].parent
     say_written(folder, place, f"Run with the tuned observer: cmg-mj run {files[1]}", arguments.as_json)
     if ctrl_c.noted:
-        note(f"interrupted; {len(study.levels)} of {total} noise levels are in {final_path(folder, place)}")
-        sys.exit(INTERRUPTED)
+        end_interrupted(f"interrupted; {len(study.levels)} of {total} noise levels are in {final_path(folder, place)}")
 
 
 @click.command("tune-log", short_help="Fit an observer's parameters to the reference of your own logs.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
-@click.option("--observer", required=True, metavar="NAME", help="Observer to tune: a name, or package.module:Class.")
+@observer_option("to tune", required=True)
 @takes_log_options
-@takes_parameters
+@parameter_options
 @click.option(
     "--split",
     type=float,
@@ -137,13 +126,7 @@ def tune(
 )
 @with_pendulum
 @with_noise
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="observer.NAME=VALUE",
-    help="Set a parameter to start from and to compare with. May be given again.",
-)
+@settings_option("Set a parameter to start from and to compare with.", "observer.NAME=VALUE")
 @with_out
 @with_json
 @users_code()
@@ -179,7 +162,6 @@ def tune_log(
     from cmg_mj.studies.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
     from cmg_mj.studies.tuning.save_on_logs import FILES
 
-    check_observer("--observer", observer)
     for setting in settings:
         if not setting.startswith("observer."):
             raise InputError(f"--set {setting}: write observer.PARAMETER=VALUE")
@@ -188,8 +170,7 @@ def tune_log(
     check_distinct_logs(logs)
     recordings = [read_log(path, options) for path in logs]
     pendulum = None if model is None else model_of(model)
-    default = Path("runs") / f"tune-{file_name(observer)}-{safe_name(recordings[0].name)}"
-    folder = claim_folder(default if out is None else output_path(out), FILES)
+    folder = claim_output(out, f"tune-{file_name(observer)}-{safe_name(recordings[0].name)}", FILES)
     with CtrlC() as ctrl_c:
         with progress(f"{recordings[0].name}: {observer}", 1.0, ctrl_c) as on_progress:
             study = tune_on_logs(
@@ -200,7 +181,7 @@ def tune_log(
                 start_parameters=start_parameters.get(observer),
                 split=split,
                 settle_s=settle_s,
-                parameters=_names(parameters),
+                parameters=names_in(parameters),
                 ranges=_ranges(ranges),
                 on_share=on_progress,
             )
@@ -208,10 +189,6 @@ def tune_log(
         place = save_log_study(folder, study)
     tuned = " ".join(f"--set '{setting}'" for setting in study.settings())
     say_written(folder, place, f"Replay it tuned: {tuned}", as_json)
-
-
-def _names(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 def _ranges(texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
@@ -230,7 +207,7 @@ def _ranges(texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
 def _densities(text: str) -> list[float]:
     """Parse noise densities separated by commas; a repeated one counts once."""
     densities: list[float] = []
-    for part in _names(text):
+    for part in names_in(text):
         try:
             density = float(part)
         except ValueError:

@@ -44,19 +44,6 @@ class Tick(NamedTuple):
     """The observer's estimate (x1, x2, x3, its extra signals), then those of the open-loop observers."""
 
 
-class SensorReadings(NamedTuple):
-    """Arguments of `Controller.decide`: floats, or arrays (n_worlds,)."""
-
-    forces: Sequence[Scalar]
-    """Specific force: inner x, inner z, outer x, outer z [m/s^2]."""
-    encoders: Sequence[Scalar]
-    """Gimbal angles, one a gimbal [rad]."""
-    fog: Scalar
-    """The fibre-optic gyro's rate [rad/s]."""
-    rate: Scalar
-    """The true rate [rad/s]: no sensor's, but what `feedback = "truth"` uses."""
-
-
 class PlantInterface(NamedTuple):
     """The plant's properties that its controller knows."""
 
@@ -243,17 +230,10 @@ class Controller:
             if step % sensor.steps_per_sample == 0 or first:  # a start between two samples still has something to show
                 sensor.sample(step, ideal)
 
-    def readings(self, step: int) -> SensorReadings:
-        """Return the sensors' readings at a physics step.
-
-        Args:
-            step: Number of the physics step.
-
-        Returns:
-            The samples that have been delivered, and the true rate of the last sampling instant.
-        """
+    def readings(self, step: int) -> tuple[Forces, Sequence[Scalar], Scalar]:
+        """Return the samples that have been delivered by a physics step, as `decide` takes them."""
         accelerometers, encoders, fog = self._sampled
-        return _new(SensorReadings, (accelerometers.read(step), encoders.read(step), fog.read(step), self._true_rate))
+        return accelerometers.read(step), encoders.read(step), fog.read(step)
 
     def control(self, step: int) -> None:
         """Take the control decision of a tick, a multiple of `period`: see `update`."""

@@ -15,7 +15,7 @@ from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.runner import read_only
 
 TILTS = (0.01, 0.011)
-"""Of the two samples [rad]."""
+"""The tilts of the two samples [rad]."""
 
 
 def dry_run_observer(observer: Observer, worlds: int | None) -> None:

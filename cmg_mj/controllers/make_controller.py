@@ -1,16 +1,15 @@
-"""Makes controllers: of one axis, by the host or a processor, and of several axes as one."""
+"""Makes controllers of one axis, whose decisions the host or a processor takes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Unpack
 
 from cmg_mj.controllers.controller import Controller, ControllerOptions, PlantInterface
 from cmg_mj.controllers.laws.protocol import Law
-from cmg_mj.controllers.multi_axis import MultiAxisController, YawCoupling
+from cmg_mj.controllers.multi_axis import MultiAxisController
 from cmg_mj.controllers.processor import Processor, ProcessorController
+from cmg_mj.errors import InputError, nearest
 from cmg_mj.observers.protocol import Observer
-from cmg_mj.sensors.mems_gyro import MemsGyro
 from cmg_mj.sensors.sampled import Sensors
 
 AnyController = Controller | MultiAxisController
@@ -38,24 +37,13 @@ def make_controller(
         The controller.
 
     Raises:
-        InputError: A rate does not fit the physics step, or an option does not fit the observer or the law.
+        InputError: A rate does not fit the physics step, or an option is unknown or does not fit the observer or the
+            law.
     """
+    known = ControllerOptions.__annotations__
+    for name in options:
+        if name not in known:
+            raise InputError(f"controller: {name!r}: no such option; {nearest(name, known)}")
     if processor is None:
         return Controller(observer, law, sensors, plant, **options)
     return ProcessorController(processor, observer, law, sensors, plant, **options)
-
-
-def join_axes(
-    controllers: Sequence[Controller], coupling: YawCoupling | None, gyro: MemsGyro | None = None
-) -> AnyController:
-    """Join the controllers of a plant's axes.
-
-    Args:
-        controllers: One an axis.
-        coupling: What a turn about the vertical couples; None if the gimbals do not compensate it.
-        gyro: Shows the turn rate; by default the first axis' cheap gyro.
-
-    Returns:
-        The controller; of one axis that axis' own.
-    """
-    return controllers[0] if len(controllers) == 1 else MultiAxisController(controllers, coupling, gyro)

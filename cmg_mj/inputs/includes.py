@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from cmg_mj.errors import InputError
+from cmg_mj.inputs.sanity import read_text
 
 LARGEST = 50_000_000
 """Bytes of an XML file."""
@@ -44,7 +45,7 @@ def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[Path]
         raise InputError(
             f"{root}: contains itself: {' in '.join(p.name for p in (*within[within.index(here) :], here))}"
         )
-    text = _COMMENT.sub("", _text(path, root))
+    text = _COMMENT.sub("", read_text(path, f"{root}: {path.name}", LARGEST))
     yield path
     for element, name, count in _COUNT.findall(text):
         if math.prod(int(number) for number in re.findall(r"\d{1,20}", count)) > LARGEST_COUNT:
@@ -79,14 +80,3 @@ def _places(value: str, path: Path, root: Path, folders: list[str]) -> Iterator[
 def _attributes(text: str) -> Iterator[tuple[str, str]]:
     for name, double, single in _REFERENCE.findall(text):
         yield name, html.unescape(double or single)
-
-
-def _text(path: Path, root: Path) -> str:
-    try:
-        if path.stat().st_size > LARGEST:
-            raise InputError(f"{root}: {path.name} is larger than {LARGEST // 1_000_000} MB")
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{root}: {path.name} is not UTF-8 text (at byte {error.start})") from error
-    except OSError as error:
-        raise InputError(f"{root}: {path.name} cannot be read: {error.strerror}") from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import json
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,15 +23,22 @@ class UserClassKind:
         what: `observer` or `law`.
         section: The scenario's section whose `kind` names one and whose other fields are its parameters.
         known: Name a user types -> dotted path of the class.
-        bench_parameters: Parameters that the bench gives, not the user.
+        always_given: Parameters that the bench gives to every class.
+        given_if_taken: Parameters that the bench gives to a class that takes them.
         methods: What it must have: name -> its parameters, in words.
     """
 
     what: str
     section: str
     known: Mapping[str, str]
-    bench_parameters: Collection[str]
+    always_given: tuple[str, ...]
+    given_if_taken: tuple[str, ...]
     methods: Mapping[str, str]
+
+    @property
+    def bench_parameters(self) -> tuple[str, ...]:
+        """The parameters that are not the user's choice."""
+        return (*self.always_given, *self.given_if_taken)
 
     def find(self, kind: str) -> type:
         """Find a class.
@@ -125,7 +132,7 @@ class UserClassKind:
 
         Args:
             kind: A name of `known`, or `package.module:Class`.
-            bench_arguments: What the bench gives it.
+            bench_arguments: All that the bench may give it.
             parameters: The user's choice; those left out keep their defaults.
 
         Returns:
@@ -136,10 +143,12 @@ class UserClassKind:
         """
         cls = self.find(kind)
         self.check_names(kind, parameters)
+        names = (*self.always_given, *(name for name in self.given_if_taken if name in self.takes(kind)))
+        arguments = {name: bench_arguments[name] for name in names}
         try:
-            return cls(**bench_arguments, **parameters)
+            return cls(**arguments, **parameters)
         except ValidationError as error:
-            clause = complaint(cls, error.errors()[0], {**bench_arguments, **parameters})
+            clause = complaint(cls, error.errors()[0], {**arguments, **parameters})
             raise InputError(f"{self.section}.{clause} ({self.what} {kind})") from error
         except (Exception, SystemExit) as error:  # a user's own class may refuse its parameters in its own way
             raise InputError(f"{self.what} {kind}: {raised(error)}") from error

@@ -22,7 +22,7 @@ from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
 SINUSOID = "disturbance_n_m"
 
 FASTEST = 2.0
-"""What the rates of the observer times the sample period must stay below."""
+"""Limit of the observer's rates times the sample period."""
 
 
 class State(NamedTuple):

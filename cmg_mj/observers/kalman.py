@@ -16,8 +16,8 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.sensors.tilt import TiltNoise
 
 TERMS = 6
-"""Of the transition's series. What these leave off phi, psi and chi is below 4e-12 of each while the rig's pole times
-the sample period is below 1/20; on the bundled rig that is 0.037, and below 6e-13 is left off."""
+"""Number of terms of the transition's series. The rest of phi, psi and chi is below 4e-12 of each while the rig's pole
+times the sample period is below 1/20. On the bundled rig that product is 0.037, and the rest is below 6e-13."""
 
 PAIRS = tuple((i, j) for i in range(4) for j in range(i, 4))
 """Rows and columns of what is kept of a symmetric 4x4 matrix: 11, 12, 13, 14, 22, 23, 24, 33, 34, 44."""

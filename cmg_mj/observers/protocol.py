@@ -1,9 +1,10 @@
-"""What an observer is: a frozen value with `init` and `step`, discrete in time, elementwise in the worlds."""
+"""The protocol of an observer: a frozen value with `init` and `step`, discrete in time, elementwise in the worlds."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from cmg_mj.elementwise import Scalar
@@ -84,12 +85,12 @@ class Observer(Protocol):
 
 
 NEEDS = ("model", "gimbals", "acceleration")
-"""What an observer may need beside y1: the reduced model, y2 and u, the angular acceleration."""
+"""Inputs that an observer may need beside y1: the reduced model, y2 and u, the angular acceleration."""
 
 BIAS = "bias_rad"
 """The extra signal of an observer that estimates e, the equilibrium bias [rad]."""
 TORQUE = "torque_n_m"
-"""That of one that estimates a tilting torque on the whole rig [N m]."""
+"""The extra signal of an observer that estimates a tilting torque on the whole rig [N m]."""
 
 RESERVED = ("x1_rad", "x2_rad_s", "x3_rad")
 
@@ -102,10 +103,15 @@ def needs(observer: Observer | type) -> tuple[str, ...]:
     Raises:
         InputError: It names something else.
     """
-    named = tuple(getattr(observer, "needs", ("model", "gimbals")))
+    return check_needs(getattr(observer, "needs", ("model", "gimbals")), NEEDS)
+
+
+def check_needs(names: Iterable[str], known: Sequence[str]) -> tuple[str, ...]:
+    """Refuse what an observer or a law says that it needs if there is no such input."""
+    named = tuple(names)
     for name in named:
-        if name not in NEEDS:
-            raise InputError(f"needs = {named!r}: there is no {name!r}; {nearest(str(name), NEEDS)}")
+        if name not in known:
+            raise InputError(f"needs = {named!r}: there is no {name!r}; {nearest(str(name), known)}")
     return named
 
 

@@ -145,13 +145,7 @@ class ReducedModel:
         import control
 
         return control.StateSpace(
-            self.A,
-            self.B,
-            self.C,
-            np.zeros((2, 1)),
-            inputs=["u"],
-            outputs=["y1", "y2"],
-            states=["x1", "x2", "x3"],
+            self.A, self.B, self.C, np.zeros((2, 1)), inputs=["u"], outputs=["y1", "y2"], states=["x1", "x2", "x3"]
         )
 
     def nonlinear_system(self) -> control.NonlinearIOSystem:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Iterable
 from typing import Any
 
 from cmg_mj.errors import InputError
@@ -28,26 +26,10 @@ OBSERVERS = {
 }
 """Name a user types -> dotted path of the class."""
 
-BENCH_PARAMETERS = ("dt", "model", "noise")
-"""What the bench gives every observer whose constructor takes it; all else is the user's choice."""
-
-OF_OBSERVERS = UserClassKind("observer", "observer", OBSERVERS, BENCH_PARAMETERS, {"init": "y", "step": "state, y, u"})
-"""How an observer is found, checked and made."""
-
-
-def observer_class(kind: str) -> type:
-    """Find an observer's class.
-
-    Args:
-        kind: A name of `OBSERVERS`, or `package.module:Class`.
-
-    Returns:
-        The class.
-
-    Raises:
-        InputError: There is no such observer, or its module cannot be imported.
-    """
-    return OF_OBSERVERS.find(kind)
+OBSERVER_CLASSES = UserClassKind(
+    "observer", "observer", OBSERVERS, ("dt", "model"), ("noise",), {"init": "y", "step": "state, y, u"}
+)
+"""Finds, checks and makes observers."""
 
 
 def make_observer(
@@ -68,29 +50,7 @@ def make_observer(
     Raises:
         InputError: Unknown observer or parameter, or a parameter that the observer refuses.
     """
-    check_names(kind, parameters)
-    signature = OF_OBSERVERS.takes(kind)
-    bench_arguments: dict[str, float | ReducedModel | TiltNoise | None] = {"dt": dt, "model": model}
-    if "noise" in signature:
-        if noise is None and signature["noise"].default is inspect.Parameter.empty:
-            raise InputError(f"observer {kind}: needs the noise of its sensors (a TiltNoise after the model)")
-        bench_arguments["noise"] = noise
-    return OF_OBSERVERS.make(kind, bench_arguments, parameters)
-
-
-def check_names(kind: str, names: Iterable[str]) -> None:
-    """Refuse the names of parameters that an observer does not have.
-
-    Args:
-        kind: A name of `OBSERVERS`, or `package.module:Class`.
-        names: Of its parameters.
-
-    Raises:
-        InputError: Unknown observer or parameter.
-    """
-    OF_OBSERVERS.check_names(kind, names)
-
-
-def takes_noise(kind: str) -> bool:
-    """Return whether an observer is constructed with the noise of its sensors."""
-    return "noise" in OF_OBSERVERS.takes(kind)
+    parameter = OBSERVER_CLASSES.takes(kind).get("noise")
+    if noise is None and parameter is not None and parameter.default is parameter.empty:
+        raise InputError(f"observer {kind}: needs the noise of its sensors (a TiltNoise after the model)")
+    return OBSERVER_CLASSES.make(kind, {"dt": dt, "model": model, "noise": noise}, parameters)

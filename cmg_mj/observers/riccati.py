@@ -12,7 +12,7 @@ import math
 from cmg_mj.elementwise import Scalar
 
 TERMS = 7
-"""Of the series: it converges to rounding while N times the step is below 1/2."""
+"""Number of terms of the series, which converges to rounding while N times the step is below 1/2."""
 
 
 def exact_step(

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from cmg_mj.errors import RunStopped, raised
 
 FAILURES = (Exception, SystemExit)
-"""What a user's code may raise."""
+"""Exceptions that a user's code may raise."""
 
 
 class UserCode(NamedTuple):

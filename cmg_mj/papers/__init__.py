@@ -25,21 +25,21 @@ PAPERS = {
 """Paper -> its title."""
 
 BEYOND = {"beyond": "A step beyond the papers"}
-"""What is reproduced only when asked for by name, because it takes long."""
+"""The studies reproduced only when asked for by name, because they take long."""
 
 NEEDS = {"aranovskiy2020": ("sympy",), "sokolov2019": ("sympy",)}
 """Paper -> the packages that it needs beyond the bench's; the extra `[papers]` has them all."""
 
 
 @dataclass
-class Reproduced:
-    """What was obtained for one paper.
+class Reproduction:
+    """The claims obtained for one paper.
 
     Attributes:
         paper: Its short name.
         claims: One a figure, table, remark, proof or statement.
         complete: Whether all sections were done (not interrupted).
-        seconds: How long it took [s].
+        seconds: Time that it took [s].
     """
 
     paper: str
@@ -49,7 +49,7 @@ class Reproduced:
 
 
 def check_installed(papers: Iterable[str]) -> None:
-    """See whether all that the papers need is there, before anything is computed.
+    """Check that all packages that the papers need are there, before anything is computed.
 
     Args:
         papers: Their short names.
@@ -60,17 +60,17 @@ def check_installed(papers: Iterable[str]) -> None:
     needed = {(paper, package) for paper in papers for package in NEEDS.get(paper, ())}
     missing = sorted((paper, package) for paper, package in needed if find_spec(package) is None)
     if missing:
-        who = " and ".join(dict.fromkeys(paper for paper, _ in missing))
-        what = " and ".join(dict.fromkeys(package for _, package in missing))
-        raise InputError(f'{who}: {what} is not installed: python -m pip install "cmg_mj[papers]"')
+        paper_names = " and ".join(dict.fromkeys(paper for paper, _ in missing))
+        packages = " and ".join(dict.fromkeys(package for _, package in missing))
+        raise InputError(f'{paper_names}: {packages} is not installed: python -m pip install "cmg_mj[papers]"')
 
 
 def sections_of(paper: str) -> list[Section]:
-    """The sections in which a paper is reproduced."""
+    """Import the sections in which a paper is reproduced."""
     return importlib.import_module(f"cmg_mj.papers.{paper}").SECTIONS
 
 
-def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) -> list[Reproduced]:
+def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) -> list[Reproduction]:
     """Obtain every claim of the papers.
 
     Args:
@@ -85,18 +85,18 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
     """
     check_installed(papers)
     sections = {paper: sections_of(paper) for paper in papers}
-    entries = [Reproduced(paper) for paper in papers]
-    total = sum(section.seconds for of_paper in sections.values() for section in of_paper)
-    before = 0.0
+    entries = [Reproduction(paper) for paper in papers]
+    total = sum(section.seconds for paper_sections in sections.values() for section in paper_sections)
+    begin = 0.0
     try:
         for entry in entries:
             for section in sections[entry.paper]:
-                on_share = _on_share(on_progress, f"{entry.paper}: {section.title}", before, section.seconds, total)
+                on_share = _on_share(on_progress, f"{entry.paper}: {section.title}", begin, section.seconds, total)
                 on_share(0.0)
                 start = time.perf_counter()
                 entry.claims += section.claims(on_share)
                 entry.seconds += time.perf_counter() - start
-                before += section.seconds
+                begin += section.seconds
             entry.complete = True
     except KeyboardInterrupt:
         pass
@@ -104,7 +104,7 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
 
 
 def _on_share(
-    on_progress: Callable[[str, float], None], now: str, before: float, seconds: float, total: float
+    on_progress: Callable[[str, float], None], label: str, begin: float, seconds: float, total: float
 ) -> Callable[[float], None]:
-    """From a section's share to that of the whole, of which so many seconds lie before it."""
-    return lambda share: on_progress(now, (before + share * seconds) / total)
+    """Turn a section's share into that of the whole, of which so many seconds lie before the section."""
+    return lambda share: on_progress(label, (begin + share * seconds) / total)

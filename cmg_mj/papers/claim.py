@@ -19,28 +19,28 @@ class Claim:
     """One figure, table, remark, proof or statement. Its verdict follows from what was found.
 
     Attributes:
-        place: Where in the paper: `Fig. 2`, `Remark 1`, `Section V`.
-        says: What the paper says there, in our words.
-        found: What was obtained, with its figures, in words.
+        place: Place in the paper: `Fig. 2`, `Remark 1`, `Section V`.
+        statement: Statement of the paper there, in our words.
+        result: Result obtained, with its figures, in words.
         table: More figures than a sentence bears, as a Markdown table below the words.
         holds: Whether what was obtained bears the paper out, computed from the figures.
         conditions: Under which conditions it holds, a whole sentence; empty if it holds outright.
-        otherwise: What to make of it where it does not hold, a whole sentence.
-        figures: The numbers behind `found`, by names that end in their unit, as JSON can hold them.
+        otherwise: Explanation where it does not hold, a whole sentence.
+        figures: The numbers behind `result`, by names that end in their unit, as JSON can hold them.
         pictures: Plots.
-        ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
+        is_ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
     """
 
     place: str
-    says: str
-    found: str
+    statement: str
+    result: str
     table: str = ""
     holds: bool
     conditions: str = ""
     otherwise: str = "The figures above do not bear it out."
     figures: Mapping[str, Any] = field(default_factory=dict)
     pictures: Sequence[Picture] = ()
-    ours: bool = False
+    is_ours: bool = False
 
     def __post_init__(self) -> None:
         for name in ("conditions", "otherwise"):
@@ -53,13 +53,13 @@ class Claim:
 
     @property
     def verdict(self) -> Verdict:
-        """How the paper and what was obtained compare."""
+        """The comparison of the paper with what was obtained."""
         if not self.holds:
             return "not reproduced"
         return "reproduced within stated conditions" if self.conditions else "reproduced"
 
     @property
-    def why(self) -> str:
+    def reason(self) -> str:
         """The conditions under which it holds, or why it does not; empty if it holds outright."""
         return self.conditions if self.holds else self.otherwise
 
@@ -69,7 +69,7 @@ class Section:
     """A part of a paper whose claims are obtained in one go.
 
     Attributes:
-        title: What the progress bar shows.
+        title: Title that the progress bar shows.
         seconds: About how long it takes, for the progress bar.
         claims: Obtains them.
     """
@@ -77,3 +77,12 @@ class Section:
     title: str
     seconds: float
     claims: Callable[[OnShare], list[Claim]]
+
+
+def obtain(parts: Sequence[Callable[[], Claim]], on_share: OnShare) -> list[Claim]:
+    """Obtain claims one by one, and report the share done before each."""
+    claims = []
+    for i, part in enumerate(parts):
+        on_share(i / len(parts))
+        claims.append(part())
+    return claims

@@ -8,13 +8,13 @@ from cmg_mj.observers.reduced_model import ReducedModel
 
 
 def rank_margin(matrix: np.ndarray) -> float:
-    """Least singular value by the largest: zero for a matrix without full rank."""
+    """Return the least singular value by the largest: zero for a matrix without full rank."""
     values = np.linalg.svd(matrix, compute_uv=False)
     return float(values[-1] / values[0])
 
 
 def controllability_margin(A: np.ndarray, B: np.ndarray) -> float:
-    """Rank margin of [B, A B, ..., A^(n-1) B], for A (n, n) and B (n, m)."""
+    """Return the rank margin of [B, A B, ..., A^(n-1) B], for A (n, n) and B (n, m)."""
     columns = [B]
     for _ in range(len(A) - 1):
         columns.append(A @ columns[-1])
@@ -22,7 +22,7 @@ def controllability_margin(A: np.ndarray, B: np.ndarray) -> float:
 
 
 def finite_difference_error(model: ReducedModel, h: float = 1e-5) -> float:
-    """Largest error of a model's A and B against central differences of its nonlinear form, by the largest entry."""
+    """Return the error of a model's A and B against central differences of its nonlinear form, by the largest entry."""
 
     def f(x: np.ndarray, u: float) -> np.ndarray:
         return np.array([x[1], model.tilt_acceleration(float(x[0]), float(x[1]), float(x[2]), u), u])
@@ -33,8 +33,14 @@ def finite_difference_error(model: ReducedModel, h: float = 1e-5) -> float:
     return float(max(np.abs(A - model.A).max() / np.abs(A).max(), np.abs(B - model.B).max() / np.abs(B).max()))
 
 
+def model_difference(model: ReducedModel, reference: ReducedModel) -> float:
+    """Return the largest relative difference of a reduced model's constants from the printed ones."""
+    names = ("J1", "J2", "J_d", "omega_d", "gravity_torque")
+    return max(abs(getattr(model, name) / getattr(reference, name) - 1.0) for name in names)
+
+
 def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where x' = A x + B u, u = -K x + k1 e rests. With y1 = x1 - e the bias enters with a plus.
+    """Solve x' = A x + B u, u = -K x + k1 e for its rest. With y1 = x1 - e the bias enters with a plus.
 
     Args:
         A: State matrix, (n, n).
@@ -50,11 +56,11 @@ def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[
 
 
 def poles_in_words(poles: np.ndarray) -> str:
-    """Poles, (n,), from the fastest to the slowest; each pair once."""
+    """List poles, (n,), from the fastest to the slowest; each pair once."""
     upper = sorted((p for p in poles if p.imag >= -1e-9), key=lambda p: p.real)
     return ", ".join(f"{p.real:.3g}+-{p.imag:.3g}j" if p.imag > 1e-9 else f"{p.real:.3g}" for p in upper)
 
 
 def poles_as_pairs(poles: np.ndarray) -> list[list[float]]:
-    """Poles, (n,), as [real part, imaginary part], which JSON can hold."""
+    """List poles, (n,), as [real part, imaginary part], which JSON can hold."""
     return [[float(p.real), float(p.imag)] for p in poles]

@@ -26,11 +26,11 @@ from cmg_mj.papers.plvcc_geometry import (
 Paper = Literal["aranovskiy2020", "sokolov2019"]
 
 
-class Printed(NamedTuple):
-    """What a paper prints of its inertia.
+class PrintedInertia(NamedTuple):
+    """A paper's inertia as printed.
 
     Attributes:
-        place: Where it says that the system is not PLvCC.
+        place: Place at which it says that the system is not PLvCC.
         gimbals: Number of gimbals.
         factor: The factor before (J1 + J2 cos^2 q2)/(I_c + I_d) in m1.
         arm: Distance from the tilt axis of the mass m, which J1 holds as m arm^2/gimbals [m].
@@ -42,9 +42,9 @@ class Printed(NamedTuple):
     arm: str
 
 
-PRINTED: dict[Paper, Printed] = {
-    "aranovskiy2020": Printed("Appendix", 2, 2, "0.19"),
-    "sokolov2019": Printed("Proposition 1", 1, 1, "0.13"),
+PRINTED: dict[Paper, PrintedInertia] = {
+    "aranovskiy2020": PrintedInertia("Appendix", 2, 2, "0.19"),
+    "sokolov2019": PrintedInertia("Proposition 1", 1, 1, "0.13"),
 }
 
 
@@ -52,7 +52,7 @@ PRINTED: dict[Paper, Printed] = {
 
 
 def papers_m1(paper: Paper, numbers: bool = False) -> Any:
-    """m1 as printed: with the symbols J1, J2 and I_c + I_d, or with the exact numbers of Table 1 (Table I)."""
+    """Return m1 as printed, with the symbols J1, J2 and I_c + I_d, or with the exact numbers of Table 1 (Table I)."""
     import sympy as sp
 
     q2 = coordinates()[1]
@@ -68,7 +68,7 @@ def papers_m1(paper: Paper, numbers: bool = False) -> Any:
 
 
 def inertia_factor(paper: Paper) -> Any:
-    """The factor s in m1 = s (J1 + J2 cos^2 q2)/(I_c + I_d) for which the equations of motion are those of diag(m1, 1).
+    """Return the s of m1 = s (J1 + J2 cos^2 q2)/(I_c + I_d) for which the motion is that of diag(m1, 1).
 
     With T = (M11 w_b^2 + M22 w_c^2)/2, the gimbal's equation is M22 w_c' - M11' w_b^2/2. In both papers the quotient of
     those terms is (J2/2) sin(2 q_c)/(I_c + I_d), with M11 = n (J1 + J2 cos^2 q_c) for n gimbals.
@@ -86,7 +86,7 @@ def inertia_factor(paper: Paper) -> Any:
 
 
 def jet(name: str) -> Any:
-    """A function by its value and first derivatives at q = 0, `name + name_1 q1 + name_2 q2`.
+    """Write a function by its value and first derivatives at q = 0, `name + name_1 q1 + name_2 q2`.
 
     B_(i) holds no higher derivatives, and q = 0 may be any point: what is so for these is so for all functions.
     """
@@ -98,14 +98,14 @@ def jet(name: str) -> Any:
 
 
 def any_psi() -> Any:
-    """Any Psi(q), to first order at q = 0, (2, 2)."""
+    """Return any Psi(q), to first order at q = 0, (2, 2)."""
     import sympy as sp
 
     return sp.Matrix([[jet("a"), jet("b")], [jet("c"), jet("d")]])
 
 
 def any_m1() -> Any:
-    """diag(m1(q2), 1) with any m1, to first order at q = 0, (2, 2)."""
+    """Return diag(m1(q2), 1) with any m1, to first order at q = 0, (2, 2)."""
     import sympy as sp
 
     return sp.diag(jet("m").subs(sp.Symbol("m_1"), 0), 1)
@@ -113,23 +113,23 @@ def any_m1() -> Any:
 
 def symmetric_part_is_lie_derivative(i: int, M: Any) -> bool:
     """Step 1 for one column and any Psi, at q = 0."""
-    Psi, here = any_psi(), dict.fromkeys(coordinates(), 0)
-    matrix = B(i, Psi, M, here)
-    return all(vanishes(entry) for entry in matrix + matrix.T - lie_derivative(Psi[:, i], M).subs(here))
+    Psi, origin = any_psi(), dict.fromkeys(coordinates(), 0)
+    matrix = B(i, Psi, M, origin)
+    return all(vanishes(entry) for entry in matrix + matrix.T - lie_derivative(Psi[:, i], M).subs(origin))
 
 
 def printed_entries() -> dict[str, bool]:
-    """Whether the definition gives what the appendix prints for the entries of B_(2), for any Psi and any m1(q2)."""
+    """Compare the definition with the appendix's entries of B_(2), for any Psi and any m1(q2)."""
     import sympy as sp
 
-    found = B(1, any_psi(), any_m1(), dict.fromkeys(coordinates(), 0))
+    matrix = B(1, any_psi(), any_m1(), dict.fromkeys(coordinates(), 0))
     m, dm, d, b_1, b_2, d_1, d_2 = sp.symbols("m m_2 d b_1 b_2 d_1 d_2")
-    printed = {
-        "B_(2)22": (found[1, 1], -d_2),
-        "B_(2)11": (found[0, 0], (-2 * m * b_1 - d * dm) / (2 * m**2)),
-        "B_(2)12 + B_(2)21": (found[0, 1] + found[1, 0], -(d_1 + m * b_2) / m),
+    pairs = {
+        "B_(2)22": (matrix[1, 1], -d_2),
+        "B_(2)11": (matrix[0, 0], (-2 * m * b_1 - d * dm) / (2 * m**2)),
+        "B_(2)12 + B_(2)21": (matrix[0, 1] + matrix[1, 0], -(d_1 + m * b_2) / m),
     }
-    return {name: vanishes(here - there) for name, (here, there) in printed.items()}
+    return {name: vanishes(entry - formula) for name, (entry, formula) in pairs.items()}
 
 
 def mixed_derivatives(sign: int = 1) -> bool:
@@ -149,7 +149,7 @@ def mixed_derivatives(sign: int = 1) -> bool:
 
 
 def zero_d_is_singular() -> bool:
-    """Whether d = 0 with a constant b, the appendix's trivial solution, leaves a singular Psi (it does not)."""
+    """Return true if d = 0 with a constant b, the appendix's trivial solution, leaves a singular Psi (it does not)."""
     import sympy as sp
 
     Psi = sp.Matrix([[0, 1], [1, 0]])
@@ -158,24 +158,24 @@ def zero_d_is_singular() -> bool:
 
 @dataclass(frozen=True)
 class Proof:
-    """What of a paper's proof was found right.
+    """The checked steps and decisions of a paper's proof.
 
     Attributes:
         steps: Step in words -> whether it was found so.
-        no: The decisions on the paper's m1, with symbols and with the numbers of its table.
-        yes: The decisions on inertias that are PLvCC, constant m1 first.
+        decisions: The decisions on the paper's m1, with symbols and with the numbers of its table.
+        checks: The decisions on inertias that are PLvCC, constant m1 first.
     """
 
     steps: Mapping[str, bool]
-    no: tuple[Decision, Decision]
-    yes: tuple[Decision, ...]
+    decisions: tuple[Decision, Decision]
+    checks: tuple[Decision, ...]
 
     @property
-    def wrong(self) -> list[str]:
-        """What was not found so: a step, a Psi for the paper's m1, no Psi for an m1 that has one."""
-        wrong = [name for name, right in self.steps.items() if not right]
-        wrong += [f"m1 = {decision.m1}: a Psi was found" for decision in self.no if decision.plvcc]
-        return wrong + [f"m1 = {decision.m1}: no Psi was found" for decision in self.yes if not decision.plvcc]
+    def failures(self) -> list[str]:
+        """The failures: a step, a Psi for the paper's m1, no Psi for an m1 that has one."""
+        failures = [name for name, right in self.steps.items() if not right]
+        failures += [f"m1 = {decision.m1}: a Psi was found" for decision in self.decisions if decision.plvcc]
+        return failures + [f"m1 = {decision.m1}: no Psi was found" for decision in self.checks if not decision.plvcc]
 
 
 def proof(paper: Paper) -> Proof:
@@ -195,52 +195,52 @@ def proof(paper: Paper) -> Proof:
         sp.diff(condition(f**2), q2) - 2 * f**2 * sp.diff(sp.diff(f, q2, 2) / f, q2)
     )
     steps["it is 8 A D k^2 for f = A exp(k q2) + D exp(-k q2)"] = vanishes(condition(family) - 8 * A * D * k**2)
-    no = (decide(papers_m1(paper)), decide(papers_m1(paper, numbers=True)))
-    yes = tuple(decide(m1) for m1 in (sp.Symbol("J1", positive=True), sp.exp(2 * k * q2), sp.cosh(k * q2) ** 2))
-    return Proof(steps, no, yes)
+    decisions = (decide(papers_m1(paper)), decide(papers_m1(paper, numbers=True)))
+    checks = tuple(decide(m1) for m1 in (sp.Symbol("J1", positive=True), sp.exp(2 * k * q2), sp.cosh(k * q2) ** 2))
+    return Proof(steps, decisions, checks)
 
 
 # --- the claim ----------------------------------------------------------------------------------------------
 
 
 def claim(paper: Paper) -> Claim:
-    """The appendix of aranovskiy2020, or Proposition 1 of sokolov2019, whose proof is not printed there."""
+    """Judge the appendix of aranovskiy2020, or Proposition 1 of sokolov2019, whose proof is not printed there."""
     result = proof(paper)
-    symbolic, numeric = result.no
-    constant, *others = result.yes
-    said = ", ".join(f"{value} at q2 = {angle}" for angle, value in symbolic.values.items())
-    gap, factor, printed = not zero_d_is_singular(), inertia_factor(paper), PRINTED[paper].factor
+    symbolic, numeric = result.decisions
+    constant, *other_decisions = result.checks
+    condition_values = ", ".join(f"{value} at q2 = {angle}" for angle, value in symbolic.values.items())
+    gap, factor, printed_factor = not zero_d_is_singular(), inertia_factor(paper), PRINTED[paper].factor
     remarks = {
         "The printed proof has a gap: d = 0 alone does not make Psi singular (m1 = 1, Psi = [[0, 1], [1, 0]]); the "
         "same argument for c, from B_(1), closes it: m1 (m1'/m1)' not constant makes both c and d zero.": gap,
         "The equality of the mixed derivatives is printed with a wrong sign: it is "
         "m1 (m1'/m1)' d = +2 d''.": mixed_derivatives() and not mixed_derivatives(sign=-1),
-        f"By (2) the factor before (J1 + J2 cos^2 q2)/(I_c + I_d) is {factor}, not {printed}, since both gimbals turn; "
-        "the conclusion is the same for any factor.": factor != printed,
+        f"By (2) the factor before (J1 + J2 cos^2 q2)/(I_c + I_d) is {factor}, not {printed_factor}, since both "
+        "gimbals turn; the conclusion is the same for any factor.": factor != printed_factor,
     }
     on_printed_proof = " ".join(remark for remark, is_so in remarks.items() if is_so)
     return Claim(
         place=PRINTED[paper].place,
-        says="No full-rank Psi(q) makes B_(1) and B_(2) skew-symmetric: the system is not partially linearisable via "
-        "coordinate changes.",
-        found=f"No such Psi exists: m1 (m1'/m1)' is {said} (I_cd = I_c + I_d), which differ for every J2 other than 0. "
-        f"The checker can say yes: constant m1 has Psi = {_text(constant.Psi)}, "
-        + ", ".join(f"m1 = {decision.m1} has Psi = {_text(decision.Psi)}" for decision in others)
+        statement="No full-rank Psi(q) makes B_(1) and B_(2) skew-symmetric: the system is not partially linearisable "
+        "via coordinate changes.",
+        result=f"No such Psi exists: m1 (m1'/m1)' is {condition_values} (I_cd = I_c + I_d), which differ for every J2 "
+        f"other than 0. The checker can say yes: constant m1 has Psi = {_text(constant.Psi)}, "
+        + ", ".join(f"m1 = {decision.m1} has Psi = {_text(decision.Psi)}" for decision in other_decisions)
         + ", their B_(i) skew-symmetric by substitution in the definition. The paper's necessary condition is also "
         "sufficient: a column of Psi serves exactly if it is a Killing field of M. An m1 > 0 on the whole line has "
         "two independent ones exactly if m1 = (A exp(k q2) + D exp(-k q2))^2 with A, D >= 0."
         + (" The paper prints no proof; this is one." if paper == "sokolov2019" else ""),
-        holds=not result.wrong,
+        holds=not result.failures,
         conditions=on_printed_proof if paper == "aranovskiy2020" else "",
-        otherwise=f"Not found so: {'; '.join(result.wrong)}.",
+        otherwise=f"Not found so: {'; '.join(result.failures)}.",
         figures={
             "steps": dict(result.steps),
             "papers_m1": _plain(symbolic),
             "table_numbers": _plain(numeric),
-            "counter_checks": [_plain(decision) | {"Psi": _text(decision.Psi)} for decision in result.yes],
+            "counter_checks": [_plain(decision) | {"Psi": _text(decision.Psi)} for decision in result.checks],
             "d_zero_alone_is_singular": not gap,
             "factor_of_m1_by_the_equations": int(factor),
-            "factor_of_m1_printed": printed,
+            "factor_of_m1_printed": printed_factor,
         },
     )
 

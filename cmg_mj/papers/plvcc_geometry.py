@@ -25,14 +25,14 @@ class UndecidedError(ValueError):
 
 
 def coordinates() -> tuple[Any, Any]:
-    """The symbols q1 (tilt) and q2 (gimbal angle)."""
+    """Return the symbols q1 (tilt) and q2 (gimbal angle)."""
     import sympy as sp
 
     return sp.symbols("q1 q2", real=True)
 
 
 def bracket(X: Any, Y: Any) -> Any:
-    """The Lie bracket [X, Y] = dY/dq X - dX/dq Y, as sokolov2019 prints it, (2, 1).
+    """Return the Lie bracket [X, Y] = dY/dq X - dX/dq Y, as sokolov2019 prints it, (2, 1).
 
     aranovskiy2020 prints q_i and q_j for q, which gives no vector.
     """
@@ -40,51 +40,51 @@ def bracket(X: Any, Y: Any) -> Any:
     return Y.jacobian(q) * X - X.jacobian(q) * Y
 
 
-def B(i: int, Psi: Any, M: Any, at: Mapping[Any, Any] | None = None) -> Any:
-    """B_(i), aranovskiy2020 appendix, (2, 2).
+def B(i: int, Psi: Any, M: Any, point: Mapping[Any, Any] | None = None) -> Any:
+    """Return B_(i), aranovskiy2020 appendix, (2, 2).
 
     Args:
         i: Number of the column of Psi, from 0.
         Psi: The change of velocities, (2, 2).
         M: The inertia matrix, (2, 2).
-        at: Where to evaluate it, coordinate -> value. Putting that in early keeps the expressions small.
+        point: Point to evaluate it at, coordinate -> value. Putting that in early keeps the expressions small.
     """
     import sympy as sp
 
     q = coordinates()
 
-    def put(matrix: Any) -> Any:
-        return matrix.subs(at) if at else matrix
+    def substitute(matrix: Any) -> Any:
+        return matrix.subs(point) if point else matrix
 
     N = Psi.T * M * Psi
-    first, second = put(M * Psi * Psi.T).inv(), put(N).inv()
+    first, second = substitute(M * Psi * Psi.T).inv(), substitute(N).inv()
     result = sp.zeros(2, 2)
     for j in range(2):
-        result += put(bracket(Psi[:, i], Psi[:, j]) * Psi[:, j].T) * first
-        derivative = -second * put(N.diff(q[j])) * second  # of the inverse of N
-        result += sp.Rational(1, 2) * put(Psi[j, i] * Psi) * derivative * put(Psi.T)
+        result += substitute(bracket(Psi[:, i], Psi[:, j]) * Psi[:, j].T) * first
+        derivative = -second * substitute(N.diff(q[j])) * second  # of the inverse of N
+        result += sp.Rational(1, 2) * substitute(Psi[j, i] * Psi) * derivative * substitute(Psi.T)
     return result
 
 
 def lie_derivative(X: Any, M: Any) -> Any:
-    """The Lie derivative of the inverse of M along X, (2, 2): zero exactly if X is a Killing field of M."""
+    """Return the Lie derivative of the inverse of M along X, (2, 2): zero exactly if X is a Killing field of M."""
     import sympy as sp
 
     q = coordinates()
     inverse = M.inv()
-    along = sum((X[k] * inverse.diff(q[k]) for k in range(2)), sp.zeros(2, 2))
-    return along - X.jacobian(q) * inverse - inverse * X.jacobian(q).T
+    directional_derivative = sum((X[k] * inverse.diff(q[k]) for k in range(2)), sp.zeros(2, 2))
+    return directional_derivative - X.jacobian(q) * inverse - inverse * X.jacobian(q).T
 
 
 def vanishes(expression: Any) -> bool:
-    """Whether a quotient of polynomials in q, sines, cosines and exponentials is zero.
+    """Return true if a quotient of polynomials in q, sines, cosines and exponentials is zero.
 
     sympy's simplify does this too, in minutes for some of the expressions here.
     """
     import sympy as sp
     from sympy.polys.fields import sfield
 
-    def lowered(power: Any) -> Any:
+    def lower_power(power: Any) -> Any:
         return (1 - sp.cos(power.base.args[0]) ** 2) ** (power.exp // 2) * power.base ** (power.exp % 2)
 
     expression = sp.sympify(expression).rewrite((sp.sinh, sp.cosh, sp.tanh), sp.exp)
@@ -92,18 +92,18 @@ def vanishes(expression: Any) -> bool:
         return not sfield(expression)[1]  # faster than the rest
     numerator = sp.expand(sp.fraction(sp.together(expression))[0])
     numerator = numerator.replace(
-        lambda part: part.is_Pow and isinstance(part.base, sp.sin) and part.exp.is_Integer and part.exp > 1, lowered
+        lambda part: part.is_Pow and isinstance(part.base, sp.sin) and part.exp.is_Integer and part.exp > 1, lower_power
     )
     return sp.expand(numerator) == 0
 
 
 def is_skew(matrix: Any) -> bool:
-    """Whether A + A' is zero."""
+    """Return true if A + A' is zero."""
     return all(vanishes(entry) for entry in matrix + matrix.T)
 
 
 def condition(m1: Any) -> Any:
-    """m1 (m1'/m1)', of which the paper's necessary condition is that it is constant, as m1'' - m1'^2/m1."""
+    """Return m1 (m1'/m1)' = m1'' - m1'^2/m1, which by the paper's necessary condition is constant."""
     import sympy as sp
 
     q2 = coordinates()[1]
@@ -111,7 +111,7 @@ def condition(m1: Any) -> Any:
 
 
 def explicit_psi(m1: Any, C: Any) -> Any:
-    """The Psi of step 3 for an m1 with m1 (m1'/m1)' = C, (2, 2)."""
+    """Return the Psi of step 3 for an m1 with m1 (m1'/m1)' = C, (2, 2)."""
     import sympy as sp
 
     q1, q2 = coordinates()
@@ -125,7 +125,7 @@ def explicit_psi(m1: Any, C: Any) -> Any:
 
 @dataclass(frozen=True)
 class Decision:
-    """Whether M = diag(m1(q2), 1) is PLvCC.
+    """The decision whether M = diag(m1(q2), 1) is PLvCC.
 
     Attributes:
         plvcc: Whether it is.
@@ -160,17 +160,17 @@ def decide(m1: Any) -> Decision:
 
     q2 = coordinates()[1]
     value = condition(m1)
-    at = {
+    values = {
         angle: sp.factor(value.subs(q2, angle))
         for angle in (sp.Integer(0), sp.pi / 2, sp.pi / 4, sp.Integer(1))
         if not vanishes(m1.subs(q2, angle))
     }
-    angle, C = next(iter(at.items()))
+    angle, C = next(iter(values.items()))
     if not vanishes(sp.diff(value, q2)):
-        for other, there in at.items():
-            difference = sp.factor(there - C)
+        for other_angle, other_value in values.items():
+            difference = sp.factor(other_value - C)
             if difference.is_zero is False or (difference.free_symbols and not vanishes(difference)):
-                return Decision(False, m1, None, False, {angle: C, other: there})
+                return Decision(False, m1, None, False, {angle: C, other_angle: other_value})
         raise UndecidedError(f"m1 = {m1}: m1 (m1'/m1)' = {value} was not seen to be constant, nor to change")
     if not (C.is_zero or C.is_positive or C.is_negative):
         raise UndecidedError(f"m1 = {m1}: the sign of {C} depends on its symbols; say which of them are positive")

@@ -1,4 +1,4 @@
-"""What several papers read off a recorded run."""
+"""Readings of a recorded run that several papers need."""
 
 from __future__ import annotations
 
@@ -6,20 +6,50 @@ import numpy as np
 
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.visualization.plots.figure_spec import Line, Panel
 
 
 def trajectory_of(result: Result) -> Trajectory:
-    """What was recorded, of a result that kept it."""
+    """Return the recording of a result that kept it."""
     assert result.trajectory is not None
     return result.trajectory
 
 
-def pushed(trajectory: Trajectory) -> list[tuple[float, float]]:
-    """When the push acted on one world, as panels shade it [s]."""
+def push_intervals(trajectory: Trajectory) -> list[tuple[float, float]]:
+    """Find when the push acted on one world, as panels shade it [s]."""
     times = trajectory["time_s"][trajectory["push_n_m"] != 0.0]
     return [(float(times[0]), float(times[-1]))] if len(times) else []
 
 
 def rms(values: np.ndarray) -> np.ndarray:
-    """Root of the mean square over the ticks, (n_ticks, ...) -> (...)."""
+    """Return the root of the mean square over the ticks, (n_ticks, ...) -> (...)."""
     return np.sqrt(np.mean(values**2, axis=0))
+
+
+def loop_panels(run: Trajectory, name: str, equation: str, title: str, noise_width: float) -> list[Panel]:
+    """Draw one world's tilt, tilt rate and command, the observer in the loop beside the truth.
+
+    Args:
+        run: Recording of one world.
+        name: Name of the observer.
+        equation: Equation of the observer in the paper.
+        title: Title above the tilt.
+        noise_width: Width of the measured tilt's line.
+
+    Returns:
+        The three panels.
+    """
+    t, shaded = run["time_s"], push_intervals(run)
+    tilt = [
+        Line(t, np.degrees(run["y1_rad"]), "measured y1", color=7, width=noise_width),
+        Line(t, np.degrees(run["x1_rad"]), "true x1", color=0),
+    ]
+    rates = [
+        Line(t, run[f"estimate/{name}/x2_rad_s"], f"estimate of {equation}", color=1, width=0.6),
+        Line(t, run["x2_rad_s"], "true x2", color=0),
+    ]
+    return [
+        Panel("tilt [deg]", tilt, title, shaded=shaded),
+        Panel("tilt rate [rad/s]", rates, shaded=shaded),
+        Panel("command u [rad/s]", [Line(t, run["u_rad_s"], "u", color=3, width=0.6)], shaded=shaded),
+    ]

@@ -10,16 +10,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from cmg_mj.papers import BEYOND, PAPERS, Reproduced
+from cmg_mj.papers import BEYOND, PAPERS, Reproduction
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.sentences import Once
+from cmg_mj.papers.sentences import SentenceLog
 from cmg_mj.results import markdown
 from cmg_mj.results.run_folder import RunFolder, Writers, claimed, write_text
 from cmg_mj.visualization.plots.run_plot import draw
 
 
-def figures_of(entries: Sequence[Reproduced]) -> dict[str, Any]:
-    """Everything but the pictures, as `--json` prints it."""
+def figures_of(entries: Sequence[Reproduction]) -> dict[str, Any]:
+    """Collect everything but the pictures, as `--json` prints it."""
     return {
         "versions": {name: version(name) for name in ("cmg_mj", "mujoco", "numpy", "scipy")}
         | {"python": platform.python_version()},
@@ -37,21 +37,21 @@ def figures_of(entries: Sequence[Reproduced]) -> dict[str, Any]:
 def _figures_of_claim(claim: Claim) -> dict[str, Any]:
     return {
         "place": claim.place,
-        "says": claim.says,
-        "found": claim.found,
+        "says": claim.statement,
+        "found": claim.result,
         "table": claim.table,
         "verdict": claim.verdict,
-        "why": claim.why,
-        "ours": claim.ours,
+        "why": claim.reason,
+        "ours": claim.is_ours,
         "figures": dict(claim.figures),
         "pictures": [f"{picture.name}.png" for picture in claim.pictures],
     }
 
 
-def verdict_table(entries: Sequence[Reproduced]) -> str:
-    """Every claim and its verdict, as a Markdown table."""
+def verdict_table(entries: Sequence[Reproduction]) -> str:
+    """Write every claim and its verdict as a Markdown table."""
     rows = [
-        (entry.paper, claim.place + _whose(claim), claim.says, verdict_words(claim))
+        (entry.paper, claim.place + _owner_note(claim), claim.statement, verdict_words(claim))
         for entry in entries
         for claim in entry.claims
     ]
@@ -67,19 +67,19 @@ OURS = {
 
 
 def verdict_words(claim: Claim) -> str:
-    """A claim's verdict, in the words for those of a paper or for ours."""
-    return OURS[claim.verdict] if claim.ours else claim.verdict
+    """Say a claim's verdict in the words for those of a paper or for ours."""
+    return OURS[claim.verdict] if claim.is_ours else claim.verdict
 
 
-def report_text(entries: Sequence[Reproduced]) -> str:
-    """The whole report in Markdown."""
+def report_text(entries: Sequence[Reproduction]) -> str:
+    """Write the whole report in Markdown."""
     parts = [f"# {_title(entries)}", *_opening(entries), "## All claims", verdict_table(entries)]
     for entry in entries:
         parts.append(f"## {entry.paper}: {(PAPERS | BEYOND)[entry.paper]}")
         if not entry.complete:
             parts.append("**Interrupted: not all of this paper's claims are here.**")
-        once = Once()
-        parts += [part for claim in entry.claims for part in _parts_of_claim(claim, once)]
+        log = SentenceLog()
+        parts += [part for claim in entry.claims for part in _parts_of_claim(claim, log)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -89,11 +89,11 @@ MEANINGS = {
     "mended; they stand below the claim",
     "not reproduced": "it does not, and the reason stands below the claim",
 }
-"""What the verdicts say."""
+"""The meanings of the verdicts."""
 
 
-def _opening(entries: Sequence[Reproduced]) -> list[str]:
-    """What the verdicts mean, how many there are of each, and which claims were not reproduced."""
+def _opening(entries: Sequence[Reproduction]) -> list[str]:
+    """List the meanings of the verdicts, their counts, and the claims that were not reproduced."""
     parts = [
         "Each claim stands beside what this software obtains. Its verdict is computed from the figures behind it, "
         "and no parameter was tuned to bring one about.",
@@ -101,7 +101,7 @@ def _opening(entries: Sequence[Reproduced]) -> list[str]:
         _count_of_verdicts(entries),
     ]
     failed = [
-        f"- {entry.paper}, {claim.place}{_whose(claim)}: {claim.says}"
+        f"- {entry.paper}, {claim.place}{_owner_note(claim)}: {claim.statement}"
         for entry in entries
         for claim in entry.claims
         if not claim.holds
@@ -109,53 +109,53 @@ def _opening(entries: Sequence[Reproduced]) -> list[str]:
     return [*parts, "Not reproduced:", "\n".join(failed)] if failed else parts
 
 
-def _whose(claim: Claim) -> str:
-    return " (not the paper's)" if claim.ours else ""
+def _owner_note(claim: Claim) -> str:
+    return " (not the paper's)" if claim.is_ours else ""
 
 
-def _title(entries: Sequence[Reproduced]) -> str:
+def _title(entries: Sequence[Reproduction]) -> str:
     first = entries[0].paper
     title = BEYOND.get(first, f"{first}, reproduced") if len(entries) == 1 else "Four papers, reproduced"
     return title if all(entry.complete for entry in entries) else f"{title} (interrupted: not all of it)"
 
 
-def _parts_of_claim(claim: Claim, once: Once) -> list[str]:
-    """A claim's paragraphs; conditions that an earlier claim of the paper had are not said again."""
+def _parts_of_claim(claim: Claim, log: SentenceLog) -> list[str]:
+    """Write a claim's paragraphs, without the conditions that an earlier claim of the paper had."""
     parts = [
         f"### {claim.place}: {verdict_words(claim)}",
-        f"**{'Ours' if claim.ours else 'The paper'}:** {claim.says}",
-        f"**Here:** {claim.found}",
+        f"**{'Ours' if claim.is_ours else 'The paper'}:** {claim.statement}",
+        f"**Here:** {claim.result}",
     ]
     if claim.table:
         parts.append(claim.table)
-    if claim.why:
-        parts.append(f"**{'Conditions' if claim.holds else 'Why not'}:** {once.of(claim.why, claim.place)}")
+    if claim.reason:
+        parts.append(f"**{'Conditions' if claim.holds else 'Why not'}:** {log.omit_repeats(claim.reason, claim.place)}")
     return parts + [f"![{picture.title}]({picture.name}.png)" for picture in claim.pictures]
 
 
-def _count_of_verdicts(entries: Sequence[Reproduced]) -> str:
-    """How many claims have which verdict, the papers' and ours apart, and how long it took."""
+def _count_of_verdicts(entries: Sequence[Reproduction]) -> str:
+    """Count the claims by verdict, the papers' and ours apart, and say how long they took."""
     claims = [claim for entry in entries for claim in entry.claims]
     sentences = []
-    for ours, words in ((False, "claims of the papers"), (True, "beside them, not the papers'")):
-        counts = Counter(verdict_words(claim) for claim in claims if claim.ours is ours)
+    for is_ours, words in ((False, "claims of the papers"), (True, "beside them, not the papers'")):
+        counts = Counter(verdict_words(claim) for claim in claims if claim.is_ours is is_ours)
         if counts:
-            order = [OURS[v] if ours else v for v in OURS]
-            listed = ", ".join(f"{counts[v]} {v}" for v in order if counts[v])
-            sentences.append(f"{sum(counts.values())} {words}: {listed}.")
+            order = [OURS[v] if is_ours else v for v in OURS]
+            counts_text = ", ".join(f"{counts[v]} {v}" for v in order if counts[v])
+            sentences.append(f"{sum(counts.values())} {words}: {counts_text}.")
     return " ".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
 
 
 REPORT_FILES = ["report.md", "figures.json"]
-"""What every report has; its pictures are beside them."""
+"""The files of every report; its pictures are beside them."""
 
 
-def save_report(folder: RunFolder | Path, entries: Sequence[Reproduced]) -> Path:
+def save_report(folder: RunFolder | Path, entries: Sequence[Reproduction]) -> Path:
     """Write report.md, figures.json and the plots, all at once.
 
     Args:
-        folder: Where. What is there and was not written by cmg_mj stays.
-        entries: What was obtained.
+        folder: Folder to write into. What is there and was not written by cmg_mj stays.
+        entries: The reproductions.
 
     Returns:
         Where they are: the folder, or one in it (see `RunFolder.write`).
@@ -169,5 +169,5 @@ def save_report(folder: RunFolder | Path, entries: Sequence[Reproduced]) -> Path
         "figures.json": lambda path: write_text(path, json.dumps(figures_of(entries), indent=2)),
         **{f"{picture.name}.png": lambda path, picture=picture: draw(path, picture) for picture in pictures},
     }
-    with claimed(folder) as it:
-        return it.write(writers, complete=all(entry.complete for entry in entries))
+    with claimed(folder) as target:
+        return target.write(writers, complete=all(entry.complete for entry in entries))

@@ -15,18 +15,18 @@ ROOM = 0.05
 
 
 def on_common_scales(claims: Sequence[Claim]) -> list[Claim]:
-    """The claims with pictures in which all panels of one quantity have the range that all of them need."""
+    """Give all panels of one quantity, in all claims' pictures, the range that they all need."""
     panels = [panel for claim in claims for picture in claim.pictures for panel in picture.panels]
     ranges = {label: _range([panel for panel in panels if panel.y_label == label]) for label in _labels(panels)}
 
-    def scaled(claim: Claim) -> Claim:
+    def scale_claim(claim: Claim) -> Claim:
         pictures = [
             replace(picture, panels=[replace(panel, y_range=ranges[panel.y_label]) for panel in picture.panels])
             for picture in claim.pictures
         ]
         return replace(claim, pictures=pictures)
 
-    return [scaled(claim) for claim in claims]
+    return [scale_claim(claim) for claim in claims]
 
 
 def _labels(panels: Sequence[Panel]) -> set[str]:

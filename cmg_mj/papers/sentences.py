@@ -11,43 +11,43 @@ LONGEST = 40
 _END = re.compile(r"(?<=[.!?])(?<!\bFig\.)(?<!\be\.g\.)(?<!\bi\.e\.)\s+")
 
 
-def sentences(text: str) -> list[str]:
-    """The sentences of a text, in their order."""
+def split_sentences(text: str) -> list[str]:
+    """Split a text into its sentences."""
     return [part for part in _END.split(text.strip()) if part]
 
 
-def words(sentence: str) -> int:
-    """How many words a sentence has."""
+def count_words(sentence: str) -> int:
+    """Count the words of a sentence."""
     return sum(any(letter.isalnum() for letter in part) for part in sentence.split())
 
 
 def too_long(text: str) -> Iterator[str]:
-    """The sentences of a text that have more words than `LONGEST`."""
-    return (sentence for sentence in sentences(text) if words(sentence) > LONGEST)
+    """Find the sentences of a text that have more words than `LONGEST`."""
+    return (sentence for sentence in split_sentences(text) if count_words(sentence) > LONGEST)
 
 
-class Once:
+class SentenceLog:
     """Says a sentence once; where it stood before is said instead of saying it again."""
 
     def __init__(self) -> None:
-        self._said: dict[str, str] = {}
+        self._places: dict[str, str] = {}
 
-    def of(self, text: str, place: str) -> str:
-        """A text without the sentences that earlier places had, which are named first.
+    def omit_repeats(self, text: str, place: str) -> str:
+        """Return a text without the sentences that earlier places had, which are named first.
 
         Args:
             text: Whole sentences.
-            place: Whose they are.
+            place: Place of their claim.
 
         Returns:
             The rest, after `As at Fig. 2.` where something is left out.
         """
         new, before = [], []
-        for sentence in sentences(text):
-            where = self._said.setdefault(sentence, place)
-            if where == place:
+        for sentence in split_sentences(text):
+            first_place = self._places.setdefault(sentence, place)
+            if first_place == place:
                 new.append(sentence)
-            elif where not in before:
-                before.append(where)
-        said = [f"As at {' and '.join(before)}."] if before else []
-        return " ".join([*said, *new])
+            elif first_place not in before:
+                before.append(first_place)
+        reference = [f"As at {' and '.join(before)}."] if before else []
+        return " ".join([*reference, *new])

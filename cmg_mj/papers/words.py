@@ -1,4 +1,4 @@
-"""How numbers are written in a claim's words."""
+"""The numbers in a claim's words."""
 
 from __future__ import annotations
 
@@ -7,23 +7,28 @@ from collections.abc import Sequence
 from cmg_mj.results.intervals import Interval
 
 
-def plus_minus(interval: Interval | None, digits: int = 4, *, signed: bool = False) -> str:
-    """A mean with half its interval, `0.0601 +- 0.0005`; a dash where there is none.
+def plus_minus(interval: Interval | None, digits: int = 4, *, with_sign: bool = False) -> str:
+    """Write a mean with half its interval, `0.0601 +- 0.0005`; a dash where there is none.
 
     Args:
         interval: The interval.
         digits: So many after the point.
-        signed: Whether a positive mean has its sign.
+        with_sign: Whether a positive mean has its sign.
 
     Returns:
         The words.
     """
     if interval is None:
         return "-"
-    return f"{interval.mean:{'+' if signed else ''}.{digits}f} +- {interval.half:.{digits}f}"
+    return f"{interval.mean:{'+' if with_sign else ''}.{digits}f} +- {interval.half:.{digits}f}"
 
 
-def listed_and(words: Sequence[str]) -> str:
-    """One or several things as a sentence lists them: `a`, `a and b`, `a, b and c`."""
+def with_ends(interval: Interval) -> str:
+    """Write a mean and the ends of its interval, `0.985 (0.970 to 1.001)`."""
+    return f"{interval.mean:.3f} ({interval.low:.3f} to {interval.high:.3f})"
+
+
+def join_with_and(words: Sequence[str]) -> str:
+    """Join one or several things as a sentence lists them: `a`, `a and b`, `a, b and c`."""
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last

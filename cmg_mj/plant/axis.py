@@ -13,8 +13,9 @@ import numpy as np
 
 from cmg_mj.elementwise import Scalar
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.plant.effective_inertia import at_keyframe, inertia_about
-from cmg_mj.plant.parts import TILT_ELEMENT, Module
+from cmg_mj.plant.effective_inertia import inertia_about
+from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.parts import TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.tilt_line import Addressed, Line, line_at_site, line_of_joint
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.ideal import IdealReading
@@ -142,7 +143,7 @@ def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]
     """
     prefix = f"{name}/" if name else ""
     data = at_keyframe(model, key)
-    joint, site = _id(model, "joint", prefix + TILT_ELEMENT), _id(model, "site", prefix + TILT_ELEMENT)
+    joint, site = element_id(model, "joint", prefix + TILT_ELEMENT), element_id(model, "site", prefix + TILT_ELEMENT)
     if joint >= 0:
         line: Line | None = line_of_joint(model, joint, key)
         frame, point, direction = int(model.jnt_bodyid[joint]), model.jnt_pos[joint], model.jnt_axis[joint]
@@ -153,7 +154,7 @@ def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]
     assert line is not None  # `RigChecker` has looked
     addresses, radii = [], []
     for which in ("inner", "outer"):
-        sensor = _id(model, "sensor", f"{prefix}accelerometer_{which}")
+        sensor = element_id(model, "sensor", f"{prefix}accelerometer_{which}")
         arm = model.site_pos[model.sensor_objid[sensor]] - point
         radii.append(math.hypot(*(arm - (arm @ direction) * direction)))
         addresses.append(int(model.sensor_adr[sensor]))
@@ -167,8 +168,8 @@ def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]
         ReducedModel(1.0, 0.0, 1.0, 1.0, 1.0),
         RadialTilt(*radii),
         [address + along for address in addresses for along in (0, 2)],
-        [int(model.sensor_adr[_id(model, "sensor", f"{module}/gimbal_encoder")]) for module in modules],
-        int(model.sensor_adr[_id(model, "sensor", f"{prefix}fog")]) + 1,  # its y axis
+        [int(model.sensor_adr[element_id(model, "sensor", f"{module}/gimbal_encoder")]) for module in modules],
+        int(model.sensor_adr[element_id(model, "sensor", f"{prefix}fog")]) + 1,  # its y axis
     )
     return replace(axis, reduced=read_reduced(model, key, axis))
 
@@ -179,8 +180,8 @@ def find_locked_modules(model: mujoco.MjModel, key: int, modules: Sequence[str])
 
 
 def _find_module(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Module:
-    gimbal, flywheel = (_id(model, "joint", f"{name}/{joint}") for joint in ("gimbal", "flywheel"))
-    servo, motor = (_id(model, "actuator", f"{name}/{drive}") for drive in ("gimbal_servo", "flywheel_motor"))
+    gimbal, flywheel = (element_id(model, "joint", f"{name}/{joint}") for joint in ("gimbal", "flywheel"))
+    servo, motor = (element_id(model, "actuator", f"{name}/{drive}") for drive in ("gimbal_servo", "flywheel_motor"))
     angle, spin = int(model.jnt_qposadr[gimbal]), int(model.jnt_dofadr[flywheel])
     zero = float(model.key_qpos[key, angle])
     speed = float(model.key_ctrl[key, motor])
@@ -220,7 +221,3 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     mujoco.mj_forward(model, data)
     gravity_torque = -(line.motion(model, data) @ data.qfrc_bias) / n
     return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n)
-
-
-def _id(model: mujoco.MjModel, kind: str, name: str) -> int:
-    return int(mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))

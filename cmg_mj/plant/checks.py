@@ -1,4 +1,4 @@
-"""What of a compiled model is set wrongly for a rig: all of it, not the first."""
+"""Finds all settings of a compiled model that are wrong for a rig, not only the first."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import numpy as np
 
 from cmg_mj.errors import shown
 from cmg_mj.inputs.sanity import LARGEST
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT
+from cmg_mj.plant.effective_inertia import wheel_momentum
+from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, element_id
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 
 TRUE_DEG = 0.05
@@ -68,19 +70,17 @@ class RigChecker:
     def __init__(self, model: mujoco.MjModel, axes: Mapping[str, Sequence[str]]) -> None:
         self.hints: list[str] = []
         self.wrong: list[str] = []
-        self.key = _id(model, "key", EQUILIBRIUM_KEY)
+        self.key = element_id(model, "key", EQUILIBRIUM_KEY)
         if self.key < 0:
             return
-        self.model, self.data = model, mujoco.MjData(model)
-        mujoco.mj_resetDataKeyframe(model, self.data, self.key)
-        mujoco.mj_forward(model, self.data)
+        self.model, self.data = model, at_keyframe(model, self.key)
         complete = {
             name: [module for module in modules if min(self._addresses(module)) >= 0] for name, modules in axes.items()
         }
         for name, modules in complete.items():
             self.wrong += self._axis(name, modules)
         self.wrong += self._rest()
-        if _id(model, "joint", "yaw") >= 0:
+        if element_id(model, "joint", "yaw") >= 0:
             self._momentum([module for modules in complete.values() for module in modules])
 
     def _axis(self, name: str, modules: Sequence[str]) -> Iterator[str]:
@@ -88,7 +88,7 @@ class RigChecker:
         model, data = self.model, self.data
         self.prefix = f"{name}/" if name else ""
         self.what = what = self.prefix + TILT_ELEMENT
-        joint, site = _id(model, "joint", what), _id(model, "site", what)
+        joint, site = element_id(model, "joint", what), element_id(model, "site", what)
         if max(joint, site) < 0:
             return
         if joint >= 0:
@@ -114,8 +114,10 @@ class RigChecker:
 
     def _addresses(self, module: str) -> tuple[int, int, int, int]:
         """Return the addresses of gimbal, flywheel, servo and motor; negative for one that is missing."""
-        gimbal, flywheel = (_id(self.model, "joint", f"{module}/{name}") for name in ("gimbal", "flywheel"))
-        servo, motor = (_id(self.model, "actuator", f"{module}/{name}") for name in ("gimbal_servo", "flywheel_motor"))
+        gimbal, flywheel = (element_id(self.model, "joint", f"{module}/{name}") for name in ("gimbal", "flywheel"))
+        servo, motor = (
+            element_id(self.model, "actuator", f"{module}/{name}") for name in ("gimbal_servo", "flywheel_motor")
+        )
         return gimbal, flywheel, servo, motor
 
     def _upright(self) -> Iterator[str]:
@@ -144,7 +146,7 @@ class RigChecker:
         gimbal, flywheel, servo, motor = self._addresses(module)
         turns, spins = data.xaxis[gimbal], data.xaxis[flywheel]
         angle = float(data.qpos[model.jnt_qposadr[gimbal]])
-        at_keyframe = f"at the keyframe {EQUILIBRIUM_KEY!r}"
+        place = f"at the keyframe {EQUILIBRIUM_KEY!r}"
         if not (_is_square(turns, self.axis) and _is_square(spins, turns)):
             yield (
                 f"the axes of '{module}/gimbal' and the tilt, and of '{module}/flywheel' and its gimbal, must be at "
@@ -156,7 +158,7 @@ class RigChecker:
             off = apart - math.copysign(math.pi / 2.0, apart)
             if abs(math.degrees(off)) > TRUE_DEG:
                 yield (
-                    f"{at_keyframe} the axis of '{module}/flywheel' must be at right angles to the tilt's; it is "
+                    f"{place} the axis of '{module}/flywheel' must be at right angles to the tilt's; it is "
                     f"{abs(math.degrees(off)):.3g} deg off ('{module}/gimbal' = {angle + off:.6g} would be "
                     "right)"
                 )
@@ -192,7 +194,7 @@ class RigChecker:
         radii = {}
         for name, kind in SENSORS.items():
             name = self.prefix + name
-            sensor = _id(model, "sensor", name)
+            sensor = element_id(model, "sensor", name)
             if sensor < 0 or model.sensor_objtype[sensor] != mujoco.mjtObj.mjOBJ_SITE:
                 continue
             site = int(model.sensor_objid[sensor])
@@ -234,11 +236,7 @@ class RigChecker:
         momenta = []
         for module in modules:
             _, flywheel, _, _ = self._addresses(module)
-            body = int(model.jnt_bodyid[flywheel])
-            shares = data.ximat[body].reshape(3, 3).T @ data.xaxis[flywheel]  # of the principal inertias
-            momenta.append(
-                model.body_inertia[body] @ shares**2 * data.qvel[model.jnt_dofadr[flywheel]] * data.xaxis[flywheel]
-            )
+            momenta.append(wheel_momentum(model, data, flywheel, data.qvel[model.jnt_dofadr[flywheel]]))
         left = float(np.linalg.norm(np.sum(momenta, axis=0)))
         if left > 0.01 * sum(float(np.linalg.norm(momentum)) for momentum in momenta):
             self.hints.append(
@@ -259,10 +257,6 @@ def survives_first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     """
     mujoco.mj_step(model, data, int(np.clip(FIRST_S / model.opt.timestep, 4, 100)))
     return bool(np.all(np.abs(data.qpos) < HUGE) and np.all(np.abs(data.qvel) < HUGE))
-
-
-def _id(model: mujoco.MjModel, kind: str, name: str) -> int:
-    return int(mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
 
 
 def _degrees_between(a: np.ndarray, b: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""What a turn about the vertical couples: the momenta of one axis, its wheels' and its tilt's, are swept round."""
+"""Coupling of the axes by a turn about the vertical, which sweeps the momenta of an axis' wheels and tilt round."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 
 from cmg_mj.controllers.multi_axis import YawCoupling
 from cmg_mj.plant.axis import Axis
-from cmg_mj.plant.effective_inertia import at_keyframe
+from cmg_mj.plant.effective_inertia import wheel_momentum
+from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import Module
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -43,10 +44,7 @@ def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCouplin
 def _turned(model: mujoco.MjModel, data: mujoco.MjData, module: Module) -> np.ndarray:
     """Return the derivative of a wheel's momentum by x3 at x3 = 0, in the world (3,) [N m s]."""
     gimbal, wheel = int(model.dof_jntid[module.gimbal_dof]), int(model.dof_jntid[module.flywheel_dof])
-    body = int(model.jnt_bodyid[wheel])
-    shares = data.ximat[body].reshape(3, 3).T @ data.xaxis[wheel]  # of the principal inertias
-    momentum = float(model.body_inertia[body] @ shares**2) * module.speed * data.xaxis[wheel]
-    return module.direction * np.cross(data.xaxis[gimbal], momentum)
+    return module.direction * np.cross(data.xaxis[gimbal], wheel_momentum(model, data, wheel, module.speed))
 
 
 def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarray:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.parts import ON_A_JOINT
 from cmg_mj.plant.tilt_line import HingeLine, Line
 
 SMALL = 1e-9
@@ -19,14 +21,6 @@ class Inertia:
 
     coupling_row: np.ndarray
     tilt_inertia: float
-
-
-def at_keyframe(model: mujoco.MjModel, key: int) -> mujoco.MjData:
-    """Fresh data at a keyframe, after a forward pass."""
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, key)
-    mujoco.mj_forward(model, data)
-    return data
 
 
 def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int, float]) -> Inertia:
@@ -65,15 +59,21 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
     return Inertia(row, float(line_inertia))
 
 
+def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, joint: int, speed: float) -> np.ndarray:
+    """Return the momentum of a wheel that turns at a speed [rad/s] in its joint, in the world (3,) [N m s]."""
+    body = int(model.jnt_bodyid[joint])
+    shares = data.ximat[body].reshape(3, 3).T @ data.xaxis[joint]  # of the principal inertias
+    return model.body_inertia[body] @ shares**2 * speed * data.xaxis[joint]
+
+
 def _free_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
     """Degrees of freedom that neither a constraint nor a servo holds, flywheels and gimbals left out."""
     held = set()
     for constraint in np.flatnonzero((model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (data.eq_active == 1)):
         held.add(int(model.jnt_dofadr[model.eq_obj1id[constraint]]))
-    on_a_joint = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
     for actuator in range(model.nu):
         holds = model.actuator_biasprm[actuator, 1:3].any()  # a servo of position or rate
-        if holds and int(model.actuator_trntype[actuator]) in on_a_joint:
+        if holds and int(model.actuator_trntype[actuator]) in ON_A_JOINT:
             held.add(int(model.jnt_dofadr[model.actuator_trnid[actuator, 0]]))
     return [dof for dof in range(model.nv) if dof not in held]
 

@@ -10,13 +10,10 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
-from cmg_mj.plant.effective_inertia import at_keyframe
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, TILT_ELEMENT
+from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, ON_A_JOINT, TILT_ELEMENT, element_id, joint_sizes
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 
-_QPOS_SIZES = {0: 7, 1: 4, 2: 1, 3: 1}
-_QVEL_SIZES = {0: 6, 1: 3, 2: 1, 3: 1}
-"""Of a free joint, a ball, a slide and a hinge, by MuJoCo's mjtJoint."""
 YAW = "yaw"
 
 
@@ -46,8 +43,7 @@ def lock_axes(
     Raises:
         InputError: There is no such axis, it tilts about no hinge, or no axis is left.
     """
-    key = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, EQUILIBRIUM_KEY))
-    for line in _hinges_of(model, key, axes, known, path):
+    for line in _hinges_of(model, element_id(model, "key", EQUILIBRIUM_KEY), axes, known, path):
         name = model.joint(line.joint).name
         angle = line.zero - float(model.qpos0[line.angle])
         if angle:
@@ -71,10 +67,10 @@ def _hinges_of(
             names = nearest(axis, known, "its axes") if any(known) else "its only one has no name"
             raise InputError(f"{setting} has no axis {axis!r}; {names}")
         name = f"{axis}/{TILT_ELEMENT}".lstrip("/")
-        joint = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name))
+        joint = element_id(model, "joint", name)
         line: Line | None = line_of_joint(model, joint, key) if joint >= 0 else None
         if line is None:
-            line = line_at_site(model, data, int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)), key)
+            line = line_at_site(model, data, element_id(model, "site", name), key)
         if not isinstance(line, HingeLine):
             raise InputError(f"{setting} tilts about {name!r} as a free body does; only a hinge can be locked")
         hinges.append(line)
@@ -116,7 +112,7 @@ def remove_hinge(spec: mujoco.MjSpec, name: str) -> None:
         name: The joint.
     """
     before = spec.joints[: [joint.name for joint in spec.joints].index(name)]
-    of_joints = [sum(sizes[int(joint.type)] for joint in before) for sizes in (_QPOS_SIZES, _QVEL_SIZES)]
+    of_joints = [sum(joint_sizes(int(joint.type))[i] for joint in before) for i in (0, 1)]
     drives = list(spec.actuators)
     gone = [i for i, drive in enumerate(drives) if _drives(drive, name)]
     starts = np.cumsum([0, *map(_states, drives)])
@@ -135,8 +131,7 @@ def remove_hinge(spec: mujoco.MjSpec, name: str) -> None:
 
 
 def _drives(drive: Any, joint: str) -> bool:
-    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    return drive.target == joint and int(drive.trntype) in map(int, kinds)
+    return drive.target == joint and int(drive.trntype) in ON_A_JOINT
 
 
 def _states(drive: Any) -> int:

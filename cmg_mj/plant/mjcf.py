@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,7 +68,7 @@ class Rig(NamedTuple):
 
     model: mujoco.MjModel
     axes: dict[str, list[str]]
-    hints: list[str]
+    hints: tuple[str, ...]
 
 
 def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> Rig:
@@ -104,13 +104,40 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> Rig:
         numbers = invalid_numbers(model)
         placement = None if numbers else RigChecker(model, axes)
         wrong += numbers if placement is None else placement.wrong
-        rig = Rig(model, axes, [] if placement is None else placement.hints)
+        rig = Rig(model, axes, () if placement is None else tuple(placement.hints))
     if wrong or rig is None:
         raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([REQUIRED_PARTS] if missing else [])]))
     if locked_axes:
         lock_axes(spec, rig.model, locked_axes, rig.axes, path)
         rig = rig._replace(model=compile_model(spec, path))
     return rig
+
+
+def compile_drawn(
+    path: Path, *, lock: bool, locked_axes: Sequence[str], axes: Mapping[str, Sequence[str]]
+) -> mujoco.MjModel:
+    """Compile a rig that `load_rig` has read with all that is only seen.
+
+    Args:
+        path: The model's file.
+        lock: Whether to take the yaw joint out.
+        locked_axes: Axes whose hinges to take out.
+        axes: All axes of the rig.
+
+    Returns:
+        The compiled model.
+
+    Raises:
+        InputError: MuJoCo's compiler refuses it, because of a mesh that cannot be read.
+    """
+    spec = parse(path)
+    if lock:
+        lock_thrust_bearing(spec, path)
+    model = compile_model(spec, path)
+    if locked_axes:
+        lock_axes(spec, model, locked_axes, axes, path)
+        model = compile_model(spec, path)
+    return model
 
 
 def check_rig(path: Path, name: Path) -> None:

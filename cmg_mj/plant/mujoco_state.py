@@ -1,4 +1,4 @@
-"""MuJoCo's process-wide switches."""
+"""MuJoCo's process-wide switches, and its data in a given state."""
 
 from __future__ import annotations
 
@@ -31,3 +31,19 @@ def set_control_callback(callback: object | None) -> Iterator[None]:
         yield
     finally:
         mujoco.set_mjcb_control(before)
+
+
+def at_keyframe(model: mujoco.MjModel, key: int) -> mujoco.MjData:
+    """Return fresh data at a keyframe, after a forward pass."""
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, key)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def posed(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
+    """Return fresh data with given joint positions, after a forward pass."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    return data

@@ -1,4 +1,4 @@
-"""What a rig consists of, by name and kind, and what a model lacks of it: all of it, not the first."""
+"""The parts of a rig, by name and kind; finds all parts that a model lacks, not only the first."""
 
 from __future__ import annotations
 
@@ -15,10 +15,13 @@ TILT_ELEMENT = "tilt"
 """The hinge that a rig tilts about, or the site whose y axis lies along a line that it tilts about."""
 SENSORS = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
 REQUIRED_PARTS = (
-    "a rig needs a joint or a site tilt, the joints CUBE/gimbal, CUBE/flywheel, the actuators CUBE/gimbal_servo, "
-    f"CUBE/flywheel_motor, the sensors CUBE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe {EQUILIBRIUM_KEY}, "
-    "for one CUBE or more; of several axes each has its name before these, as roll/tilt and roll/CUBE/gimbal"
+    "a rig needs a joint or a site tilt, the joints MODULE/gimbal, MODULE/flywheel, the actuators MODULE/gimbal_servo, "
+    f"MODULE/flywheel_motor, the sensors MODULE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe "
+    f"{EQUILIBRIUM_KEY}, for one MODULE or more; of several axes each has its name before these, as roll/tilt and "
+    "roll/MODULE/gimbal"
 )
+ON_A_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+"""Transmissions of an actuator that drives a joint."""
 _OF_A_MODULE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
 
 
@@ -110,6 +113,16 @@ def missing_parts(spec: mujoco.MjSpec) -> list[str]:
             check("sensor", prefix + name, _is_a(kind), f"sensor {prefix + name!r} must be of the kind {kind!r}")
     check("keyframe", EQUILIBRIUM_KEY, lambda _: True, "")
     return [_missing(kind, names, list(elements[kind])) for kind, names in missing.items() if names] + wrong
+
+
+def element_id(model: mujoco.MjModel, kind: str, name: str) -> int:
+    """Return the number of an element of a kind, such as `joint`; -1 if there is none of that name."""
+    return int(mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
+
+
+def joint_sizes(kind: int) -> tuple[int, int]:
+    """Return how many numbers a joint of a kind (MuJoCo's mjtJoint) has in qpos and in qvel."""
+    return {0: (7, 6), 1: (4, 3)}.get(kind, (1, 1))
 
 
 def axes_in(names: Iterable[str]) -> list[str]:

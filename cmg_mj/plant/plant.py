@@ -29,10 +29,9 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
 from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
-from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
-from cmg_mj.plant.mjcf import compile_model, load_rig, parse
+from cmg_mj.plant.mjcf import compile_drawn, load_rig
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Module
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, element_id
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
@@ -76,7 +75,7 @@ class Plant:
         locked = settings.locked_axes
         self.model, modules, self.hints = load_rig(path, lock=settings.lock_thrust_bearing, locked_axes=locked)
         self._as_filed = self.model
-        self.key = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, EQUILIBRIUM_KEY))
+        self.key = element_id(self.model, "key", EQUILIBRIUM_KEY)
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in self.joint_names else None
         self._module_names = modules
         self._axes_as_filed = tuple(
@@ -124,7 +123,7 @@ class Plant:
         self.settings, self._of_axes = settings, of_axes
         self.backlash = math.radians(settings.gimbal_backlash_arcmin / ARCMIN_A_DEGREE)
         self.model = copy.copy(self._as_filed)
-        axes = []
+        axes, speed = [], settings.flywheel_speed_rad_s
         for axis in self._axes_as_filed:
             axis_settings = of_axes.get(axis.name, settings)
             changed = replace(
@@ -133,26 +132,19 @@ class Plant:
                 initial_tilt=math.radians(axis_settings.initial_tilt_deg),
                 radial_tilt=place_accelerometers(self.model, axis_settings, axis, self.path),
             )
-            if settings.flywheel_speed_rad_s is not None:
-                modules = with_flywheel_speed(
-                    self.model, self.key, axis.modules, settings.flywheel_speed_rad_s, self.path
-                )
+            if speed is not None:
+                modules = with_flywheel_speed(self.model, self.key, axis.modules, speed, self.path)
                 changed = replace(changed, modules=modules)
                 changed = replace(changed, reduced=read_reduced(self._as_filed, self.key, changed))
             axes.append(changed)
         self.axes = tuple(axes)
-        held = self._held
-        if settings.flywheel_speed_rad_s is not None:
-            held = with_flywheel_speed(self.model, self.key, held, settings.flywheel_speed_rad_s, self.path)
+        held = self._held if speed is None else with_flywheel_speed(self.model, self.key, self._held, speed, self.path)
         if settings.turn_rate_rad_s:
             set_turn_rate(self.model, self.key, settings.turn_rate_rad_s, self.path)
         filed = float(self.model.opt.timestep)
         vary(self.model, settings, self.path, self.axes, held)
-        shaken = (
-            max(abs(module.speed) for axis in self.axes for module in axis.modules)
-            if settings.flywheel_imbalance_kg_m
-            else 0.0
-        )
+        speeds = [abs(module.speed) for axis in self.axes for module in axis.modules]
+        shaken = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
         self.largest_step = largest_step(self.model, self.key, filed, shaken)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
@@ -178,18 +170,11 @@ class Plant:
     def drawn_model(self) -> mujoco.MjModel:
         """The model with all that is only seen: the same bodies and joints, and geoms that physics does without."""
         with set_control_callback(None), quiet():  # compiling a model runs it
-            spec = parse(self.path)
-            if self.settings.lock_thrust_bearing:
-                lock_thrust_bearing(spec, self.path)
-            model = compile_model(spec, self.path)
-            if self.settings.locked_axes:
-                lock_axes(spec, model, self.settings.locked_axes, self._module_names, self.path)
-                model = compile_model(spec, self.path)
+            lock, locked_axes = self.settings.lock_thrust_bearing, self.settings.locked_axes
+            model = compile_drawn(self.path, lock=lock, locked_axes=locked_axes, axes=self._module_names)
         for axis in self._axes_as_filed:
             place_accelerometers(model, self._of_axes.get(axis.name, self.settings), axis, self.path)
         return model
-
-    # --- several axes ---------------------------------------------------------------------------------------
 
     def single_axis(self, axis: str) -> Plant:
         """The rig as one of its axes sees it: with that axis alone.
@@ -198,7 +183,7 @@ class Plant:
             axis: Its name.
 
         Returns:
-            The rig, whose `reduced`, `modules`, `ideal_readings`, `controller`, ... are that axis'.
+            The rig, whose `axis`, `reduced`, `ideal_readings`, `controller`, ... are that axis'.
 
         Raises:
             InputError: There is no such axis.
@@ -229,8 +214,6 @@ class Plant:
         lean = np.take_along_axis(leans, farthest[None], axis=0)[0]
         return lean if lean.ndim else float(lean)
 
-    # --- the only axis, or the first -----------------------------------------------------------------------
-
     @property
     def axis(self) -> Axis:
         """The rig's axis, or the first of several."""
@@ -242,19 +225,9 @@ class Plant:
         return self.axis.reduced
 
     @property
-    def modules(self) -> tuple[Module, ...]:
-        """Addresses of the modules of the axis."""
-        return self.axis.modules
-
-    @property
     def radial_tilt(self) -> RadialTilt:
         """The tilt estimate for the accelerometers of the axis."""
         return self.axis.radial_tilt
-
-    @property
-    def frame(self) -> int:
-        """The body that carries the sensors of the axis."""
-        return self.axis.frame
 
     @property
     def bias(self) -> float:
@@ -285,20 +258,14 @@ class Plant:
         upward = sensordata[self.axis.gyro + 1]
         return MultiAxisReading([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
 
-    def gimbal_angle(self, qpos: Addressed) -> Scalar:
-        """True x3 of the axis: see `Axis.gimbal_angle`."""
-        return self.axis.gimbal_angle(qpos)
-
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
         """Return the bias that an observer should find: see `Axis.apparent_bias`."""
         return self.axis.apparent_bias(accelerometer, self.gravity)
 
-    # --- running -------------------------------------------------------------------------------------------
-
     @property
     def interface(self) -> PlantInterface:
         """The plant as a controller of the axis knows it."""
-        zeros = tuple(module.gimbal_zero for module in self.modules)
+        zeros = tuple(module.gimbal_zero for module in self.axis.modules)
         gimbal_angle = GimbalAngle(tuple(self.axis.directions), zeros)
         return PlantInterface(self.radial_tilt, gimbal_angle, self.model.opt.timestep, self.backlash)
 
@@ -369,16 +336,9 @@ class Plant:
     @property
     def parameters(self) -> PlantParameters:
         """Parameters from which a scenario's controller and observers are made."""
-        modules = tuple(module.name for module in self.modules)
+        names = tuple(module.name for module in self.axis.modules)
         return PlantParameters(
-            self.path,
-            modules,
-            self.reduced,
-            self.radial_tilt,
-            self.gravity,
-            self.timestep,
-            self.largest_step,
-            tuple(self.hints),
+            self.path, names, self.reduced, self.radial_tilt, self.gravity, self.timestep, self.largest_step, self.hints
         )
 
     def initialise(self, data: mujoco.MjData) -> None:

@@ -1,4 +1,4 @@
-"""How large a physics step of a rig may be."""
+"""The largest physics step of a rig."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RK4 is stable up to 2.8. `docs/studies/steps.py` prints the table. A torque that
 Simpson's rule, to 1.5^4/2880 = 0.18 %.
 """
 OTHERS_LIMIT_S = 0.001
-"""Of MuJoCo's other integrators none is as accurate at any step that costs less [s]."""
+"""Largest step of MuJoCo's other integrators; none is as accurate at any step that costs less [s]."""
 
 
 def largest_step(model: mujoco.MjModel, key: int, own_s: float, shaken: float = 0.0) -> float:

@@ -1,4 +1,4 @@
-"""How a rig differs from its model file: integrator and step, friction, servos, wheels, the equilibrium bias."""
+"""Differences of a rig from its model file: integrator and step, friction, servos, wheels, the equilibrium bias."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import Axis
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Module
+from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.sensors.tilt import RadialTilt
@@ -29,11 +30,7 @@ YAW_SERVO = "yaw_servo"
 
 
 def vary(
-    model: mujoco.MjModel,
-    settings: PlantSettings,
-    path: Path,
-    axes: Sequence[Axis],
-    held: Sequence[Module] = (),
+    model: mujoco.MjModel, settings: PlantSettings, path: Path, axes: Sequence[Axis], held: Sequence[Module] = ()
 ) -> None:
     """Change a compiled model as its settings say.
 
@@ -124,10 +121,7 @@ def set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> N
         InputError: There is no drive that holds the rate, or it takes no such command.
     """
     prefix = f"plant.turn_rate_rad_s = {rate:g}: {path}"
-    joint, servo = (
-        int(mujoco.mj_name2id(model, kind, name))
-        for kind, name in ((mujoco.mjtObj.mjOBJ_JOINT, "yaw"), (mujoco.mjtObj.mjOBJ_ACTUATOR, YAW_SERVO))
-    )
+    joint, servo = element_id(model, "joint", "yaw"), element_id(model, "actuator", YAW_SERVO)
     if joint < 0 or servo < 0 or int(model.actuator_trnid[servo, 0]) != joint:
         raise InputError(f"{prefix} has no actuator {YAW_SERVO!r} that drives a joint 'yaw', which alone holds a rate")
     low, high = model.actuator_ctrlrange[servo]
@@ -167,8 +161,7 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
         )
     for name, (to, was) in distances.items():
         if to is not None:
-            sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, axis.prefix + name)
-            site = int(model.sensor_objid[sensor])
+            site = int(model.sensor_objid[element_id(model, "sensor", axis.prefix + name)])
             arm = model.site_pos[site] - axis.point
             model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (to / was - 1.0)
             model.site_sameframe[site] = 0  # should it have stood where the body's frame does
@@ -228,12 +221,10 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
     if model.body_mass[frame] <= 0.0:
         raise InputError(
             f"plant.equilibrium_bias_deg: {path}: the body {model.body(frame).name!r}, which tilts, needs a mass of "
-            "its own to move (give the model's compiler fusestatic=\"true\", so that the cubes' halves become part of "
-            "it)"
+            "its own to move (give the model's compiler fusestatic=\"true\", so that the modules' halves become part "
+            "of it)"
         )
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, EQUILIBRIUM_KEY))
-    mujoco.mj_forward(model, data)
+    data = at_keyframe(model, element_id(model, "key", EQUILIBRIUM_KEY))
     to_frame = data.xmat[frame].reshape(3, 3).T
     centre = to_frame @ (data.subtree_com[all_that_tilts] - data.xpos[frame]) - axis.point
     radial = centre - (centre @ axis.direction) * axis.direction

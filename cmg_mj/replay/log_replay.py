@@ -14,7 +14,7 @@ import numpy as np
 
 from cmg_mj.controllers.dry_run import dry_run_observer
 from cmg_mj.errors import InputError, raised
-from cmg_mj.observers import OBSERVERS, Observer, check_names, make_observer, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
 from cmg_mj.observers.protocol import extra_signals, needs
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay.alignment import Alignment
@@ -155,10 +155,10 @@ def _ready(
     ready: dict[str, Observer] = {}
     left_out: dict[str, str] = {}
     for name in names:
-        cls = observer_class(name)
+        cls = OBSERVER_CLASSES.find(name)
         lacks = [need for need in needs(cls) if need not in available]
         if lacks:
-            check_names(name, parameters.get(name, {}))
+            OBSERVER_CLASSES.check_names(name, parameters.get(name, {}))
             assumed = "" if hasattr(cls, "needs") else ", as a class does that does not say what it needs (needs = ())"
             left_out[name] = "needs " + " and ".join(NEEDS_IN_WORDS[need] for need in lacks) + assumed
             continue

@@ -19,18 +19,21 @@ from cmg_mj.replay.user_pendulum import model_of
 from cmg_mj.results.run_folder import RunFolder
 
 
-@dataclass(frozen=True)
-class ReplayRequest:
-    """Request to replay some logs.
+@dataclass
+class LogReplays:
+    """Request to replay some logs, and the replays that are done. The logs are read at once.
 
     Attributes:
-        paths: The logs.
+        paths: The logs' files.
         observers: Names of the observers.
         options: Options with which all logs are read.
         model: The pendulum as `model_of` takes it.
         noises: Noises from `noise_numbers`.
         parameters: Observer -> parameter -> value, where not the default.
         settle_s: Time at the start of each part that is not scored [s]; None for `replay_prepared`'s.
+        logs: The logs.
+        names: Their names in file names.
+        results: The replays that are done.
     """
 
     paths: Sequence[str]
@@ -45,6 +48,11 @@ class ReplayRequest:
         for kind in self.parameters:
             if kind not in self.observers:
                 raise InputError(f"--set {kind}: is not among --observers {','.join(self.observers)}")
+        self._model = None if self.model is None else model_of(self.model)
+        check_distinct_logs(self.paths)
+        self.logs: list[Log] = [read_log(path, self.options) for path in self.paths]
+        self.names = distinct_names([log.name for log in self.logs])
+        self.results: list[ReplayResult] = []
 
     def as_toml(self) -> str:
         """Return the request as TOML."""
@@ -63,27 +71,6 @@ class ReplayRequest:
                 "replay": {name: value for name, value in replay.items() if value not in (None, {})},
             }
         )
-
-
-class LogReplays:
-    """The logs of a request, and the replays that are done.
-
-    Args:
-        request: The request; its logs are read at once.
-
-    Attributes:
-        logs: The logs.
-        names: Their names in file names.
-        results: The replays that are done.
-    """
-
-    def __init__(self, request: ReplayRequest) -> None:
-        self.request = request
-        self._model = None if request.model is None else model_of(request.model)
-        check_distinct_logs(request.paths)
-        self.logs: list[Log] = [read_log(path, request.options) for path in request.paths]
-        self.names = distinct_names([log.name for log in self.logs])
-        self.results: list[ReplayResult] = []
 
     @property
     def complete(self) -> bool:
@@ -107,16 +94,15 @@ class LogReplays:
             on_progress: Called with the logs done so far, parts of one included, and the current one's name. It may
                 raise `KeyboardInterrupt`; the results until then are kept.
         """
-        request = self.request
         for i, log in enumerate(self.logs):
             self.results.append(
                 replay_prepared(
                     log,
-                    request.observers,
+                    self.observers,
                     model=self._model,
-                    noises=request.noises,
-                    parameters=request.parameters,
-                    settle_s=request.settle_s,
+                    noises=self.noises,
+                    parameters=self.parameters,
+                    settle_s=self.settle_s,
                     on_share=lambda share, i=i, log=log: on_progress(i + share, f"Replay {log.name}"),
                 )
             )
@@ -124,4 +110,4 @@ class LogReplays:
     def save(self, folder: RunFolder | Path) -> Path:
         """Write the files of the replays that are done, and return where they are."""
         names = self.names[: len(self.results)]
-        return save_replay(folder, self.results, names, self.request.as_toml(), complete=self.complete)
+        return save_replay(folder, self.results, names, self.as_toml(), complete=self.complete)

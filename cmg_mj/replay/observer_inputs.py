@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 from cmg_mj.errors import InputError
@@ -11,7 +10,7 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay.log_replay import SETTLE_S, OnShare, ReplayResult, replay_log
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.parameter_options import Parameters
-from cmg_mj.replay.user_noise import noise_from, noise_of
+from cmg_mj.replay.user_noise import noise_of
 from cmg_mj.replay.user_pendulum import plant_parameters_of
 from cmg_mj.scenario.design import design
 from cmg_mj.scenario.loading import parse_scenario
@@ -56,7 +55,7 @@ def observer_inputs(
     """
     noises, parameters = noises or {}, dict(parameters or {})
     if log.scenario is None:
-        return ObserverInputs(model, noise_from(log, noises) or noise_of(log), parameters)
+        return ObserverInputs(model, noise_of(log, noises), parameters)
     scenario = parse_scenario(dict(log.scenario), log.name)
     plant = plant_parameters_of(scenario)
     noise = _run_noise(log, scenario, plant, noises)
@@ -102,9 +101,7 @@ def replay_prepared(
 def _run_noise(log: Log, scenario: Scenario, plant: PlantParameters, noises: Mapping[str, float]) -> TiltNoise | None:
     """Return another noise than that of the run's sensors; another density alone leaves their other errors."""
     if "accelerometer" not in noises:
-        return noise_from(log, noises)
+        return noise_of(log, noises) if noises else None
     if len(noises) > 1:
         raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
-    sensors = scenario.sensors
-    accelerometer = replace(sensors.accelerometer, noise_density_ug_rthz=noises["accelerometer"])
-    return plant.noise(replace(sensors, accelerometer=accelerometer))
+    return plant.noise(scenario.sensors.with_noise_density(noises["accelerometer"]))

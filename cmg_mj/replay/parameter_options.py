@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TypeAlias
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.observers import OBSERVERS, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS
 
 ParameterValue: TypeAlias = "bool | int | float | str | Sequence[ParameterValue] | None"
 """Value of an observer's parameter."""
@@ -61,7 +61,7 @@ def parameters_of(settings: Sequence[str]) -> dict[str, dict[str, ParameterValue
             raise InputError(f"--set {setting!r}: write OBSERVER.PARAMETER=VALUE, for example homogeneous.k1=20")
         if ":" not in kind and kind not in OBSERVERS:
             raise InputError(f"--set {setting!r}: no such observer; {nearest(kind, OBSERVERS)}")
-        observer_class(kind)
+        OBSERVER_CLASSES.find(kind)
         try:
             (value,) = tomllib.loads(f"value = {text}").values()
         except (ValueError, RecursionError):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from cmg_mj.replay.log_replay import ReplayResult, describe_log
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import figure_text, shown_first
 from cmg_mj.replay.scores import Figures
-from cmg_mj.results.files import whole_file
 from cmg_mj.results.stored_columns import LONG, select_rows, stretches
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
@@ -25,8 +24,12 @@ from cmg_mj.visualization.plots.run_plot import (
     SMALL_HEIGHT,
     fit,
     pyplot,
+    save_figure,
 )
 from cmg_mj.visualization.plots.thinning import thinned
+
+if TYPE_CHECKING:
+    from cmg_mj.visualization.plots.run_plot import Axes
 
 DETAIL_S = 2.0
 """Length of the detail [s]."""
@@ -71,7 +74,6 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         path: The PNG to write.
         replayed: The replay.
     """
-    plt = pyplot()
     log, names = replayed.log, list(replayed.estimates)
     few, referred = shown_first(replayed), "reference" in log.has
     others = [name for name in names if name not in few]
@@ -80,11 +82,11 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     small = [others[i : i + SMALL_COLUMNS] for i in range(0, len(others), SMALL_COLUMNS)]
     tall = 4 if referred else 3
     heights = [PANEL_HEIGHT] * tall + [SMALL_HEIGHT] * len(small)
-    figure = plt.figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
+    figure = pyplot().figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
     grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
     panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
     start, end = liveliest_span(replayed)
-    _line(panels[0], replayed, np.degrees(log["y1_rad"]), color=MEASURED, linewidth=0.8, label="measured")
+    _line(panels[0], replayed, np.degrees(log["y1_rad"]), None, color=MEASURED, linewidth=0.8, label="measured")
     panels[0].set_ylabel("tilt [deg]")
     rates = None
     for axes in (panels[1], panels[-1]):
@@ -102,7 +104,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         for name in few:
             text = f"{labels[name].lstrip('_')} {_rms(replayed.summaries[name])}"
             error = replayed.estimates[name]["x2_rad_s"] - log[REFERENCE]
-            _line(panels[2], replayed, error, color=palette[name], linewidth=0.6, label=text)
+            _line(panels[2], replayed, error, None, color=palette[name], linewidth=0.6, label=text)
         panels[2].set_ylabel("estimate less\nreference [rad/s]")
         errors = [_outline(replayed.estimates[n]["x2_rad_s"] - log[REFERENCE]) for n in few]
         fit(panels[2], [_outline(log[REFERENCE])], errors)
@@ -120,25 +122,29 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=6, frameon=False, borderpad=0)
     panels[-1].set_xlabel(f"time [s], {DETAIL_S:g} s in detail" if end - start < log.duration_s else "time [s]")
     figure.align_ylabels(panels)
-    figure.suptitle(describe_log(log), x=0.01, ha="left", parse_math=False)
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=110, format="png")
-    plt.close(figure)
+    save_figure(path, figure, describe_log(log), dpi=110)
 
 
 def _line(
-    axes: Any, replayed: ReplayResult, values: np.ndarray, detail: tuple[float, float] | None = None, **style: Any
+    axes: Axes,
+    replayed: ReplayResult,
+    values: np.ndarray,
+    detail: tuple[float, float] | None,
+    color: str,
+    linewidth: float,
+    label: str | None = None,
 ) -> None:
     """Draw a signal; of a long one, the outline, or all of it around the detail."""
     log = replayed.log
     if len(log) <= LONG:
-        axes.plot(*log.broken(values), **style)
+        x, y = log.broken(values)
     elif detail is None:
         pieces = [thinned(*log.broken(values[rows], rows), FEW_DRAWN) for rows in stretches(len(log))]
-        axes.plot(*(np.concatenate(part) for part in zip(*pieces, strict=True)), **style)
+        x, y = (np.concatenate(part) for part in zip(*pieces, strict=True))
     else:
         first, last = np.searchsorted(log["time_s"], (detail[0] - DETAIL_S, detail[1] + DETAIL_S)).tolist()
-        axes.plot(*log.broken(values[first:last], slice(first, last)), **style)
+        x, y = log.broken(values[first:last], slice(first, last))
+    axes.plot(x, y, color=color, linewidth=linewidth, label=label)
 
 
 def _outline(values: np.ndarray) -> np.ndarray:
@@ -149,7 +155,7 @@ def _outline(values: np.ndarray) -> np.ndarray:
 
 
 def _draw_small(
-    axes: Any,
+    axes: Axes,
     replayed: ReplayResult,
     name: str,
     label: str,

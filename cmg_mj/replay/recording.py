@@ -14,7 +14,7 @@ from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import replay_markdown, shown_first
 from cmg_mj.results.stored_columns import LONG, STRETCH, select_rows, stretches
-from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, colours
+from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, Colour, colours
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.thinning import thinned
 from cmg_mj.visualization.recording.legend import numbered_parts
@@ -79,8 +79,10 @@ def _series(replayed: ReplayResult, some: slice) -> Iterator[Series]:
     """Make the series of some rows, one by one."""
     log, columns = replayed.log, select_rows(replayed.log.columns, some)
 
-    def row(path: str, name: str, values: np.ndarray, color: tuple, width: float = 1.5, **more: object) -> Series:
-        return Series(path, name, *log.broken(values, some), color, width, **more)  # type: ignore[arg-type]
+    def row(
+        path: str, name: str, values: np.ndarray, color: Colour, width: float = 1.5, whole: bool = True, by: str = ""
+    ) -> Series:
+        return Series(path, name, *log.broken(values, some), color, width, whole, by)
 
     yield row("tilt/measured", "measured", np.degrees(columns["y1_rad"]), BASELINE_COLOURS["gyro"])
     if "reference" in log.has:
@@ -95,7 +97,7 @@ def _series(replayed: ReplayResult, some: slice) -> Iterator[Series]:
         if BIAS in estimates:
             signals["bias"] = np.degrees(estimates[BIAS])
         for folder, values in signals.items():
-            yield row(f"{folder}/{part}", labels[name], values, color, whole=False, observer=name)
+            yield row(f"{folder}/{part}", labels[name], values, color, whole=False, by=name)
     if "acceleration" in log.has:
         measured = columns["acceleration_rad_s2"]
         yield row("acceleration/measured", "measured", measured, BASELINE_COLOURS["gyro"], 1.0, whole=False)

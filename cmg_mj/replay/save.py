@@ -63,10 +63,12 @@ def save_replay(
     Raises:
         InputError: The folder, or a file, cannot be written.
     """
+    from cmg_mj.replay.recording import write_replay  # 0.4 s of import, needed only here
+
     writers: list[Callable[[Path], None]] = [
         lambda path: write_text(path, json.dumps(finite(replay_figures(replays)), indent=2)),
         lambda path: write_text(path, settings_toml),
-        lambda path: _record(path, replays, names, settings_toml),
+        lambda path: write_replay(path, replays, names, settings_toml),
     ]
     for replayed in replays:
         writers += [signals(replayed).save, lambda path, replayed=replayed: plot_replay(path, replayed)]
@@ -85,10 +87,4 @@ def signals(replayed: ReplayResult) -> Trajectory:
         estimates = stored(replayed.estimates[kind])
         columns = columns.joined(estimates.renamed({f"estimate/{kind}/{name}": name for name in estimates}))
     metadata = {"replay": finite(log_figures(replayed))}
-    return Trajectory(columns if len(log) > LONG else dict(columns), metadata, Layout(names, extra))
-
-
-def _record(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:
-    from cmg_mj.replay.recording import write_replay  # 0.4 s of import, needed only here
-
-    write_replay(path, replays, names, settings_toml)
+    return Trajectory(columns if len(log) > LONG else dict(columns), metadata, Layout(names, extra, ()))

@@ -23,31 +23,30 @@ NOISES = ("accelerometer", "tilt", "acceleration")
 """Names of `--noise`."""
 
 
-def noise_of(
-    log: Log,
-    *,
-    accelerometer_ug_rthz: float | None = None,
-    tilt_deg: float | None = None,
-    acceleration_rad_s2: float | None = None,
-) -> TiltNoise:
-    """Return the sensors' noise that observers are told.
+def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> TiltNoise:
+    """Return the noise of a log's sensors that observers assume.
 
     Args:
-        log: With two accelerometers, both noises follow from theirs.
-        accelerometer_ug_rthz: Noise density of the accelerometers [ug/sqrt(Hz)]; their resolution is the bench's.
-        tilt_deg: One sample's standard deviation of another tilt [deg].
-        acceleration_rad_s2: One sample's of another angular acceleration [rad/s^2].
+        log: With two accelerometers, both noises follow from theirs, whose resolution is the bench's.
+        noises: Noises from `noise_numbers` that replace the assumed ones.
 
     Returns:
         The noise of tilt and acceleration, and their correlation.
+
+    Raises:
+        InputError: A noise belongs to another sensor than the log's.
     """
+    noises = noises or {}
     if log.tilt is not None:
-        density = NOISE_DENSITY_UG_RTHZ if accelerometer_ug_rthz is None else accelerometer_ug_rthz
+        if {"tilt", "acceleration"} & noises.keys():
+            raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
+        density = noises.get("accelerometer", NOISE_DENSITY_UG_RTHZ)
         sensor = Accelerometer(rate_hz=1.0 / log.dt, noise_density_ug_rthz=density)
         return dataclasses.replace(log.tilt.noise(sensor.sample_sigma, STANDARD_GRAVITY), gimbal=Encoder().sample_sigma)
-    tilt = TILT_NOISE_DEG if tilt_deg is None else tilt_deg
-    acceleration = ACCELERATION_NOISE_RAD_S2 if acceleration_rad_s2 is None else acceleration_rad_s2
-    return TiltNoise(math.radians(tilt), acceleration, 0.0, Encoder().sample_sigma)
+    if "accelerometer" in noises:
+        raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
+    acceleration = noises.get("acceleration", ACCELERATION_NOISE_RAD_S2)
+    return TiltNoise(math.radians(noises.get("tilt", TILT_NOISE_DEG)), acceleration, 0.0, Encoder().sample_sigma)
 
 
 def noise_numbers(text: str) -> dict[str, float]:
@@ -57,19 +56,3 @@ def noise_numbers(text: str) -> dict[str, float]:
         if not value > 0.0:
             raise InputError(f"--noise {name}={value:g}: must be greater than 0")
     return noises
-
-
-def noise_from(log: Log, noises: Mapping[str, float]) -> TiltNoise | None:
-    """Return the noise of a user's log from `noise_numbers`; None without any."""
-    if not noises:
-        return None
-    if log.tilt is not None and ({"tilt", "acceleration"} & noises.keys()):
-        raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
-    if log.tilt is None and "accelerometer" in noises:
-        raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
-    return noise_of(
-        log,
-        accelerometer_ug_rthz=noises.get("accelerometer"),
-        tilt_deg=noises.get("tilt"),
-        acceleration_rad_s2=noises.get("acceleration"),
-    )

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+METADATA_KEY = b"cmg_mj"
+"""The key of what cmg_mj says of a table, as JSON, in the metadata of its Parquet file."""
 
 
 def is_plain_file(path: Path) -> bool:
@@ -45,31 +49,39 @@ def write_bytes(path: Path, content: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def write_parquet(path: Path, table: pa.Table, *, durable: bool = False) -> None:
+def write_parquet(
+    path: Path, table: pa.Table, metadata: Mapping[str, Any] | None = None, *, durable: bool = False
+) -> None:
     """Write a table as Parquet.
 
     Args:
         path: The file.
         table: The table.
+        metadata: What the file says of the table beside it; by default nothing.
         durable: Whether the file must outlast a power cut.
     """
-    write_row_groups(path, [table], durable=durable)
+    write_row_groups(path, [table], metadata, durable=durable)
 
 
-def write_row_groups(path: Path, tables: Iterable[pa.Table], *, durable: bool = False) -> None:
+def write_row_groups(
+    path: Path, tables: Iterable[pa.Table], metadata: Mapping[str, Any] | None = None, *, durable: bool = False
+) -> None:
     """Write tables with the same columns as one Parquet file, a row group each.
 
     Args:
         path: The file.
         tables: The tables, at least one; each is written before the next is asked for.
+        metadata: What the file says of the table beside it; by default nothing.
         durable: Whether the file must outlast a power cut.
     """
     import pyarrow.parquet as pq
 
+    stored = None if metadata is None else {METADATA_KEY: json.dumps(metadata).encode()}
     # Opened here: Arrow takes no path with bytes that are no UTF-8.
     with whole_file(path) as temporary, temporary.open("wb") as file:
         writer = None
-        for table in tables:
+        for rows in tables:
+            table = rows if stored is None else rows.replace_schema_metadata(stored)
             writer = writer or pq.ParquetWriter(file, table.schema)
             writer.write_table(table)
         assert writer is not None

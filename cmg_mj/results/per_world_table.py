@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
-from cmg_mj.results.files import write_parquet
 from cmg_mj.results.summary_keys import Summary
 
 if TYPE_CHECKING:
@@ -38,8 +35,3 @@ def as_table(rows: Iterable[Summary]) -> pa.Table:
     figures = dict.fromkeys(key for row in worlds for key in row if key not in ID_COLUMNS)
     schema = pa.schema([*ID_COLUMNS.items(), *((key, "float64") for key in figures)])
     return pa.table({name: [row.get(name) for row in worlds] for name in schema.names}, schema=schema)
-
-
-def save_table(path: Path, table: pa.Table, metadata: Mapping[str, Any]) -> None:
-    """Write the table as Parquet, whole or not at all."""
-    write_parquet(path, table.replace_schema_metadata({b"cmg_mj": json.dumps(metadata).encode()}))

@@ -1,4 +1,4 @@
-"""How the worlds of a run ended, and their numbers."""
+"""Outcomes and figures of the worlds of a run."""
 
 from __future__ import annotations
 

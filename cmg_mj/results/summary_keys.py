@@ -11,7 +11,7 @@ Figures = dict[str, float | None]
 SummaryValue: TypeAlias = "float | str | Sequence[SummaryValue] | Mapping[str, SummaryValue] | None"
 """A number, a text, or a part of a summary."""
 Summary = dict[str, SummaryValue]
-"""What `--json` prints of a run or of an observer of a comparison."""
+"""Figures of a run, or of an observer of a comparison, as `--json` prints them."""
 
 
 class Key(NamedTuple):

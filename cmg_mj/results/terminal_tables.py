@@ -11,10 +11,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from cmg_mj.controllers.laws.registry import OF_LAWS
 from cmg_mj.inputs.bundled import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
-from cmg_mj.observers.registry import OF_OBSERVERS
 from cmg_mj.results import markdown
 from cmg_mj.results.summary_keys import (
     AXES,
@@ -148,12 +146,7 @@ def summary_table(summary: Mapping[str, SummaryValue]) -> Group:
     ends = {"done": "stood to the end, {:g} s", "fell": "fell at {:.2f} s"}
     outcome = str(summary["outcome"])
     end = ends.get(outcome, outcome + " at {:g} s").format(summary["end_time_s"])
-    table = Table(
-        title=_title(run_title(summary)),
-        box=box.SIMPLE_HEAD,
-        title_justify="left",
-        show_header=False,
-    )
+    table = Table(title=_title(run_title(summary)), box=box.SIMPLE_HEAD, title_justify="left", show_header=False)
     axes = section(summary, AXES) or {"": summary}
     table.show_header = len(axes) > 1
     table.add_column()
@@ -191,17 +184,8 @@ def scenario_list() -> str:
     return "\n".join(["Scenarios", *(f"  {name:{width}}  {load_scenario(name).title}" for name in names)])
 
 
-def observer_list() -> str:
-    """List every observer, the defaults of its parameters, and its description."""
-    return _class_list(OF_OBSERVERS)
-
-
-def law_list() -> str:
-    """List every control law, the defaults of its parameters, and its description."""
-    return _class_list(OF_LAWS)
-
-
-def _class_list(kind: UserClassKind) -> str:
+def class_list(kind: UserClassKind) -> str:
+    """List every observer, or every control law, the defaults of its parameters, and its description."""
     width = max(len(name) for name in kind.known)
     lines = [f"{kind.what.capitalize()}s, and the defaults of their parameters (--set {kind.section}.NAME=VALUE)"]
     for name in kind.known:

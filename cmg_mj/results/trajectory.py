@@ -6,12 +6,13 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, NotRequired, TypedDict
+from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.results.files import write_row_groups
+from cmg_mj.results.files import METADATA_KEY, write_row_groups
 from cmg_mj.results.stored_columns import STRETCH, StoredColumns, number_of_rows, select_rows
 
 SIGNALS = (
@@ -47,17 +48,6 @@ RATES["free"] = (*(f"velocity/{{}}/{part}_m_s" for part in "xyz"), *RATES["ball"
 """Columns of a joint by its kind, in the order of qvel; angular velocities are in the body's own axes."""
 
 
-class StoredLayout(TypedDict):
-    """A `Layout` as JSON has it."""
-
-    observers: list[str]
-    extra_signals: list[list[str]]
-    joints: list[str]
-    kinds: NotRequired[list[str]]
-    axes: NotRequired[list[StoredLayout]]
-    name: NotRequired[str]
-
-
 @dataclass(frozen=True)
 class Layout:
     """The observers, joints and axes that a trajectory has columns of.
@@ -71,9 +61,9 @@ class Layout:
         name: The axis' name.
     """
 
-    observers: tuple[str, ...] = ()
-    extra_signals: tuple[tuple[str, ...], ...] = ()
-    joints: tuple[str, ...] = ()
+    observers: tuple[str, ...]
+    extra_signals: tuple[tuple[str, ...], ...]
+    joints: tuple[str, ...]
     kinds: tuple[str, ...] = ()
     axes: tuple[Layout, ...] = ()
     name: str = ""
@@ -95,6 +85,10 @@ class Layout:
         """List all columns after `time_s`, in order."""
         return [*self._signals(), *self.positions(), *self.rates()]
 
+    def named(self, columns: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+        """Name the columns after `time_s`, given in order."""
+        return dict(zip(self.columns(), columns, strict=True))
+
     def _signals(self) -> list[str]:
         """List the columns that are no joints'."""
         if self.axes:
@@ -105,18 +99,6 @@ class Layout:
             for name in (*ESTIMATES, *more)
         ]
         return [*SIGNALS, *estimates]
-
-    @staticmethod
-    def loaded(stored: StoredLayout) -> Layout:
-        """Make a layout from what `asdict`, then JSON made of one."""
-        return Layout(
-            tuple(stored["observers"]),
-            tuple(map(tuple, stored["extra_signals"])),
-            tuple(stored["joints"]),
-            tuple(stored.get("kinds", ())),
-            tuple(map(Layout.loaded, stored.get("axes", ()))),
-            stored.get("name", ""),
-        )
 
 
 @dataclass(frozen=True)
@@ -132,7 +114,7 @@ class Trajectory:
 
     columns: Mapping[str, np.ndarray]
     metadata: Mapping[str, Any] = field(default_factory=dict)
-    layout: Layout = field(default_factory=Layout)
+    layout: Layout = Layout((), (), ())
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]
@@ -232,10 +214,8 @@ class Trajectory:
         """Write one world's trajectory as Parquet, a row group a stretch, whole or not at all."""
         import pyarrow as pa
 
-        stored = {"layout": asdict(self.layout), **self.metadata}
-        metadata = {b"cmg_mj": json.dumps(stored).encode()}
         tables = (pa.table(dict(self.rows(rows).columns)) for rows in self.stretches())
-        write_row_groups(path, (table.replace_schema_metadata(metadata) for table in tables))
+        write_row_groups(path, tables, {"layout": asdict(self.layout), **self.metadata})
 
     @staticmethod
     def load(path: Path) -> Trajectory:
@@ -258,12 +238,12 @@ class Trajectory:
                 table = pq.read_table(file)
         except (OSError, pa.ArrowException) as error:
             raise InputError(f"{path}: not a trajectory: {' '.join(str(error).split())}") from error
-        text = (table.schema.metadata or {}).get(b"cmg_mj")
+        text = (table.schema.metadata or {}).get(METADATA_KEY)
         if text is None or "time_s" not in table.column_names:
             raise InputError(f"{path}: a Parquet file, but not a trajectory written by cmg-mj")
         try:
             stored = json.loads(text)
-            layout = Layout.loaded(stored.pop("layout"))
+            layout = TypeAdapter(Layout).validate_python(stored.pop("layout"))
         except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise InputError(
                 f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"

@@ -39,7 +39,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
     changes = settings.changes()
     rows = [
         ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
-        ("plant", f"{fields['plant']['model']}, cubes: {', '.join(rig.modules)}"),
+        ("plant", f"{fields['plant']['model']}, modules: {', '.join(rig.modules)}"),
         *([("", assignments(changes))] if changes else []),
         ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
         *_law_rows(scenario, design, rig, fields["controller"]),
@@ -103,7 +103,7 @@ def rig_description(name: str, scenario: Scenario, design: Design, rig: PlantPar
     reduced = rig.reduced
     share = f", for one of {reduced.gimbals} gimbals" if reduced.gimbals > 1 else ""
     rows = [
-        ("cubes", ", ".join(rig.modules)),
+        ("modules", ", ".join(rig.modules)),
         ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
         ("", f"omega_d = {reduced.omega_d:.6g} rad/s, m g l/sqrt(2) = {reduced.gravity_torque:.6g} N m"),
         ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),

@@ -12,14 +12,14 @@ from cmg_mj.controllers.dry_run import dry_run_law, dry_run_observer
 from cmg_mj.controllers.integrator_trim import integrator_trim
 from cmg_mj.controllers.laws import LAWS, Law
 from cmg_mj.controllers.laws.protocol import NEEDS, needs
-from cmg_mj.controllers.laws.registry import OF_LAWS
+from cmg_mj.controllers.laws.registry import LAW_CLASSES
 from cmg_mj.controllers.make_controller import make_controller
 from cmg_mj.controllers.processor import Processor
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.observers.registry import OF_OBSERVERS
+from cmg_mj.observers.registry import OBSERVER_CLASSES
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.sensors.sampled import Sensors
@@ -155,18 +155,18 @@ def _check(scenario: Scenario) -> None:
     names += [("compare.observers", name) for name in (scenario.compare.names() if scenario.compare else ())]
     for field, name in names:
         try:
-            OF_OBSERVERS.find(name)
+            OBSERVER_CLASSES.find(name)
         except InputError as error:
             raise InputError(str(error).replace("observer.kind = ", f"{field}: ", 1)) from error
-    OF_OBSERVERS.check_types(scenario.observer.kind, scenario.observer.parameters)
+    OBSERVER_CLASSES.check_types(scenario.observer.kind, scenario.observer.parameters)
     controller = scenario.controller
     kind, parameters = controller.kind, controller.parameters
-    law = OF_LAWS.find(kind)
-    OF_LAWS.check_types(kind, parameters)
-    for clause in OF_LAWS.unknown(kind, parameters, ControllerSettings.model_fields):
+    law = LAW_CLASSES.find(kind)
+    LAW_CLASSES.check_types(kind, parameters)
+    for clause in LAW_CLASSES.unknown(kind, parameters, ControllerSettings.model_fields):
         raise InputError(clause)
     gains = next((name for name in ("gains", "lqr") if getattr(controller, name) is not None), None)
-    if gains and not OF_LAWS.may_take(kind, "gains"):
+    if gains and not LAW_CLASSES.may_take(kind, "gains"):
         raise InputError(f"controller.{gains}: {kind} takes no gains; leave it out")
     try:
         unused = () if needs(law) == NEEDS else ("feedback", "angle_source")

@@ -9,7 +9,7 @@ from pathlib import PurePath
 from cmg_mj.errors import TomlValue
 
 LONGEST_NAME = 60
-"""Of the differences in a folder's name [characters]."""
+"""Longest text of the differences in a folder's name [characters]."""
 SHOWN = 3
 """So many differences are shown in one line."""
 

@@ -14,7 +14,7 @@ from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.field_types import STRICT, Batched, Duration, GridDuration, GridInstant, Instant
 
 AFTER_PUSH_S = 1.0
-"""What an estimate is worth shows from a push's start until so long after its end [s]: at other times the rig hardly
+"""Estimates are judged from a push's start until so long after its end [s]: at other times the rig hardly
 moves, and an estimate of zero does well."""
 
 Window = tuple[float, float]

@@ -12,6 +12,7 @@ from typing import Any
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import bundled, find, folder
 from cmg_mj.inputs.overrides import override
+from cmg_mj.inputs.sanity import read_text
 from cmg_mj.scenario.schema import ControllerSettings, ObserverSettings, Scenario, parse_scenario
 
 LARGEST_FILE = 1_000_000
@@ -84,26 +85,18 @@ def _kind_of(fields: Mapping[str, Any], section: str) -> Any:
 
 def _read(path: Path, name: str) -> dict[str, Any]:
     """The content of a TOML file."""
+    text = read_text(path, name, LARGEST_FILE)
+    if text.lstrip().startswith("<"):
+        raise InputError(f"{name}: is XML, not a scenario; a scenario names its model with plant.model")
+    if _ENDLESS_KEY.search(text):
+        raise InputError(f"{name}: not valid TOML: a key of more than {MOST_PARTS} parts")
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError(f"{name}: larger than {LARGEST_FILE // 1000} kB, which no scenario is")
-        text = path.read_text(encoding="utf-8-sig")
-        if text.lstrip().startswith("<"):
-            raise InputError(f"{name}: is XML, not a scenario; a scenario names its model with plant.model")
-        if _ENDLESS_KEY.search(text):
-            raise InputError(f"{name}: not valid TOML: a key of more than {MOST_PARTS} parts")
         return tomllib.loads(text)
-    except UnicodeDecodeError as error:
-        raise InputError(f"{name}: not valid TOML: not UTF-8 text (at byte {error.start})") from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{name}: not valid TOML: {error}") from error
     except RecursionError as error:
         raise InputError(f"{name}: not valid TOML: brackets in one another without end") from error
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read: {error.strerror}") from error
     except ValueError as error:
-        if isinstance(error, InputError):
-            raise
         raise InputError(f"{name}: not valid TOML: a number of too many digits, or no date") from error
 
 

@@ -11,12 +11,11 @@ from typing import Any, TypeGuard
 
 import tomli_w
 
-from cmg_mj.controllers.laws.registry import BENCH_PARAMETERS as GIVEN_TO_LAWS
+from cmg_mj.controllers.laws import LAW_CLASSES
 from cmg_mj.errors import TomlValue
 from cmg_mj.inputs.bundled import folder
-from cmg_mj.inputs.field_types import NoEffect
-from cmg_mj.inputs.marks import marked_fields
-from cmg_mj.observers import BENCH_PARAMETERS
+from cmg_mj.inputs.field_types import NoEffect, marked_fields
+from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.scenario.schema import ALL_AXES_LAW_FIELDS, AxisPlant, AxisSettings, ControllerSettings, Scenario
@@ -65,7 +64,7 @@ def _resolved(scenario: Scenario, design: Design) -> dict[str, Any]:
     fields["plant"] = {
         field.name: plant[field.name] for field in dataclasses.fields(PlantSettings) if field.name in plant
     }
-    law = _parameters(scenario.controller.parameters, design.law, GIVEN_TO_LAWS)
+    law = _parameters(scenario.controller.parameters, design.law, LAW_CLASSES.bench_parameters)
     controller = fields["controller"] | law
     if "gains" in law:
         controller.pop("lqr", None)  # they have been solved for
@@ -74,7 +73,7 @@ def _resolved(scenario: Scenario, design: Design) -> dict[str, Any]:
     fields["open_loop_observers"] = scenario.open_loop_names()
     fields["observer"] = {
         "kind": scenario.observer.kind,
-        **_parameters(scenario.observer.parameters, design.observer(), BENCH_PARAMETERS),
+        **_parameters(scenario.observer.parameters, design.observer(), OBSERVER_CLASSES.bench_parameters),
     }
     for rare in ("axes", "swing"):
         if not fields[rare]:

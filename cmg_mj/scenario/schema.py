@@ -1,10 +1,10 @@
-"""What a scenario file may say: its sections and fields, their types, limits and defaults; and how it is checked."""
+"""The schema of scenario files: sections and fields, their types, limits, defaults and checks."""
 
 from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, Self
 
@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.controllers.controller import AngleSource, Feedback
 from cmg_mj.controllers.laws import LAWS, Law, lqr_gains, make_law, scaled_gains
-from cmg_mj.controllers.laws.registry import OF_LAWS
+from cmg_mj.controllers.laws.registry import LAW_CLASSES
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.field_types import (
     STRICT,
@@ -29,8 +29,8 @@ from cmg_mj.inputs.field_types import (
     Positive,
     Rate,
     WhateverTheLaw,
+    marked_fields,
 )
-from cmg_mj.inputs.marks import marked_fields
 from cmg_mj.inputs.messages import complaint, fields_of
 from cmg_mj.inputs.sanity import out_of_size, unreadable
 from cmg_mj.inputs.user_classes import as_json
@@ -277,31 +277,30 @@ class Scenario(BaseModel):
 
         On a rig of several axes it is that of all: what an axis has of another's own goes.
         """
-        common = self.observer.kind
-        axes = {
-            name: settings
-            if settings.observer.get("kind", common) == kind
-            else settings.model_copy(update={"observer": {}})
-            for name, settings in self.axes.items()
-        }
+        common, axes = self.observer.kind, self._axes_with_kind("observer", kind)
         observer = self.observer if kind == common else ObserverSettings(kind=kind)
         return self.model_copy(update={"observer": observer, "axes": axes})
 
     def with_law(self, kind: str) -> Scenario:
         """The same experiment with another control law, with its default parameters, on all axes."""
-        common = self.controller.kind
-        axes = {
-            name: settings
-            if settings.controller.get("kind", common) == kind
-            else settings.model_copy(
-                update={"controller": {n: v for n, v in settings.controller.items() if n in COMMON_LAW_FIELDS}}
-            )
-            for name, settings in self.axes.items()
-        }
+        common, axes = self.controller.kind, self._axes_with_kind("controller", kind, COMMON_LAW_FIELDS)
         if kind == common:
             return self.model_copy(update={"axes": axes})
         fields: dict[str, Any] = {name: getattr(self.controller, name) for name in COMMON_LAW_FIELDS}
         return self.model_copy(update={"controller": ControllerSettings(**fields, kind=kind), "axes": axes})
+
+    def _axes_with_kind(
+        self, section: Literal["observer", "controller"], kind: str, shared: Collection[str] = ()
+    ) -> dict[str, AxisSettings]:
+        """The settings of the axes; of a section of another kind the fields that all kinds share are left."""
+        is_observer, axes = section == "observer", dict(self.axes)
+        common = self.observer.kind if is_observer else self.controller.kind
+        for name, settings in self.axes.items():
+            fields = settings.observer if is_observer else settings.controller
+            if fields.get("kind", common) != kind:
+                fields = {field: value for field, value in fields.items() if field in shared}
+                axes[name] = settings.model_copy(update={section: fields})
+        return axes
 
     def open_loop_names(self) -> list[str]:
         """The open-loop observers, spelled out, without the observer itself."""
@@ -345,7 +344,7 @@ def _unknown_to_bench_law(fields: Mapping[str, Any]) -> list[str]:
         return []
     kind = section.get("kind", ControllerSettings().kind)
     is_bench_law = isinstance(kind, str) and kind in LAWS
-    return OF_LAWS.unknown(kind, section, ControllerSettings.model_fields) if is_bench_law else []
+    return LAW_CLASSES.unknown(kind, section, ControllerSettings.model_fields) if is_bench_law else []
 
 
 def _merged(common: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:

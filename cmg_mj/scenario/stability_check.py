@@ -1,4 +1,4 @@
-"""Whether the gains suit the rig: the control law on its reduced model, sampled and delayed as the scenario says."""
+"""Checks the gains against the rig: the control law on its reduced model, sampled and delayed as the scenario says."""
 
 from __future__ import annotations
 

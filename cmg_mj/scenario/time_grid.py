@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.field_types import OnGrid
-from cmg_mj.inputs.marks import marked_values
+from cmg_mj.inputs.field_types import OnGrid, marked_values
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.timing import whole_steps
 
@@ -18,9 +17,9 @@ FINEST_S = 1e-4
 SWING_SHARE = 10.0
 """A swinging torque has at least so many samples a period."""
 MOST_TICKS = 2_000_000
-"""Of a run; one takes about 1.5 kB of memory until the recording is written."""
+"""Most ticks of a run; a tick takes about 1.5 kB of memory until the recording is written."""
 MOST_STEPS = 1_000_000_000
-"""Of a run; so many take hours."""
+"""Most physics steps of a run; so many take hours."""
 _LARGEST_DENOMINATOR = 10**9  # 1/3 s as a float is the fraction 1/3
 
 

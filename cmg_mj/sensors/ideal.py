@@ -1,4 +1,4 @@
-"""What perfect sensors would show."""
+"""Readings of perfect sensors."""
 
 from __future__ import annotations
 

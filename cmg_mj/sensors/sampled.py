@@ -6,6 +6,7 @@ import itertools
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -24,7 +25,7 @@ from cmg_mj.sensors.noise_streams import NoiseStream, normals
 from cmg_mj.sensors.timing import steps_until, whole_steps
 
 Reading = TypeVar("Reading")
-"""What a sensor delivers: a number, one a gimbal, or the forces of the accelerometers."""
+"""A sensor's reading: a number, a number for each gimbal, or the forces of the accelerometers."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -42,6 +43,10 @@ class Sensors:
     encoder: Encoder = Field(default_factory=Encoder)
     fog: Fog = Field(default_factory=Fog)
     mems_gyro: MemsGyro = Field(default_factory=MemsGyro)
+
+    def with_noise_density(self, ug_rthz: float) -> Sensors:
+        """Return the sensors with another noise density of the accelerometers [ug/sqrt(Hz)]."""
+        return replace(self, accelerometer=replace(self.accelerometer, noise_density_ug_rthz=ug_rthz))
 
 
 class SampledSensor(Generic[Reading]):
@@ -185,18 +190,14 @@ def sampled_sensors(
         return normals(seed, worlds, stream.on_axis(axis), channels) if channels else itertools.repeat(())
 
     pair = sensors.accelerometer
-    drift = (
-        _flicker_source(pair, noise(NoiseStream.FLICKER, len(CORNERS_HZ) * pair.channels))
-        if pair.bias_instability_ug
-        else None
-    )
+    flicker_noise = noise(NoiseStream.FLICKER, len(CORNERS_HZ) * pair.channels)
+    drift = _flicker_source(pair, flicker_noise) if pair.bias_instability_ug else None
     kind = UnevenPair if pair.skew_s or pair.bandwidth_hz else SampledSensor[Forces]
     encoder, fog = sensors.encoder, sensors.fog
-    of_pair = noise(NoiseStream.ACCELEROMETER, pair.channels)
-    of_encoder = noise(NoiseStream.ENCODER, encoder.channels)
-    of_fog = noise(NoiseStream.FOG, fog.channels)
+    pair_noise = noise(NoiseStream.ACCELEROMETER, pair.channels)
+    encoder_noise, fog_noise = noise(NoiseStream.ENCODER, encoder.channels), noise(NoiseStream.FOG, fog.channels)
     return (
-        kind(pair, timestep, of_pair, "sensors.accelerometer", pair.make_reading_function(drift)),
-        SampledSensor(encoder, timestep, of_encoder, "sensors.encoder", encoder.make_reading_function()),
-        SampledSensor(fog, timestep, of_fog, "sensors.fog", fog.make_reading_function()),
+        kind(pair, timestep, pair_noise, "sensors.accelerometer", pair.make_reading_function(drift)),
+        SampledSensor(encoder, timestep, encoder_noise, "sensors.encoder", encoder.make_reading_function()),
+        SampledSensor(fog, timestep, fog_noise, "sensors.fog", fog.make_reading_function()),
     )

@@ -6,23 +6,20 @@ import copy
 import dataclasses
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypedDict
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.laws import Law, law_class
-from cmg_mj.controllers.laws.registry import OF_LAWS
-from cmg_mj.elementwise import Scalar
+from cmg_mj.controllers.controller import PlantInterface
+from cmg_mj.controllers.laws import LAW_CLASSES, Law
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.inputs.field_types import Batched, NoEffect
-from cmg_mj.inputs.marks import marked_fields
-from cmg_mj.observers.registry import takes_noise
+from cmg_mj.inputs.field_types import Batched, NoEffect, marked_fields
+from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.batch_values import batch_values
 
 BATCHED_FIELDS = marked_fields(Scenario, Batched)
@@ -35,28 +32,17 @@ class KeyPart(NamedTuple):
     """One of the things that worlds of one batch have in common.
 
     Attributes:
-        kind: A field of the scenario, the reduced model, or the noise that an observer or the law gets.
-        name: The field, or the observer.
+        words: A field of the scenario, or the part in words.
         axis: The axis, of several.
+        is_of_observer: Whether the part changes neither the physics nor the sensors nor the law.
     """
 
-    kind: Literal["field", "reduced model", "noise of observer", "noise of law"]
-    name: str = ""
-    axis: str = ""
-
-    @property
-    def is_of_observer(self) -> bool:
-        """Return whether the part changes neither the physics nor the sensors nor the law."""
-        return self.kind == "noise of observer" or (self.kind == "field" and self.name.partition(".")[0] == "observer")
+    words: str
+    axis: str
+    is_of_observer: bool = False
 
     def __str__(self) -> str:
-        words = {
-            "field": self.name,
-            "reduced model": "the reduced model",
-            "noise of observer": f"the sensors' noise, which {self.name} is told,",
-            "noise of law": "the noise that the law is told",
-        }[self.kind]
-        return f"axes.{self.axis}.{words}" if self.axis else words
+        return f"axes.{self.axis}.{self.words}" if self.axis else self.words
 
 
 @dataclass(frozen=True)
@@ -75,30 +61,12 @@ class BatchKey:
         return BatchKey(tuple((part, value) for part, value in self.parts if not part.is_of_observer))
 
 
-class PlantStructure(NamedTuple):
-    """Common properties of the plants of one batch."""
-
-    timestep: float
-    integrator: int
-    joints: tuple[str, ...]
-    joint_kinds: tuple[str, ...]
+PlantStructure = tuple[float, int, tuple[str, ...], tuple[str, ...]]
+"""Common properties of the plants of one batch: physics step, integrator, joints and their kinds."""
 
 
-class PlantOptions(TypedDict):
-    """Options of a controller of many worlds that come from an axis of their plants."""
-
-    tilt: RadialTilt
-    backlash: Scalar
-    axis: int
-
-
-class AxisPart(NamedTuple):
-    """An axis of an experiment."""
-
-    scenario: Scenario
-    design: Design
-    axis: str
-    """Its name; empty on a plant of one axis."""
+AxisPart = tuple[Scenario, Design, str]
+"""An axis of an experiment: its scenario, its design, its name, which is empty on a plant of one axis."""
 
 
 def batch_key(parts: Sequence[AxisPart]) -> BatchKey:
@@ -110,14 +78,14 @@ def _key_parts(scenario: Scenario, design: Design, axis: str) -> Iterator[tuple[
     law = scenario.controller.kind
     for field, value in _leaves(scenario.as_fields()):
         if field.partition(".")[0] not in UNUSED and not can_vary_in_batch(field, law):
-            yield KeyPart("field", field, axis), hashable(value)
+            yield KeyPart(field, axis, field.partition(".")[0] == "observer"), hashable(value)
     _, model, noise = design.constructor_arguments
-    yield KeyPart("reduced model", axis=axis), model
+    yield KeyPart("the reduced model", axis), model
     for observer in (scenario.observer.kind, *scenario.open_loop_names()):
-        if takes_noise(observer):
-            yield KeyPart("noise of observer", observer, axis), noise
-    if "noise" in OF_LAWS.takes(law):
-        yield KeyPart("noise of law", axis=axis), noise
+        if "noise" in OBSERVER_CLASSES.takes(observer):
+            yield KeyPart(f"the sensors' noise, which {observer} is told,", axis, is_of_observer=True), noise
+    if "noise" in LAW_CLASSES.takes(law):
+        yield KeyPart("the noise that the law is told", axis), noise
 
 
 def _leaves(fields: Any, at: str = "") -> Iterator[tuple[str, Any]]:
@@ -144,7 +112,9 @@ def can_vary_in_batch(field: str, law: str) -> bool:
     parts = [part for part in field.split(".") if not part.isdecimal()]
     names = [".".join(parts[: i + 1]) for i in range(len(parts))]
     mark = next((BATCHED_FIELDS[name] for name in names if name in BATCHED_FIELDS), None)
-    return mark is not None and (mark.law_field is None or mark.law_field in getattr(law_class(law), "arrays", ()))
+    if mark is None or mark.law_field is None:
+        return mark is not None
+    return mark.law_field in getattr(LAW_CLASSES.find(law), "arrays", ())
 
 
 def varied_settings(vary: Mapping[str, Sequence[Any] | np.ndarray], scenario: Scenario) -> list[dict[str, Any]]:
@@ -169,13 +139,19 @@ def varied_settings(vary: Mapping[str, Sequence[Any] | np.ndarray], scenario: Sc
 def plant_structure(plant: Plant) -> PlantStructure:
     """Find what a plant has in common with all that may run with it."""
     options = plant.model.opt
-    return PlantStructure(options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds)
+    return options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds
 
 
-def plant_options(plants: Sequence[Plant], axis: int) -> PlantOptions:
-    """Find what a controller of many worlds has of an axis of their plants."""
-    tilt = batch_values([plant.axes[axis].radial_tilt for plant in plants])
-    return {"tilt": tilt, "backlash": batch_values([plant.backlash for plant in plants]), "axis": axis}
+def batched_interface(plant: Plant, plants: Sequence[Plant], axis: int) -> PlantInterface:
+    """Combine the properties that a controller of many worlds knows of an axis.
+
+    Args:
+        plant: The plant with that axis alone.
+        plants: The plant of each world.
+        axis: The number of the axis.
+    """
+    tilt = batch_values([world_plant.axes[axis].radial_tilt for world_plant in plants])
+    return plant.interface._replace(tilt=tilt, backlash=batch_values([world_plant.backlash for world_plant in plants]))
 
 
 def require_same_structure(plants: Sequence[Plant], worlds: int, scenario_plant: Plant | None = None) -> None:
@@ -189,9 +165,7 @@ def require_same_structure(plants: Sequence[Plant], worlds: int, scenario_plant:
         )
 
 
-def batched(
-    worlds: Sequence[tuple[Law, Sensors, tuple[Push, ...]]],
-) -> tuple[Law, Sensors, tuple[Push, ...]]:
+def batched(worlds: Sequence[tuple[Law, Sensors, tuple[Push, ...]]]) -> tuple[Law, Sensors, tuple[Push, ...]]:
     """Law, sensors and pushes of many worlds as one, with arrays (n_worlds,) where they differ."""
     laws, sensors, pushes = zip(*worlds, strict=True)
     return _batched_law(laws), batch_values(sensors), tuple(batch_values(push) for push in zip(*pushes, strict=True))

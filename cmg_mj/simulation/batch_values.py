@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,14 +29,13 @@ def batch_values(values: Sequence[T]) -> T:
     if all(value is first or value == first for value in values):
         return first
     if dataclasses.is_dataclass(first):
-        instance = object.__new__(type(first))
+        fields = {}
         for field in dataclasses.fields(first):
             try:
-                of_all = batch_values([getattr(value, field.name) for value in values])
+                fields[field.name] = batch_values([getattr(value, field.name) for value in values])
             except InputError as error:
                 raise InputError(f"{field.name}: {error}") from error
-            object.__setattr__(instance, field.name, of_all)
-        return instance  # type: ignore[return-value]
+        return _with_fields(type(first), fields)  # type: ignore[return-value]
     if isinstance(first, tuple) and {len(value) for value in values} == {len(first)}:  # type: ignore[arg-type]
         return tuple(map(batch_values, zip(*values, strict=True)))  # type: ignore[call-overload,return-value]
     if not all(type(value) in (int, float) for value in values):
@@ -70,7 +69,12 @@ def value_of_world(value: T, world: int) -> T:
     parts = {field.name: value_of_world(getattr(value, field.name), world) for field in dataclasses.fields(value)}
     if all(part is getattr(value, name) for name, part in parts.items()):
         return value
-    instance = object.__new__(type(value))
-    for name, part in parts.items():
-        object.__setattr__(instance, name, part)
-    return instance  # type: ignore[return-value]
+    return _with_fields(type(value), parts)
+
+
+def _with_fields(cls: type[T], fields: Mapping[str, Any]) -> T:
+    """Make a frozen dataclass without checking its fields anew."""
+    instance = object.__new__(cls)
+    for name, value in fields.items():
+        object.__setattr__(instance, name, value)
+    return instance

@@ -20,7 +20,7 @@ from cmg_mj.simulation.experiment import Experiment, batch_inputs, once, run_bat
 from cmg_mj.simulation.simulate import SimulationOptions
 
 MOST_WORLDS = 1024
-"""Of one batch: beyond, Python's share of a world no longer falls and memory grows."""
+"""Most worlds of one batch: beyond, Python's share of a world no longer falls and memory grows."""
 
 
 class BatchJob(NamedTuple):
@@ -120,12 +120,8 @@ def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
         yield batch
 
 
-class SharedKey(NamedTuple):
-    """Key that jobs with different observers share."""
-
-    key: BatchKey
-    plant: PlantStructure
-    extra_signals: tuple[str, ...]
+SharedKey = tuple[BatchKey, PlantStructure, tuple[str, ...]]
+"""Key that jobs with different observers share; the last part is their extra signals."""
 
 
 def _shared_key(job: BatchJob) -> SharedKey | None:
@@ -134,7 +130,7 @@ def _shared_key(job: BatchJob) -> SharedKey | None:
     if first.axes or first.scenario.open_loop_names() or len({one.batch_key for one in once(job.experiments)}) > 1:
         return None
     key = first.batch_key.without_observer()
-    return SharedKey(key, plant_structure(first.plant), extra_signals(first.design.observer()))
+    return key, plant_structure(first.plant), extra_signals(first.design.observer())
 
 
 def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[Result]:

@@ -13,9 +13,9 @@ import tomli_w
 
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law
-from cmg_mj.controllers.make_controller import AnyController, join_axes
+from cmg_mj.controllers.make_controller import AnyController
+from cmg_mj.controllers.multi_axis import MultiAxisController
 from cmg_mj.controllers.processor import Processor
-from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
@@ -29,24 +29,17 @@ from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.stability_check import hints
 from cmg_mj.scenario.time_grid import time_grid
-from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.batch import (
-    AxisPart,
     BatchKey,
     batch_key,
     batched,
+    batched_interface,
     hashable,
-    plant_options,
     require_same_structure,
     varied_settings,
 )
 from cmg_mj.simulation.prepare import check_axes, plant_on_grid
 from cmg_mj.simulation.simulate import SimulationOptions, simulate
-
-ON_THE_BOARD = "Run on the emulated board (docs/board.md), whose numbers are not quite the host's."
-ANOTHER_WORLD = "World {world}: its noise is not that of world 0."
-"""Above a scenario that does not rerun to the same numbers by itself."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,9 +74,8 @@ class Experiment:
     @property
     def observer_names(self) -> list[str]:
         """The observer in the loop, then the open-loop observers; of several axes the first one's."""
-        if self.axes:
-            return self.axes[0].observer_names
-        return [self.scenario.observer.kind, *self.scenario.open_loop_names()]
+        first = self.parts[0].scenario
+        return [first.observer.kind, *first.open_loop_names()]
 
     def controller(self, worlds: int | Sequence[int] = 0) -> AnyController:
         """Make a fresh controller.
@@ -94,31 +86,19 @@ class Experiment:
         Returns:
             The controller; of several axes a `MultiAxisController`.
         """
-        return self.of_axes([part.axis_controller(worlds, axis=i) for i, part in enumerate(self.parts)])
+        return self.of_axes(
+            [part.design.controller(part.plant.interface, worlds=worlds, axis=i) for i, part in enumerate(self.parts)]
+        )
 
     def axis_controller(
-        self,
-        worlds: int | Sequence[int] = 0,
-        processor: Processor | None = None,
-        *,
-        observer: Observer | None = None,
-        law: Law | None = None,
-        sensors: Sensors | None = None,
-        tilt: RadialTilt | None = None,
-        backlash: Scalar | None = None,
-        axis: int = 0,
+        self, worlds: int | Sequence[int] = 0, processor: Processor | None = None, observer: Observer | None = None
     ) -> Controller:
         """Make a fresh controller of the only axis.
 
         Args:
             worlds: The number of one world, or the numbers of many.
             processor: Takes the decisions in the host's place.
-            observer: Instead of the scenario's, as are the next four.
-            law: The control law.
-            sensors: The sensors.
-            tilt: The tilt estimate.
-            backlash: Between the servos' motors and the gimbals [rad].
-            axis: The number of the axis, on which the noise depends.
+            observer: Instead of the scenario's.
 
         Returns:
             The controller.
@@ -126,21 +106,15 @@ class Experiment:
         Raises:
             InputError: The plant has several axes.
         """
-        self.require_single_axis("one controller")
-        (part,) = self.parts
-        plant = part.plant.interface
-        plant = plant if tilt is None else plant._replace(tilt=tilt)
-        plant = plant if backlash is None else plant._replace(backlash=backlash)
-        return part.design.controller(
-            plant, worlds=worlds, axis=axis, processor=processor, observer=observer, law=law, sensors=sensors
-        )
+        part = self.require_single_axis("one controller")
+        return part.design.controller(part.plant.interface, worlds=worlds, processor=processor, observer=observer)
 
     def of_axes(self, controllers: Sequence[Controller]) -> AnyController:
-        """Join the controllers of the axes."""
-        compensate = self.scenario.controller.compensate_turning
-        several = len(controllers) > 1
-        coupling = self.plant.turning if several and compensate else None
-        return join_axes(controllers, coupling, self.scenario.sensors.mems_gyro)
+        """Join the controllers of the axes; of one axis its controller itself."""
+        if len(controllers) == 1:
+            return controllers[0]
+        coupling = self.plant.turning if self.scenario.controller.compensate_turning else None
+        return MultiAxisController(controllers, coupling, self.scenario.sensors.mems_gyro)
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world. Options are those of `simulate`."""
@@ -156,7 +130,6 @@ class Experiment:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
         from cmg_mj.codegen.board import Board
 
-        self.require_single_axis("a board or other processor")
         result = self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
         return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result
 
@@ -189,14 +162,17 @@ class Experiment:
             return run_batch(self.with_varied(vary), numbers, **options)
         plants = [self.plant] * len(numbers) if plants is None else list(plants)
         require_same_structure(plants, len(numbers), self.plant)
-        controllers = [part.axis_controller(numbers, **plant_options(plants, i)) for i, part in enumerate(self.parts)]
+        controllers = [
+            part.design.controller(batched_interface(part.plant, plants, i), worlds=numbers, axis=i)
+            for i, part in enumerate(self.parts)
+        ]
         return self.simulate(plants, self.of_axes(controllers), **options)
 
     @property
     def batch_key(self) -> BatchKey:
         """Key that its worlds share with all worlds that may run in one batch with them."""
         return batch_key(
-            [AxisPart(part.scenario, part.design, part.plant.axis.name if self.axes else "") for part in self.parts]
+            [(part.scenario, part.design, part.plant.axis.name if self.axes else "") for part in self.parts]
         )
 
     @property
@@ -216,10 +192,9 @@ class Experiment:
         Raises:
             InputError: There is no such field, a value is not allowed, or the lists differ in length.
         """
-        rows = varied_settings(vary, self.scenario)
-        keys = [hashable(row) for row in rows]
-        experiments = {key: self.with_settings(row) for key, row in dict(zip(keys, rows, strict=True)).items()}
-        return [experiments[key] for key in keys]
+        keyed = [(hashable(row), row) for row in varied_settings(vary, self.scenario)]
+        experiments = {key: self.with_settings(row) for key, row in dict(keyed).items()}
+        return [experiments[key] for key, _ in keyed]
 
     def with_settings(self, values: Mapping[str, Any]) -> Experiment:
         """The same with other values of some fields.
@@ -237,8 +212,7 @@ class Experiment:
         for name, value in values.items():
             assign(fields, name, value, f"vary: {name!r}")
         settings = ", ".join(f"{name}={value}" for name, value in values.items())
-        scenario = parse_scenario(fields, f"{self.scenario.source} with {settings}".strip())
-        return prepare(scenario, like=self.plant)
+        return prepare(parse_scenario(fields, f"{self.scenario.source} with {settings}".strip()), like=self.plant)
 
     def simulate(
         self,
@@ -273,8 +247,8 @@ class Experiment:
             **options,
         )
 
-    def require_single_axis(self, what: str) -> None:
-        """Refuse a plant of several axes.
+    def require_single_axis(self, what: str) -> Experiment:
+        """Return the experiment of the only axis, and refuse a plant of several.
 
         Args:
             what: The operation that takes one axis, for the message.
@@ -288,6 +262,7 @@ class Experiment:
                 f"{self.plant.path}: tilts about several axes ({', '.join(names)}), and {what} takes one; lock the "
                 f'others, as with --set plant.locked_axes=["{names[-1]}"]'
             )
+        return self.parts[0]
 
     @property
     def hints(self) -> list[str]:
@@ -327,17 +302,20 @@ class Experiment:
 
     def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
         """The resolved scenario: running it again gives the same run; its head says if that needs options."""
-        options = [(ON_THE_BOARD, "--driver board")] if driver == "board" else []
-        options += [(ANOTHER_WORLD.format(world=world), f"--world {world}")] if world else []
-        lines = [" ".join([*(why for why, _ in options), "To the same numbers it runs with"])]
-        lines += [" ".join(["    cmg-mj run scenario.toml", *(option for _, option in options)])]
-        head = "".join(f"# {line}\n" for line in lines) + "\n" if options else ""
+        why, command = "", "cmg-mj run scenario.toml"
+        if driver == "board":
+            why += "Run on the emulated board (docs/board.md), whose numbers are not quite the host's. "
+            command += " --driver board"
+        if world:
+            why += f"World {world}: its noise is not that of world 0. "
+            command += f" --world {world}"
+        head = f"# {why}To the same numbers it runs with\n#     {command}\n\n" if why else ""
         return head + tomli_w.dumps(self.resolved())
 
-    def save(self, path: Path, driver: Driver = "native", world: int = 0) -> None:
+    def save(self, path: Path) -> None:
         """Write it as TOML."""
         with whole_file(path) as temporary:
-            temporary.write_text(self.as_toml(driver, world), encoding="utf-8")
+            temporary.write_text(self.as_toml(), encoding="utf-8")
 
 
 def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None = None) -> Experiment:
@@ -359,13 +337,13 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
         plant = plant or plant_on_grid(scenario, grid, like)
         check_axes(scenario, plant)
     if len(plant.axes) == 1 and not scenario.axes:
-        return Experiment(scenario, plant, design(scenario, plant.parameters))
-    parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
-    axes = tuple(
-        Experiment(axis_scenario, axis_plant, design(axis_scenario, axis_plant.parameters))
-        for axis_scenario, axis_plant in parts
-    )
+        return _experiment_of_axis(scenario, plant)
+    axes = tuple(_experiment_of_axis(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names)
     return Experiment(scenario, plant, axes[0].design, axes)
+
+
+def _experiment_of_axis(scenario: Scenario, plant: Plant) -> Experiment:
+    return Experiment(scenario, plant, design(scenario, plant.parameters))
 
 
 def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:
@@ -403,16 +381,17 @@ def batch_inputs(
         worlds: The worlds' numbers.
         observer: The observer of all worlds instead of the first experiment's.
     """
-    plants = [experiment.plant for experiment in experiments]
-    first = experiments[0]
+    first, plants = experiments[0], [experiment.plant for experiment in experiments]
     controllers, pushes = [], ()
     for i, part in enumerate(first.parts):
         parts = [experiment.parts[i] for experiment in experiments]
         law, sensors, pushes = batched(
             [(one.design.fresh_law(), one.scenario.sensors, tuple(one.scenario.push)) for one in parts]
         )
-        options = plant_options(plants, i)
-        controllers.append(part.axis_controller(worlds, observer=observer, law=law, sensors=sensors, **options))
+        interface = batched_interface(part.plant, plants, i)
+        controllers.append(
+            part.design.controller(interface, worlds=worlds, axis=i, observer=observer, law=law, sensors=sensors)
+        )
     return plants, first.of_axes(controllers), pushes
 
 

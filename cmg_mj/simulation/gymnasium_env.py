@@ -18,6 +18,7 @@ from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.baselines import MEMS_GYRO, References
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
+from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.timing import whole_steps
 from cmg_mj.simulation.control_loop import ControlLoop
 from cmg_mj.simulation.experiment import Experiment, prepare
@@ -31,7 +32,7 @@ except ModuleNotFoundError as error:
 
 ID = "cmg_mj/ScissoredPair-v0"
 READINGS = ("mems_gyro", "acceleration", "fog")
-"""What can be observed beside y1 and y2."""
+"""Readings that can be observed beside y1 and y2."""
 STATE_COST = (100.0, 1.0, 1.0)
 """Weights of x1, x2, x3 in the reward; that of u is 1."""
 MOST = 1e6
@@ -144,9 +145,7 @@ class ScissoredPairEnv(gymnasium.Env):
         return changed
 
     def _start(self, experiment: Experiment, seed: int) -> None:
-        experiment.require_single_axis("an environment")
-        self.experiment = experiment
-        (part,) = experiment.parts
+        self.experiment, part = experiment, experiment.require_single_axis("an environment")
         scenario = part.scenario.model_copy(update={"seed": seed, "open_loop_observers": []})
         plant, timestep = experiment.plant, experiment.plant.timestep
         self._physics = OneWorld(plant)
@@ -174,7 +173,9 @@ class ScissoredPairEnv(gymnasium.Env):
             return "fall"
         self._loop.step = self._steps
         _, v = self._physics.state()
-        self._controller.sample(self._steps, self._physics.axis_reading(v))
+        reading = self._physics.reading(v)
+        assert isinstance(reading, IdealReading)  # of one axis
+        self._controller.sample(self._steps, reading)
         return "end"
 
     @quiet()
@@ -213,7 +214,7 @@ class ScissoredPairEnv(gymnasium.Env):
         plant = self.experiment.plant
         q, v = self._physics.state()
         x1 = plant.axis.line.lean(q) + plant.bias
-        x = (x1, plant.axis.line.rate(v), plant.gimbal_angle(q))
+        x = (x1, plant.axis.line.rate(v), plant.axis.gimbal_angle(q))
         return x if all(abs(value) < MOST for value in x) else (self._fall, 0.0, 0.0)
 
     def _cost(self, u: float) -> float:
@@ -222,7 +223,7 @@ class ScissoredPairEnv(gymnasium.Env):
 
     def _observed(self) -> tuple[np.ndarray, dict[str, Any]]:
         step, controller = self._loop.step, self._controller
-        forces, encoders, fog, _ = controller.readings(step)
+        forces, encoders, fog = controller.readings(step)
         x1, x2, x3 = self._state()
         tilt = controller.tilt
         extra = {

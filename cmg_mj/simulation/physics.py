@@ -94,7 +94,6 @@ class OneWorld:
         single = len(plant.axes) == 1
         self.tilt = plant.axis.line.lean if single else plant.largest_tilt
         self._ideal = plant.axis.ideal if single else plant.ideal_readings
-        self._first_axis = plant.axis
 
     def state(self) -> State:
         """Read joint angles and rates as floats."""
@@ -104,11 +103,6 @@ class OneWorld:
         """Compute what perfect sensors show at the present state, with the torques and commands that hold there."""
         self._forward()
         return self._ideal(self._sensordata.tolist(), v)
-
-    def axis_reading(self, v: Joints) -> IdealReading:
-        """Compute the same of the first axis."""
-        self._forward()
-        return self._first_axis.ideal(self._sensordata.tolist(), v)
 
     def command(self, u: Scalar, axis: int = 0) -> None:
         """Set the gimbal rate of an axis, each module in its direction [rad/s]."""

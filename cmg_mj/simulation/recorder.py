@@ -9,13 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cmg_mj.controllers.controller import Tick
+from cmg_mj.controllers.controller import Controller, Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import References
-from cmg_mj.results.metrics import Metrics
+from cmg_mj.results.metrics import Metrics, TickBlock
 from cmg_mj.results.stored_columns import ColumnStore, StoredColumns
-from cmg_mj.results.tick_block import TickBlock
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.simulation.physics import Joints
 
@@ -28,13 +27,10 @@ class TickRecorder:
 
     Args:
         plants: The rigs, one a world.
-        observers: The observer in the loop, then the open-loop observers.
-        extras: What each of them estimates beyond x.
+        observers: Names of the observer in the loop, then of the open-loop observers.
+        controller: The controller whose ticks they are: floats of one world, or arrays (n_worlds,).
         metrics: Takes every piece.
-        references: What the estimates are judged beside.
-        dt: Control period [s].
         keep: Whether to keep the pieces for a trajectory.
-        single: Whether the ticks hold floats (one world) or arrays (n_worlds,).
         joints: Whether to keep the joints.
         spool: Folder whose disk takes what a long trajectory of one world would need in memory, if any.
     """
@@ -43,29 +39,27 @@ class TickRecorder:
         self,
         plants: Sequence[Plant],
         observers: Sequence[str],
-        extras: Sequence[Sequence[str]],
+        controller: Controller,
         metrics: Metrics,
-        references: References,
-        dt: float,
         *,
         keep: bool,
-        single: bool,
-        joints: bool = True,
+        joints: bool,
         spool: Path | None = None,
     ) -> None:
         self._axis = plants[0].axis
         self._bias = np.array([plant.bias for plant in plants])
         names, kinds = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ((), ())
+        extras, seed, worlds = controller.extra_signals, controller.seed, controller.worlds
         self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), names, kinds)
         self._joints = joints
         self._estimated = [(*ESTIMATES, *names) for names in extras]
-        self._metrics = metrics
-        self._references = references
-        self._dt = dt
+        self.metrics = metrics
+        self._dt = controller.law.dt
+        self._references = References(controller.sensors.mems_gyro, self._dt, seed, worlds, controller.axis)
         self._keep = keep
-        self._single = single
+        self._single = isinstance(worlds, int)
         self._waiting: list[tuple] = []
-        self._kept = ColumnStore(len(self._layout.columns()), spool if single else None)
+        self._kept = ColumnStore(len(self._layout.columns()), spool if isinstance(worlds, int) else None)
 
     def add(self, q: Joints, v: Joints, tick: Tick, torque: Scalar, running: np.ndarray | None) -> None:
         """Take one tick.
@@ -87,10 +81,12 @@ class TickRecorder:
             return
         piece = self._piece(self._waiting)
         self._waiting = []
-        self._metrics.update(piece, self._references.rates(piece.x2))
+        self.metrics.update(piece, self._references.rates(piece.x2))
         if self._keep:
             columns, ended = piece.columns, piece.ended
-            self._kept.append(columns if ended is None else [np.where(ended, np.nan, column) for column in columns])
+            if ended is not None:
+                columns = {name: np.where(ended, np.nan, column) for name, column in columns.items()}
+            self._kept.append([columns[name] for name in self._layout.columns()])
 
     def _piece(self, waiting: Sequence[tuple]) -> TickBlock:
         qs, vs, ticks, torques, runnings = zip(*waiting, strict=True)
@@ -106,22 +102,9 @@ class TickRecorder:
         if ended is not None:
             x1 = np.where(ended, np.nan, x1)
         named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
-        columns = [
-            x1,
-            x2,
-            x3,
-            y1,
-            y2,
-            acceleration,
-            fog,
-            u,
-            x_e,
-            push,
-            *(part for parts in estimated for part in parts),
-            *(q if self._joints else ()),
-            *(v if self._joints else ()),
-        ]
-        return TickBlock(x1, x2, x3, y1, fog, u, named, columns, ended)
+        joints = [*q, *v] if self._joints else []
+        signals = [x1, x2, x3, y1, y2, acceleration, fog, u, x_e, push, *chain.from_iterable(estimated), *joints]
+        return TickBlock(x1, x2, x3, y1, fog, u, named, self._layout.named(signals), ended)
 
     def _columns(self, ticks: Sequence) -> np.ndarray:
         """(n_ticks, n_signals[, n_worlds]) -> (n_signals, n_ticks, n_worlds)."""
@@ -147,14 +130,14 @@ class TickRecorder:
         """
         return self._since(tick, self._piece(self._waiting).columns if self._waiting else None)
 
-    def _since(self, tick: int, waiting: Sequence[np.ndarray] | None = None) -> Trajectory:
-        n_kept = len(self._kept)
+    def _since(self, tick: int, waiting: Mapping[str, np.ndarray] | None = None) -> Trajectory:
+        end = n_kept = len(self._kept)
         columns = {}
         for i, name in enumerate(self._layout.columns()):
             columns[name] = self._read(i, tick, n_kept)
             if waiting is not None:
-                columns[name] = np.concatenate([columns[name], waiting[i][max(0, tick - n_kept) :, 0]])
-        end = n_kept if waiting is None else n_kept + len(waiting[0])
+                columns[name] = np.concatenate([columns[name], waiting[name][max(0, tick - n_kept) :, 0]])
+                end = n_kept + len(waiting[name])
         return Trajectory({"time_s": self._times(min(tick, end), end), **columns}, layout=self._layout)
 
     def _read(self, column: int, start: int, end: int) -> np.ndarray:

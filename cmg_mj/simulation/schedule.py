@@ -14,11 +14,7 @@ Instant = tuple[int, int, Sequence[Scalar]]
 
 
 def sampling_instants(
-    steps: int,
-    steps_per_sample: int,
-    pushes: Sequence[Push],
-    timestep: float,
-    axes: Sequence[str] = ("",),
+    steps: int, steps_per_sample: int, pushes: Sequence[Push], timestep: float, axes: Sequence[str] = ("",)
 ) -> Iterator[Instant]:
     """Find the instants of a run at which a sensor or the controller is due, or a push begins or ends.
 

@@ -16,7 +16,7 @@ from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.plant import Plant
-from cmg_mj.results.baselines import RATES, References
+from cmg_mj.results.baselines import RATES
 from cmg_mj.results.error_bounds import Floors
 from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.result import Driver, Outcome, Result
@@ -110,49 +110,54 @@ class _Simulation:
         settings: MetricsSettings,
         options: SimulationOptions,
     ) -> None:
-        self.plant, self.controller, self.duration_s = plants[0], controller, duration_s
-        self.axis_names = names = self.plant.axis_names
-        self.timestep = timestep = self.plant.timestep
-        self.observers = tuple(observers[names[0]])
+        self.plants, self.controller, self.duration_s, self.observers = plants, controller, duration_s, observers
+        self.pushes, self.settings = pushes, settings
+        self.axis_names = names = plants[0].axis_names
+        self.timestep = timestep = plants[0].timestep
         steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
         self.fall_angle = np.radians(settings.fall_angle_deg).item()
-        pairs = [
-            _recorder_and_metrics(
-                plants, name, part, observers[name], pushes, settings, options, joints=name == names[0]
-            )
-            for name, part in zip(names, controller.parts, strict=True)
-        ]
-        self.recorders = [recorder for recorder, _ in pairs]
-        self.metrics = [metrics for _, metrics in pairs]
+        self.recorders = [self._recorder_of(*pair, options) for pair in zip(names, controller.parts, strict=True)]
         several = MultiAxisRecorder(dict(zip(names, self.recorders, strict=True))) if len(names) > 1 else None
         self.recorder: Recorder = several or self.recorders[0]
         self.on_progress = options.get("on_progress")
         if on_start := options.get("on_start"):
             on_start(self.recorder)
-        self.n_worlds = len(plants)
         self.outcomes: list[Outcome] = []
         instants = sampling_instants(steps, controller.steps_per_sample, pushes, timestep, names)
         self.instants = with_swing_torques(instants, swings, timestep, names) if swings else instants
+
+    def _recorder_of(self, axis: str, controller: Controller, options: SimulationOptions) -> TickRecorder:
+        """Make what records and judges the ticks of one axis; that of the first axis has the joints."""
+        plants, observers = [plant.single_axis(axis) for plant in self.plants], self.observers[axis]
+        pairs = list(zip(plants, split_values(controller.sensors, len(plants)), strict=True))
+        targets = {BIAS: [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs]}
+        dt, limit = controller.law.dt, controller.law.rate_limit
+        noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
+        floors = Floors(noises, max(dt, 1.0 / controller.sensors.accelerometer.rate_hz))
+        metrics = Metrics(observers, len(plants), dt, self.pushes, limit, self.settings, targets, RATES, floors)
+        keep, first = options.get("keep_trajectory", True), axis == self.axis_names[0]
+        spool = options.get("spool")
+        return TickRecorder(plants, observers, controller, metrics, keep=keep, joints=first, spool=spool)
 
     def advance(self, physics: Physics, driver: Driver) -> None:
         """Run to the end, whatever that is."""
         native = driver == "native"
         loop_class = ControlLoop if native else CallbackLoop
         loop = loop_class(physics, self.controller, self.instants, self.fall_angle)
-        driving: AbstractContextManager = nullcontext() if native else control_callback(self.plant, self.controller)
+        driving: AbstractContextManager = nullcontext() if native else control_callback(self.plants[0], self.controller)
         rest = Outcome("done", self.duration_s)
         try:
             with driving:
                 self._record(loop)
         except RunStopped as error:
-            rest = Outcome("stopped", loop.step * self.timestep, str(error), self.n_worlds > 1)
+            rest = Outcome("stopped", loop.step * self.timestep, str(error), len(self.plants) > 1)
         except KeyboardInterrupt:
             rest = Outcome("interrupted", loop.step * self.timestep)
         for recorder in self.recorders:
             recorder.flush()
         endings = loop.endings
         self.outcomes = [
-            _outcome(endings[world], self.timestep) if world in endings else rest for world in range(self.n_worlds)
+            _outcome(endings[world], self.timestep) if world in endings else rest for world in range(len(self.plants))
         ]
 
     def _record(self, loop: ControlLoop) -> None:
@@ -175,8 +180,8 @@ class _Simulation:
         summaries = [
             combine_axes(
                 {
-                    name: metrics.summary(world, outcome.kind == "done")
-                    for name, metrics in zip(self.axis_names, self.metrics, strict=True)
+                    name: recorder.metrics.summary(world, outcome.kind == "done")
+                    for name, recorder in zip(self.axis_names, self.recorders, strict=True)
                 }
             )
             for world, outcome in enumerate(self.outcomes)
@@ -185,39 +190,8 @@ class _Simulation:
         numbers = (worlds,) if isinstance(worlds, int) else tuple(worlds)
         longest = max(outcome.time_s for outcome in self.outcomes)
         trajectory = self.recorder.trajectory()
-        return Result(
-            self.outcomes, summaries, trajectory, longest, self.observers, self.controller.seed, numbers, driver
-        )
-
-
-def _recorder_and_metrics(
-    plants: Sequence[Plant],
-    axis: str,
-    controller: Controller,
-    observers: Sequence[str],
-    pushes: Sequence[Push],
-    settings: MetricsSettings,
-    options: SimulationOptions,
-    *,
-    joints: bool,
-) -> tuple[TickRecorder, Metrics]:
-    """Make what records and judges the ticks of one axis."""
-    plants = [plant.single_axis(axis) for plant in plants]
-    sensors = split_values(controller.sensors, len(plants))
-    pairs = list(zip(plants, sensors, strict=True))
-    targets = {BIAS: [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs]}
-    dt, limit = controller.law.dt, controller.law.rate_limit
-    noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
-    floors = Floors(noises, max(dt, 1.0 / controller.sensors.accelerometer.rate_hz))
-    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, floors)
-    baselines = References(controller.sensors.mems_gyro, dt, controller.seed, controller.worlds, controller.axis)
-    single = isinstance(controller.worlds, int)
-    extras = controller.extra_signals
-    keep, spool = options.get("keep_trajectory", True), options.get("spool")
-    recorder = TickRecorder(
-        plants, observers, extras, metrics, baselines, dt, keep=keep, single=single, joints=joints, spool=spool
-    )
-    return recorder, metrics
+        observers = tuple(self.observers[self.axis_names[0]])
+        return Result(self.outcomes, summaries, trajectory, longest, observers, self.controller.seed, numbers, driver)
 
 
 def _outcome(ending: Ending, timestep: float) -> Outcome:

@@ -90,11 +90,9 @@ def bench_table(figures: dict[str, Any]) -> Table:
     """Return the table that `cmg-mj bench loop` prints."""
     load = figures["load_before"]
     busy = "" if load is None else f", {load:.1f} processes wanted one before"
-    table = Table(
-        title=f"{figures['processors']} processors{busy}; sensors at the control rate; ratios: medians of {REPEATS} "
-        "pairs; bare: MuJoCo alone with the same steps and forward passes",
-        box=box.SIMPLE_HEAD,
-        title_justify="left",
+    title = (
+        f"{figures['processors']} processors{busy}; sensors at the control rate; ratios: medians of {REPEATS} "
+        "pairs; bare: MuJoCo alone with the same steps and forward passes"
     )
     worlds = figures["worlds"]
     columns = {
@@ -110,11 +108,18 @@ def bench_table(figures: dict[str, Any]) -> Table:
         "an update\n[us]: one\nworld": ("update_us", "{:.1f}"),
         f"\n{worlds}\nworlds": ("update_of_batch_us", "{:.0f}"),
     }
-    table.add_column("observer", vertical="bottom")
-    for heading in columns:
-        table.add_column(heading.strip(" "), justify="right", vertical="bottom")
+    table = figures_table(title, [heading.strip(" ") for heading in columns])
     for row in figures["figures"]:
         table.add_row(row["observer"], *(_cell(row[key], pattern) for key, pattern in columns.values()))
+    return table
+
+
+def figures_table(title: str, headings: Iterable[str]) -> Table:
+    """Make a table of observers' figures without its rows."""
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
+    table.add_column("observer", vertical="bottom")
+    for heading in headings:
+        table.add_column(heading, justify="right", vertical="bottom")
     return table
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmg_mj.plant.mujoco_state import quiet
-from cmg_mj.results.per_world_table import save_table
+from cmg_mj.results.files import write_parquet
 from cmg_mj.results.result import Driver, Outcome, Result
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
@@ -48,13 +48,13 @@ class RunReport:
     runs: Sequence[Run]
 
 
-def report_run(experiment: Experiment, result: Result, *, compared: bool = False) -> RunReport:
+def report_run(experiment: Experiment, result: Result, *, several: bool = False) -> RunReport:
     """Assemble the report of a result's first world.
 
     Args:
         experiment: The experiment.
         result: Its result, with the trajectory.
-        compared: Whether a recording has several observers: names of `runs` then begin with the observer.
+        several: Whether a recording has several observers: names of `runs` then begin with the observer.
 
     Returns:
         The report.
@@ -90,8 +90,8 @@ def report_run(experiment: Experiment, result: Result, *, compared: bool = False
     if trajectory.axes:
         common = {key: value for key, value in summary.items() if key not in (AXES, *OPEN_LOOP_SECTIONS)}
         runs = [
-            Run(f"{observer}, {axis}" if compared else axis, trajectory.along(axis), {**common, **own}, outcome, axis)
-            for axis, own in section(summary, AXES).items()
+            Run(f"{observer}, {axis}" if several else axis, trajectory.along(axis), {**common, **part}, outcome, axis)
+            for axis, part in section(summary, AXES).items()
         ]
     return RunReport(experiment, result.driver, world, outcome, summary, trajectory, runs)
 
@@ -136,15 +136,15 @@ def save_run(folder: RunFolder | Path, report: RunReport, *, plot: bool = False)
 def files_of_comparison(kinds: Sequence[str], *, plot: bool = False) -> list[str]:
     """List the files that a comparison of these observers writes."""
     trajectories = [f"trajectory-{name}.parquet" for name in file_names(kinds)]
-    others = ["summary.json", "worlds.parquet", "scenario.toml", "recording.rrd"]
-    return [*trajectories, *others, *(["plot.png"] if plot else [])]
+    common_files = ["summary.json", "worlds.parquet", "scenario.toml", "recording.rrd"]
+    return [*trajectories, *common_files, *(["plot.png"] if plot else [])]
 
 
 @quiet()
 def save_comparison(
     folder: RunFolder | Path,
     experiment: Experiment,
-    compared: Sequence[ComparedObserver],
+    observers: Sequence[ComparedObserver],
     *,
     plot: bool = False,
     complete: bool = True,
@@ -154,7 +154,7 @@ def save_comparison(
     Args:
         folder: Where to. Files there that cmg_mj has not written stay.
         experiment: The experiment whose scenario runs to the same comparison: `comparison.rerunnable`.
-        compared: The observers with their runs.
+        observers: The observers with their runs.
         plot: Write plot.png as well: how every figure is distributed over the worlds.
         complete: Whether these are all observers that were to be compared.
 
@@ -167,18 +167,17 @@ def save_comparison(
     from cmg_mj.studies.compare.plot import plot_worlds
     from cmg_mj.visualization.recording import write_recording
 
-    several = len(compared) > 1
-    reports = [report_run(entry.experiment, entry.world_0, compared=several) for entry in compared]
+    reports = [report_run(entry.experiment, entry.world_0, several=len(observers) > 1) for entry in observers]
     header = recording_header(reports[0].experiment, reports[0].driver, reports[0].world)
     writers = (
         *(report.trajectory.save for report in reports),
-        lambda path: _write_json(path, standings(compared)),
-        lambda path: save_table(path, worlds_table(compared), {"scenario": experiment.resolved()}),
+        lambda path: _write_json(path, standings(observers)),
+        lambda path: write_parquet(path, worlds_table(observers), {"scenario": experiment.resolved()}),
         experiment.save,
         lambda path: write_recording(path, header, [run for report in reports for run in report.runs]),
-        lambda path: plot_worlds(path, compared, experiment.scenario.title),
+        lambda path: plot_worlds(path, observers, experiment.scenario.title),
     )
-    names = files_of_comparison([entry.kind for entry in compared], plot=plot)
+    names = files_of_comparison([entry.kind for entry in observers], plot=plot)
     with claimed(folder) as place:
         return place.write(dict(zip(names, writers, strict=False)), complete=complete)
 

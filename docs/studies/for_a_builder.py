@@ -15,7 +15,7 @@ from bias_limits import Case, limits
 from cmg_mj import load_scenario, prepare
 from cmg_mj.codegen.board.cost import cost_scenario, measure
 from cmg_mj.errors import InputError
-from cmg_mj.observers import OBSERVERS, needs, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, needs
 from cmg_mj.results import markdown
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.intervals import mean_interval
@@ -64,7 +64,7 @@ def main() -> None:
     borne = dict(zip(OBSERVERS, limits([Case(name) for name in OBSERVERS]), strict=True))
     rows = []
     for name, result in results.items():
-        asked = [WORDS[need] for need in needs(observer_class(name))]
+        asked = [WORDS[need] for need in needs(OBSERVER_CLASSES.find(name))]
         fell = f"{100.0 * result.fell.mean():.0f}%"
         rows.append(
             [f"`{name}`", *errors(result), fell, bears(borne[name]), counted.get(name, "-"), ", ".join(["y1", *asked])]

@@ -1,4 +1,4 @@
-"""What the acceptance tests run: observers in the loop, and all of them in open loop on the gyro's."""
+"""The runs of the acceptance tests: observers in the loop, and all of them in open loop on the gyro's."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STANDING = {
     "finite_difference": ("sensors.accelerometer.noise_density_ug_rthz=100.0",),
     "super_twisting": ("observer.L=15.0",),
 }
-FALLING = ("luenberger",)
+FALLERS = ("luenberger",)
 """Observers that let the rig fall under the headline push in every world, with their default parameters."""
 
 GROUP = 20
@@ -43,7 +43,7 @@ def closed_loop(observer: str, settings: tuple[str, ...], seed: int, worlds: int
 
 
 @cache
-def ride_along(seed: int, worlds: int) -> Result:
+def open_loop_run(seed: int, worlds: int) -> Result:
     """Observer tuning: the loop closed on the gyro."""
     return prepare(load_scenario("observer_tuning", [f"seed={seed}"])).run_many(worlds, keep_trajectory=False)
 
@@ -63,7 +63,7 @@ def closed_loop_figures(result: Result, first: int = 0) -> dict[str, float]:
     }
 
 
-def ride_along_figures(result: Result, first: int = 0) -> dict[str, float]:
+def open_loop_group(result: Result, first: int = 0) -> dict[str, float]:
     """Each observer's velocity RMS error over a group of GROUP worlds, in the whole run and in the push window."""
     group: list[dict[str, Any]] = result.summaries[first : first + GROUP]
     figures = {}

@@ -13,7 +13,7 @@ import statistics
 import sys
 from pathlib import Path
 
-from tests.acceptance.cases import GROUP, STANDING, closed_loop, closed_loop_figures, ride_along, ride_along_figures
+from tests.acceptance.cases import GROUP, STANDING, closed_loop, closed_loop_figures, open_loop_group, open_loop_run
 
 SWEEP_SEED, GROUPS = 50_000, 12
 FILE = Path(__file__).parent / "bounds.json"
@@ -21,30 +21,32 @@ FILE = Path(__file__).parent / "bounds.json"
 
 def bounds(groups: list[dict[str, float]]) -> dict[str, list[float]]:
     """Figure -> [low, high]."""
-    found = {}
+    result = {}
     for name in groups[0]:
         values = [group[name] for group in groups]
         mean, spread = statistics.fmean(values), 4.0 * statistics.stdev(values)
-        found[name] = [float(f"{max(mean - spread, 0.0):.4g}"), float(f"{mean + spread:.4g}")]
-    return found
+        result[name] = [float(f"{max(mean - spread, 0.0):.4g}"), float(f"{mean + spread:.4g}")]
+    return result
 
 
 def main() -> None:
     """Write the bounds of those that are named, or of all."""
-    wanted = sys.argv[1:] or list(STANDING)
-    if unknown := set(wanted) - STANDING.keys():
+    names = sys.argv[1:] or list(STANDING)
+    if unknown := set(names) - STANDING.keys():
         sys.exit(f"{', '.join(unknown)}: not in STANDING of cases.py")
-    kept = json.loads(FILE.read_text(encoding="utf-8"))
+    all_bounds = json.loads(FILE.read_text(encoding="utf-8"))
     firsts = range(0, GROUPS * GROUP, GROUP)
-    for observer in wanted:
+    for observer in names:
         result = closed_loop(observer, STANDING[observer], SWEEP_SEED, GROUPS * GROUP)
-        kept["closed_loop"][observer] = bounds([closed_loop_figures(result, first) for first in firsts])
-    result = ride_along(SWEEP_SEED, GROUPS * GROUP)
-    riding = bounds([ride_along_figures(result, first) for first in firsts])
-    kept["ride_along"] |= {
-        name: riding[name] for name in riding if name.partition(",")[0] in wanted or name not in kept["ride_along"]
+        all_bounds["closed_loop"][observer] = bounds([closed_loop_figures(result, first) for first in firsts])
+    result = open_loop_run(SWEEP_SEED, GROUPS * GROUP)
+    open_loop_bounds = bounds([open_loop_group(result, first) for first in firsts])
+    all_bounds["open_loop"] |= {
+        name: open_loop_bounds[name]
+        for name in open_loop_bounds
+        if name.partition(",")[0] in names or name not in all_bounds["open_loop"]
     }
-    FILE.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    FILE.write_text(json.dumps(all_bounds, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -13,13 +13,13 @@ import pytest
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.summary_keys import open_loop_figures
 from tests.acceptance.cases import (
-    FALLING,
+    FALLERS,
     GROUP,
     STANDING,
     closed_loop,
     closed_loop_figures,
-    ride_along,
-    ride_along_figures,
+    open_loop_group,
+    open_loop_run,
 )
 
 SEED = 7
@@ -36,13 +36,13 @@ def test_closed_loop_figures(observer: str) -> None:
         assert low <= value <= high, f"{observer}: {name} = {value:.4g} not in [{low}, {high}]"
 
 
-def test_ride_along_figures() -> None:
-    for name, value in ride_along_figures(ride_along(SEED, GROUP)).items():
-        low, high = BOUNDS["ride_along"][name]
+def test_open_loop_figures() -> None:
+    for name, value in open_loop_group(open_loop_run(SEED, GROUP)).items():
+        low, high = BOUNDS["open_loop"][name]
         assert low <= value <= high, f"{name}: {value:.4g} not in [{low}, {high}]"
 
 
-@pytest.mark.parametrize("observer", FALLING)
+@pytest.mark.parametrize("observer", FALLERS)
 def test_falls(observer: str) -> None:
     """aranovskiy2020, end of section V: a time-invariant observer does not stabilise the rig."""
     result = closed_loop(observer, (), SEED, GROUP)
@@ -73,11 +73,11 @@ def test_what_an_estimate_of_zero_does_as_well() -> None:
         assert_less(error, loop(name, "zero"), loop(name))
     assert_less(error, loop("homogeneous"), loop("homogeneous", "zero"))
     for name in OBSERVERS.keys() - {"gyro_free"}:
-        assert_less(error, riding("zero"), riding(name))
-    assert_less(error, riding("gyro_free"), riding("zero"))
+        assert_less(error, open_loop_worlds("zero"), open_loop_worlds(name))
+    assert_less(error, open_loop_worlds("gyro_free"), open_loop_worlds("zero"))
     for name in ("linear_high_gain", "linear", "gyro_free"):
-        assert_less(push_error, riding(name), riding("zero"))
-    assert_less(push_error, riding("zero"), riding("homogeneous"))
+        assert_less(push_error, open_loop_worlds(name), open_loop_worlds("zero"))
+    assert_less(push_error, open_loop_worlds("zero"), open_loop_worlds("homogeneous"))
 
 
 def test_a_cheap_gyro_is_far_better() -> None:
@@ -85,8 +85,8 @@ def test_a_cheap_gyro_is_far_better() -> None:
     for key in ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"):
         for name in STANDING:
             if not STANDING[name]:
-                of, gyro = loop(name), loop(name, "mems_gyro")
-                ratio = statistics.fmean(x[key] for x in of) / statistics.fmean(x[key] for x in gyro)
+                estimates, gyro = loop(name), loop(name, "mems_gyro")
+                ratio = statistics.fmean(x[key] for x in estimates) / statistics.fmean(x[key] for x in gyro)
                 assert (4.0 < ratio < 10.0) if name == "gyro_free" else ratio > 10.0, (name, key, ratio)
 
 
@@ -99,9 +99,9 @@ def loop(observer: str, reference: str | None = None) -> Figures:
     return [s["references"][reference] for s in summaries] if reference else summaries
 
 
-def riding(name: str) -> Figures:
+def open_loop_worlds(name: str) -> Figures:
     """World by world, of an open-loop observer on the gyro's loop."""
-    return [{**s, **open_loop_figures(s).get(name, {})} for s in ride_along(SEED, GROUP).summaries]
+    return [{**s, **open_loop_figures(s).get(name, {})} for s in open_loop_run(SEED, GROUP).summaries]
 
 
 def assert_less(key: str, smaller: Figures, larger: Figures) -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj.observers import OBSERVERS, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS
 from cmg_mj.observers.protocol import needs
 from cmg_mj.results.summary_keys import open_loop_figures
-from tests.acceptance.cases import GROUP, closed_loop, ride_along
+from tests.acceptance.cases import GROUP, closed_loop, open_loop_run
 
 SEED = 7
 ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
-OF_Y1 = [name for name in OBSERVERS if not needs(observer_class(name))]
+TILT_ONLY = [name for name in OBSERVERS if not needs(OBSERVER_CLASSES.find(name))]
 
 
 def loop(name: str, key: str, reference: str | None = None, worlds: int = GROUP) -> np.ndarray:
@@ -21,33 +21,33 @@ def loop(name: str, key: str, reference: str | None = None, worlds: int = GROUP)
 
 
 def upper_end(a: np.ndarray, b: np.ndarray) -> float:
-    """Of the 95 % interval of the ratio of two means over the same worlds, to first order."""
+    """Return the upper end of the 95 % interval of the ratio of two means over the same worlds, to first order."""
     ratio = a.mean() / b.mean()
     return ratio + 2.09 * np.std((a - ratio * b) / b.mean(), ddof=1) / np.sqrt(len(a))
 
 
 def test_these_see_y1_alone() -> None:
-    assert OF_Y1 == ["linear", "finite_difference", "super_twisting", "linear_high_gain"]
+    assert TILT_ONLY == ["linear", "finite_difference", "super_twisting", "linear_high_gain"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("key", [ERROR, PUSH_ERROR])
 def test_no_observer_of_y1_alone_is_below_its_floor(key: str) -> None:
     """On one and the same motion, in no world: the floor is found afterwards, in each world by itself."""
-    result = ride_along(SEED, GROUP)
+    result = open_loop_run(SEED, GROUP)
     worlds = [{result.observers[0]: s, **open_loop_figures(s)} for s in result.summaries]
-    for name in OF_Y1:
+    for name in TILT_ONLY:
         assert all(world[name][key] > world["floor_y1"][key] for world in worlds), name
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("key", "within"), [(ERROR, 1.1), (PUSH_ERROR, 1.3)])
-def test_gyro_free_is_at_its_floor(key: str, within: float) -> None:
+@pytest.mark.parametrize(("key", "limit"), [(ERROR, 1.1), (PUSH_ERROR, 1.3)])
+def test_gyro_free_is_at_its_floor(key: str, limit: float) -> None:
     """Above it but for chance, and by little. A push's edges are no straight line, as the floor has it."""
-    of, floor = loop("gyro_free", key, worlds=100), loop("gyro_free", key, "floor_accel", worlds=100)
+    errors, floor = loop("gyro_free", key, worlds=100), loop("gyro_free", key, "floor_accel", worlds=100)
     assert np.ptp(floor) == 0.0
-    assert upper_end(of, floor) > 1.0
-    assert upper_end(of, floor) < within
+    assert upper_end(errors, floor) > 1.0
+    assert upper_end(errors, floor) < limit
 
 
 @pytest.mark.slow

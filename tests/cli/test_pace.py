@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cmg_mj.cli.pace import ProgressRate
-from cmg_mj.cli.terminal import progress
+from cmg_mj.cli.terminal import ProgressRate, progress
 
 
 class Clock:
@@ -16,7 +15,7 @@ class Clock:
 
 
 @pytest.mark.parametrize(
-    ("seconds", "done", "said"),
+    ("seconds", "amount", "message"),
     [
         (0.5, 400, ""),
         (10.0, 400, ""),
@@ -25,11 +24,11 @@ class Clock:
         (1000.0, 401, "0.001 trials a second, 5444.2 h left"),
     ],
 )
-def test_the_pace_is_of_what_was_done_since(seconds: float, done: int, said: str) -> None:
+def test_the_pace_is_of_what_was_done_since(seconds: float, amount: int, message: str) -> None:
     clock = Clock()
     pace = ProgressRate("trials", 20_000, 400, clock)
     clock.now += seconds
-    assert pace.text(done) == said
+    assert pace.text(amount) == message
 
 
 def test_without_a_terminal_a_line_a_minute(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""What a scenario of several axes says, what is written of its run, and what is refused."""
+"""Scenarios of several axes: their description, the files of their runs, and refusals."""
 
 import json
 from pathlib import Path
@@ -50,20 +50,20 @@ def test_what_a_run_writes_reruns_and_has_every_axis(tmp_path: Path) -> None:
     place = save_run(tmp_path / "run", report_run(experiment, result), plot=True)
     assert result.trajectory is not None
 
-    again = prepare(load_scenario(str(place / "scenario.toml"))).run().trajectory
-    assert again is not None
-    kept = Trajectory.load(place / "trajectory.parquet")
-    assert kept.axes == ("roll", "pitch")
-    assert kept.layout == result.trajectory.layout
+    rerun = prepare(load_scenario(str(place / "scenario.toml"))).run().trajectory
+    assert rerun is not None
+    trajectory = Trajectory.load(place / "trajectory.parquet")
+    assert trajectory.axes == ("roll", "pitch")
+    assert trajectory.layout == result.trajectory.layout
     for name, column in result.trajectory.columns.items():
-        np.testing.assert_array_equal(again[name], column, err_msg=name)
-        np.testing.assert_array_equal(kept[name], column, err_msg=name)
-    roll = kept.along("roll")
+        np.testing.assert_array_equal(rerun[name], column, err_msg=name)
+        np.testing.assert_array_equal(trajectory[name], column, err_msg=name)
+    roll = trajectory.along("roll")
     assert roll.observers == ("adaptive",)
-    np.testing.assert_array_equal(roll["estimate/adaptive/bias_rad"], kept["roll/estimate/adaptive/bias_rad"])
-    np.testing.assert_array_equal(roll.qpos(), kept.qpos())
+    np.testing.assert_array_equal(roll["estimate/adaptive/bias_rad"], trajectory["roll/estimate/adaptive/bias_rad"])
+    np.testing.assert_array_equal(roll.qpos(), trajectory.qpos())
     with pytest.raises(InputError, match="axis 'rol': did you mean 'roll'"):
-        kept.along("rol")
+        trajectory.along("rol")
     assert {"plot-roll.png", "plot-pitch.png", "recording.rrd"} <= {path.name for path in place.iterdir()}
 
 
@@ -71,22 +71,22 @@ def test_with_open_loop_observers_it_reruns_with_the_same_columns(tmp_path: Path
     """An axis' own observer is no open-loop observer of its own; of the other axis it may be."""
     experiment = two_axes("axes.roll.observer.kind=linear", "open_loop_observers=['homogeneous', 'kalman']")
     experiment.save(tmp_path / "scenario.toml")
-    first, again = (
+    first, rerun = (
         run.run().trajectory for run in (experiment, prepare(load_scenario(str(tmp_path / "scenario.toml"))))
     )
     assert first is not None
-    assert again is not None
-    assert list(again.columns) == list(first.columns)
+    assert rerun is not None
+    assert list(rerun.columns) == list(first.columns)
     assert "roll/estimate/homogeneous/x2_rad_s" in first.columns
 
 
 def test_the_observer_that_is_named_is_that_of_all_axes() -> None:
-    mixed = load_scenario("two_axes", ["axes.roll.observer.kind=linear"])
-    assert prepare(mixed).observer_title == "roll linear, pitch homogeneous"
+    mixed_axes = load_scenario("two_axes", ["axes.roll.observer.kind=linear"])
+    assert prepare(mixed_axes).observer_title == "roll linear, pitch homogeneous"
     for kind in ("homogeneous", "linear", "kalman"):
-        assert prepare(mixed.with_observer(kind)).observer_title == kind
-    tuned = load_scenario("two_axes", ["axes.roll.observer.k1=25"])
-    assert tuned.with_observer("homogeneous").of_axis("roll").observer.parameters == {"k1": 25}
+        assert prepare(mixed_axes.with_observer(kind)).observer_title == kind
+    tuned_axis = load_scenario("two_axes", ["axes.roll.observer.k1=25"])
+    assert tuned_axis.with_observer("homogeneous").of_axis("roll").observer.parameters == {"k1": 25}
 
 
 def test_an_observer_on_the_command_line_is_that_of_all_axes(tmp_path: Path) -> None:
@@ -102,10 +102,10 @@ def test_another_law_does_without_the_files_gains() -> None:
     assert two_axes("controller.kind=lqg").run().outcomes[0].kind == "done"
     with pytest.raises(InputError, match="lqg takes no gains"):
         two_axes("controller.kind=lqg", "controller.gains=[1, 2, 3, 4]")
-    limited = load_scenario(
+    lqg_scenario = load_scenario(
         "two_axes", ["axes.roll.controller.rate_limit_rad_s=3", "axes.roll.controller.gains=[1, 2, 3, 4]"]
     )
-    roll = limited.with_law("lqg").of_axis("roll").controller
+    roll = lqg_scenario.with_law("lqg").of_axis("roll").controller
     assert (roll.kind, roll.gains, roll.rate_limit_rad_s) == ("lqg", None, 3.0)
 
 
@@ -116,7 +116,7 @@ def test_sensors_of_an_axis_have_rates_of_their_own() -> None:
 
 
 def test_the_true_rate_is_used_throughout_where_it_is_fed_back() -> None:
-    """What the observer says then changes nothing, the gimbals' turn against the other axis included."""
+    """The observer's estimate then changes nothing, the gimbals' turn against the other axis included."""
     runs = [two_axes("controller.feedback=truth", f"observer.kind={kind}").run() for kind in ("homogeneous", "linear")]
     first, second = (run.trajectory for run in runs)
     assert first is not None
@@ -134,9 +134,9 @@ def test_replay_of_several_axes_is_refused_for_what_it_is(tmp_path: Path) -> Non
 def test_the_rigs_figures_are_the_worst_of_its_axes() -> None:
     summary: dict[str, Any] = two_axes().run().summaries[0]
     axes = list(summary[AXES].values())
-    for key, about in KEYS.items():
+    for key, description in KEYS.items():
         if key in summary and None not in (values := [axis[key] for axis in axes]):
-            assert summary[key] == (min(values) if about.better == "more" else max(values)), key
+            assert summary[key] == (min(values) if description.better == "more" else max(values)), key
     zero = [axis["references"]["zero"]["velocity_rms_error_rad_s"] for axis in axes]
     assert summary["references"]["zero"]["velocity_rms_error_rad_s"] == max(zero)
 
@@ -153,28 +153,28 @@ def test_a_push_moves_the_axis_that_it_is_about() -> None:
             two_axes(*calm, "axes.pitch.plant.equilibrium_bias_deg=0", f"push.{1 - i}.torque_n_m=0").run().trajectory
         )
         assert trajectory is not None
-        during = slice(200, 230)
-        peaks = {axis: np.abs(trajectory[f"{axis}/x2_rad_s"][during]).max() for axis in ("roll", "pitch")}
+        push_rows = slice(200, 230)
+        peaks = {axis: np.abs(trajectory[f"{axis}/x2_rad_s"][push_rows]).max() for axis in ("roll", "pitch")}
         assert peaks.pop(name) > 5.0 * max(peaks.values())
         assert trajectory[f"{name}/push_n_m"][205] == 1.0
 
 
 def test_check_says_what_each_axis_amounts_to() -> None:
-    said = cmg_mj("check", "two_axes")
-    assert said.status == 0
-    assert said.out.count(": valid") == 2
-    assert "two_axes, axis roll" in said.out
-    assert "equilibrium bias -0.3 deg" in said.out
-    assert "push        1 N m about pitch from 6 s to 6.1 s" in said.out
+    outcome = cmg_mj("check", "two_axes")
+    assert outcome.status == 0
+    assert outcome.out.count(": valid") == 2
+    assert "two_axes, axis roll" in outcome.out
+    assert "equilibrium bias -0.3 deg" in outcome.out
+    assert "push        1 N m about pitch from 6 s to 6.1 s" in outcome.out
 
 
 def test_the_command_prints_each_axis(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    sets = [part for setting in SHORT for part in ("--set", setting)]
-    said = cmg_mj("run", "two_axes", *sets, "--out", "it")
-    assert said.status == 0, said
-    assert "roll" in said.out
-    assert "Open loop, pitch" in said.out
+    options = [part for setting in SHORT for part in ("--set", setting)]
+    outcome = cmg_mj("run", "two_axes", *options, "--out", "it")
+    assert outcome.status == 0, outcome
+    assert "roll" in outcome.out
+    assert "Open loop, pitch" in outcome.out
     summary = json.loads((tmp_path / "it" / "summary.json").read_text())
     assert list(summary["axes"]) == ["roll", "pitch"]
 

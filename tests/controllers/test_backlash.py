@@ -34,10 +34,10 @@ def test_the_gimbal_rests_until_the_motor_has_crossed_the_gap(worlds: int | None
     play = Backlash(1.0 if worlds is None else np.full(worlds, 1.0), DT)
     gimbal = [0.0]
     for rate in rates.tolist():
-        turned = play(rate if worlds is None else np.full(worlds, rate))
+        gimbal_rate = play(rate if worlds is None else np.full(worlds, rate))
         if worlds is not None:
-            assert np.ptp(turned) == 0.0
-        gimbal.append(gimbal[-1] + DT * float(np.max(turned)))
+            assert np.ptp(gimbal_rate) == 0.0
+        gimbal.append(gimbal[-1] + DT * float(np.max(gimbal_rate)))
     angle = np.array(gimbal)
     assert np.abs(motor - angle).max() == pytest.approx(0.5)
     assert angle[50] == pytest.approx(1.5)  # the top of the first swing
@@ -50,10 +50,10 @@ def test_the_gimbal_rests_until_the_motor_has_crossed_the_gap(worlds: int | None
 def test_without_a_gap_the_command_goes_through_as_it_is() -> None:
     rates = np.random.default_rng(0).normal(size=(50, 2))
     play = Backlash(np.array([0.0, 0.1]), DT)
-    turned = np.array([play(rate) for rate in rates])
-    np.testing.assert_array_equal(turned[:, 0], rates[:, 0])
+    gimbal_rates = np.array([play(rate) for rate in rates])
+    np.testing.assert_array_equal(gimbal_rates[:, 0], rates[:, 0])
     alone = Backlash(0.1, DT)
-    np.testing.assert_array_equal(turned[:, 1], [alone(float(rate)) for rate in rates[:, 1]])
+    np.testing.assert_array_equal(gimbal_rates[:, 1], [alone(float(rate)) for rate in rates[:, 1]])
 
 
 def trajectory(setup: Experiment, driver: Any = "native") -> Trajectory:
@@ -77,16 +77,16 @@ def test_the_rigs_gimbals_stay_behind_the_recorded_commands(driver: Any) -> None
     """But for their servos' motion, I x'' = kp (setpoint - x) - kv x', and what the tilt does to it."""
     gap = np.radians(60.0 / 60.0)
     run = trajectory(experiment("plant.gimbal_backlash_arcmin=60.0"), driver)
-    foreseen = gimbals_from_commands(run, gap)
+    prediction = gimbals_from_commands(run, gap)
     servo = [85.6], [1.56e-3, 0.731, 85.6]
 
     def off(setpoint: np.ndarray) -> float:
         """By how much of the gap the gimbal is elsewhere."""
         return float(np.abs(run["x3_rad"] - lsim(servo, setpoint, run["time_s"])[1]).max() / gap)
 
-    assert off(foreseen) < 0.05
+    assert off(prediction) < 0.05
     assert off(gimbals_from_commands(run, 0.0)) > 0.4
-    assert np.abs(np.diff(foreseen)[20:] == 0.0).mean() > 0.1  # it does rest
+    assert np.abs(np.diff(prediction)[20:] == 0.0).mean() > 0.1  # it does rest
 
 
 def test_a_users_own_loop_has_it_too() -> None:
@@ -104,27 +104,27 @@ def test_a_users_own_loop_has_it_too() -> None:
     assert controller.gimbal_rate is None
 
 
-def test_observers_are_told_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_observers_get_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     setup = experiment("plant.gimbal_backlash_arcmin=60.0")
     commands: list[float] = []
     controller = setup.axis_controller()
     observer: Any = controller.observer
-    monkeypatch.setattr(type(observer), "step", _recorded(type(observer).step, commands))
-    commanded = []
+    monkeypatch.setattr(type(observer), "step", _record(type(observer).step, commands))
+    expected = []
     step = 0
     ideal = setup.plant.ideal_readings(setup.plant.new_data().sensordata.tolist(), setup.plant.new_data().qvel.tolist())
-    while len(commanded) < 20:
+    while len(expected) < 20:
         if controller.update(step, ideal):
             assert controller.tick is not None
-            commanded.append(controller.tick.u)
+            expected.append(controller.tick.u)
         step += controller.steps_per_sample
-    assert commands == commanded[:-1]
-    assert controller.gimbal_rate != commanded[-1] or controller.gimbal_rate == 0.0
+    assert commands == expected[:-1]
+    assert controller.gimbal_rate != expected[-1] or controller.gimbal_rate == 0.0
 
 
-def _recorded(step: Any, commands: list[float]) -> Any:
-    def recorded(self: Any, state: Any, y: Any, u: float) -> Any:
+def _record(step: Any, commands: list[float]) -> Any:
+    def record_step(self: Any, state: Any, y: Any, u: float) -> Any:
         commands.append(u)
         return step(self, state, y, u)
 
-    return recorded
+    return record_step

@@ -70,7 +70,7 @@ def test_the_extended_pair_is_controllable() -> None:
 
 
 def test_closed_loop_poles_of_table_2() -> None:
-    """Of the law itself, differentiated: A_e - B_e K_e has -10.47 +- 4.60j and -0.203 +- 0.295j."""
+    """The law itself, differentiated: A_e - B_e K_e has -10.47 +- 4.60j and -0.203 +- 0.295j."""
     K = [[-StateFeedback(DT)(*row)[0] for row in (1e-3 * np.eye(4)).tolist()]]
     poles = np.linalg.eigvals(A_E - B_E @ (1e3 * np.array(K)))
     expected = [-10.47 - 4.60j, -10.47 + 4.60j, -0.203 - 0.295j, -0.203 + 0.295j]
@@ -158,14 +158,14 @@ def one_period(x: list[float], u: float) -> list[float]:
         gyroscopic = u * (MOMENTUM * math.cos(x[2]) - J2 * x[1] * math.sin(2.0 * x[2]))
         return [x[1], (gyroscopic + GRAVITY_TORQUE * math.sin(x[0])) / (J1 + J2 * math.sin(x[2]) ** 2), u]
 
-    def along(k: list[float], h: float) -> list[float]:
+    def advance(k: list[float], h: float) -> list[float]:
         return [a + h * b for a, b in zip(x, k, strict=True)]
 
     k1 = slope(x)
-    k2 = slope(along(k1, DT / 2.0))
-    k3 = slope(along(k2, DT / 2.0))
-    k4 = slope(along(k3, DT))
-    return along([(a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)], DT)
+    k2 = slope(advance(k1, DT / 2.0))
+    k3 = slope(advance(k2, DT / 2.0))
+    k4 = slope(advance(k3, DT))
+    return advance([(a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)], DT)
 
 
 @pytest.mark.parametrize("e_deg", [0.5, -2.0])
@@ -248,13 +248,13 @@ class Script:
 
     def __init__(self, estimate: Callable[[int], Any]) -> None:
         self.estimate = estimate
-        self.asked: list[tuple[float, float, float]] = []
+        self.calls: list[tuple[float, float, float]] = []
 
     def init(self, y: Measurement) -> int:
         return 0
 
     def step(self, state: int, y: Measurement, u: float) -> tuple[int, Any]:
-        self.asked.append((y.y1, y.y2, u))
+        self.calls.append((y.y1, y.y2, u))
         return state + 1, self.estimate(state + 1)
 
 
@@ -317,12 +317,12 @@ def test_first_estimate_is_at_rest_at_the_measurement() -> None:
 def test_observer_gets_the_sample_and_the_command_held_since_the_last() -> None:
     observer = Script(ESTIMATES.__getitem__)
     result = ticks(controller(observer))
-    assert observer.asked == [(now.y1, now.y2, before.u) for before, now in itertools.pairwise(result)]
+    assert observer.calls == [(tick.y1, tick.y2, last.u) for last, tick in itertools.pairwise(result)]
 
 
 @pytest.mark.parametrize("angles", ["measured", "estimated"])
 @pytest.mark.parametrize("feedback", ["observer", "fog", "truth"])
-def test_law_acts_on_the_signals_it_was_told_to(feedback: Any, angles: Any) -> None:
+def test_law_acts_on_the_signals_of_its_settings(feedback: Any, angles: Any) -> None:
     """(8) with y1, y2 or their estimates; the rate from the observer, the gyro (here off by 0.02) or the truth."""
     loop = controller(Script(ESTIMATES.__getitem__), feedback=feedback, angle_source=angles)
     loop.sensors = Sensors(
@@ -344,10 +344,10 @@ def test_law_acts_on_the_signals_it_was_told_to(feedback: Any, angles: Any) -> N
 def test_open_loop_observers_see_the_same_and_change_nothing() -> None:
     open_loop_observer = Script(lambda k: Estimate(9.0, -9.0 * k, 9.0))
     alone, observer = ticks(controller(Script(ESTIMATES.__getitem__))), Script(ESTIMATES.__getitem__)
-    together = ticks(controller(observer, open_loop_observers={"hers": open_loop_observer}))
-    assert open_loop_observer.asked == observer.asked
-    assert [tick.u for tick in together] == [tick.u for tick in alone]
-    assert [tick.estimates[1].x2 for tick in together] == [0.0, -9.0, -18.0, -27.0]
+    both_ticks = ticks(controller(observer, open_loop_observers={"hers": open_loop_observer}))
+    assert open_loop_observer.calls == observer.calls
+    assert [tick.u for tick in both_ticks] == [tick.u for tick in alone]
+    assert [tick.estimates[1].x2 for tick in both_ticks] == [0.0, -9.0, -18.0, -27.0]
 
 
 class WithBias(Script):
@@ -419,9 +419,9 @@ def test_nothing_is_due_between_ticks() -> None:
     observer = Script(ESTIMATES.__getitem__)
     loop = controller(observer)
     assert (loop.period, loop.steps_per_sample) == (5, 5)
-    due = [loop.update(step, READINGS[0]) for step in range(16)]
-    assert [step for step, is_due in enumerate(due) if is_due] == [0, 5, 10, 15]
-    assert len(observer.asked) == 3
+    dues = [loop.update(step, READINGS[0]) for step in range(16)]
+    assert [step for step, is_due in enumerate(dues) if is_due] == [0, 5, 10, 15]
+    assert len(observer.calls) == 3
 
 
 def test_steps_per_sample_is_where_anything_may_be_due() -> None:
@@ -453,11 +453,9 @@ def test_an_observer_that_raises_stops_the_run_by_name() -> None:
     def fail(k: int) -> Estimate:
         raise ZeroDivisionError("no gain")
 
-    with pytest.raises(
-        RunStopped, match=r"observer Script raised ZeroDivisionError: no gain at t = 0\.005 s"
-    ) as caught:
+    with pytest.raises(RunStopped, match=r"observer Script raised ZeroDivisionError: no gain at t = 0\.005 s") as info:
         ticks(controller(Script(fail)))
-    assert isinstance(caught.value.__cause__, ZeroDivisionError)
+    assert isinstance(info.value.__cause__, ZeroDivisionError)
 
 
 @pytest.mark.parametrize(
@@ -477,13 +475,13 @@ def test_recorded_commands_are_the_papers_law(kind: str) -> None:
     trajectory = run("duration_s=1", f"observer.kind={kind}", "push.0.start_s=0.3", "push.0.torque_n_m=4.0")
     y1, y2, u, x_e = (trajectory[name] for name in ("y1_rad", "y2_rad", "u_rad_s", "x_e_rad_times_s"))
     x2 = trajectory[f"estimate/{kind}/x2_rad_s"]
-    demanded = -(35.0 * y1 + 4.0 * x2 - 1.0 * y2 + 0.3 * x_e)
-    np.testing.assert_allclose(u, np.clip(demanded, -4.7, 4.7), rtol=0.0, atol=1e-12)
-    saturated = np.abs(demanded) > 4.7
+    demand = -(35.0 * y1 + 4.0 * x2 - 1.0 * y2 + 0.3 * x_e)
+    np.testing.assert_allclose(u, np.clip(demand, -4.7, 4.7), rtol=0.0, atol=1e-12)
+    saturated = np.abs(demand) > 4.7
     assert 0 < saturated.sum() < 100
     assert x_e[0] == 0.0
-    held = saturated & (y2 * demanded > 0.0)
-    np.testing.assert_allclose(np.diff(x_e), np.where(held, 0.0, -0.005 * y2)[:-1], rtol=0.0, atol=1e-12)
+    is_held = saturated & (y2 * demand > 0.0)
+    np.testing.assert_allclose(np.diff(x_e), np.where(is_held, 0.0, -0.005 * y2)[:-1], rtol=0.0, atol=1e-12)
 
 
 def test_a_scenario_may_feed_back_the_estimated_angles() -> None:
@@ -518,14 +516,14 @@ def test_gimbals_move_oppositely_at_the_commanded_rate() -> None:
     first, second = (trajectory[f"angle/cube{i}/gimbal_rad"] - math.pi / 2.0 for i in (1, 2))
     np.testing.assert_allclose(first, -second, atol=1e-6)
     np.testing.assert_allclose(trajectory["x3_rad"], first, atol=1e-6)
-    commanded = np.concatenate([[0.0], np.cumsum(trajectory["u_rad_s"])[:-1]]) * 0.005
-    np.testing.assert_allclose(first[100:], commanded[100:], atol=2e-2)
+    setpoint = np.concatenate([[0.0], np.cumsum(trajectory["u_rad_s"])[:-1]]) * 0.005
+    np.testing.assert_allclose(first[100:], setpoint[100:], atol=2e-2)
 
 
 # --- something else while it runs --------------------------------------------------------------------------
 
 
-def test_another_observer_rides_along_and_takes_over() -> None:
+def test_another_observer_is_open_loop_first_and_takes_over() -> None:
     """The command is the one's until the other takes over, which began with the next sample and knows its held u."""
     one, other = Script(lambda k: Estimate(0.0, 1.0, 0.0)), Script(lambda k: Estimate(0.0, -1.0, 0.0))
     loop = controller(one)
@@ -537,18 +535,18 @@ def test_another_observer_rides_along_and_takes_over() -> None:
         assert loop.tick is not None
         rates.append(loop.tick.estimates[0][1])
     assert rates == [0.0, *[1.0] * (2 + TAKEOVER_TICKS), *[-1.0] * 5]
-    assert len(one.asked) == 2 + TAKEOVER_TICKS
-    assert len(other.asked) == TAKEOVER_TICKS + 4
-    assert other.asked == [*one.asked[3:], *other.asked[TAKEOVER_TICKS - 1 :]]
+    assert len(one.calls) == 2 + TAKEOVER_TICKS
+    assert len(other.calls) == TAKEOVER_TICKS + 4
+    assert other.calls == [*one.calls[3:], *other.calls[TAKEOVER_TICKS - 1 :]]
 
 
 def test_it_takes_over_at_once_from_one_that_fails() -> None:
-    def failing(k: int) -> Estimate:
+    def fail_later(k: int) -> Estimate:
         if k > 4:
             raise KeyError("gone")
         return Estimate(0.0, 1.0, 0.0)
 
-    loop = controller(Script(failing))
+    loop = controller(Script(fail_later))
     rates = []
     for k in range(9):
         if k == 3:

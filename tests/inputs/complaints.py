@@ -1,4 +1,4 @@
-"""What the tests of wrong input say and look for."""
+"""Helpers and common messages of the tests of wrong input."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import Said, cmg_mj
+from tests.command import CommandOutcome, cmg_mj
 
 RATE = "must be a number greater than or equal to 0.1 and at most 1e+06"
 OVER_0, FROM_0 = "must be a number greater than 0", "must be a number greater than or equal to 0"
@@ -19,11 +19,11 @@ def table(*rows: tuple) -> pytest.MarkDecorator:
     """Parametrise with rows (what, input, expected fragments...)."""
     return pytest.mark.parametrize(
         ("wrong_input", "fragments"),
-        [pytest.param(wrong_input, fragments, id=what) for what, wrong_input, *fragments in rows],
+        [pytest.param(wrong_input, fragments, id=case) for case, wrong_input, *fragments in rows],
     )
 
 
-def check(text: str | bytes) -> Said:
+def check(text: str | bytes) -> CommandOutcome:
     Path("my.toml").write_bytes(text.encode() if isinstance(text, str) else text)
     return cmg_mj("check", "my.toml")
 

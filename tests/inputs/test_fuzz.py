@@ -24,14 +24,14 @@ from cmg_mj import load_scenario
 from cmg_mj.inputs.bundled import folder
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import prepare
-from tests.command import Said, cmg_mj, cmg_mj_process
+from tests.command import CommandOutcome, cmg_mj, cmg_mj_process
 from tests.tiers import slow_but
 
 SCENARIOS, MODELS, IN_PROCESSES = 400, 200, 6
 GROUP = 25  # cases a test, so that the workers share them
 HANG_S = 20.0
 TICKS = 3
-"""What gets so far has started."""
+"""A run that gets so far has started."""
 
 NUMBERS = [0, 1, -1, 2, 0.5, 1e-3, 1e-9, 1e9, 1e17, 1e30, 1e300, 1e306, 1.7e308, 5e-324, 1e-300, -1e308, 10**20, 2**127]
 NUMBERS += [float("nan"), float("inf"), -float("inf"), 0.0049999, 1 / 3, 200, 1000, 0.1, 45, 90]
@@ -88,8 +88,8 @@ def valid_scenario() -> str:
 
 def places(value: Any, path: tuple = ()) -> Iterator[tuple]:
     """Paths of everything in a scenario."""
-    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for name, item in inside:
+    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for name, item in entries:
         yield (*path, name)
         yield from places(item, (*path, name))
 
@@ -113,13 +113,13 @@ def scenario(rng: np.random.Generator) -> bytes:
             place = place[section]
         values = [*NUMBERS, *TEXTS, True, [], {}, [1], {"a": 1}, [[1, 2], [3]], nested(5), nested(200)]
         value = values[rng.integers(len(values))]
-        was = place[name]
-        if isinstance(was, (int, float)) and rng.random() < 0.6:  # the type is right at least
+        old_value = place[name]
+        if isinstance(old_value, (int, float)) and rng.random() < 0.6:  # the type is right at least
             value = NUMBERS[rng.integers(len(NUMBERS))]
-        if isinstance(was, float) and rng.random() < 0.5:  # or even the size
-            value = float(was * 10.0 ** rng.uniform(-4, 4))
-        if isinstance(was, bool):
-            value = not was
+        if isinstance(old_value, float) and rng.random() < 0.5:  # or even the size
+            value = float(old_value * 10.0 ** rng.uniform(-4, 4))
+        if isinstance(old_value, bool):
+            value = not old_value
         if rng.random() < 0.1 and isinstance(place, dict):
             place[f"{name}s"] = place.pop(name)
         elif rng.random() < 0.05 and isinstance(place, dict):
@@ -128,15 +128,15 @@ def scenario(rng: np.random.Generator) -> bytes:
             place[name] = value
     text = tomli_w.dumps(fields).encode()
     if rng.random() < 0.1:
-        text = broken(text, rng)
+        text = corrupt(text, rng)
     return text
 
 
-def broken(text: bytes, rng: np.random.Generator) -> bytes:
+def corrupt(text: bytes, rng: np.random.Generator) -> bytes:
     """The text with some bytes taken out, put in, changed, or said again."""
     for _ in range(rng.integers(1, 4)):
-        at = int(rng.integers(len(text) + 1))
-        end = min(len(text), at + int(rng.integers(1, 30)))
+        begin = int(rng.integers(len(text) + 1))
+        end = min(len(text), begin + int(rng.integers(1, 30)))
         junk = [
             b"\0",
             b"\xff",
@@ -150,8 +150,13 @@ def broken(text: bytes, rng: np.random.Generator) -> bytes:
             b"=",
             b"&#0;",
         ]
-        into = [b"", junk[rng.integers(len(junk))], text[at:end] * 2, bytes(rng.integers(0, 256, 5, dtype=np.uint8))]
-        text = text[:at] + into[rng.integers(4)] + text[end:]
+        insertions = [
+            b"",
+            junk[rng.integers(len(junk))],
+            text[begin:end] * 2,
+            bytes(rng.integers(0, 256, 5, dtype=np.uint8)),
+        ]
+        text = text[:begin] + insertions[rng.integers(4)] + text[end:]
     return text
 
 
@@ -159,8 +164,8 @@ def model(rng: np.random.Generator) -> tuple[bytes, bytes]:
     """The bundled rig and its cube with something wrong, or not."""
     texts = [(folder("models") / name).read_text() for name in ("scissored_pair.xml", "cube.xml")]
     for _ in range(rng.integers(1, 4)):
-        which = int(rng.integers(2))
-        text = re.sub(r"<!--.*?-->", "", texts[which], flags=re.DOTALL)
+        file_index = int(rng.integers(2))
+        text = re.sub(r"<!--.*?-->", "", texts[file_index], flags=re.DOTALL)
         kind = rng.random()
         if kind < 0.5:  # another number
             spots = list(re.finditer(r"(?<=[\" ])-?\d+\.?\d*(?:e-?\d+)?(?=[\" ])", text))
@@ -205,10 +210,10 @@ def model(rng: np.random.Generator) -> tuple[bytes, bytes]:
             spots = list(re.finditer(r"<[a-z]\w*[^<>]*/>", text))
             new = [2 * spots[rng.integers(len(spots))][0], '<include file="pipe"/>', '<joint type="free"/>', "<body/>"]
         spot = spots[rng.integers(len(spots))]
-        texts[which] = text[: spot.start()] + new[rng.integers(len(new))] + text[spot.end() :]
+        texts[file_index] = text[: spot.start()] + new[rng.integers(len(new))] + text[spot.end() :]
     rig, cube = (text.encode() for text in texts)
     if rng.random() < 0.1:
-        rig = broken(rig, rng)
+        rig = corrupt(rig, rng)
     return rig, cube
 
 
@@ -246,7 +251,7 @@ def start(name: str) -> None:
     experiment.resolved()
 
 
-def case(outcome: Said) -> bool:
+def case(outcome: CommandOutcome) -> bool:
     """Judge what `check` says of a file, and start it if that is valid; whether it is."""
     if outcome.status == 0:
         start("my.toml")
@@ -255,7 +260,7 @@ def case(outcome: Said) -> bool:
     return False
 
 
-def tried(make: Callable[[np.random.Generator], Any], seeds: range, write: Callable[[Any], None]) -> int:
+def count_valid(make: Callable[[np.random.Generator], Any], seeds: range, write: Callable[[Any], None]) -> int:
     """Make, check and start; how many were valid."""
     valid = 0
     for seed in seeds:
@@ -281,14 +286,14 @@ def write_model(texts: tuple[bytes, bytes]) -> None:
 
 @pytest.mark.parametrize("first", slow_but(range(0, SCENARIOS, GROUP), 0, GROUP))
 def test_scenarios(first: int) -> None:
-    valid = tried(scenario, range(first, first + GROUP), write_scenario)
+    valid = count_valid(scenario, range(first, first + GROUP), write_scenario)
     assert 0 < valid < GROUP  # or the fuzz shows nothing
 
 
 @pytest.mark.parametrize("first", slow_but(range(0, MODELS, GROUP), 0))
 def test_models(first: int) -> None:
     os.mkfifo("pipe")
-    valid = tried(model, range(1000 + first, 1000 + first + GROUP), write_model)
+    valid = count_valid(model, range(1000 + first, 1000 + first + GROUP), write_model)
     assert 0 < valid < GROUP
 
 
@@ -298,10 +303,10 @@ def test_by_the_real_command(seed: int, tmp_path: Path) -> None:
     """`check` and then `run`, each in a process of its own."""
     rng = np.random.default_rng(2000 + seed)
     write_model(model(rng)) if seed % 2 else write_scenario(scenario(rng))
-    checked = cmg_mj_process("check", "my.toml", cwd=tmp_path)
-    ran = cmg_mj_process("run", "my.toml", "--out", "it", "--json", cwd=tmp_path)
-    if checked.status == 0:
-        assert json.loads(ran.out)
+    check = cmg_mj_process("check", "my.toml", cwd=tmp_path)
+    run = cmg_mj_process("run", "my.toml", "--out", "it", "--json", cwd=tmp_path)
+    if check.status == 0:
+        assert json.loads(run.out)
     else:
-        assert checked.complaint
-        assert ran.complaint
+        assert check.complaint
+        assert run.complaint

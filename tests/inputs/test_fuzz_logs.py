@@ -1,4 +1,4 @@
-"""Hundreds of broken logs, the same ones every time: a table or one clear line, no traceback and no hang."""
+"""Hundreds of corrupt logs, the same ones every time: a table or one clear line, no traceback and no hang."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from cmg_mj.errors import InputError
 from cmg_mj.replay.log_replay import replay_log
 from cmg_mj.replay.logs import ReadOptions, read_log
-from tests.inputs.test_fuzz import GROUP, TEXTS, broken, no_hang
+from tests.inputs.test_fuzz import GROUP, TEXTS, corrupt, no_hang
 from tests.replay.logs.motion import sine, tilt, write_csv
 from tests.tiers import slow_but
 
@@ -37,12 +37,12 @@ def columns(rng: np.random.Generator) -> dict[str, list]:
         elif kind < 0.5:
             signals[name] = [values[0]] * len(values) if values else []
         elif kind < 0.6 and len(values) > 2:
-            at, end = sorted(rng.integers(0, len(values), 2))
+            start, end = sorted(rng.integers(0, len(values), 2))
             for column in signals.values():
-                del column[at:end]
+                del column[start:end]
         elif kind < 0.7 and len(values) > 2:
-            at = int(rng.integers(len(values)))
-            signals[name] = values[:at] + [None] * (len(values) - at)
+            start = int(rng.integers(len(values)))
+            signals[name] = values[:start] + [None] * (len(values) - start)
         elif kind < 0.8:
             signals[name] = [v * float(10.0 ** rng.uniform(-300, 300)) if isinstance(v, float) else v for v in values]
         elif kind < 0.9:
@@ -63,7 +63,7 @@ def write(rng: np.random.Generator) -> Path:
     else:
         path = write_csv("log.csv", signals, delimiter=str(rng.choice([",", ";", "\t"])))
     if rng.random() < 0.3:
-        path.write_bytes(broken(path.read_bytes(), rng))
+        path.write_bytes(corrupt(path.read_bytes(), rng))
     return path
 
 
@@ -79,11 +79,11 @@ def test_logs(first: int, monkeypatch: pytest.MonkeyPatch) -> None:
         rate = None if "time" in roles and rng.random() < 0.7 else float(rng.choice([1.0, 100.0, 1e5]))
         try:
             with no_hang():
-                replayed = replay_log(
+                result = replay_log(
                     read_log(path, ReadOptions(roles, rate_hz=rate)), ["linear", "finite_difference"], settle_s=0.1
                 )
             right += 1
-            assert replayed.summaries["zero"]["noise_gain_1_s"] == 0.0
+            assert result.summaries["zero"]["noise_gain_1_s"] == 0.0
         except InputError as error:
             complaints.append(str(error))
         except BaseException as error:

@@ -1,4 +1,4 @@
-"""What goes wrong while a run goes on, or when it is written."""
+"""Failures during a run, or when its files are written."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class PutsInTheWay(Mine):
 def test_what_comes_in_the_way_of_a_file(quick: str) -> None:
     outcome = cmg_mj("run", quick, "--out", "it", "--json", "--plot", "--observer", f"{__name__}:PutsInTheWay")
     assert outcome.status == 0
-    assert outcome.err.startswith("Written to it/incomplete; what it has held stays as it was. Open")
+    assert outcome.err.startswith("Written to it/incomplete; the earlier files in it stay as they were. Open")
     assert outcome.out.startswith("{")  # the summary is not lost
     assert names("it") == ["incomplete", "plot.png"]
     assert names("it/plot.png") == ["mine"]
@@ -55,14 +55,14 @@ def test_what_comes_in_the_way_of_a_file(quick: str) -> None:
 def test_a_file_that_cannot_be_written_keeps_no_other_from_being(
     quick: str, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fails(path: Path, *arguments: object) -> None:
+    def fail(path: Path, *arguments: object) -> None:
         path.write_text("begun")
         raise IsADirectoryError(21, "Is a directory")
 
     write_text = runs.write_text
 
     def fails_on_toml(path: Path, text: str) -> None:
-        (write_text if text.startswith("{") else fails)(path, text)
+        (write_text if text.startswith("{") else fail)(path, text)
 
     owner, writer = {
         "scenario.toml": (runs, "write_text"),
@@ -70,8 +70,8 @@ def test_a_file_that_cannot_be_written_keeps_no_other_from_being(
         "summary.json": (runs, "_write_json"),
         "recording.rrd": (recording, "write_recording"),
     }[name]
-    method = fails_on_toml if name == "scenario.toml" else fails
-    monkeypatch.setattr(owner, writer, method if isinstance(owner, ModuleType) else lambda _, path, *more: fails(path))
+    method = fails_on_toml if name == "scenario.toml" else fail
+    monkeypatch.setattr(owner, writer, method if isinstance(owner, ModuleType) else lambda _, path, *more: fail(path))
     outcome = cmg_mj("run", quick, "--out", "it", "--json")
     assert outcome.status == 2
     assert outcome.err == f"cmg-mj: it/{name}: cannot be written: Is a directory\n"

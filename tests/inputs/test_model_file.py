@@ -12,11 +12,11 @@ import pytest
 from cmg_mj import load_plant
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import folder
-from tests.command import Said, cmg_mj
+from tests.command import CommandOutcome, cmg_mj
 from tests.inputs.complaints import assert_in_order, check, table
 
 
-def edited(rig: tuple[str, str] | None = None, cube: tuple[str, str] | None = None) -> Said:
+def check_edited(rig: tuple[str, str] | None = None, cube: tuple[str, str] | None = None) -> CommandOutcome:
     """`check` on a copy of the bundled model, in which a pattern has been replaced."""
     for name, edit in (("scissored_pair.xml", rig), ("cube.xml", cube)):
         text = (folder("models") / name).read_text()
@@ -27,7 +27,7 @@ def edited(rig: tuple[str, str] | None = None, cube: tuple[str, str] | None = No
     return check("duration_s = 0.1\n[plant]\nmodel = 'rig.xml'")
 
 
-def without(start: str) -> tuple[str, str]:
+def delete_element(start: str) -> tuple[str, str]:
     return rf"<{start}.*?/>", ""
 
 
@@ -37,36 +37,40 @@ BODY = '<body name="more" pos="1 0 0">{}<inertial pos="0 0 0" mass="1" diaginert
 @table(
     (
         "joint tilt",
-        {"rig": without('joint name="tilt"')},
+        {"rig": delete_element('joint name="tilt"')},
         "the model has no joint 'tilt'; its joints: cube1/flywheel, ",
     ),
     ("typo in tilt", {"rig": ('"tilt"', '"tlit"')}, "the model has no joint 'tilt'; did you mean 'tlit'?"),
     (
         "joint flywheel",
-        {"cube": without('joint name="flywheel"')},
+        {"cube": delete_element('joint name="flywheel"')},
         "has no joint 'cube1/flywheel', 'cube2/flywheel'; its joints: cube1/g",
     ),
-    ("joint gimbal", {"cube": without('joint name="gimbal"')}, "the model has no joint 'cube1/gimbal'"),
+    ("joint gimbal", {"cube": delete_element('joint name="gimbal"')}, "the model has no joint 'cube1/gimbal'"),
     (
         "actuator servo",
-        {"cube": without("intvelocity")},
+        {"cube": delete_element("intvelocity")},
         "has no actuator 'cube1/gimbal_servo', 'cube2/gimbal_servo'; its actuators: cube1/f",
     ),
-    ("actuator motor", {"cube": without("velocity name")}, "the model has no actuator 'cube1/flywheel_motor'"),
-    ("sensor encoder", {"cube": without("jointpos")}, "the model has no sensor 'cube1/gimbal_encoder'"),
-    ("accelerometer", {"rig": without('accelerometer name="accelerometer_inner"')}, "no sensor 'accelerometer_inner'"),
-    ("gyro", {"rig": without("gyro")}, "the model has no sensor 'fog'; its sensors: accelerometer_inner"),
+    ("actuator motor", {"cube": delete_element("velocity name")}, "the model has no actuator 'cube1/flywheel_motor'"),
+    ("sensor encoder", {"cube": delete_element("jointpos")}, "the model has no sensor 'cube1/gimbal_encoder'"),
+    (
+        "accelerometer",
+        {"rig": delete_element('accelerometer name="accelerometer_inner"')},
+        "no sensor 'accelerometer_inner'",
+    ),
+    ("gyro", {"rig": delete_element("gyro")}, "the model has no sensor 'fog'; its sensors: accelerometer_inner"),
     (
         "keyframe",
         {"rig": ("<keyframe>.*</keyframe>", "")},
         "the model has no keyframe 'equilibrium'; its keyframes: none",
     ),
     ("typo in keyframe", {"rig": ('"equilibrium"', '"equilibrum"')}, "'equilibrium'; did you mean 'equilibrum'?"),
-    ("cubes", {"rig": ('<frame name="cube..mount.*?</frame>', "")}, "the model has no joint 'cube1/gimbal'"),
+    ("modules", {"rig": ('<frame name="cube..mount.*?</frame>', "")}, "the model has no joint 'cube1/gimbal'"),
     ("the cube's file", {"rig": ('file="cube.xml"', 'file="cub.xml"')}, "not a model MuJoCo can read: ", "cub.xml"),
 )
 def test_a_model_that_lacks(wrong_input: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**wrong_input).complaint)
+    assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)
 
 
 @table(
@@ -121,28 +125,28 @@ def test_a_model_that_lacks(wrong_input: dict[str, Any], fragments: list[str]) -
     ("no mass", {"cube": ('mass="0.61"', 'mass="0"')}, "does not compile: mass and inertia", "'cube1/flywheel'"),
 )
 def test_a_model_that_has(wrong_input: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**wrong_input).complaint)
+    assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)
 
 
 def test_the_unedited_copy_is_a_model() -> None:
-    assert edited().status == 0
+    assert check_edited().status == 0
 
 
 def test_a_lock_without_a_bearing() -> None:
-    edited(rig=('<joint name="yaw".*?/>', ""))
+    check_edited(rig=('<joint name="yaw".*?/>', ""))
     complaint = cmg_mj("run", "my.toml", "--set", "plant.lock_thrust_bearing=true").complaint
     assert "plant.lock_thrust_bearing = true: rig.xml has no joint 'yaw' to lock" in complaint
 
 
 def test_a_lock_where_the_keyframe_gives_no_rates() -> None:
-    edited(rig=('qvel="[^"]*"', ""))
+    check_edited(rig=('qvel="[^"]*"', ""))
     with pytest.raises(
         InputError, match=r"^rig\.xml: keyframe 'equilibrium' must start 'cube1/flywheel' at its motor's"
     ):
         load_plant(model="rig.xml", lock_thrust_bearing=True)
 
 
-AT = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
+KEYFRAME_ANGLES = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
 """The keyframe's angles of tilt, gimbal, flywheel and gimbal."""
 
 
@@ -162,12 +166,12 @@ AT = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
     ("a mass of any size", {"cube": ('mass="1.66"', 'mass="1e300"')}, "mass of body 'frame' is no number of any size"),
     (
         "a keyframe that lies flat",
-        {"rig": (AT, "0.78539816339744828 1.5707963267948966 0 1.5707963267948966")},
+        {"rig": (KEYFRAME_ANGLES, "0.78539816339744828 1.5707963267948966 0 1.5707963267948966")},
         "the rig must stand upright, its mass above the tilt axis; it leans by 90 deg ('tilt' = -0.785398 would be up",
     ),
     (
         "gimbals a quarter turn off",
-        {"rig": (AT, "-0.78539816339744828 0 0 0")},
+        {"rig": (KEYFRAME_ANGLES, "-0.78539816339744828 0 0 0")},
         "the axis of 'cube1/flywheel' must be at right angles to the tilt's; it is 90 deg off ('cube1/gimbal' = ",
         "the axis of 'cube2/flywheel'",
         "keyframe 'equilibrium' must have the setpoint (act) of 'cube2/gimbal_servo' where its gimbal stands: 0, not",
@@ -205,14 +209,14 @@ AT = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
         {"rig": ('width="256"', 'width="100000000"')},
         "<texture width='100000000'>: at most 10000",
     ),
-    ("a model that is no text", {"rig": ("sun", "sun\xff")}, "rig.xml is not UTF-8 text (at byte "),
+    ("a model that is no text", {"rig": ("sun", "sun\xff")}, "rig.xml: not UTF-8 text (at byte "),
 )
 def test_a_model_that_is_set_wrongly(wrong_input: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], edited(**wrong_input).complaint)
+    assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)
 
 
 def test_all_that_is_missing_and_wrong_is_said_at_once() -> None:
-    edited()
+    check_edited()
     rig = Path("rig.xml").read_text()
     for edit in (
         ('name="fog" site', 'name="fg" site'),
@@ -228,14 +232,14 @@ def test_all_that_is_missing_and_wrong_is_said_at_once() -> None:
             "the model has no sensor 'fog'; did you mean 'fg'? its sensors: ",
             "the model has no keyframe 'equilibrium'; its keyframes: none",
             "<option gravity='0 0 9.81'>: must point straight down",
-            "a rig needs a joint or a site tilt, the joints CUBE/gimbal, CUBE/flywheel, the actuators ",
+            "a rig needs a joint or a site tilt, the joints MODULE/gimbal, MODULE/flywheel, the actuators ",
         ],
         cmg_mj("check", "rig.xml").complaint,
     )
 
 
 def test_check_of_a_model_by_itself() -> None:
-    edited()
+    check_edited()
     outcome = cmg_mj("check", "rig.xml")
     assert (outcome.status, outcome.err) == (0, "")
     for fragment in ("rig.xml: a rig", "cube1, cube2", "J_d = 0.0011 kg m^2", "--set plant.model=rig.xml"):

@@ -95,18 +95,18 @@ def kind(cls: type) -> str:
 def test_an_open_loop_observer_cannot_change_what_others_see(open_loop_observer: type) -> None:
     """The observer in the loop and all that is recorded are as without it; it itself is lost."""
     settings = ["duration_s=0.4", "push=[]"]
-    alone = prepare(load_scenario("push_recovery", settings)).run_many(3).trajectory
-    beside = prepare(
+    expected = prepare(load_scenario("push_recovery", settings)).run_many(3).trajectory
+    result = prepare(
         load_scenario("push_recovery", [*settings, f"open_loop_observers=['{kind(open_loop_observer)}']"])
     ).run_many(3)
-    assert alone is not None
-    assert beside.trajectory is not None
-    for name, values in alone.columns.items():
-        np.testing.assert_array_equal(beside.trajectory[name], values)
-    assert np.isnan(beside.trajectory[f"estimate/{kind(open_loop_observer)}/x2_rad_s"][-1]).all()
+    assert expected is not None
+    assert result.trajectory is not None
+    for name, values in expected.columns.items():
+        np.testing.assert_array_equal(result.trajectory[name], values)
+    assert np.isnan(result.trajectory[f"estimate/{kind(open_loop_observer)}/x2_rad_s"][-1]).all()
 
 
-def test_in_the_loop_it_is_told(quick: str) -> None:
+def test_in_the_loop_the_comparison_fails(quick: str) -> None:
     outcome = cmg_mj("compare", quick, "--observers", kind(ChangesTheTilt), "--worlds", 2)
     assert outcome.status == 2
     assert "read-only" in outcome.err
@@ -160,6 +160,6 @@ def test_what_it_prints_is_no_output_of_the_command(quick: str) -> None:
     assert json.loads(outcome.out)["observer"] == kind(Prints)
     assert {"made", "step"} <= set(outcome.err.split())
     Path("mine.toml").write_text(f"duration_s = 0.3\n[observer]\nkind = '{kind(Prints)}'")
-    checked = cmg_mj("check", "mine.toml")
-    assert "made" not in checked.out
-    assert "your own code, which was imported and tried on two samples" in checked.out
+    check_outcome = cmg_mj("check", "mine.toml")
+    assert "made" not in check_outcome.out
+    assert "your own code, which was imported and tried on two samples" in check_outcome.out

@@ -29,8 +29,8 @@ class Mine:
     def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
         return state + 1, self.command(state, -35.0 * x.x1 - 4.0 * x.x2 + x.x3)
 
-    def command(self, k: int, demanded: Any) -> Any:
-        return demanded
+    def command(self, k: int, demand: Any) -> Any:
+        return demand
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -90,17 +90,17 @@ class ReturnsACommand(Mine):
 
 
 class ReturnsText(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
+    def command(self, k: int, demand: Any) -> Any:
         return "0.0"
 
 
 class ReturnsAList(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return [demanded]
+    def command(self, k: int, demand: Any) -> Any:
+        return [demand]
 
 
 class GivesNanAtOnce(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
+    def command(self, k: int, demand: Any) -> Any:
         return math.nan
 
 
@@ -122,33 +122,33 @@ class TrimsNothing(Mine):
 
 
 class ForOneWorld(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return math.copysign(1.0, demanded)
+    def command(self, k: int, demand: Any) -> Any:
+        return math.copysign(1.0, demand)
 
 
 class ForgetsWorlds(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
+    def command(self, k: int, demand: Any) -> Any:
         return 0.0
 
 
 class FailsLater(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return 1 / 0 if k == 30 else demanded
+    def command(self, k: int, demand: Any) -> Any:
+        return 1 / 0 if k == 30 else demand
 
 
 class GivesNan(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return demanded * (math.nan if k >= 30 else 1.0)
+    def command(self, k: int, demand: Any) -> Any:
+        return demand * (math.nan if k >= 30 else 1.0)
 
 
 class GivesInfinity(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return demanded * 0.0 + (math.inf if k >= 30 else 0.0)
+    def command(self, k: int, demand: Any) -> Any:
+        return demand * 0.0 + (math.inf if k >= 30 else 0.0)
 
 
 class ReturnsTextLater(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        return "0.0" if k == 30 else demanded
+    def command(self, k: int, demand: Any) -> Any:
+        return "0.0" if k == 30 else demand
 
 
 class ChangesWhatItIsGiven(Mine):
@@ -161,22 +161,22 @@ class ChangesWhatItIsGiven(Mine):
 class AsksForMuch(Mine):
     """Far beyond the limit, with NumPy's numbers."""
 
-    seen: ClassVar[list] = []
+    commands: ClassVar[list] = []
 
     def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
-        self.seen.append(u)
+        self.commands.append(u)
         return state + 1, np.float64(1000.0)
 
 
 RETURN = "step(state, y, x, u) must return"
 
 
-def named(law: type) -> str:
+def law_path(law: type) -> str:
     return f"{__name__}:{law.__name__}"
 
 
-def set_to(law: type) -> list[str]:
-    return ["--set", f"controller.kind={named(law)}"]
+def law_option(law: type) -> list[str]:
+    return ["--set", f"controller.kind={law_path(law)}"]
 
 
 @table(
@@ -199,11 +199,11 @@ def set_to(law: type) -> list[str]:
 def test_a_law_that_cannot_work(wrong_input: type, fragments: list[str], command: str) -> None:
     """It is found before the run, so that not even a folder is made."""
     if command == "check":
-        Path("mine.toml").write_text(f"[controller]\nkind = '{named(wrong_input)}'")
+        Path("mine.toml").write_text(f"[controller]\nkind = '{law_path(wrong_input)}'")
         outcome = cmg_mj("check", "mine.toml")
         Path("mine.toml").unlink()
     else:
-        outcome = cmg_mj(command, "push_recovery", *set_to(wrong_input))
+        outcome = cmg_mj(command, "push_recovery", *law_option(wrong_input))
     assert_in_order(fragments, outcome.complaint)
     assert list(Path().iterdir()) == []
 
@@ -297,15 +297,15 @@ def test_gains_reach_a_law_of_ones_own_that_takes_them() -> None:
     ),
 )
 def test_a_law_for_one_world_among_many(quick: str, wrong_input: type, fragments: list[str]) -> None:
-    assert cmg_mj("run", quick, *set_to(wrong_input)).status == 0
-    outcome = cmg_mj("compare", quick, *set_to(wrong_input), "--out", "compared")
-    assert_in_order([f"controller.kind = '{named(wrong_input)}': ", *fragments], outcome.complaint)
+    assert cmg_mj("run", quick, *law_option(wrong_input)).status == 0
+    outcome = cmg_mj("compare", quick, *law_option(wrong_input), "--out", "compared")
+    assert_in_order([f"controller.kind = '{law_path(wrong_input)}': ", *fragments], outcome.complaint)
     assert not Path("compared").exists()
 
 
 def test_a_law_that_changes_what_it_is_given_changes_no_record() -> None:
     """A batch that had no dry run on arrays stops, rather than go on with an estimate that nobody made."""
-    settings = ["push=[]", "duration_s=0.1", f"controller.kind={named(ChangesWhatItIsGiven)}"]
+    settings = ["push=[]", "duration_s=0.1", f"controller.kind={law_path(ChangesWhatItIsGiven)}"]
     result = prepare(load_scenario("push_recovery", settings)).run_many(2)
     assert [outcome.kind for outcome in result.outcomes] == ["stopped"] * 2
     assert "raised ValueError: output array is read-only" in result.outcomes[0].reason
@@ -319,12 +319,12 @@ def test_a_law_that_changes_what_it_is_given_changes_no_record() -> None:
 )
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_a_law_that_fails_in_a_run(wrong_input: type, fragments: list[str], driver: str) -> None:
-    """What was recorded until then is kept."""
-    outcome = cmg_mj("run", "push_recovery", *set_to(wrong_input), "--driver", driver, "--out", "it")
+    """The recording until then is kept."""
+    outcome = cmg_mj("run", "push_recovery", *law_option(wrong_input), "--driver", driver, "--out", "it")
     assert outcome.status == 2
     assert "stopped at 0.15 s" in outcome.out
-    written, complaint = outcome.err.splitlines()
-    assert written.startswith("Written to it. ")
+    note, complaint = outcome.err.splitlines()
+    assert note.startswith("Written to it. ")
     assert_in_order(["cmg-mj: ", *fragments, "what was recorded until then is in it"], complaint)
     assert len(assert_whole("it")) == 30
 
@@ -340,25 +340,25 @@ def test_a_law_that_fails_in_one_world_of_many() -> None:
 
 
 class FailsInWorld1(Mine):
-    def command(self, k: int, demanded: Any) -> Any:
-        lost = np.zeros(np.shape(demanded))
+    def command(self, k: int, demand: Any) -> Any:
+        error = np.zeros(np.shape(demand))
         if k >= 30:
-            lost[1] = math.nan
-        return demanded + lost
+            error[1] = math.nan
+        return demand + error
 
 
 def test_no_law_gets_beyond_the_limit() -> None:
     """Its next sample tells it what was commanded, as a float."""
-    AsksForMuch.seen.clear()
+    AsksForMuch.commands.clear()
     experiment = prepare(
-        load_scenario("push_recovery", ["push=[]", "duration_s=0.05", f"controller.kind={named(AsksForMuch)}"])
+        load_scenario("push_recovery", ["push=[]", "duration_s=0.05", f"controller.kind={law_path(AsksForMuch)}"])
     )
-    AsksForMuch.seen.clear()
+    AsksForMuch.commands.clear()
     trajectory = experiment.run().trajectory
     assert trajectory is not None
     np.testing.assert_array_equal(trajectory["u_rad_s"], 4.7)
-    assert AsksForMuch.seen == [0.0] + [4.7] * (len(trajectory) - 1)
-    assert all(type(u) is float for u in AsksForMuch.seen)
+    assert AsksForMuch.commands == [0.0] + [4.7] * (len(trajectory) - 1)
+    assert all(type(u) is float for u in AsksForMuch.commands)
     many = experiment.run_many(2).trajectory
     assert many is not None
     np.testing.assert_array_equal(many["u_rad_s"], 4.7)
@@ -368,10 +368,10 @@ def test_a_law_that_remembers_in_itself_is_fresh_in_every_run() -> None:
     experiment = prepare(
         load_scenario("push_recovery", ["push=[]", "duration_s=0.1", f"controller.kind={__name__}:Remembers"])
     )
-    one, again = experiment.run().trajectory, experiment.run().trajectory
+    one, rerun = experiment.run().trajectory, experiment.run().trajectory
     assert one is not None
-    assert again is not None
-    np.testing.assert_array_equal(one["u_rad_s"], again["u_rad_s"])
+    assert rerun is not None
+    np.testing.assert_array_equal(one["u_rad_s"], rerun["u_rad_s"])
     assert one["u_rad_s"][-1] == pytest.approx(0.01 * len(one))
     with pytest.raises(InputError, match="differs"):
         prepare(load_scenario("push_recovery")).run_many(2, vary={"controller.kind": ["lqg", "state_feedback"]})

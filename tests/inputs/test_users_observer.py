@@ -143,7 +143,7 @@ RETURN = "step(state, y, u) must return"
     ("signals", NamesNoSignals, "extra_signals must be a tuple of names like ('bias_rad',), each once, not 'bias_rad'"),
     ("a signal too few", OwesASignal, f"{RETURN} (state, (x1, x2, x3, bias_rad)), not (state, "),
 )
-@pytest.mark.parametrize("place", ["in the loop", "riding along", "compared"])
+@pytest.mark.parametrize("place", ["in the loop", "open loop", "compared"])
 def test_an_observer_that_cannot_work(wrong_input: type, fragments: list[str], place: str) -> None:
     """It is found before the run, so that not even a folder is made."""
     kind = f"{__name__}:{wrong_input.__name__}"
@@ -182,13 +182,13 @@ def test_an_observer_for_one_world_among_many(quick: str, wrong_input: type, fra
 )
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_an_observer_that_fails_in_a_run(wrong_input: type, fragments: list[str], driver: str) -> None:
-    """What was recorded until then is kept."""
+    """The recording until then is kept."""
     kind = f"{__name__}:{wrong_input.__name__}"
     outcome = cmg_mj("run", "push_recovery", "--observer", kind, "--driver", driver, "--out", "it")
     assert outcome.status == 2
     assert "stopped at 0.15 s" in outcome.out
-    written, complaint = outcome.err.splitlines()
-    assert written.startswith("Written to it. ")
+    note, complaint = outcome.err.splitlines()
+    assert note.startswith("Written to it. ")
     assert_in_order(["cmg-mj: ", *fragments, "what was recorded until then is in it"], complaint)
     assert len(assert_whole("it")) == 30
 
@@ -213,7 +213,7 @@ def test_an_open_loop_observer_that_gives_nan_harms_nobody(quick: str) -> None:
 
 
 def test_an_observer_that_changes_its_own_arrays_is_judged_as_in_one_world(quick: str) -> None:
-    """What it has said at a tick is not what it says later."""
+    """A change of its arrays does not reach the estimates of earlier ticks."""
     experiment = prepare(load_scenario(quick, [], f"{__name__}:ChangesInPlace"))
     one, many = experiment.run(), experiment.run_many(2)
     assert one.trajectory is not None

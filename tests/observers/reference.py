@@ -28,7 +28,7 @@ EPSILON, BOUND = 0.0287, 10.4
 """Defaults that are not a paper's: epsilon of linear_high_gain and L of super_twisting, from `cmg-mj tune`."""
 
 NOISE = TiltNoise(0.0063, 0.41, 0.89, 3.1e-4)
-"""Of the bundled rig's accelerometers, 400 ug/rtHz at 200 Hz."""
+"""The noise of the bundled rig's accelerometers, 400 ug/rtHz at 200 Hz."""
 
 Signal = Sequence[float] | np.ndarray
 
@@ -43,8 +43,8 @@ def observer(kind: str, dt: float = DT, model: ReducedModel = PAPER, **parameter
 def run(estimator: Observer, y1: Signal, y2: Signal, u: Signal) -> tuple[np.ndarray, list]:
     """Estimates after the first sample, (n - 1, 3), and all n states."""
     states, estimates = [estimator.init(Measurement(float(y1[0]), float(y2[0])))], []
-    for a, b, held in zip(y1[1:], y2[1:], u, strict=False):
-        state, estimate = estimator.step(states[-1], Measurement(float(a), float(b)), float(held))
+    for a, b, command in zip(y1[1:], y2[1:], u, strict=False):
+        state, estimate = estimator.step(states[-1], Measurement(float(a), float(b)), float(command))
         states.append(state)
         estimates.append(estimate)
     return np.array(estimates), states

@@ -1,4 +1,4 @@
-"""What every observer must be: a value with pure, elementwise init and step, that filters and starts at rest."""
+"""The contract of every observer: a value with pure, elementwise init and step, that filters and starts at rest."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.observers import BENCH_PARAMETERS, OBSERVERS, Estimate, Measurement
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement
 from tests.observers.reference import DT, PAPER, observer, rough_signals
 from tests.plant import paper_model as paper
 
@@ -99,10 +99,10 @@ def test_estimate_uses_the_sample_it_is_given(kind: str) -> None:
     estimator = observer(kind)
     state = estimator.init(Measurement(0.0, 0.1, 0.0))
     _, estimate = estimator.step(state, Measurement(1e-5, 0.1, 0.0), 0.0)
-    _, moved = estimator.step(state, Measurement(5e-5, 0.1, 0.0), 0.0)
-    assert abs(moved.x2 - estimate.x2) > 1e-6
-    _, turned = estimator.step(state, Measurement(1e-5, 0.3, 0.0), 0.0)
-    assert abs(turned.x3 - estimate.x3) > 1e-4
+    _, tilt_estimate = estimator.step(state, Measurement(5e-5, 0.1, 0.0), 0.0)
+    assert abs(tilt_estimate.x2 - estimate.x2) > 1e-6
+    _, gimbal_estimate = estimator.step(state, Measurement(1e-5, 0.3, 0.0), 0.0)
+    assert abs(gimbal_estimate.x3 - estimate.x3) > 1e-4
 
 
 MODELS = ("ltv", "homogeneous", "luenberger", "kalman", "high_gain", "adaptive", "homogeneous_adaptive")
@@ -119,18 +119,18 @@ def test_models_use_the_command_held_since_the_sample_before(kind: str) -> None:
     estimator = observer(kind)
     state = estimator.init(Measurement(0.0, 0.0))
     _, still = estimator.step(state, Measurement(0.0, 0.0), 0.0)
-    _, driven = estimator.step(state, Measurement(0.0, 2.0 * DT), 2.0)  # and the gimbal has turned
-    assert driven.x2 - still.x2 == pytest.approx(paper.J_d * paper.omega_d / paper.J1 * 2.0 * DT, rel=0.1)
+    _, command_estimate = estimator.step(state, Measurement(0.0, 2.0 * DT), 2.0)  # and the gimbal has turned
+    assert command_estimate.x2 - still.x2 == pytest.approx(paper.J_d * paper.omega_d / paper.J1 * 2.0 * DT, rel=0.1)
 
 
 @pytest.mark.parametrize("kind", DIFFERENTIATORS)
 def test_differentiators_use_no_model(kind: str) -> None:
     """Neither the command nor the gimbal nor the rig's parameters reach the rate."""
-    bent = dataclasses.replace(PAPER, J1=1.0, J2=0.3, J_d=0.1, omega_d=10.0, gravity_torque=9.0)
+    other_model = dataclasses.replace(PAPER, J1=1.0, J2=0.3, J_d=0.1, omega_d=10.0, gravity_torque=9.0)
     still = [(y1, 0.0, acceleration, 0.0) for y1, _, acceleration, _ in samples()]
     rates = [
         [e.x2 for e in walk(estimator, s)[1]]
-        for estimator, s in ((observer(kind), samples()), (observer(kind, model=bent), still))
+        for estimator, s in ((observer(kind), samples()), (observer(kind, model=other_model), still))
     ]
     assert rates[0] == rates[1]
 
@@ -140,8 +140,10 @@ def test_differentiators_use_no_model(kind: str) -> None:
 def test_arrays_equal_floats_bit_by_bit(kind: str, n_worlds: int) -> None:
     estimator = observer(kind)
     worlds = [samples(120, seed) for seed in range(n_worlds)]
-    together = [tuple(np.array([world[k][i] for world in worlds]) for i in range(4)) for k in range(len(worlds[0]))]
-    _, many = walk(estimator, together)
+    batch_samples = [
+        tuple(np.array([world[k][i] for world in worlds]) for i in range(4)) for k in range(len(worlds[0]))
+    ]
+    _, many = walk(estimator, batch_samples)
     for i, world in enumerate(worlds):
         _, single = walk(estimator, world)
         assert all(type(number) is float for number in single[-1])
@@ -160,7 +162,9 @@ def positive_gains() -> list[tuple[str, str]]:
     result = []
     for kind in EVERY:
         estimator: Any = observer(kind)
-        names = [field.name for field in dataclasses.fields(estimator) if field.name not in BENCH_PARAMETERS]
+        names = [
+            field.name for field in dataclasses.fields(estimator) if field.name not in OBSERVER_CLASSES.bench_parameters
+        ]
         result += [
             (kind, name) for name in names if isinstance(value := getattr(estimator, name), float) and value > 0.0
         ]

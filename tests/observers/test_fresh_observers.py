@@ -71,8 +71,8 @@ class RaisesLate:
 def test_the_resolved_scenario_has_the_defaults_and_reruns_to_the_same_numbers() -> None:
     kind = f"{__name__}:Remembers"
     first = cmg_mj("run", "push_recovery", "--observer", kind, *SHORT, "--out", "first", "--json")
-    written = tomllib.loads(Path("first/scenario.toml").read_text())["observer"]
-    assert (written["last"], written["rate"]) == (0.0, 0.0)
+    fields = tomllib.loads(Path("first/scenario.toml").read_text())["observer"]
+    assert (fields["last"], fields["rate"]) == (0.0, 0.0)
     assert cmg_mj("run", "first/scenario.toml", "--out", "again", "--json").out == first.out
 
 

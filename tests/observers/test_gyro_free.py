@@ -68,8 +68,8 @@ def least_squares(estimator: GyroFree, y1: np.ndarray, a: np.ndarray) -> tuple[f
     start_b = np.eye(1, unknown + 1, 2) / estimator.bias_start
     rows = np.vstack([reading, n_rows / NOISE.acceleration, start_p, start_z, start_b])
     solution = np.linalg.lstsq(rows[:, :-1], -rows[:, -1], rcond=None)[0]
-    known = np.append(solution, 1.0)
-    return float(x1[-1] @ known), float(x2[-1] @ known)
+    coefficients = np.append(solution, 1.0)
+    return float(x1[-1] @ coefficients), float(x2[-1] @ coefficients)
 
 
 @pytest.mark.parametrize("n", [2, 3, 10, 60])
@@ -123,12 +123,12 @@ class SteadyGains(GyroFree):
     """The same with the gains that it settles at, from the start."""
 
     def init(self, y: Measurement) -> State:
-        still, zero = Measurement(0.0, 0.0, 0.0), 0.0 * y.y1
-        settled = super().init(still)
+        rest, zero = Measurement(0.0, 0.0, 0.0), 0.0 * y.y1
+        state = super().init(rest)
         for _ in range(4000):
-            settled, _ = super().step(settled, still, 0.0)
+            state, _ = super().step(state, rest, 0.0)
         p, z, b, *_ = super().init(y)
-        return State(p, z, b, *(number + zero for number in settled[3:]))
+        return State(p, z, b, *(number + zero for number in state[3:]))
 
 
 def figures(offset_mg: float, kind: str = "gyro_free", **parameters: float) -> float:
@@ -144,16 +144,16 @@ def figures(offset_mg: float, kind: str = "gyro_free", **parameters: float) -> f
 @pytest.mark.slow
 def test_the_trap_of_the_offset() -> None:
     """Without an offset, leaving the bias out looks best; with 5 mg on one accelerometer only time-varying gains do."""
-    without: Any = {"bias_start": 1e-6, "bias_walk": 0.0}
+    no_bias: Any = {"bias_start": 1e-6, "bias_walk": 0.0}
     steady = f"{__name__}:SteadyGains"
     # Best without an offset: no state for it.
-    assert figures(0.0, **without) < figures(0.0) < 1.25 * figures(0.0, **without)
+    assert figures(0.0, **no_bias) < figures(0.0) < 1.25 * figures(0.0, **no_bias)
     # With one, that is the worst by far, and steady gains, quick or slow, are in between.
     result = figures(5.0)
     assert result < 1.1 * figures(0.0)
-    assert figures(5.0, **without) > 4.0 * result
+    assert figures(5.0, **no_bias) > 4.0 * result
     for bias_walk in (0.03, 0.3):
-        assert 1.2 * result < figures(5.0, steady, bias_walk=bias_walk) < 0.5 * figures(5.0, **without)
+        assert 1.2 * result < figures(5.0, steady, bias_walk=bias_walk) < 0.5 * figures(5.0, **no_bias)
 
 
 def test_without_a_measured_acceleration_it_is_refused() -> None:

@@ -48,12 +48,12 @@ def printed_slope(m: ReducedModel, **parameters: float) -> Slope:
 
 @pytest.mark.parametrize("L", [1.0, 2.5, 7.0])
 def test_correction_is_the_printed_one_at_any_gain(L: float) -> None:
-    """What (7) takes from the copy of the model; b matters where L is not 1, which it hardly leaves on this rig."""
+    """(7) takes this from the copy of the model; b matters where L is not 1, which it hardly leaves on this rig."""
     slope, estimator = printed_slope(PAPER), high_gain()
     for e in (-0.2, -0.01, 0.003, 0.1):
         copy = slope(np.array([0.0, 0.0, L]), 0.0, 0.0, 0.0)[:2]
-        printed = copy - slope(np.array([e, 0.0, L]), 0.0, 0.0, 0.0)[:2]
-        assert estimator.correction(e, L) == pytest.approx(tuple(printed), rel=1e-12)
+        expected = copy - slope(np.array([e, 0.0, L]), 0.0, 0.0, 0.0)[:2]
+        assert estimator.correction(e, L) == pytest.approx(tuple(expected), rel=1e-12)
 
 
 CASES = [
@@ -131,7 +131,7 @@ def test_a_bias_leaves_the_rate_error_of_its_equilibrium(e_deg: float, d_inf: fl
 
 
 def test_a_larger_error_is_corrected_more_than_in_proportion() -> None:
-    """What d_inf > 0 is for, and the opposite of `homogeneous`."""
+    """This is the purpose of d_inf > 0, and the opposite of `homogeneous`."""
 
     def pull(error: float, d_inf: float) -> float:
         estimator = high_gain(d_inf=d_inf)
@@ -159,9 +159,9 @@ def test_a_larger_error_is_corrected_more_than_in_proportion() -> None:
     ],
 )
 def test_what_the_theorem_does_not_allow_is_refused(parameters: dict, message: str) -> None:
-    with pytest.raises(InputError, match=message) as caught:
+    with pytest.raises(InputError, match=message) as info:
         high_gain(**parameters)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(info.value)
 
 
 def test_the_fastest_gains_that_are_taken_are_stable() -> None:

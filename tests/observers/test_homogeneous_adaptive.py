@@ -13,7 +13,7 @@ from cmg_mj.observers import Measurement
 from tests.observers.reference import DT, GRAVITY_TORQUE, J1, observer, rough_signals
 
 
-def test_is_adaptive_and_then_the_homogeneous_one_told_its_bias() -> None:
+def test_is_adaptive_and_then_the_homogeneous_one_with_its_bias() -> None:
     both: Any = observer("homogeneous_adaptive", k1=25.0, alpha=0.9, Sigma=7.0, L=(-30.0, -200.0), Gamma=0.5)
     adaptive: Any = observer("adaptive", Sigma=7.0, L=(-30.0, -200.0), Gamma=(0.5, 1.0, 1.0))
     homogeneous: Any = observer("homogeneous", k1=25.0, alpha=0.9)

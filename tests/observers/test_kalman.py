@@ -51,19 +51,19 @@ def jacobian(estimator: Kalman, x: np.ndarray, u: float) -> np.ndarray:
     return np.array([(slope(estimator, x + d, u) - slope(estimator, x - d, u)) / 2e-5 for d in steps]).T
 
 
-def added_noise(estimator: Kalman, A: np.ndarray) -> np.ndarray:
+def sample_noise(estimator: Kalman, A: np.ndarray) -> np.ndarray:
     """The covariance that a sample period adds, by quadrature, (4, 4)."""
     m = estimator.model
     per_torque, gyroscopic = 1.0 / (m.gimbals * m.J1), m.J_d * m.omega_d / m.J1
-    into = np.zeros((4, 3))
-    into[3, 0], into[1, 1] = estimator.torque_walk, per_torque * estimator.torque_white
-    into[1:3, 2] = gyroscopic * estimator.gimbal_white, estimator.gimbal_white
+    input_matrix = np.zeros((4, 3))
+    input_matrix[3, 0], input_matrix[1, 1] = estimator.torque_walk, per_torque * estimator.torque_white
+    input_matrix[1:3, 2] = gyroscopic * estimator.gimbal_white, estimator.gimbal_white
 
-    def at(s: float) -> np.ndarray:
-        grown = expm(A * s) @ into
-        return grown @ grown.T
+    def integrand(s: float) -> np.ndarray:
+        response = expm(A * s) @ input_matrix
+        return response @ response.T
 
-    return quad_vec(at, 0.0, estimator.dt, epsabs=1e-16)[0]
+    return quad_vec(integrand, 0.0, estimator.dt, epsabs=1e-16)[0]
 
 
 def measured_noise(estimator: Kalman) -> np.ndarray:
@@ -73,26 +73,26 @@ def measured_noise(estimator: Kalman) -> np.ndarray:
 
 def matrix(P: Covariance) -> np.ndarray:
     """All sixteen entries, (4, 4)."""
-    whole = np.zeros((4, 4))
+    full = np.zeros((4, 4))
     for (i, j), entry in zip(PAIRS, P, strict=True):
-        whole[i, j] = whole[j, i] = entry
-    return whole
+        full[i, j] = full[j, i] = entry
+    return full
 
 
 def reference(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The textbook's extended Kalman filter: estimates (n - 1, 4), and the last covariance (4, 4)."""
     R = measured_noise(estimator)
-    Q = added_noise(estimator, jacobian(estimator, np.zeros(4), 0.0))
+    Q = sample_noise(estimator, jacobian(estimator, np.zeros(4), 0.0))
     x, P = (
         np.array([y1[0], 0.0, y2[0], 0.0]),
         np.diag([R[0, 0], estimator.rate_start**2, R[1, 1], estimator.torque_start**2]),
     )
     estimates = []
     for k in range(1, len(y1)):
-        held = float(u[k - 1])
-        F = expm(jacobian(estimator, x, held) * estimator.dt)
+        command = float(u[k - 1])
+        F = expm(jacobian(estimator, x, command) * estimator.dt)
         x = solve_ivp(
-            lambda t, x, held=held: slope(estimator, x, held), (0.0, estimator.dt), x, rtol=1e-11, atol=1e-12
+            lambda t, x, command=command: slope(estimator, x, command), (0.0, estimator.dt), x, rtol=1e-11, atol=1e-12
         ).y[:, -1]
         P = F @ P @ F.T + Q
         K = P @ C.T @ np.linalg.inv(C @ P @ C.T + R)
@@ -102,7 +102,7 @@ def reference(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) 
     return np.array(estimates), P
 
 
-def walked(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, State]:
+def run_filter(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, State]:
     """Estimates (n - 1, 4), and the last state."""
     state, estimates = estimator.init(Measurement(float(y1[0]), float(y2[0]))), []
     for k in range(1, len(y1)):
@@ -117,7 +117,7 @@ def test_equals_the_textbooks_filter(model: ReducedModel) -> None:
     estimator = kalman(model)
     signals = rough_signals(200, seed=1)
     expected, P = reference(estimator, *signals)
-    estimates, state = walked(estimator, *signals)
+    estimates, state = run_filter(estimator, *signals)
     off = np.abs(estimates - expected).max(axis=0)
     assert (off < [2e-6, 2e-4, 1e-9, 1e-4]).all(), off
     np.testing.assert_allclose(matrix(state.P), P, rtol=2e-3, atol=1e-10)
@@ -141,18 +141,20 @@ def test_settles_at_the_linear_filter() -> None:
     estimator = kalman()
     F, Q = (
         expm(jacobian(estimator, np.zeros(4), 0.0) * DT),
-        added_noise(estimator, jacobian(estimator, np.zeros(4), 0.0)),
+        sample_noise(estimator, jacobian(estimator, np.zeros(4), 0.0)),
     )
     R = measured_noise(estimator)
-    before = solve_discrete_are(F.T, C.T, Q, R)
-    after = before - before @ C.T @ np.linalg.solve(C @ before @ C.T + R, C @ before)
-    still = np.zeros(8000)
-    _, state = walked(estimator, still, still, still)
-    np.testing.assert_allclose(matrix(state.P), after, rtol=1e-6, atol=1e-14)
-    gain = after @ C.T @ np.linalg.inv(R)
+    prediction_covariance = solve_discrete_are(F.T, C.T, Q, R)
+    covariance = prediction_covariance - prediction_covariance @ C.T @ np.linalg.solve(
+        C @ prediction_covariance @ C.T + R, C @ prediction_covariance
+    )
+    zeros = np.zeros(8000)
+    _, state = run_filter(estimator, zeros, zeros, zeros)
+    np.testing.assert_allclose(matrix(state.P), covariance, rtol=1e-6, atol=1e-14)
+    gain = covariance @ C.T @ np.linalg.inv(R)
     for column, y in ((0, Measurement(1e-9, 0.0)), (1, Measurement(0.0, 1e-9))):
-        moved = np.array(estimator.step(state, y, 0.0)[1])
-        np.testing.assert_allclose(moved, gain[:, column] * 1e-9, rtol=1e-5, atol=1e-16)
+        estimate = np.array(estimator.step(state, y, 0.0)[1])
+        np.testing.assert_allclose(estimate, gain[:, column] * 1e-9, rtol=1e-5, atol=1e-16)
 
 
 @pytest.mark.parametrize("dt", [0.001, 0.005, 0.02])
@@ -169,7 +171,7 @@ def test_covariance_stays_a_covariance(dt: float) -> None:
             assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > 1e-6, k
 
 
-def simulated(
+def simulate(
     rig: Kalman, estimator: Kalman, runs: int, ticks: int, seed: int
 ) -> tuple[np.ndarray, np.ndarray, list[State]]:
     """The reduced model with just the noise that one filter expects, and another filter on it; many runs side by side.
@@ -188,14 +190,14 @@ def simulated(
     errors, squares, states = [], [], []
     for _ in range(ticks):
         for _ in range(parts):
-            white, turned, walk = rng.standard_normal((3, runs)) * math.sqrt(h)
+            torque_noise, gimbal_noise, walk_noise = rng.standard_normal((3, runs)) * math.sqrt(h)
             D = m.J1 + m.J2 * np.sin(x3) ** 2
-            rate = u * h + rig.gimbal_white * turned
+            rate = u * h + rig.gimbal_white * gimbal_noise
             gyroscopic = (m.J_d * m.omega_d * np.cos(x3) - m.J2 * x2 * np.sin(2.0 * x3)) * rate
-            pushed = (torque * h + rig.torque_white * white) / m.gimbals
+            impulse = (torque * h + rig.torque_white * torque_noise) / m.gimbals
             x1 = x1 + h * x2
-            x2 = x2 + (gyroscopic + h * m.gravity_torque * np.sin(x1) + pushed) / D
-            x3, torque = x3 + rate, torque + rig.torque_walk * walk
+            x2 = x2 + (gyroscopic + h * m.gravity_torque * np.sin(x1) + impulse) / D
+            x3, torque = x3 + rate, torque + rig.torque_walk * walk_noise
         y = Measurement(x1 + v1 * rng.standard_normal(runs), x3 + v2 * rng.standard_normal(runs))
         x, P = estimator._predicted(state, u)
         (r1, _), (_, r2) = measured_noise(estimator)
@@ -209,10 +211,10 @@ def simulated(
     return np.array(errors), np.array(squares), states
 
 
-def normalised(estimator: Kalman) -> list[tuple[str, float, float, float]]:
+def normalise(estimator: Kalman) -> list[tuple[str, float, float, float]]:
     """On a rig with the default's noise: mean of the squares, and between what they should be, 1 time in 10,000 not."""
     runs, ticks, ends = 300, 300, [5e-5, 1.0 - 5e-5]
-    errors, squares, states = simulated(kalman(), estimator, runs, ticks, seed=3)
+    errors, squares, states = simulate(kalman(), estimator, runs, ticks, seed=3)
     low, high = chi2.ppf(ends, 4 * runs) / runs
     result = []
     for k in (0, 1, 5, 20, 100, ticks - 1):
@@ -225,8 +227,8 @@ def normalised(estimator: Kalman) -> list[tuple[str, float, float, float]]:
 
 
 def test_errors_are_as_large_as_the_covariance_says() -> None:
-    for what, low, mean, high in normalised(kalman()):
-        assert low < mean < high, what
+    for label, low, mean, high in normalise(kalman()):
+        assert low < mean < high, label
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
@@ -234,22 +236,22 @@ def test_errors_are_as_large_as_the_covariance_says() -> None:
 def test_a_filter_that_expects_another_noise_is_found_out(name: str, factor: float) -> None:
     default = kalman()
     wrong = kalman(**{name: factor * getattr(default, name)})
-    assert not all(low < mean < high for _, low, mean, high in normalised(wrong))
+    assert not all(low < mean < high for _, low, mean, high in normalise(wrong))
 
 
 def test_a_bias_is_found_as_a_torque() -> None:
     """At rest at y1 = -e gravity pulls as if upright: the torque that e makes is n M sin e."""
     estimator = kalman()
     e = math.radians(1.0)
-    still = np.zeros(3000)
-    estimates, _ = walked(estimator, still - e, still, still)
+    zeros = np.zeros(3000)
+    estimates, _ = run_filter(estimator, zeros - e, zeros, zeros)
     expected = (0.0 - e, 0.0, 0.0, PAIR.gimbals * PAIR.gravity_torque * math.sin(e))
     np.testing.assert_allclose(estimates[-1], expected, atol=1e-4)
     assert "bias_rad" not in estimator.extra_signals
 
 
 @pytest.mark.parametrize("counts", [64, 4096])
-def test_is_told_the_scenarios_encoders(counts: int) -> None:
+def test_it_uses_the_noise_of_the_scenarios_encoders(counts: int) -> None:
     """y2 is the mean of two, each rounded to whole counts."""
     changes = [f"sensors.encoder.counts_per_revolution={counts}"]
     setup: Any = prepare(load_scenario("push_recovery", changes, "kalman")).design.observer()

@@ -1,4 +1,4 @@
-"""What observers are given: the paper's y, two angles, and the angular acceleration beside it."""
+"""The observers' input: the paper's y, two angles, and the angular acceleration beside it."""
 
 from __future__ import annotations
 

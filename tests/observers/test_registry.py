@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.simulation.experiment import prepare
@@ -44,18 +44,18 @@ class Greedy(Mine):
         self.others = others
 
 
-MINE = f"{__name__}:Mine"
+USER_OBSERVER = f"{__name__}:Mine"
 
 
 @pytest.mark.parametrize("kind", sorted(OBSERVERS))
 def test_every_name_makes_its_observer(kind: str) -> None:
     result = make_observer(kind, DT, PAPER, NOISE)
     assert f"{type(result).__module__}:{type(result).__name__}" == OBSERVERS[kind]
-    assert observer_class(OBSERVERS[kind]) is type(result)
+    assert OBSERVER_CLASSES.find(OBSERVERS[kind]) is type(result)
 
 
 def test_a_users_class_by_dotted_path() -> None:
-    result: Any = make_observer(MINE, DT, PAPER, gain=2.0)
+    result: Any = make_observer(USER_OBSERVER, DT, PAPER, gain=2.0)
     assert isinstance(result, Mine)
     assert (result.dt, result.model, result.gain) == (DT, PAPER, 2.0)
     greedy: Any = make_observer(f"{__name__}:Greedy", DT, PAPER, anything=1)
@@ -64,10 +64,10 @@ def test_a_users_class_by_dotted_path() -> None:
 
 def test_a_users_class_in_a_scenario() -> None:
     """A difference three times too large in the loop: the parameter arrives, and the run is this observer's."""
-    scenario = {"duration_s": 0.1, "observer": {"kind": MINE, "gain": 1.5}}
+    scenario = {"duration_s": 0.1, "observer": {"kind": USER_OBSERVER, "gain": 1.5}}
     trajectory = prepare(parse_scenario(scenario)).run().trajectory
     assert trajectory is not None
-    y1, rate = trajectory["y1_rad"], trajectory[f"estimate/{MINE}/x2_rad_s"]
+    y1, rate = trajectory["y1_rad"], trajectory[f"estimate/{USER_OBSERVER}/x2_rad_s"]
     assert rate[0] == 0.0
     assert rate[1:] == pytest.approx(1.5 * 200.0 * (y1[1:] - y1[:-1]), rel=1e-9)
 
@@ -76,16 +76,16 @@ def test_a_users_class_in_a_scenario() -> None:
     ("kind", "parameters", "message"),
     [
         ("linear", {"tua": 0.1}, r"observer\.tua: linear has no such parameter; did you mean 'tau'\?"),
-        (MINE, {"gian": 1.0}, r"observer\.gian: .*Mine has no such parameter; did you mean 'gain'\?"),
-        (MINE, {"gain": 200.0}, r"observer .*Mine: RuntimeError: gain is far too large"),
+        (USER_OBSERVER, {"gian": 1.0}, r"observer\.gian: .*Mine has no such parameter; did you mean 'gain'\?"),
+        (USER_OBSERVER, {"gain": 200.0}, r"observer .*Mine: RuntimeError: gain is far too large"),
         (f"{__name__}:Yours", {}, r"observer\.kind = .*Yours': cannot be imported: AttributeError"),
         (f"{__name__}:Open", {}, r"must be a class with the methods init\(y\) and step\(state, y, u\)"),
-        (f"{__name__}:MINE", {}, r"must be a class with the methods"),
+        (f"{__name__}:USER_OBSERVER", {}, r"must be a class with the methods"),
         (":", {}, r"observer\.kind = ':': cannot be imported"),
     ],
 )
 def test_what_is_wrong_with_a_class_is_named_in_one_line(kind: str, parameters: dict, message: str) -> None:
-    """What is wrong with a name, or with a parameter of the bench's own: tests/inputs/."""
-    with pytest.raises(InputError, match=message) as caught:
+    """tests/inputs/ has wrong names and wrong parameters of the bench's own."""
+    with pytest.raises(InputError, match=message) as info:
         observer(kind, **parameters)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(info.value)

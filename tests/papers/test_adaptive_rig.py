@@ -38,11 +38,11 @@ def test_accelerometer_bias_is_part_of_what_is_found(offsets: tuple[float, float
     """e less the tilt that the offsets make, by aranovskiy2020's reference [8]: weights 3/2 and -1/2 of the sites."""
     biases = np.array([-1.0, 0.5, 0.9])
     result = rig.learnt_bias(62_000, biases.tolist(), offsets)
-    found, expected = result.values("bias_estimate_deg") - biases, result.values("bias_deg") - biases
+    excess, expected = result.values("bias_estimate_deg") - biases, result.values("bias_deg") - biases
     tilt = np.degrees((1.5 * offsets[0] - 0.5 * offsets[1]) * 1e-3 * 9.80665 / 9.81)
-    print(f"found less e {found}, expected {expected}, small angles {tilt:.3f} deg")
+    print(f"found less e {excess}, expected {expected}, small angles {tilt:.3f} deg")
     np.testing.assert_allclose(expected, tilt, atol=0.01)
-    np.testing.assert_allclose(found, expected, atol=0.05)
+    np.testing.assert_allclose(excess, expected, atol=0.05)
     assert rig.errors(result, "bias_rms_error_deg").max() < 0.15
 
 
@@ -56,13 +56,13 @@ def test_a_gait_and_a_torque_are_found() -> None:
 
 def test_trimming_spares_the_gimbals_and_the_time_to_settle() -> None:
     """With the integrator held where the estimated bias asks for it, the gimbals need not turn to get it there."""
-    found = {}
+    runs = {}
     for bias_trim_s in (0.0, 1.0):
         settings = ["plant.equilibrium_bias_deg=1.0", f"controller.bias_trim_s={bias_trim_s}", "seed=63000"]
         result = prepare(load_scenario("bias_estimation", settings)).run_many(6, keep_trajectory=False)
-        found[bias_trim_s] = {key: result.values(key) for key in ("gimbal_peak_deg", "tilt_rms_deg", "settle_time_s")}
-    print(f"by bias_trim_s: { {trim: {k: v.mean() for k, v in values.items()} for trim, values in found.items()} }")
-    without, trimmed = found.values()
-    assert np.all(trimmed["gimbal_peak_deg"] < 0.75 * without["gimbal_peak_deg"])
-    assert np.all(trimmed["tilt_rms_deg"] < without["tilt_rms_deg"])
-    assert trimmed["settle_time_s"].mean() < without["settle_time_s"].mean()
+        runs[bias_trim_s] = {key: result.values(key) for key in ("gimbal_peak_deg", "tilt_rms_deg", "settle_time_s")}
+    print(f"by bias_trim_s: { {trim: {k: v.mean() for k, v in values.items()} for trim, values in runs.items()} }")
+    untrimmed, trimmed = runs.values()
+    assert np.all(trimmed["gimbal_peak_deg"] < 0.75 * untrimmed["gimbal_peak_deg"])
+    assert np.all(trimmed["tilt_rms_deg"] < untrimmed["tilt_rms_deg"])
+    assert trimmed["settle_time_s"].mean() < untrimmed["settle_time_s"].mean()

@@ -39,9 +39,9 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_the_paper_of_the_page_is_reproduced(package: Path) -> None:
-    said = cmg_mj("reproduce", PAPER, "--json")
-    assert said.status == 0, said
-    (claim,) = json.loads(said.out)["papers"][PAPER]["claims"]
+    run = cmg_mj("reproduce", PAPER, "--json")
+    assert run.status == 0, run
+    (claim,) = json.loads(run.out)["papers"][PAPER]["claims"]
     assert claim["verdict"] == "reproduced within stated conditions"
     report = (Path("runs") / f"reproduce-{PAPER}" / "report.md").read_text(encoding="utf-8")
     assert "### Theorem 2: reproduced within stated conditions" in report

@@ -38,22 +38,22 @@ from cmg_mj.papers.andrieu2009.simulation import (
 )
 from cmg_mj.papers.andrieu2009.study import Study, rms_by_kind, study
 from cmg_mj.papers.claim import Claim
-from cmg_mj.results.result import Outcome, Result
 from cmg_mj.visualization.plots.figure_spec import Picture
+from tests.papers.worlds import make_result
 
 SEEDS, FIRST = 6, 500
 """Other seeds than the report's."""
 
 
 @pytest.fixture(scope="module")
-def done() -> Study:
+def runs() -> Study:
     return study(SEEDS, FIRST)
 
 
 def of_json(claim: Claim) -> Claim:
     """A claim whose figures JSON can hold and whose words are whole."""
     json.dumps(dict(claim.figures), allow_nan=False)
-    for text in (claim.says, claim.found, claim.why):
+    for text in (claim.statement, claim.result, claim.reason):
         assert "{" not in text.replace("{eta1 >=", "")
         assert "  " not in text
     return claim
@@ -119,7 +119,7 @@ def test_closed_forms_of_the_bounds_are_the_maxima(hbar: float) -> None:
         printed = np.abs(m1 + hat**p * (inner + m2 * x2 ** (2.0 - p))).max()
         assert reactor.Omega1(u, x1, hat) == pytest.approx(first, rel=1e-5)
         assert reactor.Omega2(u, x1, hat, p) == pytest.approx(second, rel=1e-5)
-        assert reactor.Omega2(u, x1, hat, p, as_printed=True) == pytest.approx(printed, rel=1e-5)
+        assert reactor.Omega2(u, x1, hat, p, with_misprint=True) == pytest.approx(printed, rel=1e-5)
 
 
 def test_input_is_the_papers() -> None:
@@ -153,8 +153,8 @@ def test_noise_has_the_papers_standard_deviation() -> None:
 def test_claims_on_the_bounds() -> None:
     parts = ("invariance", "coordinates", "increments", "order_of_bounds", "noise_level")
     claims = [of_json(getattr(bioreactor_bounds, part)()) for part in parts]
-    within = "reproduced within stated conditions"
-    assert [claim.verdict for claim in claims] == ["reproduced", "reproduced", within, within, "not reproduced"]
+    partly = "reproduced within stated conditions"
+    assert [claim.verdict for claim in claims] == ["reproduced", "reproduced", partly, partly, "not reproduced"]
 
 
 def test_the_set_is_not_invariant_for_inputs_beyond_its_own() -> None:
@@ -167,11 +167,11 @@ def test_the_set_is_not_invariant_for_inputs_beyond_its_own() -> None:
 @pytest.mark.parametrize("p", [0.5, 0.9])
 @pytest.mark.parametrize("hbar", [0.8, 1.0])
 def test_both_inequalities_hold_and_the_misprint_shows(hbar: float, p: float) -> None:
-    found = bioreactor_bounds.increments_over_domain(hbar, p, 24)
-    assert max(found.by_Omega1, found.by_Omega2, found.by_Omega2_local) <= 1.0 + 1e-9
-    assert found.slope_over_Omega2 <= 1.0 + 1e-9
-    assert found.slope_over_Omega2_printed > 1.01
-    assert found.by_Omega2_printed <= 1.0  # c_inf is so large that the misprint does no harm there
+    quotients = bioreactor_bounds.increments_over_domain(hbar, p, 24)
+    assert max(quotients.by_Omega1, quotients.by_Omega2, quotients.by_Omega2_local) <= 1.0 + 1e-9
+    assert quotients.slope_over_Omega2 <= 1.0 + 1e-9
+    assert quotients.slope_over_Omega2_printed > 1.01
+    assert quotients.by_Omega2_printed <= 1.0  # c_inf is so large that the misprint does no harm there
 
 
 def test_the_largest_slope_is_at_a_corner_of_the_domain() -> None:
@@ -184,114 +184,114 @@ def test_the_largest_slope_is_at_a_corner_of_the_domain() -> None:
 # --- the figures --------------------------------------------------------------------------------------------
 
 
-def test_rates_are_in_order_in_every_window(done: Study) -> None:
-    means, holds = figure_1.ordered_rates(done)
-    assert holds.tolist() == [True] * 4
+def test_rates_are_in_order_in_every_window(runs: Study) -> None:
+    means, in_order = figure_1.ordered_rates(runs)
+    assert in_order.tolist() == [True] * 4
     # An independent implementation's figures. In the first window the start has not quite faded.
     assert means[1, 1:] == pytest.approx([1.25, 2.93, 1.35], rel=0.03)
     assert means[2, 1:] == pytest.approx([1.23, 1.04, 1.18], rel=0.03)
     assert means[3, 1:] == pytest.approx([-1.22, -0.63, -1.11], abs=0.03)
 
 
-def test_errors_are_in_order_in_every_seed(done: Study) -> None:
-    for replays in (done.found, done.loud):
-        rms = rms_by_kind(done.run, replays)
+def test_errors_are_in_order_in_every_seed(runs: Study) -> None:
+    for replays in (runs.nominal, runs.loud):
+        rms = rms_by_kind(runs.run, replays)
         assert figure_2.share_in_order(rms) >= 0.95
-    assert rms_by_kind(done.run, done.found).mean(axis=1) == pytest.approx([0.255, 0.071, 0.056], rel=0.08)
+    assert rms_by_kind(runs.run, runs.nominal).mean(axis=1) == pytest.approx([0.255, 0.071, 0.056], rel=0.08)
 
 
-def test_claims_on_the_figures(done: Study) -> None:
-    within = "reproduced within stated conditions"
+def test_claims_on_the_figures(runs: Study) -> None:
+    partly = "reproduced within stated conditions"
     claims = {
         figure_1.figure_1: ("reproduced",),
-        figure_2.figure_2: (within,),
+        figure_2.figure_2: (partly,),
         figure_2.bias: ("reproduced",),
         figure_2.bias_of_constant_gain: ("not reproduced",),
-        figure_2.bias_of_updated_gains: ("reproduced", within),
-        figure_2.spread: ("reproduced", within),
+        figure_2.bias_of_updated_gains: ("reproduced", partly),
+        figure_2.spread: ("reproduced", partly),
         simple_copy: ("reproduced",),
     }
-    for make, expected in claims.items():
-        assert of_json(make(done)).verdict in expected
+    for make, verdicts in claims.items():
+        assert of_json(make(runs)).verdict in verdicts
 
 
-def test_claims_can_fail(done: Study) -> None:
+def test_claims_can_fail(runs: Study) -> None:
     """The observers' names exchanged."""
-    swapped = {CONSTANT: done.found[UPDATED], UPDATED: done.found[CONSTANT], HOMOGENEOUS: done.found[HOMOGENEOUS]}
-    other = done._replace(found=swapped)
+    swapped = {CONSTANT: runs.nominal[UPDATED], UPDATED: runs.nominal[CONSTANT], HOMOGENEOUS: runs.nominal[HOMOGENEOUS]}
+    exchanged = runs._replace(nominal=swapped)
     for make in (figure_1.figure_1, figure_2.figure_2, figure_2.bias):
-        claim = make(other)
+        claim = make(exchanged)
         assert claim.verdict == "not reproduced"
-        assert claim.why
+        assert claim.reason
 
 
-def test_cause_of_a_bias_is_judged_by_what_is_left_without_it(done: Study) -> None:
+def test_cause_of_a_bias_is_judged_by_what_is_left_without_it(runs: Study) -> None:
     """Observers that know hbar beside those that do not; the constant gain's bias stays, the others' mostly goes."""
-    left = figure_2.bias_left(done)
-    assert left[0].min() > 0.7
-    claim = figure_2.bias_of_constant_gain(done)
-    assert claim.figures["share_left_with_exact_hbar"] == left[0].tolist()
-    assert left[1:, [0, 2]].max() < 0.4
-    shown = done.found[CONSTANT].eta2_error
-    gone = done.exact | {CONSTANT: dataclasses.replace(done.exact[CONSTANT], eta2_error=0.1 * shown)}
-    assert figure_2.bias_of_constant_gain(done._replace(exact=gone)).verdict == "reproduced"
-    assert figure_2.bias_of_updated_gains(done._replace(exact=done.found)).verdict == "not reproduced"
+    shares = figure_2.bias_left(runs)
+    assert shares[0].min() > 0.7
+    claim = figure_2.bias_of_constant_gain(runs)
+    assert claim.figures["share_left_with_exact_hbar"] == shares[0].tolist()
+    assert shares[1:, [0, 2]].max() < 0.4
+    error = runs.nominal[CONSTANT].eta2_error
+    gone = runs.exact | {CONSTANT: dataclasses.replace(runs.exact[CONSTANT], eta2_error=0.1 * error)}
+    assert figure_2.bias_of_constant_gain(runs._replace(exact=gone)).verdict == "reproduced"
+    assert figure_2.bias_of_updated_gains(runs._replace(exact=runs.nominal)).verdict == "not reproduced"
 
 
-def test_order_of_figure_2_is_needed_in_nearly_every_seed(done: Study) -> None:
+def test_order_of_figure_2_is_needed_in_nearly_every_seed(runs: Study) -> None:
     """With the second and third exchanged in one seed of six it is in order in five."""
-    second, third = (np.array(done.found[kind].eta2_error) for kind in (UPDATED, HOMOGENEOUS))
+    second, third = (np.array(runs.nominal[kind].eta2_error) for kind in (UPDATED, HOMOGENEOUS))
     second[:, 0], third[:, 0] = third[:, 0].copy(), second[:, 0].copy()
     swapped = {
-        UPDATED: dataclasses.replace(done.found[UPDATED], eta2_error=second),
-        HOMOGENEOUS: dataclasses.replace(done.found[HOMOGENEOUS], eta2_error=third),
+        UPDATED: dataclasses.replace(runs.nominal[UPDATED], eta2_error=second),
+        HOMOGENEOUS: dataclasses.replace(runs.nominal[HOMOGENEOUS], eta2_error=third),
     }
-    claim = figure_2.figure_2(done._replace(found=done.found | swapped))
+    claim = figure_2.figure_2(runs._replace(nominal=runs.nominal | swapped))
     assert claim.figures["share_of_seeds_in_order"] == pytest.approx(5.0 / 6.0)
     assert claim.verdict == "not reproduced"
 
 
-def test_spread_must_go_with_the_rate(done: Study) -> None:
+def test_spread_must_go_with_the_rate(runs: Study) -> None:
     """The errors of the noisiest given to the one with the least rate."""
-    other = dataclasses.replace(done.found[HOMOGENEOUS], eta2_error=10.0 * done.found[CONSTANT].eta2_error)
-    assert figure_2.spread(done._replace(found=done.found | {HOMOGENEOUS: other})).verdict == "not reproduced"
+    noisy = dataclasses.replace(runs.nominal[HOMOGENEOUS], eta2_error=10.0 * runs.nominal[CONSTANT].eta2_error)
+    assert figure_2.spread(runs._replace(nominal=runs.nominal | {HOMOGENEOUS: noisy})).verdict == "not reproduced"
 
 
-def test_gain_follows_its_rate(done: Study) -> None:
+def test_gain_follows_its_rate(runs: Study) -> None:
     """L is phi2 + (phi3/phi1) Omega = 1 + 100 Omega in the mean."""
     for kind in (UPDATED, HOMOGENEOUS):
         L, rate = (
-            window_means(done.run, values).mean(axis=1) for values in (done.found[kind].L, done.found[kind].rate)
+            window_means(runs.run, values).mean(axis=1) for values in (runs.nominal[kind].L, runs.nominal[kind].rate)
         )
         assert L / (1.0 + 100.0 * rate) == pytest.approx(1.0, abs=0.03)
     constant = 1.0 + 100.0 * Bioreactor(0.8).df2_max
-    assert np.ptp(done.found[CONSTANT].L) == 0.0
-    assert done.found[CONSTANT].L[0, 0] / constant == pytest.approx(1.0)
-    assert min(replayed.L.min() for replayed in done.found.values()) >= 1.0
+    assert np.ptp(runs.nominal[CONSTANT].L) == 0.0
+    assert runs.nominal[CONSTANT].L[0, 0] / constant == pytest.approx(1.0)
+    assert min(replayed.L.min() for replayed in runs.nominal.values()) >= 1.0
 
 
-def test_the_homogeneous_terms_are_inert(done: Study) -> None:
-    claim = of_json(correction(done.run, done.found[HOMOGENEOUS]))
-    assert claim.ours
+def test_the_homogeneous_terms_are_inert(runs: Study) -> None:
+    claim = of_json(correction(runs.run, runs.nominal[HOMOGENEOUS]))
+    assert claim.is_ours
     assert claim.verdict == "reproduced within stated conditions"
     assert claim.figures["largest_argument"] < 1e-3
     assert claim.figures["largest_difference_eta2"] < 1e-4
     assert claim.figures["rms_error_eta2_linear_correction"] == pytest.approx(claim.figures["rms_error_eta2"], rel=1e-3)
 
 
-def test_the_result_does_not_hang_on_the_step(done: Study) -> None:
+def test_the_result_does_not_hang_on_the_step(runs: Study) -> None:
     """The same noise, interpolated, at half the step; the first half of the time."""
     fine = first_half(run_plant([FIRST, FIRST + 1], dt=0.005))
-    coarse = first_half(done.run)
+    coarse = first_half(runs.run)
     for kind in (UPDATED, HOMOGENEOUS):
-        found = rms_late(fine, replay(kind, fine, Bioreactor(0.8)).eta2_error)
-        expected = rms_late(coarse, done.found[kind].eta2_error[: len(coarse.t), :2])
-        assert found == pytest.approx(expected, rel=0.02)
+        fine_rms = rms_late(fine, replay(kind, fine, Bioreactor(0.8)).eta2_error)
+        coarse_rms = rms_late(coarse, runs.nominal[kind].eta2_error[: len(coarse.t), :2])
+        assert fine_rms == pytest.approx(coarse_rms, rel=0.02)
 
 
 def first_half(run: Run) -> Run:
-    kept = run.t <= 25.0
-    return dataclasses.replace(run, t=run.t[kept], u=run.u[kept], eta=run.eta[:, kept], y=run.y[kept])
+    half = run.t <= 25.0
+    return dataclasses.replace(run, t=run.t[half], u=run.u[half], eta=run.eta[:, half], y=run.y[half])
 
 
 # --- the theory ---------------------------------------------------------------------------------------------
@@ -303,16 +303,16 @@ def test_increments_of_system_1(p: float, holds: bool) -> None:
 
 
 def test_claims_of_the_theory() -> None:
-    within = "reproduced within stated conditions"
-    expected = {
+    partly = "reproduced within stated conditions"
+    verdicts = {
         increments.increments: "reproduced",
-        finite_escape.no_observer_beyond_1: within,
+        finite_escape.no_observer_beyond_1: partly,
         theory.scaling_conditions: "not reproduced",
         theory.gain_tracking: "reproduced",
-        chain_of_integrators.theorem_2: within,
-        theorem_1.theorem_1: within,
+        chain_of_integrators.theorem_2: partly,
+        theorem_1.theorem_1: partly,
     }
-    for make, verdict in expected.items():
+    for make, verdict in verdicts.items():
         assert of_json(make()).verdict == verdict
 
 
@@ -345,44 +345,37 @@ def test_escape_is_found_below_1_and_missed_beyond() -> None:
 
 def test_on_the_rig() -> None:
     """Three worlds of `high_gain` in the loop: it stands, and its gain does not move."""
-    result = on_the_rig.in_the_loop(["high_gain"], 3, 90_000)["high_gain"]
+    result = on_the_rig.run_kinds(["high_gain"], 3, 90_000)["high_gain"]
     errors = result.values("velocity_rms_error_rad_s")
     assert np.isfinite(errors).all()
     assert 0.05 < errors.mean() < 0.085
-    claim = of_json(on_the_rig.idle(result))
+    claim = of_json(on_the_rig.idle_claim(result))
     assert claim.verdict == "reproduced"
     assert 1e-4 < claim.figures["largest_Omega_1_s"] < 0.015
 
 
-def ended(errors: list[float], *, fell: int = 0) -> Result:
-    """Worlds with these errors, of which the last ones fell."""
-    kinds = ["done"] * (len(errors) - fell) + ["fell"] * fell
-    summaries = [{"velocity_rms_error_rad_s": error, "tilt_rms_deg": error} for error in errors]
-    return Result([Outcome(kind, 5.0) for kind in kinds], summaries)  # type: ignore[arg-type]
-
-
 def test_a_fall_on_the_rig_is_not_hidden() -> None:
-    found = dict.fromkeys(on_the_rig.KINDS, ended([0.07, 0.071, 0.072, 0.073]))
-    claim = of_json(on_the_rig.compared(found | {"high_gain": ended([0.06, 0.061, 0.059, 0.08], fell=1)}))
+    runs = dict.fromkeys(on_the_rig.KINDS, make_result([0.07, 0.071, 0.072, 0.073]))
+    claim = of_json(on_the_rig.comparison_claim(runs | {"high_gain": make_result([0.06, 0.061, 0.059, 0.08], fell=1)}))
     assert claim.verdict == "not reproduced"
-    assert "3 of 4" in claim.found
-    assert "high_gain 0.0600" in claim.found
+    assert "3 of 4" in claim.result
+    assert "high_gain 0.0600" in claim.result
 
 
 def test_differences_on_the_rig_are_beyond_chance() -> None:
     """High gain less theirs, world by world: the word follows the interval's ends."""
     low, high, mixed = [0.07, 0.08, 0.09], [0.08, 0.09, 0.1], [0.06, 0.09, 0.091]
-    found = dict.fromkeys(on_the_rig.KINDS, ended(high)) | {"high_gain": ended(low)}
-    claim = on_the_rig.compared(found | {"linear": ended(mixed), "ltv": ended([0.06, 0.07, 0.08])})
-    assert "homogeneous -0.0100 +- 0.0000 (smaller)" in claim.found
-    assert "ltv +0.0100 +- 0.0000 (larger)" in claim.found
-    assert "(not different)" in claim.found.partition("linear ")[2].partition("linear ")[2]
+    runs = dict.fromkeys(on_the_rig.KINDS, make_result(high)) | {"high_gain": make_result(low)}
+    claim = on_the_rig.comparison_claim(runs | {"linear": make_result(mixed), "ltv": make_result([0.06, 0.07, 0.08])})
+    assert "homogeneous -0.0100 +- 0.0000 (smaller)" in claim.result
+    assert "ltv +0.0100 +- 0.0000 (larger)" in claim.result
+    assert "(not different)" in claim.result.partition("linear ")[2].partition("linear ")[2]
 
 
-def test_pictures_have_names(done: Study) -> None:
+def test_pictures_have_names(runs: Study) -> None:
     pictures: list[Picture] = [
-        *figure_1.figure_1(done).pictures,
-        *figure_2.figure_2(done).pictures,
+        *figure_1.figure_1(runs).pictures,
+        *figure_2.figure_2(runs).pictures,
     ]
     assert [picture.name for picture in pictures] == ["andrieu2009-fig-1", "andrieu2009-fig-2"]
     for i, picture in enumerate(pictures, start=1):

@@ -17,7 +17,7 @@ def lyapunov(d_inf: float, l1: float = 8.0, sigma: float = 3.0) -> Lyapunov:
     return Lyapunov(BiLimitCorrection((l1, 1.0), d_inf), sigma, 2.0 + d_inf)
 
 
-def at(W: Lyapunov, e1: float, e2: float) -> States:
+def invert(W: Lyapunov, e1: float, e2: float) -> States:
     """s1 and s2 of a state, q1 inverted by bisection."""
     low, high = -abs(e2) - 1.0, abs(e2) + 1.0
     for _ in range(200):
@@ -33,22 +33,22 @@ def at(W: Lyapunov, e1: float, e2: float) -> States:
 def test_w_is_its_integral_and_the_gradient_its_derivative(d_inf: float) -> None:
     W = lyapunov(d_inf)
     for e1, e2 in ((0.3, -0.8), (-0.2, -0.1), (0.01, 1.5)):
-        here = at(W, e1, e2)
-        middle = W.h(here.s2)[0]
-        first = quad(lambda s, middle=middle: float(W.h(np.array(s)) - middle), here.s2[0], here.s1[0])[0]
-        assert W.W(here)[0] == pytest.approx(first + W.sigma * abs(e2) ** W.d_W / W.d_W, rel=1e-9)
+        point = invert(W, e1, e2)
+        middle = W.h(point.s2)[0]
+        first = quad(lambda s, middle=middle: float(W.h(np.array(s)) - middle), point.s2[0], point.s1[0])[0]
+        assert W.W(point)[0] == pytest.approx(first + W.sigma * abs(e2) ** W.d_W / W.d_W, rel=1e-9)
         step = 1e-6
-        by_e1 = (W.W(at(W, e1 + step, e2)) - W.W(at(W, e1 - step, e2)))[0] / (2.0 * step)
-        by_e2 = (W.W(at(W, e1, e2 + step)) - W.W(at(W, e1, e2 - step)))[0] / (2.0 * step)
-        assert [float(part[0]) for part in W.gradient(here)] == pytest.approx([by_e1, by_e2], rel=1e-4, abs=1e-7)
+        by_e1 = (W.W(invert(W, e1 + step, e2)) - W.W(invert(W, e1 - step, e2)))[0] / (2.0 * step)
+        by_e2 = (W.W(invert(W, e1, e2 + step)) - W.W(invert(W, e1, e2 - step)))[0] / (2.0 * step)
+        assert [float(part[0]) for part in W.gradient(point)] == pytest.approx([by_e1, by_e2], rel=1e-4, abs=1e-7)
 
 
 @pytest.mark.parametrize("d_inf", [0.25, 0.75])
 def test_w_is_homogeneous_in_the_bi_limit(d_inf: float) -> None:
-    """Of degree d_W with the weights (1, 1) near 0 and (1 - d_inf, 1) far out, and positive."""
+    """W has the degree d_W with the weights (1, 1) near 0 and (1 - d_inf, 1) far out, and is positive."""
     W = lyapunov(d_inf)
-    near, far = at(W, 0.4e-9, -0.7e-9), at(W, 0.4 * (1e12) ** (1.0 - d_inf), -0.7e12)
-    twice_near, twice_far = at(W, 0.8e-9, -1.4e-9), at(W, 0.4 * (2e12) ** (1.0 - d_inf), -1.4e12)
+    near, far = invert(W, 0.4e-9, -0.7e-9), invert(W, 0.4 * (1e12) ** (1.0 - d_inf), -0.7e12)
+    twice_near, twice_far = invert(W, 0.8e-9, -1.4e-9), invert(W, 0.4 * (2e12) ** (1.0 - d_inf), -1.4e12)
     assert W.W(twice_near)[0] / W.W(near)[0] == pytest.approx(2.0**W.d_W, rel=1e-3)
     assert W.W(twice_far)[0] / W.W(far)[0] == pytest.approx(2.0**W.d_W, rel=1e-3)
     without_e2 = [W.W(States(np.array([s]), np.zeros(1)))[0] for s in (0.3e12, 0.3e12 * 2.0 ** (1.0 - d_inf))]
@@ -59,9 +59,9 @@ def test_w_is_homogeneous_in_the_bi_limit(d_inf: float) -> None:
 @pytest.mark.parametrize("d_inf", [0.0, 0.5, 0.9])
 def test_w_falls_along_motions_as_19_says(d_inf: float) -> None:
     """Integrated, with A1 and A2 that swing within (17), from other states than those of the grid."""
-    found = equations_19_20.search(d_inf)
-    assert found is not None
-    W = lyapunov(d_inf, found.l1, found.sigma)
+    pair = equations_19_20.search(d_inf)
+    assert pair is not None
+    W = lyapunov(d_inf, pair.l1, pair.sigma)
 
     def slope(tau: float, e: np.ndarray) -> list[float]:
         k1, k2 = W.K(float(e[0]))
@@ -71,10 +71,10 @@ def test_w_falls_along_motions_as_19_says(d_inf: float) -> None:
     for start in ([1.0, -2.0], [-30.0, 5.0], [0.01, 0.02]):
         tau = np.linspace(0.0, 2.0, 401)
         motion = solve_ivp(slope, (0.0, 2.0), start, "LSODA", tau, rtol=1e-9, atol=1e-12).y
-        values = np.array([W.W(at(W, *e))[0] for e in motion.T])
+        values = np.array([W.W(invert(W, *e))[0] for e in motion.T])
         fall = -np.diff(values) / np.diff(tau)
         bound = values + values ** ((W.d_W + d_inf) / W.d_W)
-        assert (fall > 0.95 * found.decay.c1 * np.minimum(bound[1:], bound[:-1]) - 1e-12).all()
+        assert (fall > 0.95 * pair.decay.c1 * np.minimum(bound[1:], bound[:-1]) - 1e-12).all()
 
 
 @pytest.mark.parametrize("b", [0.1, 0.8])
@@ -86,26 +86,26 @@ def test_20_with_a_b_of_its_own(b: float) -> None:
     step = 1e-5
     quotients = []
     for x, z in zip(e1.tolist(), e2.tolist(), strict=True):
-        ahead, behind = (at(W, x * (1.0 + b * s), z * (1.0 + (1.0 + b) * s)) for s in (step, -step))
+        ahead, behind = (invert(W, x * (1.0 + b * s), z * (1.0 + (1.0 + b) * s)) for s in (step, -step))
         growth = (W.W(ahead) - W.W(behind))[0] / (2.0 * step)
-        quotients.append(growth / W.W(at(W, x, z))[0])
-    assert decay(W, b, at=grid).c2 == pytest.approx(min(quotients), rel=1e-3)
+        quotients.append(growth / W.W(invert(W, x, z))[0])
+    assert decay(W, b, grid=grid).c2 == pytest.approx(min(quotients), rel=1e-3)
 
 
 def test_constants_hold_on_a_finer_grid() -> None:
     claim = equations_19_20.claim()
     assert claim.verdict == WITHIN
     for d_inf in (0.0, 0.5, 0.9):
-        found = equations_19_20.search(d_inf)
-        assert found is not None
+        pair = equations_19_20.search(d_inf)
+        assert pair is not None
         finer = decay(
-            lyapunov(d_inf, found.l1, found.sigma),
-            found.b,
+            lyapunov(d_inf, pair.l1, pair.sigma),
+            pair.b,
             equations_19_20.SPREAD,
             states(np.geomspace(1e-9, 1e8, 501), 97),
         )
         assert min(finer) > 0.0
-        assert finer.c1 == pytest.approx(found.decay.c1, rel=0.1)
+        assert finer.c1 == pytest.approx(pair.decay.c1, rel=0.1)
 
 
 def test_19_holds_for_every_a_within_the_spread() -> None:
@@ -147,7 +147,7 @@ def test_disturbances_and_starts() -> None:
 def test_the_disturbed_solution_is_one_of_the_system() -> None:
     """Without an error at the start, and with exact measurements of y, what is left is what was put in."""
     quiet = equations_11_12.follow([equations_11_12.Column()])
-    assert quiet.scaled.max() < 1e-5
+    assert quiet.scaled_error.max() < 1e-5
     assert quiet.gain[0, 0] == 2.0  # phi2
 
 
@@ -182,7 +182,7 @@ def test_exponent_of_6() -> None:
     claim = increments.exponent_of_6()
     assert claim.verdict == WITHIN
     assert increments.exponent_of_section_2_1(2, 2, 2, 0.4) == pytest.approx(1.4)
-    assert increments.exponent_printed(2, 2, 2, 0.4) == pytest.approx(1.0)
+    assert increments.printed_exponent(2, 2, 2, 0.4) == pytest.approx(1.0)
     assert increments.exponent_of_section_2_1(4, 3, 2, 0.2) == pytest.approx(1.0 / 0.6)
     grown = [increments.quotient_of_6(1.0, 0.5, size) for size in (1e2, 1e4, 1e6)]
     assert grown[1] / grown[0] == pytest.approx(10.0, rel=0.1)
@@ -190,7 +190,7 @@ def test_exponent_of_6() -> None:
 
 
 def test_exponent_of_6_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(increments, "exponent_printed", increments.exponent_of_section_2_1)
+    monkeypatch.setattr(increments, "printed_exponent", increments.exponent_of_section_2_1)
     assert increments.exponent_of_6().verdict == "reproduced"
     monkeypatch.setattr(increments, "exponent_of_section_2_1", lambda *args: 1.0)
     assert increments.exponent_of_6().verdict == "not reproduced"

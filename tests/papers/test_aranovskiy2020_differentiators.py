@@ -14,9 +14,9 @@ SEED = 910_000
 
 @pytest.mark.parametrize("tau", [0.01, 0.02, 0.05])
 def test_lag_and_noise_of_the_linear_differentiator(tau: float) -> None:
-    found, expected = lag.trade(tau, SEED), lag.foreseen(tau)
-    assert found.lag_s == pytest.approx(2.0 * tau, rel=1e-3)
-    assert found.noise_gain_1_s == pytest.approx(expected.noise_gain_1_s, rel=0.04)
+    result, expected = lag.trade(tau, SEED), lag.predict_trade(tau)
+    assert result.lag_s == pytest.approx(2.0 * tau, rel=1e-3)
+    assert result.noise_gain_1_s == pytest.approx(expected.noise_gain_1_s, rel=0.04)
 
 
 def test_the_trade_is_reproduced() -> None:
@@ -24,7 +24,7 @@ def test_the_trade_is_reproduced() -> None:
 
 
 def test_noise_of_a_long_time_constant() -> None:
-    assert lag.foreseen(1.0).noise_gain_1_s == pytest.approx(math.sqrt(DT / 4.0), rel=0.01)
+    assert lag.predict_trade(1.0).noise_gain_1_s == pytest.approx(math.sqrt(DT / 4.0), rel=0.01)
 
 
 def test_vicinity_of_the_homogeneous_differentiator() -> None:
@@ -45,14 +45,14 @@ def test_the_error_is_gone_in_finite_time() -> None:
 
 def test_decay_of_the_linear_observer_in_closed_form() -> None:
     """alpha = 1: poles -10 +- sqrt(50) j, half a turn pi/sqrt(50), in which the size falls by exp(-10 pi/sqrt(50))."""
-    found = finite_time.decay(1.0)
+    result = finite_time.decay(1.0)
     half_turn = math.pi / math.sqrt(50.0)
-    spans = found.time_s[found.turns]
+    spans = result.time_s[result.turns]
     assert spans[2] - spans[1] == pytest.approx(half_turn, rel=2e-3)
-    assert found.decades_a_turn == pytest.approx(10.0 * half_turn / math.log(10.0), rel=2e-3)
+    assert result.decades_a_turn == pytest.approx(10.0 * half_turn / math.log(10.0), rel=2e-3)
 
 
 def test_an_observer_that_is_late_is_not_reproduced(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = finite_time.of_the_observer
-    monkeypatch.setattr(finite_time, "of_the_observer", lambda alpha: 1.05 * right(alpha))
+    right = finite_time.observer_decay_time
+    monkeypatch.setattr(finite_time, "observer_decay_time", lambda alpha: 1.05 * right(alpha))
     assert finite_time.finite_time_claim().verdict == "not reproduced"

@@ -17,7 +17,7 @@ SMALL = {"flywheel speed": 0.01, "gimbal offset": 1.0, "servo gain": 0.02}
 
 
 @cache
-def ran() -> mismatch.Ran:
+def ran() -> mismatch.MismatchRuns:
     return mismatch.run_all(mismatch.MISMATCHES, 2, SEED, 6.0)
 
 
@@ -31,10 +31,10 @@ def test_body_a_turns_as_the_papers_own_momentum_says() -> None:
     Without bias: e moves a centre of mass, of which the paper's T does not know.
     """
     largest = [dataclasses.replace(case, sizes=case.sizes[-1:]) for case in mismatch.MISMATCHES]
-    found = mismatch.run_all(largest, 1, SEED, 3.0, ["plant.equilibrium_bias_deg=0"])
-    plant = found.plant
+    runs = mismatch.run_all(largest, 1, SEED, 3.0, ["plant.equilibrium_bias_deg=0"])
+    plant = runs.plant
     exact = paper.scissored_pair(float(plant.model.body("thrust_bearing").inertia[2]))
-    for result in found.broken.values():
+    for result in runs.broken.values():
         run = trajectory_of(result).world(0)
         qpos = np.stack([run[f"angle/{name}_rad"] for name in plant.joint_names], axis=-1)
         qvel = np.stack([run[f"rate/{name}_rad_s"] for name in plant.joint_names], axis=-1)
@@ -47,7 +47,7 @@ def test_body_a_turns_as_the_papers_own_momentum_says() -> None:
 @pytest.mark.parametrize("kind", [m.kind for m in mismatch.MISMATCHES])
 def test_conservation_foretells_the_rate_of_body_a(kind: str) -> None:
     (case,) = (m for m in mismatch.MISMATCHES if m.kind == kind)
-    assert hypotheses.yaw_of(ran(), case, case.sizes[0]).balance < 0.03
+    assert hypotheses.measure_yaw(ran(), case, case.sizes[0]).balance < 0.03
 
 
 @pytest.mark.parametrize("kind", SMALL)
@@ -55,16 +55,16 @@ def test_small_mismatch_is_foreseen_from_the_symmetric_rig(kind: str) -> None:
     """Turn and sign, tick by tick."""
     symmetric = trajectory_of(ran().symmetric)
     rate = trajectory_of(ran().broken[kind, SMALL[kind]])["rate/yaw_rad_s"]
-    foretold = yaw_momentum.foreseen_yaw_rate(kind, SMALL[kind], ran().plant, symmetric)
-    assert np.abs(foretold - rate).max() < 0.12 * np.abs(rate).max()
-    wrong = yaw_momentum.foreseen_yaw_rate(kind, -SMALL[kind], ran().plant, symmetric)
-    assert np.abs(wrong - rate).max() > 1.5 * np.abs(rate).max()
+    prediction = yaw_momentum.predict_yaw_rate(kind, SMALL[kind], ran().plant, symmetric)
+    assert np.abs(prediction - rate).max() < 0.12 * np.abs(rate).max()
+    opposite = yaw_momentum.predict_yaw_rate(kind, -SMALL[kind], ran().plant, symmetric)
+    assert np.abs(opposite - rate).max() > 1.5 * np.abs(rate).max()
 
 
 def test_tilt_and_its_estimate_hardly_notice() -> None:
     for case in mismatch.MISMATCHES:
-        found = hypotheses.yaw_of(ran(), case, case.sizes[-1])
-        assert abs(found.velocity.mean - 1.0) < 0.05
+        result = hypotheses.measure_yaw(ran(), case, case.sizes[-1])
+        assert abs(result.velocity.mean - 1.0) < 0.05
     assert ran().fell == 0
 
 

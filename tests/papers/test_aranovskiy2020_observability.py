@@ -16,8 +16,8 @@ def test_gramian_of_the_double_integrator() -> None:
     """Closed form for a = 0: [[T, T^2/2], [T^2/2, T^3/3]] and T."""
     T = 0.4
     values = np.linalg.eigvalsh([[T, T**2 / 2.0], [T**2 / 2.0, T**3 / 3.0]])
-    found = observability.gramian_bounds(np.zeros(101), 0.005, T)
-    assert found == pytest.approx((values[0], values[1]), rel=1e-9)
+    bounds = observability.gramian_bounds(np.zeros(101), 0.005, T)
+    assert bounds == pytest.approx((values[0], values[1]), rel=1e-9)
 
 
 def test_gramian_by_integration() -> None:
@@ -31,8 +31,8 @@ def test_gramian_by_integration() -> None:
     start = np.concatenate([np.eye(3).ravel(), np.zeros(9)])
     gramian = solve_ivp(slope, (0.0, T), start, rtol=1e-10, atol=1e-12).y[9:, -1].reshape(3, 3)
     values = np.linalg.eigvalsh(gramian)
-    found = observability.gramian_bounds(np.full(101, a), 0.005, T)
-    assert found == pytest.approx((values[0], values[-1]), rel=1e-6)
+    bounds = observability.gramian_bounds(np.full(101, a), 0.005, T)
+    assert bounds == pytest.approx((values[0], values[-1]), rel=1e-6)
 
 
 def test_for_any_a_and_not_without_the_tilt() -> None:

@@ -25,10 +25,10 @@ def least_return_difference(K: np.ndarray) -> float:
 @pytest.mark.parametrize("weights", [(10.0, 1.0, 0.5, 0.1), (2000.0, 0.1, 3.0, 1.0)])
 def test_a_true_lqr_gain_is_recognised_and_its_weights_found(weights: tuple[float, ...]) -> None:
     P = solve_continuous_are(PAIR.A_e, PAIR.B_e, np.diag(weights), np.eye(1))
-    found = inverse_optimality(PAIR.A_e, PAIR.B_e, (PAIR.B_e.T @ P)[0])
-    assert found.optimal
-    np.testing.assert_allclose(found.diagonal, weights, rtol=1e-5)
-    assert found.recovered < 1e-5
+    result = inverse_optimality(PAIR.A_e, PAIR.B_e, (PAIR.B_e.T @ P)[0])
+    assert result.optimal
+    np.testing.assert_allclose(result.diagonal, weights, rtol=1e-5)
+    assert result.recovered < 1e-5
 
 
 def test_a_stabilising_gain_that_is_no_lqrs_is_recognised() -> None:
@@ -52,20 +52,20 @@ def test_a_diagonal_cost_gives_the_printed_gains_to_their_digits() -> None:
     gain = lqr_gains(PAIR, claim.figures["diagonal_within_rounding"], 1.0)
     assert [round(k) for k in gain[:3]] + [round(gain[3], 1)] == list(K_E)
     # Another one than the search finds.
-    known = np.array(lqr_gains(PAIR, (405.6, 2.26, 0.223, 0.096), 1.0))
-    assert (np.abs(known - K_E) / K_E_ROUNDING).max() < 1.0
-    np.testing.assert_allclose(known, (34.68, 4.07, -1.325, 0.310), atol=0.005)
+    other_gain = np.array(lqr_gains(PAIR, (405.6, 2.26, 0.223, 0.096), 1.0))
+    assert (np.abs(other_gain - K_E) / K_E_ROUNDING).max() < 1.0
+    np.testing.assert_allclose(other_gain, (34.68, 4.07, -1.325, 0.310), atol=0.005)
 
 
 def test_a_search_that_starts_far_off_comes_near() -> None:
     weights = np.array([900.0, 3.0, 0.8, 0.2])
     K = optimality.lqr_gain(PAIR.A_e, PAIR.B_e, weights)
-    found = nearest_diagonal(PAIR.A_e, PAIR.B_e, K, np.array(K_E_ROUNDING), 1.5 * weights)
-    assert found.off < 0.1
+    result = nearest_diagonal(PAIR.A_e, PAIR.B_e, K, np.array(K_E_ROUNDING), 1.5 * weights)
+    assert result.off < 0.1
 
 
 def test_to_more_digits_no_diagonal_cost_gives_them(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(optimality, "K_E_ROUNDING", (0.05, 0.05, 0.05, 0.005))
     claim = optimality.lqr_gains()
     assert claim.verdict == "reproduced within stated conditions"
-    assert "not even to the digits printed" in claim.why
+    assert "not even to the digits printed" in claim.reason

@@ -54,15 +54,15 @@ def test_definiteness_is_lost_at_low_rates() -> None:
 
 
 def test_the_lowest_rate_lies_between_one_that_fails_and_one_that_does_not() -> None:
-    swept = {rate: transient("explicit Euler", rate) for rate in (100.0, 150.0, 190.0, 400.0)}
-    found = delicacy.lowest_rate("explicit Euler", swept, lambda t: t.least > 0.0)
-    assert found is not None
-    assert transient("explicit Euler", found).least > 0.0 >= transient("explicit Euler", found - 0.1).least
-    assert delicacy.lowest_rate("explicit Euler", swept, lambda t: True) is None
+    sweep = {rate: transient("explicit Euler", rate) for rate in (100.0, 150.0, 190.0, 400.0)}
+    rate_hz = delicacy.lowest_rate("explicit Euler", sweep, lambda t: t.least > 0.0)
+    assert rate_hz is not None
+    assert transient("explicit Euler", rate_hz).least > 0.0 >= transient("explicit Euler", rate_hz - 0.1).least
+    assert delicacy.lowest_rate("explicit Euler", sweep, lambda t: True) is None
 
 
 def test_single_precision_does_no_harm_to_runge_kutta() -> None:
-    double, single = (transient("Runge-Kutta 4", 200.0, single=s) for s in (False, True))
+    double, single = (transient("Runge-Kutta 4", 200.0, single_precision=s) for s in (False, True))
     assert single.error == pytest.approx(double.error, rel=0.2)
     assert single.error != double.error
     assert single.least > 0.0
@@ -72,14 +72,14 @@ def test_plain_form_agrees_with_ours_at_a_small_step() -> None:
     """(10) written out with 3x3 matrices is the same observer: the difference fades with the step."""
     differences = []
     for dt in (1e-3, 5e-4):
-        plain, ours = forms_of_10.Plain(forms_of_10.euler, dt), forms_of_10.ours(dt)
+        plain, exact = forms_of_10.Plain(forms_of_10.euler, dt), forms_of_10.make_exact(dt)
         y = Measurement(0.01, 0.2)
-        a, b = plain.init(y), ours.init(y)
+        a, b = plain.init(y), exact.init(y)
         x, estimate = a[0], Estimate(0.0, 0.0, 0.0)
         for k in range(round(0.3 / dt)):
             y = Measurement(0.01 + 0.03 * math.sin(9.0 * k * dt), 0.2)
             a, x = plain.step(a, y, 0.3)
-            b, estimate = ours.step(b, y, 0.3)
+            b, estimate = exact.step(b, y, 0.3)
         differences.append(abs(x[1] - estimate.x2))
     assert differences[1] < 0.65 * differences[0]
     assert differences[1] < 0.02
@@ -87,19 +87,19 @@ def test_plain_form_agrees_with_ours_at_a_small_step() -> None:
 
 
 def test_euler_makes_the_estimate_worse() -> None:
-    found = forms_of_10.euler_against_exact(SEED)
-    assert found.other_error > 1.1 * found.error
+    comparison = forms_of_10.compare_euler(SEED)
+    assert comparison.other_error > 1.1 * comparison.error
 
 
 def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matters() -> None:
-    """Where it settles, by a root of the nine equations."""
-    corrected, printed, rate = misprint.misprint(SEED)
+    """It settles at a root of its nine equations."""
+    corrected_H, printed_H, rate = misprint.misprint(SEED)
     A, lost = A_prime(), C.T @ C
-    for H, first in ((corrected, A), (printed, printed_model().A)):
+    for H, first in ((corrected_H, A), (printed_H, printed_model().A)):
         slope = H @ first.T + A @ H - H @ lost @ H + Q
         assert np.abs(slope).max() < 1e-6 * np.abs(H @ lost @ H).max()
-    assert abs(corrected[0, 1] / corrected[1, 0] - 1.0) < 1e-9
-    assert abs(printed[0, 1] / printed[1, 0] - 1.0) > 0.02
+    assert abs(corrected_H[0, 1] / corrected_H[1, 0] - 1.0) < 1e-9
+    assert abs(printed_H[0, 1] / printed_H[1, 0] - 1.0) > 0.02
     assert 0.0 < rate.difference < 0.02 * rate.error
 
 
@@ -111,7 +111,7 @@ def test_the_misprint_is_one_that_does_not_matter(monkeypatch: pytest.MonkeyPatc
     mattering = right.rate._replace(difference=0.1 * right.rate.error)
     monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(rate=mattering))
     assert misprint.misprint_claim(SEED).verdict == "not reproduced"
-    monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(printed=right.corrected, rate=mattering))
+    monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(printed_H=right.corrected_H, rate=mattering))
     assert misprint.misprint_claim(SEED).verdict == "reproduced"
 
 
@@ -119,36 +119,36 @@ def test_the_misprint_is_one_that_does_not_matter(monkeypatch: pytest.MonkeyPatc
 def test_ten_by_euler_on_floats_and_arrays_is_the_plain_one(exact_gain: bool) -> None:
     run = run_of_10(SEED)
     plain = replay(forms_of_10.Plain(forms_of_10.euler), run).x2
-    found = replay(by_euler.TenByEuler(DT, printed_model(), exact_gain), run).x2
-    settled = slice(200 if exact_gain else 0, None)
-    np.testing.assert_allclose(found[settled], plain[settled], atol=2e-4 if exact_gain else 1e-9)
+    by_floats = replay(by_euler.TenByEuler(DT, printed_model(), exact_gain), run).x2
+    late = slice(200 if exact_gain else 0, None)
+    np.testing.assert_allclose(by_floats[late], plain[late], atol=2e-4 if exact_gain else 1e-9)
     columns = {name: np.stack([run[name]] * 2, axis=1) for name in ("y1_rad", "y2_rad", "u_rad_s")}
-    both = replay(by_euler.TenByEuler(DT, printed_model(), exact_gain), Trajectory(columns)).x2
-    np.testing.assert_allclose(both[:, 1], found, rtol=1e-9, atol=1e-12)
+    by_arrays = replay(by_euler.TenByEuler(DT, printed_model(), exact_gain), Trajectory(columns)).x2
+    np.testing.assert_allclose(by_arrays[:, 1], by_floats, rtol=1e-9, atol=1e-12)
 
 
 def test_with_the_exact_gain_h_is_the_benchs() -> None:
     """A step of H at rest, from H_0 and half settled."""
     y, form = Measurement(0.0, 0.0), by_euler.TenByEuler(0.005, printed_model(), exact_gain=True)
-    state, ours = form.init(y), forms_of_10.ours(0.005)
-    theirs = ours.init(y)
+    state, exact = form.init(y), forms_of_10.make_exact(0.005)
+    entries = exact.init(y)
     for _ in range(20):
-        state, theirs = form.step(state, y, 0.0)[0], ours.step(theirs, y, 0.0)[0]
-        assert state[3:] == pytest.approx((theirs.h11, theirs.h12, theirs.h22, theirs.h33), rel=1e-9)
+        state, entries = form.step(state, y, 0.0)[0], exact.step(entries, y, 0.0)[0]
+        assert state[3:] == pytest.approx((entries.h11, entries.h12, entries.h22, entries.h33), rel=1e-9)
 
 
 def test_eleven_by_euler_approaches_the_benchs() -> None:
     """The difference fades with the step; with a J2 whose drag on the rate is seen."""
     model, differences = dataclasses.replace(printed_model(), J2=-0.03), []
     for dt in (1e-3, 2.5e-4):
-        euler, ours = by_euler.ElevenByEuler(dt, model), make_observer("homogeneous", dt, model)
+        euler, exact = by_euler.ElevenByEuler(dt, model), make_observer("homogeneous", dt, model)
         y = Measurement(0.01, 0.2)
-        a, b, found = euler.init(y), ours.init(y), (0.0, 0.0)
+        a, b, rates = euler.init(y), exact.init(y), (0.0, 0.0)
         for k in range(round(0.3 / dt)):
             y = Measurement(0.01 + 0.03 * math.sin(9.0 * (k + 1) * dt), 0.2)
-            (a, first), (b, second) = euler.step(a, y, 4.0), ours.step(b, y, 4.0)
-            found = first.x2, second.x2
-        differences.append(abs(found[0] - found[1]))
+            (a, first), (b, second) = euler.step(a, y, 4.0), exact.step(b, y, 4.0)
+            rates = first.x2, second.x2
+        differences.append(abs(rates[0] - rates[1]))
     assert differences[1] < 0.4 * differences[0]
     assert differences[1] < 0.01
 
@@ -168,12 +168,12 @@ def test_the_verdict_on_the_cost_follows_from_the_instructions(monkeypatch: pyte
         monkeypatch.setattr(update_cost, "instructions", lambda board=board: on_the_board.Instructions(board, False))
         claim = update_cost.cost()
         assert claim.verdict == verdict
-        assert "; recorded" in claim.found
+        assert "; recorded" in claim.result
 
 
 @pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
 def test_the_recorded_instructions_are_those_counted() -> None:
-    """Of another compiler or C library some per cent more or less."""
+    """Another compiler or C library may make some per cent more or less."""
     recorded = json.loads(on_the_board.RECORDED.read_text())
     assert on_the_board.count() == pytest.approx(recorded, rel=0.1)
 

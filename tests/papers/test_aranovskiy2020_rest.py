@@ -1,4 +1,4 @@
-"""Where the rig of aranovskiy2020 rests with a biased observer in the law."""
+"""The rest of the rig of aranovskiy2020 with a biased observer in the law."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ SEED = 910_000
 
 def test_the_rig_rests_at_zero_with_a_biased_observer() -> None:
     case = "(10), estimated angles"
-    (found,) = rest.rests_of([(case, 4, ())], SEED)
+    (result,) = rest.find_rests([(case, 4, ())], SEED)
     expected = rest.expected_integrator(case, rest.BIAS_DEG, math.radians(0.4), SEED)
-    assert found.x2_estimated.high < -0.01  # biased it is
-    assert found.at_zero(expected)
-    assert not found.at_zero(-expected)  # the printed sign
-    assert abs(found.x3.mean) < 2.0
+    assert result.x2_estimated.high < -0.01  # biased it is
+    assert result.is_at_zero(expected)
+    assert not result.is_at_zero(-expected)  # the printed sign
+    assert abs(result.x3.mean) < 2.0
     # The law with the true rate and the measured angles rests where (8) says.
     x_e = rest.expected_integrator(rest.TRUE_RATE, rest.BIAS_DEG, math.radians(0.4), SEED)
     assert x_e == pytest.approx(rest.integrator_rest(math.radians(rest.BIAS_DEG)), rel=1e-12)
-    assert rest.laws_claim(found, found).verdict == "not reproduced"  # that is not the observer's rest
+    assert rest.laws_claim(result, result).verdict == "not reproduced"  # that is not the observer's rest
 
 
 def test_bias_of_an_estimate_at_rest_in_closed_form() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.papers.aranovskiy2020 import comparison, figure_4, figures_5_to_7, second_place
-from cmg_mj.papers.aranovskiy2020.comparison import AngleSource, Measured, order_of
-from cmg_mj.papers.aranovskiy2020.figures_5_to_7 import ANGLES, figure, in_the_loop
+from cmg_mj.papers.aranovskiy2020.comparison import AngleSource, Measure, judge_order
+from cmg_mj.papers.aranovskiy2020.figures_5_to_7 import ANGLES, close_loops, figure
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.second_place import ELEVEN, ELEVEN_BY_EULER, TEN, TEN_BY_EULER, TEN_EXACT_GAIN
 from cmg_mj.results.intervals import mean_interval
@@ -33,68 +33,68 @@ def test_figure_4_other_seeds() -> None:
     assert claim.verdict == "not reproduced"
     figures = claim.figures
     assert figures["largest_by_smallest"] < figure_4.COMPARABLE < figures["largest_by_smallest_after_push"]
-    after = {name: figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
-    assert after["homogeneous"] > 1.3 * max(after["linear"], after["zero"])  # it misses the push
+    errors = {name: figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
+    assert errors["homogeneous"] > 1.3 * max(errors["linear"], errors["zero"])  # it misses the push
     assert max(figures[f"rms_{name}_rad_s"].low for name in OBSERVERS) > figures["rms_zero_rad_s"].high
-    assert "closer than (10) and (11)." in claim.why
-    assert "closer than (9), (10) and (11)." in claim.why
+    assert "closer than (10) and (11)." in claim.reason
+    assert "closer than (9), (10) and (11)." in claim.reason
 
 
 @pytest.mark.parametrize(("last", "verdict"), [(0.14, "reproduced within stated conditions"), (0.16, "not reproduced")])
 def test_figure_4_is_judged_by_the_push(monkeypatch: pytest.MonkeyPatch, last: float, verdict: str) -> None:
     """Errors within a factor of 1.5 after the push hold, whatever the whole run says."""
-    riding = figure_4.riding_along(2, SEED)
-    after = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.12, last, 0.11), strict=True)}
-    apart = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.5, 0.9, 0.01), strict=True)}
-    monkeypatch.setattr(figure_4, "riding_along", lambda *_: riding._replace(whole=apart, after_push=after))
+    runs = figure_4.run_open_loop(2, SEED)
+    push = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.12, last, 0.11), strict=True)}
+    whole = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.5, 0.9, 0.01), strict=True)}
+    monkeypatch.setattr(figure_4, "run_open_loop", lambda *_: runs._replace(whole=whole, after_push=push))
     claim = figure_4.figure_4(2, SEED)
     assert claim.verdict == verdict
-    assert "zero is closer than (10) and (11)." in claim.why
+    assert "zero is closer than (10) and (11)." in claim.reason
 
 
 # --- the order --------------------------------------------------------------------------------------------------
 
 
 def test_an_order_is_one_beyond_chance_in_both_steps() -> None:
-    assert order_of(numbers(0.05, 0.07, 0.11)) == "holds"
-    assert order_of(numbers(0.11, 0.07, 0.05)) == "is inverted"
-    assert order_of(numbers(0.07, 0.05, 0.11)) == "does not hold"
-    assert order_of(numbers(0.05, 0.11, 0.07)) == "does not hold"
+    assert judge_order(numbers(0.05, 0.07, 0.11)) == "holds"
+    assert judge_order(numbers(0.11, 0.07, 0.05)) == "is inverted"
+    assert judge_order(numbers(0.07, 0.05, 0.11)) == "does not hold"
+    assert judge_order(numbers(0.05, 0.11, 0.07)) == "does not hold"
     # The means are in order, or inverted, but a difference of this scatter may be none.
-    assert order_of(numbers(0.05, 0.07, 0.11, 0.02)) == "does not hold"
-    assert order_of(numbers(0.11, 0.07, 0.05, 0.02)) == "does not hold"
-    alone = {name: np.array([0.05, math.nan, math.nan]) for name in OBSERVERS}
-    assert comparison.differences(alone) == [None, None]
-    assert order_of(alone) == "does not hold"
+    assert judge_order(numbers(0.05, 0.07, 0.11, 0.02)) == "does not hold"
+    assert judge_order(numbers(0.11, 0.07, 0.05, 0.02)) == "does not hold"
+    one_world = {name: np.array([0.05, math.nan, math.nan]) for name in OBSERVERS}
+    assert comparison.differences(one_world) == [None, None]
+    assert judge_order(one_world) == "does not hold"
 
 
 @pytest.mark.parametrize("angles", ANGLES)
 def test_order_of_the_observers_in_the_loop(angles: AngleSource) -> None:
-    found = comparison.measured({angles: in_the_loop(list(OBSERVERS), angles, 6, SEED, 8.0)})
-    print({m.key: {name: v.mean() for name, v in m.numbers[angles].items()} for m in found})
-    orders = {measure.key: measure.orders[angles] for measure in found}
+    measures = comparison.read_measures({angles: close_loops(list(OBSERVERS), angles, 6, SEED, 8.0)})
+    print({m.key: {name: v.mean() for name, v in m.numbers[angles].items()} for m in measures})
+    orders = {measure.key: measure.orders[angles] for measure in measures}
     assert orders["velocity_rms_error_rad_s"] == orders["command_rms_rad_s"] == "holds"
     assert orders["tilt_rms_deg"] != "holds"
-    assert comparison.order(found).verdict == "reproduced within stated conditions"
+    assert comparison.order(measures).verdict == "reproduced within stated conditions"
 
 
-def of_measures(velocity: Mapping[AngleSource, dict], tilt: Mapping[AngleSource, dict]) -> list[Measured]:
-    return [Measured("velocity_rms_error_rad_s", velocity), Measured("tilt_rms_deg", tilt)]
+def of_measures(velocity: Mapping[AngleSource, dict], tilt: Mapping[AngleSource, dict]) -> list[Measure]:
+    return [Measure("velocity_rms_error_rad_s", velocity), Measure("tilt_rms_deg", tilt)]
 
 
 def test_the_order_is_judged_by_the_velocity_on_all_angles() -> None:
-    right, turned = numbers(0.05, 0.07, 0.11), numbers(0.11, 0.07, 0.05)
-    both: dict[AngleSource, dict] = {"measured": right, "estimated": right}
-    claim = comparison.order(of_measures(both, {"measured": turned, "estimated": turned}))
+    right, inverted = numbers(0.05, 0.07, 0.11), numbers(0.11, 0.07, 0.05)
+    velocity: dict[AngleSource, dict] = {"measured": right, "estimated": right}
+    claim = comparison.order(of_measures(velocity, {"measured": inverted, "estimated": inverted}))
     assert claim.verdict == "reproduced within stated conditions"
-    assert "By the velocity RMS error the order holds. By the tilt RMS it is inverted" in claim.why
+    assert "By the velocity RMS error the order holds. By the tilt RMS it is inverted" in claim.reason
     step = claim.figures["linear_less_ltv_measured_angles_velocity_rms_error_rad_s"]
     assert step.mean == pytest.approx(0.04)
     assert claim.figures["ltv_less_homogeneous_estimated_angles_tilt_rms_deg"].mean == pytest.approx(-0.04)
-    claim = comparison.order(of_measures({"measured": right, "estimated": turned}, both))
+    claim = comparison.order(of_measures({"measured": right, "estimated": inverted}, velocity))
     assert claim.verdict == "not reproduced"
-    claim = comparison.order(of_measures(both, {"measured": turned, "estimated": right}))
-    assert "By the tilt RMS it does not hold: best is (11) and (9)." in claim.why
+    claim = comparison.order(of_measures(velocity, {"measured": inverted, "estimated": right}))
+    assert "By the tilt RMS it does not hold: best is (11) and (9)." in claim.reason
 
 
 # --- Figs 5 to 7 ------------------------------------------------------------------------------------------------
@@ -110,18 +110,18 @@ def result_of(observer: str, angles: AngleSource, error: float, *, fell: int = 0
         "settle_time_s": 1.0 if settles else None,
     }
     outcomes = [Outcome("fell", 1.0)] * fell + [Outcome("done", 3.0)] * (3 - fell)
-    return Result(outcomes, [summary] * 3, in_the_loop([observer], angles, 3, SEED, 3.0)[observer].trajectory)
+    return Result(outcomes, [summary] * 3, close_loops([observer], angles, 3, SEED, 3.0)[observer].trajectory)
 
 
 def test_every_figure_is_of_its_own_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """A number of its own for every observer and kind of angles: each must come out in its own place."""
     sizes = {"linear": 0.11, "ltv": 0.07, "homogeneous": 0.05}
 
-    def made(names: Sequence[str], angles: AngleSource, worlds: int, seed: int) -> dict[str, Result]:
+    def make_results(names: Sequence[str], angles: AngleSource, worlds: int, seed: int) -> dict[str, Result]:
         more = 0.001 if angles == "estimated" else 0.0
         return {name: result_of(name, angles, sizes[name] + more) for name in names}
 
-    monkeypatch.setattr(figures_5_to_7, "in_the_loop", made)
+    monkeypatch.setattr(figures_5_to_7, "close_loops", make_results)
     by_euler = {TEN_BY_EULER: 0.09, TEN_EXACT_GAIN: 0.088, ELEVEN_BY_EULER: 0.051}
     monkeypatch.setattr(
         second_place, "errors_of", lambda forms, worlds, seed: {form: np.full(3, by_euler[form]) for form in forms}
@@ -133,7 +133,7 @@ def test_every_figure_is_of_its_own_runs(monkeypatch: pytest.MonkeyPatch) -> Non
         assert claim.figures["velocity_rms_error_measured_angles_rad_s"].mean == pytest.approx(sizes[name])
         assert claim.figures["velocity_rms_error_estimated_angles_rad_s"].mean == pytest.approx(sizes[name] + 0.001)
         rates = claim.pictures[0].panels[2].lines
-        truth = in_the_loop([name], "measured", 3, SEED, 3.0)[name].trajectory
+        truth = close_loops([name], "measured", 3, SEED, 3.0)[name].trajectory
         assert truth is not None
         np.testing.assert_array_equal(rates[0].y, truth.world(0)[f"estimate/{name}/x2_rad_s"])
     axes = [[panel.y_range for panel in claim.pictures[0].panels] for claim in figures]
@@ -176,8 +176,8 @@ def test_the_cause_is_partly_the_method() -> None:
     assert claim.verdict == "reproduced within stated conditions"
     assert claim.figures["of_it_by_the_method_share"] == pytest.approx(2.0 / 3.0)
     assert claim.figures["of_it_by_the_method_rad_s"].mean == pytest.approx(0.02)
-    assert "none to speak of from the equations of H" in claim.why
-    assert "have a part in it" in second_place.cause(forms(0.01, 0.03, gain=0.01)).why
+    assert "none to speak of from the equations of H" in claim.reason
+    assert "have a part in it" in second_place.cause(forms(0.01, 0.03, gain=0.01)).reason
 
 
 @pytest.mark.parametrize(
@@ -190,6 +190,6 @@ def test_the_cause_is_not_partly_the_method(exact: float, euler: float, scatter:
 
 
 def test_euler_makes_ten_worse_in_the_loop_and_eleven_hardly() -> None:
-    found = second_place.errors_of((TEN, TEN_BY_EULER, ELEVEN, ELEVEN_BY_EULER), 4, SEED)
-    assert mean_interval(found[TEN_BY_EULER] / found[TEN]).low > 1.15
-    assert abs(mean_interval(found[ELEVEN_BY_EULER] / found[ELEVEN]).mean - 1.0) < 0.05
+    errors = second_place.errors_of((TEN, TEN_BY_EULER, ELEVEN, ELEVEN_BY_EULER), 4, SEED)
+    assert mean_interval(errors[TEN_BY_EULER] / errors[TEN]).low > 1.15
+    assert abs(mean_interval(errors[ELEVEN_BY_EULER] / errors[ELEVEN]).mean - 1.0) < 0.05

@@ -24,10 +24,10 @@ def test_a_gimbal_with_a_deadband_of_a_tenth(command: float, expected: float) ->
     plant = load_plant(timestep_s=0.001, initial_tilt_deg=0.0, equilibrium_bias_deg=0.0)
     servo.in_velocity_mode(plant, 0.1)
     data = plant.new_data()
-    for module in plant.modules:
+    for module in plant.axis.modules:
         data.ctrl[module.servo] = module.direction * command
     mujoco.mj_step(plant.model, data, 20)
-    for module in plant.modules:
+    for module in plant.axis.modules:
         assert module.direction * data.qvel[module.gimbal] == pytest.approx(expected, abs=0.01)
 
 
@@ -60,16 +60,16 @@ def test_a_servo_that_is_noticed_is_not_reproduced(servos: servo.Servos) -> None
 
 
 def test_tracking_is_the_rate_less_the_command(servos: servo.Servos) -> None:
-    """Of a recording whose gimbal turns at 0.9 of the command: a tenth."""
+    """A recording whose gimbal turns at 0.9 of the command is a tenth off."""
     run = trajectory_of(servos.soft)
     time = run["time_s"]
     command = np.tile(np.sin(time)[:, None], (1, 2))
     angle = 0.9 * np.vstack([np.zeros((1, 2)), np.cumsum(command, axis=0)[:-1]]) * (time[1] - time[0])
     columns = dict(run.columns) | {"u_rad_s": command, "x3_rad": angle}
-    made = Result(servos.soft.outcomes, servos.soft.summaries, dataclasses.replace(run, columns=columns))
-    found = servo.tracking(made)
-    assert found is not None
-    assert found.mean == pytest.approx(0.1, rel=1e-6)
+    result = Result(servos.soft.outcomes, servos.soft.summaries, dataclasses.replace(run, columns=columns))
+    error = servo.measure_tracking(result)
+    assert error is not None
+    assert error.mean == pytest.approx(0.1, rel=1e-6)
 
 
 # --- two axes -------------------------------------------------------------------------------------------------
@@ -78,11 +78,11 @@ def test_tracking_is_the_rate_less_the_command(servos: servo.Servos) -> None:
 def test_the_body_of_two_pairs_has_the_papers_numbers() -> None:
     """Both axes alike: four halves and their wheels and gimbals above the joint, worked out from Table 1."""
     model = two_axes.two_pairs()
-    own = 0.5 * (13e-3 + 10e-3) * 2.0 + TABLE_1["m"] * (two_axes.HEIGHT_M**2 + 0.095**2) * 2.0
+    inertia = 0.5 * (13e-3 + 10e-3) * 2.0 + TABLE_1["m"] * (two_axes.HEIGHT_M**2 + 0.095**2) * 2.0
     for axis in range(2):
         reduced = two_axes.reduced(model, axis)
         assert reduced.gravity_torque == pytest.approx(2.0 * TABLE_1["m"] * 9.81 * two_axes.HEIGHT_M, rel=1e-6)
-        assert pytest.approx(own, rel=0.05) == reduced.J1  # gimbals and wheels besides
+        assert pytest.approx(inertia, rel=0.05) == reduced.J1  # gimbals and wheels besides
     pitch, roll = (two_axes.reduced(model, axis) for axis in range(2))
     assert pytest.approx(roll.J1, rel=1e-12) == pitch.J1
 
@@ -92,19 +92,20 @@ def test_a_command_tilts_its_own_axis_as_the_reduced_model_says() -> None:
     model = two_axes.two_pairs()
     expected = TABLE_1["J_d"] * TABLE_1["omega_d"] / two_axes.reduced(model, 0).J1
     for axis in range(2):
-        at, data = two_axes.addresses(model, axis), two_axes.at_rest(model)
-        for sign, gimbal in zip(at.signs, at.gimbals, strict=True):
+        places, data = two_axes.addresses(model, axis), two_axes.at_rest(model)
+        for sign, gimbal in zip(places.signs, places.gimbals, strict=True):
             data.qvel[gimbal] = sign
         mujoco.mj_forward(model, data)
-        assert data.qacc[at.tilt] == pytest.approx(expected, rel=0.02)  # the other pair's gimbals are free for a moment
-        other = two_axes.addresses(model, 1 - axis).tilt
-        assert abs(data.qacc[other]) < 1e-6 * expected
+        # The other pair's gimbals are free for a moment.
+        assert data.qacc[places.tilt] == pytest.approx(expected, rel=0.02)
+        other_tilt = two_axes.addresses(model, 1 - axis).tilt
+        assert abs(data.qacc[other_tilt]) < 1e-6 * expected
 
 
 def test_the_axes_are_separate_and_a_coupling_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = two_axes.coupling(1.0)
-    assert two_axes.axes_claim({1.0: found}).verdict == "reproduced within stated conditions"
-    assert 0.0 < found.share < 0.01
+    coupling = two_axes.coupling(1.0)
+    assert two_axes.axes_claim({1.0: coupling}).verdict == "reproduced within stated conditions"
+    assert 0.0 < coupling.share < 0.01
     right = two_axes.addresses
 
     def one_gimbal(model: mujoco.MjModel, axis: int) -> two_axes.Addresses:
@@ -112,8 +113,8 @@ def test_the_axes_are_separate_and_a_coupling_would_be_seen(monkeypatch: pytest.
         return right(model, axis)._replace(signs=[right(model, axis).signs[0], 0.0])
 
     monkeypatch.setattr(two_axes, "addresses", one_gimbal)
-    coupled = two_axes.coupling(1.0)
-    assert coupled.share > 10.0 * found.share
+    broken_coupling = two_axes.coupling(1.0)
+    assert broken_coupling.share > 10.0 * coupling.share
 
 
 def test_the_reduced_model_of_the_rig_is_lighter() -> None:

@@ -22,16 +22,16 @@ STANDS, FALLS = ti.Fate(0.0, 0.05), ti.Fate(1.0, None)
 
 
 def test_the_predecessors_observer_falls_from_half_a_degree() -> None:
-    found = ti.fates_of([ti.observer_of((PREDECESSOR, LINEAR))], (0.25, 0.5), 6, SEED, 6.0)[0]
-    assert found[0.25].fell == 0.0
-    assert found[0.5].fell == 1.0
-    assert found[0.5].error is None
-    assert ti.fates_of([ti.observer_of((PREDECESSOR, MEASURED))], (0.5,), 3, SEED, 6.0)[0][0.5].fell == 0.0
+    fates = ti.find_fates([ti.choose_observer((PREDECESSOR, LINEAR))], (0.25, 0.5), 6, SEED, 6.0)[0]
+    assert fates[0.25].fell == 0.0
+    assert fates[0.5].fell == 1.0
+    assert fates[0.5].error is None
+    assert ti.find_fates([ti.choose_observer((PREDECESSOR, MEASURED))], (0.5,), 3, SEED, 6.0)[0][0.5].fell == 0.0
 
 
 def test_ten_with_a_frozen_gain_is_as_good_as_ten() -> None:
-    frozen = ti.fates_of([ti.observer_of((FROZEN, MEASURED))], (0.5,), 3, SEED, 6.0)[0][0.5]
-    whole = ti.fates_of([("ltv", [])], (0.5,), 3, SEED, 6.0)[0][0.5]
+    frozen = ti.find_fates([ti.choose_observer((FROZEN, MEASURED))], (0.5,), 3, SEED, 6.0)[0][0.5]
+    whole = ti.find_fates([("ltv", [])], (0.5,), 3, SEED, 6.0)[0][0.5]
     assert frozen.fell == whole.fell == 0.0
     assert frozen.error == pytest.approx(whole.error, rel=0.02)
 
@@ -40,14 +40,14 @@ def test_ten_with_a_frozen_gain_is_as_good_as_ten() -> None:
 @pytest.mark.parametrize("gain", GAINS)
 def test_bias_of_the_rate_at_rest_by_replay(gain: str, model: str) -> None:
     """Its size and its sign: y1 = -e, and the estimated rate is below zero."""
-    kind, settings = ti.observer_of((gain, model))
+    kind, settings = ti.choose_observer((gain, model))
     fields: dict = dict(setting.removeprefix("observer.").split("=", 1) for setting in settings)
     fields = {name: json.loads(value) for name, value in fields.items()}
     if model == MEASURED:
         fields["alpha"] = 1.0
     e = math.radians(0.01)
-    still = {"y2_rad": np.zeros(2000), "u_rad_s": np.zeros(2000), "y1_rad": np.full(2000, -e)}
-    x2 = replay(make_observer(kind, DT, printed_model(), **fields), Trajectory(still)).x2[-1]
+    signals = {"y2_rad": np.zeros(2000), "u_rad_s": np.zeros(2000), "y1_rad": np.full(2000, -e)}
+    x2 = replay(make_observer(kind, DT, printed_model(), **fields), Trajectory(signals)).x2[-1]
     assert x2 == pytest.approx(-e * ti.rate_bias((gain, model)), rel=1e-3)
 
 
@@ -74,15 +74,15 @@ def factorial(falling: Mapping[ti.Cell, float], whole: float = math.inf) -> ti.F
 def test_one_remark_one_verdict() -> None:
     claim = ti.remark(factorial({(PREDECESSOR, LINEAR): 0.5, (PREDECESSOR, MEASURED): 1.0, ("slow", LINEAR): 0.25}))
     assert claim.verdict == "reproduced within stated conditions"
-    assert "with the predecessor's gain and gravity at the estimate." in claim.why
-    assert "It is not that the gain is constant" in claim.why
-    assert "from 0.5 deg with gravity at the estimate, from 1 deg with gravity at y1" in claim.why
+    assert "with the predecessor's gain and gravity at the estimate." in claim.reason
+    assert "It is not that the gain is constant" in claim.reason
+    assert "from 0.5 deg with gravity at the estimate, from 1 deg with gravity at y1" in claim.reason
     assert claim.figures[f"{PREDECESSOR}, {LINEAR}"]["fell_fraction"] == [0.0, 0.0, 1.0, 1.0]
     # Frozen, too, falls: then it may well be the constancy.
-    both = ti.remark(factorial({(PREDECESSOR, LINEAR): 0.5, (FROZEN, MEASURED): 0.5}))
-    assert both.verdict == "reproduced within stated conditions"
-    assert "It is not that the gain is constant" not in both.why
-    assert "the frozen gain and gravity at y1" in both.why
+    frozen_claim = ti.remark(factorial({(PREDECESSOR, LINEAR): 0.5, (FROZEN, MEASURED): 0.5}))
+    assert frozen_claim.verdict == "reproduced within stated conditions"
+    assert "It is not that the gain is constant" not in frozen_claim.reason
+    assert "the frozen gain and gravity at y1" in frozen_claim.reason
 
 
 @pytest.mark.parametrize(

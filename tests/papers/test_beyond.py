@@ -85,10 +85,10 @@ def test_noise_gain_is_that_of_the_impulse_response(kind: str, motion: Motion) -
 def test_one_that_is_shown_the_acceleration_has_it_in_both(motion: Motion) -> None:
     """A push is at once in the acceleration; of the noise, that of the acceleration is what the rate has most of."""
     noise = motion.experiment.design.constructor_arguments[2]
-    found = character("gyro_free", motion)
-    assert found.lag_s is not None
-    assert abs(found.lag_s) < 1e-4
-    assert 1.0 < found.noise_gain_per_s * noise.tilt / acceleration_floor(noise, DT) < 1.15
+    result = character("gyro_free", motion)
+    assert result.lag_s is not None
+    assert abs(result.lag_s) < 1e-4
+    assert 1.0 < result.noise_gain_per_s * noise.tilt / acceleration_floor(noise, DT) < 1.15
 
 
 def test_an_update_takes_time(motion: Motion) -> None:
@@ -136,7 +136,7 @@ def test_nothing_is_better_than_the_floor(rows: list[dict[str, Any]], shares: li
 
 def test_the_papers_order_holds_where_noise_is_high(rows: list[dict[str, Any]]) -> None:
     claim = order_claim(rows)
-    assert "The paper's order holds at 800 ug/rtHz and 0 deg, 800 ug/rtHz and 1 deg. " in claim.found
+    assert "The paper's order holds at 800 ug/rtHz and 0 deg, 800 ug/rtHz and 1 deg. " in claim.result
     assert claim.verdict == "reproduced within stated conditions"
     assert order_claim([row for row in rows if row["noise_ug_rthz"] == 800.0]).verdict == "reproduced"
     assert order_claim([row for row in rows if row["noise_ug_rthz"] == 200.0]).verdict == "not reproduced"
@@ -153,13 +153,13 @@ def test_the_papers_order_holds_where_noise_is_high(rows: list[dict[str, Any]]) 
 def test_most_of_what_a_friction_model_brings_is_damping() -> None:
     """It helps on the rig that rubs; it helps on the one that does not, too; and a little of it is due to knowing."""
     figures = friction(6, SEED + 2, lambda share: None, ["duration_s=6"])
-    rubbing, smooth, due = (figures[f"gain_{which}_friction_rad_s"] for which in ("with", "without", "due_to"))
-    assert rubbing.low > 0.0
+    rough, smooth, due = (figures[f"gain_{case}_friction_rad_s"] for case in ("with", "without", "due_to"))
+    assert rough.low > 0.0
     assert smooth.low > 0.0
-    assert due.mean == pytest.approx(rubbing.mean - smooth.mean, rel=1e-9)
+    assert due.mean == pytest.approx(rough.mean - smooth.mean, rel=1e-9)
     assert 0.0 < due.mean < smooth.mean
-    before, after = (figures[f"with_friction_in_the_plant_{w}_in_the_observer_rad_s"] for w in ("without", "with"))
-    assert rubbing.mean == pytest.approx(before - after, rel=1e-9)
+    plain, aware = (figures[f"with_friction_in_the_plant_{w}_in_the_observer_rad_s"] for w in ("without", "with"))
+    assert rough.mean == pytest.approx(plain - aware, rel=1e-9)
     assert friction_claim(figures).verdict == "reproduced within stated conditions"
     for none in (Interval(due.mean, -1e-4, 2.0 * due.mean), None):
         assert friction_claim(figures | {"gain_due_to_friction_rad_s": none}).verdict == "not reproduced"
@@ -178,21 +178,21 @@ def test_the_bias_fed_in_helps_where_it_is_large() -> None:
     assert claim.verdict == "reproduced"
     assert "- [100% fell]" in claim.table
     worse = large | {"gain_rad_s": Interval(-0.01, -0.02, -0.005)}
-    assert fed_bias_claim([worse, larger]).why == "It helps at e = 1.5 deg of those tried."
+    assert fed_bias_claim([worse, larger]).reason == "It helps at e = 1.5 deg of those tried."
     assert fed_bias_claim([worse]).verdict == "not reproduced"
 
 
 def test_every_rig_has_the_same_worlds() -> None:
     experiment = push_recovery("linear", SEED + 4, ["duration_s=0.5", "push=[]"])
-    first, other, again = (r.values(ERROR) for r in on_rigs(experiment, 3, "equilibrium_bias_deg", (0.0, 0.5, 0.0)))
+    first, biased, again = (r.values(ERROR) for r in on_rigs(experiment, 3, "equilibrium_bias_deg", (0.0, 0.5, 0.0)))
     assert first == pytest.approx(again, rel=1e-12)
     assert len(set(first)) == 3
-    assert (other != first).all()
+    assert (biased != first).all()
 
 
 def test_a_gain_of_worlds_that_fell_is_none() -> None:
     before, after = np.array([1.0, 0.9, np.nan, 0.8]), np.array([0.5, 0.5, 0.5, np.nan])
     assert gain(before[1:], after[1:]) is None
-    both = gain(before, after)
-    assert both is not None
-    assert both.mean == pytest.approx(0.45)
+    interval = gain(before, after)
+    assert interval is not None
+    assert interval.mean == pytest.approx(0.45)

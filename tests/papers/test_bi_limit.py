@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from cmg_mj.errors import InputError
-from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b, violated_conditions, weights
+from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b, list_violations, weights
 
 E1 = (-3.0, -0.4, -1e-3, 0.0, 1e-3, 0.7, 20.0)
 
@@ -165,16 +165,16 @@ def test_for_n_2_both_conditions_ask_for_the_same_b(p: float) -> None:
 )
 def test_largest_b_is_where_the_printed_inequalities_begin_to_fail(n: int, d_inf: float, v: tuple[float, ...]) -> None:
     bound = largest_b(n, d_inf, v)
-    assert violated_conditions(n, d_inf, 0.999 * bound, v) == []
-    assert violated_conditions(n, d_inf, 1.001 * bound, v)
+    assert list_violations(n, d_inf, 0.999 * bound, v) == []
+    assert list_violations(n, d_inf, 1.001 * bound, v)
 
 
 def test_the_papers_own_parameters_violate_21_and_22() -> None:
-    lines = violated_conditions(2, 0.9, 0.410, (0.9,))
+    lines = list_violations(2, 0.9, 0.410, (0.9,))
     assert [line[:4] for line in lines] == ["(21)", "(21)", "(21)", "(22)"]
     assert "i = 1, j = 1" in lines[0]
     assert "= 10 is not below" in lines[0]
-    assert violated_conditions(2, 0.9, 0.11, (0.9,)) == []
+    assert list_violations(2, 0.9, 0.11, (0.9,)) == []
 
 
 @pytest.mark.parametrize(

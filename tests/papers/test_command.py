@@ -21,17 +21,24 @@ from tests.command import cmg_mj
 PICTURE = Picture("a-fig-1", "a Fig. 1", [Panel("tilt [deg]", [Line([0.0, 1.0], [0.0, 2.0], "true")])])
 GOOD = Claim(
     place="Fig. 1",
-    says="it falls | or not",
-    found="it fell at 3 s",
+    statement="it falls | or not",
+    result="it fell at 3 s",
     holds=True,
     figures={"time_s": 3.0},
     pictures=[PICTURE],
 )
-PARTLY = Claim(place="Remark 1", says="always", found="above 100 Hz", holds=True, conditions="It is above 100 Hz.")
-OURS = Claim(
-    place="On the rig", says="it stands", found="it falls", holds=False, otherwise="It is too light.", ours=True
+PARTLY = Claim(
+    place="Remark 1", statement="always", result="above 100 Hz", holds=True, conditions="It is above 100 Hz."
 )
-NOT = Claim(place="Section V", says="best", found="worst", holds=False, otherwise="The noise is another.")
+OURS = Claim(
+    place="On the rig",
+    statement="it stands",
+    result="it falls",
+    holds=False,
+    otherwise="It is too light.",
+    is_ours=True,
+)
+NOT = Claim(place="Section V", statement="best", result="worst", holds=False, otherwise="The noise is another.")
 
 
 def sections(*claims: Claim) -> list[Section]:
@@ -57,8 +64,8 @@ def rows(text: str) -> list[list[str]]:
 
 
 def test_all_papers_make_one_report() -> None:
-    said = cmg_mj("reproduce", "all")
-    assert said.status == 0, said
+    run = cmg_mj("reproduce", "all")
+    assert run.status == 0, run
     folder = Path("runs/reproduce-all")
     report = (folder / "report.md").read_text()
     assert "3 claims of the papers: 1 reproduced, 1 reproduced within stated conditions, 1 not reproduced." in report
@@ -69,7 +76,7 @@ def test_all_papers_make_one_report() -> None:
         ["andrieu2009", "On the rig (not the paper's)", "it stands", "does not hold"],
     ]
     assert rows(report)[2:] == table
-    assert rows(said.out)[2:] == table
+    assert rows(run.out)[2:] == table
     opening = report.partition("## All claims")[0]
     assert "- sokolov2019, Section V: best\n- andrieu2009, On the rig (not the paper's): it stands\n" in opening
     assert "Fig. 1" not in opening  # what holds is in the table
@@ -81,13 +88,13 @@ def test_all_papers_make_one_report() -> None:
     assert "### On the rig: does not hold" in report
     assert "**Ours:** it stands" in report
     assert (folder / "a-fig-1.png").read_bytes().startswith(b"\x89PNG")
-    assert f"Read {folder / 'report.md'}" in said.err
+    assert f"Read {folder / 'report.md'}" in run.err
 
 
 def test_one_papers_figures_as_json() -> None:
-    said = cmg_mj("reproduce", "aranovskiy2020", "--json", "--out", "here")
-    figures = json.loads(said.out)
-    assert said.err == ""
+    run = cmg_mj("reproduce", "aranovskiy2020", "--json", "--out", "here")
+    figures = json.loads(run.out)
+    assert run.err == ""
     assert figures == json.loads(Path("here/figures.json").read_text())
     assert list(figures["papers"]) == ["aranovskiy2020"]
     (claim,) = figures["papers"]["aranovskiy2020"]["claims"]
@@ -98,12 +105,12 @@ def test_one_papers_figures_as_json() -> None:
 
 
 def test_ctrl_c_keeps_what_was_obtained(monkeypatch: pytest.MonkeyPatch) -> None:
-    def pressed(on_share: OnShare) -> list[Claim]:
+    def interrupt(on_share: OnShare) -> list[Claim]:
         raise KeyboardInterrupt
 
-    found = papers.reproduce(["dao2023"], lambda now, share: None)
-    assert found[0].complete
-    monkeypatch.setattr(papers, "sections_of", lambda paper: [*sections(GOOD), Section("endless", 9.0, pressed)])
+    entries = papers.reproduce(["dao2023"], lambda now, share: None)
+    assert entries[0].complete
+    monkeypatch.setattr(papers, "sections_of", lambda paper: [*sections(GOOD), Section("endless", 9.0, interrupt)])
     (entry,) = papers.reproduce(["dao2023"], lambda now, share: None)
     assert entry.claims == [GOOD]
     assert not entry.complete
@@ -116,13 +123,13 @@ def test_progress_is_the_share_of_all_sections(monkeypatch: pytest.MonkeyPatch) 
         return []
 
     monkeypatch.setattr(papers, "sections_of", lambda paper: [*sections(GOOD), Section("long", 3.0, halfway)])
-    seen: list[tuple[str, float]] = []
-    papers.reproduce(["dao2023"], lambda now, share: seen.append((now, share)))
-    assert seen == [("dao2023: Fig. 1", 0.0), ("dao2023: long", 0.25), ("dao2023: long", 0.625)]
+    progress: list[tuple[str, float]] = []
+    papers.reproduce(["dao2023"], lambda now, share: progress.append((now, share)))
+    assert progress == [("dao2023: Fig. 1", 0.0), ("dao2023: long", 0.25), ("dao2023: long", 0.625)]
 
 
 @pytest.mark.parametrize(
-    ("given", "complaint"),
+    ("arguments", "complaint"),
     [
         (["dao2024"], "'dao2024': no such paper; did you mean 'dao2023'? allowed: all, andrieu2009, aranovskiy2020, "),
         (["all", "--out", ""], "--out '': name a folder, . for the current one"),
@@ -130,26 +137,26 @@ def test_progress_is_the_share_of_all_sections(monkeypatch: pytest.MonkeyPatch) 
         ([], "Missing argument 'PAPER'"),
     ],
 )
-def test_wrong_input(given: list[str], complaint: str) -> None:
+def test_wrong_input(arguments: list[str], complaint: str) -> None:
     Path("taken").write_text("a file")
-    assert cmg_mj("reproduce", *given).complaint.startswith(complaint)
+    assert cmg_mj("reproduce", *arguments).complaint.startswith(complaint)
 
 
 def test_the_verdict_follows_from_what_was_found() -> None:
     def claim(holds: bool, conditions: str = "") -> Claim:
         return Claim(
             place="Fig. 9",
-            says="it is so",
-            found="it is",
+            statement="it is so",
+            result="it is",
             holds=holds,
             conditions=conditions,
             otherwise="It is far off.",
         )
 
-    outright, within, failed = claim(True), claim(True, "It is so at 200 Hz."), claim(False, "It is so at 200 Hz.")
-    assert (outright.verdict, outright.why) == ("reproduced", "")
-    assert (within.verdict, within.why) == ("reproduced within stated conditions", "It is so at 200 Hz.")
-    assert (failed.verdict, failed.why) == ("not reproduced", "It is far off.")
+    outright, partly, failed = claim(True), claim(True, "It is so at 200 Hz."), claim(False, "It is so at 200 Hz.")
+    assert (outright.verdict, outright.reason) == ("reproduced", "")
+    assert (partly.verdict, partly.reason) == ("reproduced within stated conditions", "It is so at 200 Hz.")
+    assert (failed.verdict, failed.reason) == ("not reproduced", "It is far off.")
     assert type(claim(np.float64(1.0) > 0.5).holds) is bool  # type: ignore[arg-type]
 
 
@@ -158,14 +165,14 @@ def test_the_verdict_follows_from_what_was_found() -> None:
 @pytest.mark.parametrize("holds", [False, True])
 def test_conditions_and_otherwise_are_whole_sentences(name: str, text: str, holds: bool) -> None:
     """Wrong even where it would not be printed: the next seed may print it."""
-    given: Any = {name: text}
+    fields: Any = {name: text}
     with pytest.raises(ValueError, match=rf"Fig\. 9: {name} = .*: must be a whole sentence"):
-        Claim(place="Fig. 9", says="it is so", found="it is", holds=holds, **given)
+        Claim(place="Fig. 9", statement="it is so", result="it is", holds=holds, **fields)
 
 
 def test_what_does_not_hold_is_explained() -> None:
     with pytest.raises(ValueError, match=r"Fig\. 9: otherwise: say what to make of it"):
-        Claim(place="Fig. 9", says="it is so", found="it is", holds=True, otherwise="")
+        Claim(place="Fig. 9", statement="it is so", result="it is", holds=True, otherwise="")
 
 
 # --- without the packages of the extra [papers] ---------------------------------------------------------------
@@ -178,7 +185,7 @@ def _without_sympy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("_without_sympy")
 @pytest.mark.parametrize(
-    ("paper", "who"),
+    ("paper", "names"),
     [
         ("aranovskiy2020", "aranovskiy2020"),
         ("sokolov2019", "sokolov2019"),
@@ -186,14 +193,14 @@ def _without_sympy(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_a_missing_package_ends_it_before_anything_is_computed(
-    paper: str, who: str, monkeypatch: pytest.MonkeyPatch
+    paper: str, names: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def computed(paper: str) -> list[Section]:
+    def refuse(paper: str) -> list[Section]:
         raise AssertionError(f"{paper} was begun")
 
-    monkeypatch.setattr(papers, "sections_of", computed)
-    said = cmg_mj("reproduce", paper)
-    assert said.complaint == f'{who}: sympy is not installed: python -m pip install "cmg_mj[papers]"'
+    monkeypatch.setattr(papers, "sections_of", refuse)
+    run = cmg_mj("reproduce", paper)
+    assert run.complaint == f'{names}: sympy is not installed: python -m pip install "cmg_mj[papers]"'
     assert not Path("runs").exists()
     with pytest.raises(InputError, match="sympy is not installed"):
         papers.reproduce(list(papers.PAPERS), lambda now, share: None)

@@ -14,58 +14,58 @@ SEED = 7
 
 
 @pytest.fixture(scope="module")
-def found() -> Study:
+def results() -> Study:
     """Ten other motions than the report's."""
     return study(seed=SEED, rates_hz=(400.0, 50.0))
 
 
-def test_conventional_state_error_keeps_oscillating_and_the_proposed_does_not(found: Study) -> None:
+def test_conventional_state_error_keeps_oscillating_and_the_proposed_does_not(results: Study) -> None:
     """Fig. 2."""
-    plain, ours = found.conventional.tail_rms()[0], found.proposed.tail_rms()[0]
-    print(f"state error RMS over 160-200 s: conventional {np.round(plain, 3)}, proposed {np.round(ours, 3)}")
+    plain, proposed = results.conventional.tail_rms()[0], results.proposed.tail_rms()[0]
+    print(f"state error RMS over 160-200 s: conventional {np.round(plain, 3)}, proposed {np.round(proposed, 3)}")
     assert plain.min() > 0.2
-    assert ours.max() < 0.1
-    assert found.largest_angle > 100.0  # the motion that no two integrators agree on
+    assert proposed.max() < 0.1
+    assert results.largest_angle > 100.0  # the motion that no two integrators agree on
 
 
-def test_settling_order(found: Study) -> None:
+def test_settling_order(results: Study) -> None:
     """Fig. 3: 1000 before 10 before 0.1; and not before 10 on the way there, nor ever faster with Sigma."""
-    ten, thousand, tenth, ten_thousand = exogenous_settle_times(found.proposed)
+    ten, thousand, tenth, ten_thousand = exogenous_settle_times(results.proposed)
     print(f"settle below {SETTLED}: Sigma 10 {ten}, 1000 {thousand}, 0.1 {tenth}, 10000 {ten_thousand}")
     assert np.sum((thousand < ten) & (ten <= tenth) & np.isfinite(thousand)) >= 9
-    early = exogenous_settle_times(found.proposed, 1.0)
+    early = exogenous_settle_times(results.proposed, 1.0)
     assert np.sum(early[1] < early[0]) < 9
     assert np.median(ten_thousand) > 2.0 * np.median(thousand)
 
 
-def test_state_error_does_not_settle_quickly(found: Study) -> None:
+def test_state_error_does_not_settle_quickly(results: Study) -> None:
     """Fig. 2(b): with all known, L alone needs some time constants of 2 s, the real part of s^2 + s + 1 = 0."""
-    settled, known = state_settle_times(found.proposed)
-    print(f"state error below {SETTLED}: {settled} s; with all known {known} s")
-    size = np.linalg.norm(found.proposed.state[0, 0], axis=-1)
+    learning_times, ideal_times = state_settle_times(results.proposed)
+    print(f"state error below {SETTLED}: {learning_times} s; with all known {ideal_times} s")
+    size = np.linalg.norm(results.proposed.state[0, 0], axis=-1)
     expected = 2.0 * np.log(size / SETTLED)
-    assert np.all(np.abs(known - expected) < 3.0)
-    assert np.median(settled) > QUICK * np.median(known)
+    assert np.all(np.abs(ideal_times - expected) < 3.0)
+    assert np.median(learning_times) > QUICK * np.median(ideal_times)
 
 
-def test_parameters_at_sigma_1000(found: Study) -> None:
-    errors = np.abs(found.proposed.exogenous[-1, 1, :, :2])
+def test_parameters_at_sigma_1000(results: Study) -> None:
+    errors = np.abs(results.proposed.exogenous[-1, 1, :, :2])
     print(f"largest errors of theta1 and theta2: {errors.max(axis=0)}")
     assert errors.max() < 1e-3
 
 
-def test_too_large_a_gain_is_slow_at_a_finer_step_too(found: Study) -> None:
+def test_too_large_a_gain_is_slow_at_a_finer_step_too(results: Study) -> None:
     """No effect of sampling: at 1 kHz Sigma = 10000 is no faster than at 400 Hz, and slower than 1000."""
     assert SIGMAS[1::2] == (1000.0, 10_000.0)
     t = np.arange(40_001) / 1000.0
     x = robot.motion(robot.starts(SEED, 10), t)
-    finer = robot.follow(robot.proposed(0.001, SIGMAS[1::2]), t, x)
+    finer = robot.follow(robot.make_proposed(0.001, SIGMAS[1::2]), t, x)
 
     def medians(errors: robot.Errors) -> np.ndarray:
         late = (errors.t > 30.0) & (errors.t <= 40.0)
         return np.median(np.linalg.norm(errors.exogenous[late], axis=-1), axis=(0, 2))
 
-    coarse, fine = medians(found.proposed)[1::2], medians(finer)
+    coarse, fine = medians(results.proposed)[1::2], medians(finer)
     print(f"median error over 30-40 s at Sigma = 1000 and 10000: at 400 Hz {coarse}, at 1 kHz {fine}")
     assert coarse[1] > 3.0 * coarse[0]
     assert fine[1] > 3.0 * fine[0]
@@ -75,16 +75,16 @@ def test_too_large_a_gain_is_slow_at_a_finer_step_too(found: Study) -> None:
 @pytest.mark.parametrize(("sigma", "duration"), [(0.1, 4.0), (10.0, 4.0), (1000.0, 1.0)])  # (9) is stiff in Sigma
 def test_continuous_identity_along_the_chaotic_robot(sigma: float, duration: float) -> None:
     """(7) to (9) with the robot itself, integrated as one: z(t) = exp((A + L C2) t) z(0)."""
-    worst, size = identities.continuous_deviation(sigma, duration, seed=5)
-    print(f"Sigma {sigma:g}: identity held to {worst:.1e}, z up to {size:.2g}")
+    largest, size = identities.continuous_deviation(sigma, duration, seed=5)
+    print(f"Sigma {sigma:g}: identity held to {largest:.1e}, z up to {size:.2g}")
     assert size > 0.1
-    assert worst < 1e-8
+    assert largest < 1e-8
 
 
 def test_sampled_identity_and_upsilon_on_another_seed() -> None:
-    worst, size = identities.sampled_deviation(1000.0, 0.005, 20.0, seed=1)
+    largest, size = identities.sampled_deviation(1000.0, 0.005, 20.0, seed=1)
     assert size > 0.1
-    assert worst < 1e-8
+    assert largest < 1e-8
     assert max(identities.upsilon_gaps(10.0, 0.005, 5.0, seed=1)) < 1e-9
 
 
@@ -92,8 +92,8 @@ def test_identity_can_fail() -> None:
     """With a wrong exosystem, z does not go its own way."""
     t = np.linspace(0.0, 3.0, 7)
     x, guessed, xm, T = identities.continuous_run(10.0, robot.starts(0, 1)[0], np.ones(6), t, 1e-10)
-    wrong = np.array([*paper.THETA, 1.0, 0.0])  # a disturbance that stands still
-    z = guessed - x - np.einsum("kij,kj->ki", T, xm - wrong)
+    broken = np.array([*paper.THETA, 1.0, 0.0])  # a disturbance that stands still
+    z = guessed - x - np.einsum("kij,kj->ki", T, xm - broken)
     right = guessed - x - np.einsum("kij,kj->ki", T, xm - paper.exosystem_state(t))
     assert np.abs(z - right).max() > 0.1
 
@@ -103,7 +103,7 @@ def test_stable_at_200_hz() -> None:
     sigmas = (10.0, 1000.0, 1e6)
     t = np.arange(20_001) * 0.005
     x = robot.motion(np.array([[0.5, 0.0], [-2.0, 1.0]]), t)
-    errors = robot.follow(robot.proposed(0.005, sigmas), t, x)
+    errors = robot.follow(robot.make_proposed(0.005, sigmas), t, x)
     assert np.isfinite(errors.state).all()
     tail = np.sqrt(np.mean(errors.state[16_000:] ** 2, axis=(0, 3)))
     print(f"at 200 Hz: state error RMS over 80-100 s {dict(zip(sigmas, tail.tolist(), strict=True))}")

@@ -32,8 +32,8 @@ AS_PRINTED = {10.0: 150.0, 1000.0: 50.0, 0.1: 190.0}
 def test_conclusion_holds_for_the_weights_tested() -> None:
     def claim(**changed: float) -> tuple[str, bool]:
         settle = AS_PRINTED | {10_000.0: 20.0} | {float(key[1:].replace("_", ".")): t for key, t in changed.items()}
-        found = figure_3.larger_gains(study(settle))
-        return found.verdict, figure_3.TESTED in found.conditions
+        result = figure_3.larger_gains(study(settle))
+        return result.verdict, figure_3.TESTED in result.conditions
 
     assert claim() == (WITHIN, False)
     assert claim(s10000=170.0) == (WITHIN, True)  # it turns round beyond them
@@ -61,45 +61,45 @@ def test_settling_order_needs_both_steps() -> None:
     ],
 )
 def test_figure_2(state: float, plain: float, two_a: str, two_b: str) -> None:
-    found = study(AS_PRINTED | {10_000.0: 20.0}, state, plain)
-    assert figure_2.conventional(found).verdict == two_a
-    assert figure_2.proposed(found).verdict == two_b
+    result = study(AS_PRINTED | {10_000.0: 20.0}, state, plain)
+    assert figure_2.conventional(result).verdict == two_a
+    assert figure_2.proposed(result).verdict == two_b
 
 
 def test_figure_2_is_that_of_the_first_weight() -> None:
     """Whatever the others do."""
-    made = errors(AS_PRINTED | {10_000.0: 20.0})
-    state = made.state.copy()
+    errors_at = errors(AS_PRINTED | {10_000.0: 20.0})
+    state = errors_at.state.copy()
     state[:, 1:] = 9.0
-    settled, _ = figure_2.state_settle_times(Errors(T, state, made.exogenous))
-    assert (settled == 0.0).all()
+    times, _ = figure_2.state_settle_times(Errors(T, state, errors_at.exogenous))
+    assert (times == 0.0).all()
     plain = study(AS_PRINTED | {10_000.0: 20.0}).conventional
-    assert figure_2.proposed(Study(Errors(T, state, made.exogenous), plain, 1.0)).verdict == WITHIN
+    assert figure_2.proposed(Study(Errors(T, state, errors_at.exogenous), plain, 1.0)).verdict == WITHIN
     state[:, 0] = 9.0
-    settled, _ = figure_2.state_settle_times(Errors(T, state, made.exogenous))
-    assert np.isinf(settled).all()
+    times, _ = figure_2.state_settle_times(Errors(T, state, errors_at.exogenous))
+    assert np.isinf(times).all()
 
 
 def test_parameters_at_the_end() -> None:
-    found = study(AS_PRINTED | {10_000.0: 20.0})
-    assert figure_3.parameters(found).verdict == WITHIN
-    found.proposed.exogenous[-1, 1, 0, 1] = 2e-3
-    assert figure_3.parameters(found).verdict == "not reproduced"
+    result = study(AS_PRINTED | {10_000.0: 20.0})
+    assert figure_3.parameters(result).verdict == WITHIN
+    result.proposed.exogenous[-1, 1, 0, 1] = 2e-3
+    assert figure_3.parameters(result).verdict == "not reproduced"
 
 
 def test_what_the_observer_finds_decides_what_is_meant(monkeypatch: pytest.MonkeyPatch) -> None:
     """(10) or (14): both are seen, a third is not."""
-    for amplitude, verdict, scaled in ((2.0, WITHIN, True), (1.0, WITHIN, False), (1.5, "not reproduced", True)):
-        monkeypatch.setattr(as_printed, "amplitude_found_if_10_holds", lambda a=amplitude: np.array([a, a]))
-        claim = as_printed.printed()
+    for amplitude, verdict, scales_d in ((2.0, WITHIN, True), (1.0, WITHIN, False), (1.5, "not reproduced", True)):
+        monkeypatch.setattr(as_printed, "amplitude_under_10", lambda a=amplitude: np.array([a, a]))
+        claim = as_printed.misprint_claim()
         assert claim.verdict == verdict
-        assert ("(14), not (10), scales d." in claim.conditions) is scaled
+        assert ("(14), not (10), scales d." in claim.conditions) is scales_d
 
 
 def test_an_explicit_step_that_stays_bounded_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(as_printed, "explicit_escape", lambda *args: np.inf)
     monkeypatch.setattr(as_printed, "DURATION_S", 80.0)
-    claim = as_printed.sampled(lambda share: None)
+    claim = as_printed.sampling_claim(lambda share: None)
     assert claim.verdict == "reproduced"
     assert claim.figures["explicit_step_escapes_after_s"] is None
-    assert "stays bounded" in claim.found
+    assert "stays bounded" in claim.result

@@ -17,9 +17,9 @@ POLE = math.sqrt(PAPER.gravity_torque / PAPER.J1)
 
 def test_floor_has_the_continuous_limit() -> None:
     """Variance 2 l^3 R with R = sigma^2 dt: the mirrored pole, for an unstable rig without process noise."""
-    for dt, allowed in ((1e-3, 0.03), (1e-4, 0.003)):
+    for dt, tolerance in ((1e-3, 0.03), (1e-4, 0.003)):
         expected = math.sqrt(2.0 * POLE**3 * 0.01**2 * dt)
-        assert velocity_floor(PAPER, dt, 0.01) == pytest.approx(expected, rel=allowed)
+        assert velocity_floor(PAPER, dt, 0.01) == pytest.approx(expected, rel=tolerance)
 
 
 def test_filter_attains_the_floor_and_a_changed_gain_does_not() -> None:

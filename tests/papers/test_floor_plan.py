@@ -25,7 +25,7 @@ NO_PAPER = frozenset(BEYOND)
 
 
 class Import(NamedTuple):
-    """What is imported, by its full name, and where."""
+    """An import: the full name, and the place."""
 
     name: str
     line: int
@@ -35,15 +35,15 @@ class Import(NamedTuple):
 def imports(path: Path) -> Iterator[Import]:
     """Everything that a file imports."""
 
-    def visit(node: ast.AST, inside: bool) -> Iterator[Import]:
+    def visit(node: ast.AST, in_a_function: bool) -> Iterator[Import]:
         if isinstance(node, ast.Import):
-            yield from (Import(alias.name, node.lineno, inside) for alias in node.names)
+            yield from (Import(alias.name, node.lineno, in_a_function) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}:{node.lineno}: write the whole name"
-            yield from (Import(f"{node.module}.{alias.name}", node.lineno, inside) for alias in node.names)
-        inside = inside or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
+            yield from (Import(f"{node.module}.{alias.name}", node.lineno, in_a_function) for alias in node.names)
+        in_a_function = in_a_function or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
         for child in ast.iter_child_nodes(node):
-            yield from visit(child, inside)
+            yield from visit(child, in_a_function)
 
     yield from visit(ast.parse(path.read_text(encoding="utf-8")), False)
 
@@ -63,7 +63,7 @@ def imported_folder(package: Path, name: str) -> str:
     return parts[2] if of_the_floor(name) and len(parts) > 2 and parts[2] in folders(package) else ""
 
 
-def at(package: Path, path: Path, line: int) -> str:
+def position(package: Path, path: Path, line: int) -> str:
     return f"{path.relative_to(package)}:{line}"
 
 
@@ -78,12 +78,12 @@ def imported_from_outside(package: Path) -> list[str]:
         if room == "papers":
             continue
         breaches += [
-            f"{at(package, path, line)} imports {name}"
-            for name, line, inside in imports(path)
-            if of_the_floor(name) and not (room == "cli" and inside)
+            f"{position(package, path, line)} imports {name}"
+            for name, line, in_a_function in imports(path)
+            if of_the_floor(name) and not (room == "cli" and in_a_function)
         ]
         breaches += [
-            f"{at(package, path, node.lineno)} names {node.value}"
+            f"{position(package, path, node.lineno)} names {node.value}"
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and of_the_floor(node.value)
         ]
@@ -94,10 +94,10 @@ def imported_from_another_paper(package: Path) -> list[str]:
     """No paper's folder imports another's, and what papers share imports none of them."""
     breaches = []
     for path in sorted((package / "papers").rglob("*.py")):
-        own, *_ = path.relative_to(package / "papers").parts
+        folder, *_ = path.relative_to(package / "papers").parts
         for name, line, _ in imports(path):
-            if imported_folder(package, name) not in ("", own):
-                breaches.append(f"{at(package, path, line)} imports {name}")
+            if imported_folder(package, name) not in ("", folder):
+                breaches.append(f"{position(package, path, line)} imports {name}")
     return breaches
 
 
@@ -109,11 +109,11 @@ def incomplete(package: Path) -> list[str]:
         if paper not in NO_PAPER and not (folder / "paper.py").is_file():
             breaches.append(f"{paper} has no paper.py")
         docstring, *statements = ast.parse((folder / "__init__.py").read_text(encoding="utf-8")).body
-        others = [node for node in statements if not isinstance(node, (ast.Import, ast.ImportFrom))]
-        if not isinstance(docstring, ast.Expr) or [_target(node) for node in others] != ["SECTIONS"]:
+        assignments = [node for node in statements if not isinstance(node, (ast.Import, ast.ImportFrom))]
+        if not isinstance(docstring, ast.Expr) or [_target(node) for node in assignments] != ["SECTIONS"]:
             breaches.append(f"{paper}/__init__.py holds something else than a docstring and SECTIONS")
             continue
-        files = [section_file(section) for section in ast.walk(others[0]) if is_section(section)]
+        files = [section_file(section) for section in ast.walk(assignments[0]) if is_section(section)]
         if not files:
             breaches.append(f"{paper}/__init__.py lists no section")
         for name in files:
@@ -137,14 +137,14 @@ def is_section(node: ast.AST) -> bool:
 def section_file(node: ast.AST) -> str:
     """`lag` of `Section("the lag", 3.0, lag.claims)`; empty if its claims come from elsewhere."""
     assert isinstance(node, ast.Call)
-    given = [*node.args, *(keyword.value for keyword in node.keywords)][-1]
-    if isinstance(given, ast.Attribute) and given.attr == "claims" and isinstance(given.value, ast.Name):
-        return given.value.id
+    argument = [*node.args, *(keyword.value for keyword in node.keywords)][-1]
+    if isinstance(argument, ast.Attribute) and argument.attr == "claims" and isinstance(argument.value, ast.Name):
+        return argument.value.id
     return ""
 
 
 def exports_claims(path: Path) -> bool:
-    """Whether a file has a function `claims` that takes one argument."""
+    """Return true if a file has a function `claims` that takes one argument."""
     if not path.is_file():
         return False
     functions = [node for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, ast.FunctionDef)]
@@ -155,18 +155,18 @@ def needed(package: Path, paper: str) -> set[str]:
     """The packages that a paper's files import, or what they use of the floor does, and the bench does not."""
     floor = package / "papers"
     bench = {top(name) for path in package.rglob("*.py") if floor not in path.parents for name, *_ in imports(path)}
-    waiting, seen = list((floor / paper).glob("*.py")), set()
-    found: set[str] = set()
-    while waiting:
-        path = waiting.pop()
-        if path in seen:
+    queue, visited = list((floor / paper).glob("*.py")), set()
+    packages: set[str] = set()
+    while queue:
+        path = queue.pop()
+        if path in visited:
             continue
-        seen.add(path)
+        visited.add(path)
         for name, *_ in imports(path):
-            found.add(top(name))
+            packages.add(top(name))
             if of_the_floor(name) and len(name.split(".")) > 2:
-                waiting += [file for file in [floor / f"{name.split('.')[2]}.py"] if file.is_file()]
-    return found - bench - set(sys.stdlib_module_names) - {"cmg_mj"}
+                queue += [file for file in [floor / f"{name.split('.')[2]}.py"] if file.is_file()]
+    return packages - bench - set(sys.stdlib_module_names) - {"cmg_mj"}
 
 
 def top(name: str) -> str:
@@ -269,12 +269,7 @@ def test_a_package_that_keeps_the_rules(package: Path) -> None:
         (incomplete, "papers/a2020/lag.py", "def claims(): ...", "a2020/lag.py does not export claims"),
         (incomplete, "papers/a2020/paper.py", None, "a2020 has no paper.py"),
         (incomplete, "papers/a2020/lag.py", None, "a2020/lag.py does not export claims"),
-        (
-            incomplete,
-            "papers/a2020/__init__.py",
-            '"""A."""\nSECTIONS = []',
-            "a2020/__init__.py lists no section",
-        ),
+        (incomplete, "papers/a2020/__init__.py", '"""A."""\nSECTIONS = []', "a2020/__init__.py lists no section"),
         (
             incomplete,
             "papers/a2020/__init__.py",

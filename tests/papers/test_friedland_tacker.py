@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from cmg_mj.errors import InputError
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, State, System
-from cmg_mj.papers.dao2023.pendulum_robot import one
+from cmg_mj.papers.dao2023.pendulum_robot import make_single
 
 N, NM, R, M, P = 3, 4, 2, 2, 2
 """n, nm, r, m, p of the random plants."""
@@ -39,10 +39,10 @@ def plant(rng: np.random.Generator) -> tuple[Callable[[float], System], np.ndarr
     B0, swing = random_matrix(rng, N, R), random_matrix(rng, N, R)
     turn = 0.3 * random_matrix(rng, N, N)
 
-    def at(t: float) -> System:
+    def matrices(t: float) -> System:
         return System(A + np.sin(2.0 * t) * turn, B0 + np.cos(3.0 * t) * swing, B2, C2, D20)
 
-    return at, L
+    return matrices, L
 
 
 def build(rng: np.random.Generator, L: np.ndarray, dt: float, sigma: float = 1.0) -> FriedlandTacker:
@@ -57,35 +57,35 @@ def build(rng: np.random.Generator, L: np.ndarray, dt: float, sigma: float = 1.0
 def test_discrete_identity_whatever_the_weights(seed: int, sigma: float) -> None:
     """z = (x^ - x) - T (xm^ - xm) goes its own way, z+ = (I - h/2 M)^-1 (I + h/2 M) z: no Gamma, no Sigma in it."""
     rng = np.random.default_rng(seed)
-    at, L = plant(rng)
+    matrices, L = plant(rng)
     h = 0.02
     observer = build(rng, L, h, sigma)
     F = expm(AM * h)
     x, xm = random_matrix(rng, N), random_matrix(rng, NM)
-    here = at(0.0)
-    y = here.C2 @ x + here.D20 @ CM @ xm
+    system = matrices(0.0)
+    y = system.C2 @ x + system.D20 @ CM @ xm
     state = observer.init(y, x=random_matrix(rng, N), xm=random_matrix(rng, NM), T=random_matrix(rng, N, NM))
     z = (state.x - x) - state.T @ (state.xm - xm)
-    worst = 0.0
+    largest = 0.0
     for k in range(300):
-        here, u = at((k + 0.5) * h), random_matrix(rng, M)
+        system, u = matrices((k + 0.5) * h), random_matrix(rng, M)
         # The plant by the implicit midpoint rule, its exosystem's mean over the step driving it.
-        driven = here.B0 @ CM @ (xm + F @ xm) / 2.0 + here.B2 @ u
-        x = np.linalg.solve(np.eye(N) - h / 2.0 * here.A, x + h / 2.0 * here.A @ x + h * driven)
+        driven = system.B0 @ CM @ (xm + F @ xm) / 2.0 + system.B2 @ u
+        x = np.linalg.solve(np.eye(N) - h / 2.0 * system.A, x + h / 2.0 * system.A @ x + h * driven)
         xm = F @ xm
-        y = here.C2 @ x + here.D20 @ CM @ xm
-        state = observer.step(state, here, u, y)
-        closed = h / 2.0 * (here.A + L @ here.C2)
+        y = system.C2 @ x + system.D20 @ CM @ xm
+        state = observer.step(state, system, u, y)
+        closed = h / 2.0 * (system.A + L @ system.C2)
         z = np.linalg.solve(np.eye(N) - closed, z + closed @ z)
-        worst = max(worst, np.abs((state.x - x) - state.T @ (state.xm - xm) - z).max())
-    print(f"sigma {sigma:g}: identity held to {worst:.1e}")
-    assert worst < 1e-8
+        largest = max(largest, np.abs((state.x - x) - state.T @ (state.xm - xm) - z).max())
+    print(f"sigma {sigma:g}: identity held to {largest:.1e}")
+    assert largest < 1e-8
 
 
 # --- against the continuous observer -------------------------------------------------------------------
 
 
-def measured(t: float) -> np.ndarray:
+def measurement(t: float) -> np.ndarray:
     """A smooth measurement and, whatever the plant, a fair input to an observer."""
     return np.array([np.sin(2.0 * t + 0.3), np.cos(1.3 * t)])
 
@@ -93,12 +93,12 @@ def measured(t: float) -> np.ndarray:
 def test_converges_to_the_continuous_observer() -> None:
     """T with the square of the period; the estimates, whose correction is implicit, with the period."""
     rng = np.random.default_rng(5)
-    at, L = plant(rng)
+    matrices, L = plant(rng)
     coarse = build(rng, L, 0.02)
     duration, u = 2.0, np.array([0.3, -0.2])
 
     def slope(t: float, s: np.ndarray) -> np.ndarray:
-        parts = coarse.slope(t, s[:N], s[N : N + NM], s[N + NM :].reshape(N, NM), at(t), u, measured(t))
+        parts = coarse.slope(t, s[:N], s[N : N + NM], s[N + NM :].reshape(N, NM), matrices(t), u, measurement(t))
         return np.concatenate([part.ravel() for part in parts])
 
     reference = solve_ivp(slope, (0.0, duration), np.zeros(N + NM + N * NM), "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
@@ -106,12 +106,12 @@ def test_converges_to_the_continuous_observer() -> None:
     for n in (200, 400, 800, 1600):
         h = duration / n
         observer = FriedlandTacker(h, AM, CM, L, coarse.Gamma, coarse.Sigma)
-        state = observer.init(measured(0.0))
+        state = observer.init(measurement(0.0))
         for k in range(n):
-            state = observer.step(state, at((k + 0.5) * h), u, measured((k + 1) * h))
-        found = (state.x, state.xm, state.T.ravel())
-        wanted = np.split(reference, [N, N + NM])
-        errors.append([np.abs(a - b).max() for a, b in zip(found, wanted, strict=True)])
+            state = observer.step(state, matrices((k + 0.5) * h), u, measurement((k + 1) * h))
+        results = (state.x, state.xm, state.T.ravel())
+        references = np.split(reference, [N, N + NM])
+        errors.append([np.abs(a - b).max() for a, b in zip(results, references, strict=True)])
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     print(f"orders of x, xm, T: {np.round(orders, 2).tolist()}; errors at {n} steps {errors[-1]}")
     np.testing.assert_allclose(orders[-1], [1.0, 1.0, 2.0], atol=0.1)
@@ -119,11 +119,11 @@ def test_converges_to_the_continuous_observer() -> None:
 
 def test_gamma_turns_with_the_exosystem() -> None:
     rng = np.random.default_rng(2)
-    at, L = plant(rng)
+    matrices, L = plant(rng)
     observer = build(rng, L, 0.02)
     state = observer.init(np.zeros(P))
     for k in range(50):
-        state = observer.step(state, at(0.02 * k), np.zeros(M), np.zeros(P))
+        state = observer.step(state, matrices(0.02 * k), np.zeros(M), np.zeros(P))
     turn = expm(AM * 1.0)
     np.testing.assert_allclose(state.P, turn @ observer.Gamma @ turn.T, rtol=0.0, atol=1e-12)
 
@@ -134,37 +134,37 @@ def test_gamma_turns_with_the_exosystem() -> None:
 def test_conventional_is_zhangs_observer() -> None:
     """Zhang 2002, Liu, Zhang, Su 2011: K = -L, theta' = Gamma (C Upsilon + D)^T Sigma (y - C x - D theta)."""
     rng = np.random.default_rng(3)
-    at, L = plant(rng)
-    here, K = at(0.7), -L
+    matrices, L = plant(rng)
+    system, K = matrices(0.7), -L
     Gamma, Sigma = definite(rng, R), definite(rng, P)
     observer = FriedlandTacker.conventional(0.01, L, Gamma, Sigma)
     x, theta, Upsilon = random_matrix(rng, N), random_matrix(rng, R), random_matrix(rng, N, R)
     u, y = random_matrix(rng, M), random_matrix(rng, P)
-    found = observer.slope(1.3, x, theta, Upsilon, here, u, y)
+    slopes = observer.slope(1.3, x, theta, Upsilon, system, u, y)
 
-    innovation = y - here.C2 @ x - here.D20 @ theta
-    dUpsilon = (here.A - K @ here.C2) @ Upsilon + here.B0 - K @ here.D20
-    dtheta = Gamma @ (here.C2 @ Upsilon + here.D20).T @ Sigma @ innovation
-    dx = here.A @ x + here.B0 @ theta + here.B2 @ u + K @ innovation + Upsilon @ dtheta
-    for a, b in zip(found, (dx, dtheta, dUpsilon), strict=True):
+    innovation = y - system.C2 @ x - system.D20 @ theta
+    dUpsilon = (system.A - K @ system.C2) @ Upsilon + system.B0 - K @ system.D20
+    dtheta = Gamma @ (system.C2 @ Upsilon + system.D20).T @ Sigma @ innovation
+    dx = system.A @ x + system.B0 @ theta + system.B2 @ u + K @ innovation + Upsilon @ dtheta
+    for a, b in zip(slopes, (dx, dtheta, dUpsilon), strict=True):
         np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-12)
 
 
 def test_proposed_is_the_conventional_one_of_the_exosystems_start() -> None:
     """Upsilon = T exp(Am t), if Upsilon's equation has (B0 + L D20) Cm exp(Am t); then xm^ = exp(Am t) theta^."""
     rng = np.random.default_rng(4)
-    at, L = plant(rng)
+    matrices, L = plant(rng)
     h = 0.02
     proposed = build(rng, L, h, 100.0)
     plain = FriedlandTacker.conventional(h, L, proposed.Gamma, proposed.Sigma)
-    a, b = proposed.init(measured(0.0)), plain.init(measured(0.0))
+    a, b = proposed.init(measurement(0.0)), plain.init(measurement(0.0))
     mean = (expm(AM * h) + np.eye(NM)) / 2.0
     for k in range(200):
-        here, u, y = at((k + 0.5) * h), random_matrix(rng, M), measured((k + 1) * h)
+        system, u, y = matrices((k + 0.5) * h), random_matrix(rng, M), measurement((k + 1) * h)
         turn = CM @ mean @ expm(AM * k * h)
-        turned = System(here.A, here.B0 @ turn, here.B2, here.C2, here.D20 @ turn)
-        a = proposed.step(a, here, u, y)
-        b = plain.step(b, turned, u, y, D20=here.D20 @ CM @ expm(AM * (k + 1) * h))
+        turned_system = System(system.A, system.B0 @ turn, system.B2, system.C2, system.D20 @ turn)
+        a = proposed.step(a, system, u, y)
+        b = plain.step(b, turned_system, u, y, D20=system.D20 @ CM @ expm(AM * (k + 1) * h))
         whole = expm(AM * (k + 1) * h)
         np.testing.assert_allclose(a.T @ whole, b.T, rtol=0.0, atol=1e-10)
         np.testing.assert_allclose(a.xm, whole @ b.xm, rtol=0.0, atol=1e-9)
@@ -176,7 +176,7 @@ def test_proposed_is_the_conventional_one_of_the_exosystems_start() -> None:
 
 def test_leading_dimensions_are_observers_side_by_side() -> None:
     rng = np.random.default_rng(6)
-    at, L = plant(rng)
+    matrices, L = plant(rng)
     Sigma = np.stack([definite(rng, P, scale) for scale in (0.1, 10.0)])[:, None]
     gains = np.stack([L, 1.5 * L, 2.0 * L])
     Gamma = definite(rng, NM)
@@ -185,33 +185,33 @@ def test_leading_dimensions_are_observers_side_by_side() -> None:
     inputs, outputs = random_matrix(rng, 40, 2, 3, M), random_matrix(rng, 41, 2, 3, P)
     state = many.init(outputs[0], x=starts)
     for k in range(40):
-        state = many.step(state, at(0.02 * k), inputs[k], outputs[k + 1])
+        state = many.step(state, matrices(0.02 * k), inputs[k], outputs[k + 1])
     for i in range(2):
         for j in range(3):
-            one = FriedlandTacker(0.02, AM, CM, gains[j], Gamma, Sigma[i, 0])
-            alone = one.init(outputs[0, i, j], x=starts[j])
+            single = FriedlandTacker(0.02, AM, CM, gains[j], Gamma, Sigma[i, 0])
+            single_state = single.init(outputs[0, i, j], x=starts[j])
             for k in range(40):
-                alone = one.step(alone, at(0.02 * k), inputs[k, i, j], outputs[k + 1, i, j])
-            np.testing.assert_allclose(state.x[i, j], alone.x, rtol=0.0, atol=1e-11)
-            np.testing.assert_allclose(state.xm[i, j], alone.xm, rtol=0.0, atol=1e-11)
+                single_state = single.step(single_state, matrices(0.02 * k), inputs[k, i, j], outputs[k + 1, i, j])
+            np.testing.assert_allclose(state.x[i, j], single_state.x, rtol=0.0, atol=1e-11)
+            np.testing.assert_allclose(state.xm[i, j], single_state.xm, rtol=0.0, atol=1e-11)
 
 
 def test_what_varies_with_time_may_be_given_at_its_time() -> None:
     """C2 and D20 of the sample itself, and another L, are used; without them the middle's and the construction's."""
     rng = np.random.default_rng(7)
-    at, L = plant(rng)
+    matrices, L = plant(rng)
     observer = build(rng, L, 0.02)
     before = observer.init(np.ones(P), x=np.ones(N), T=random_matrix(rng, N, NM))
 
-    def step(**given: Any) -> State:
-        return observer.step(before, at(0.0), np.zeros(M), np.zeros(P), **given)
+    def step(**changes: Any) -> State:
+        return observer.step(before, matrices(0.0), np.zeros(M), np.zeros(P), **changes)
 
-    here = at(0.0)
-    same = step(L=L, C2=here.C2, D20=here.D20)
-    assert all(np.array_equal(a, b) for a, b in zip(step(), same, strict=True))
-    for given in ({"L": 2.0 * L}, {"C2": 1.1 * here.C2}, {"D20": 1.1 * here.D20}):
-        assert np.abs(step(**given).x - same.x).max() > 1e-4
-    assert np.array_equal(step(C2=1.1 * here.C2).T, same.T)  # the sample's own matrices only correct
+    system = matrices(0.0)
+    reference = step(L=L, C2=system.C2, D20=system.D20)
+    assert all(np.array_equal(a, b) for a, b in zip(step(), reference, strict=True))
+    for changes in ({"L": 2.0 * L}, {"C2": 1.1 * system.C2}, {"D20": 1.1 * system.D20}):
+        assert np.abs(step(**changes).x - reference.x).max() > 1e-4
+    assert np.array_equal(step(C2=1.1 * system.C2).T, reference.T)  # the sample's own matrices only correct
 
 
 # --- what does not fit ---------------------------------------------------------------------------------
@@ -264,28 +264,28 @@ def test_conventional_refuses_a_scalar_weight() -> None:
 def test_lists_are_taken() -> None:
     """At the construction, in the plant's matrices and at a step alike."""
     lists = FriedlandTacker(**{name: np.asarray(value).tolist() for name, value in RIGHT.items()})
-    given = {name: value.tolist() for name, value in (STEP | {"y": np.array([0.3, -1.0]), "A": -np.eye(3)}).items()}
-    system = System(*(given[name] for name in ("A", "B0", "B2", "C2", "D20")))
-    found = lists.step(lists.init([0.1, 0.2]), system, given["u"], given["y"])  # type: ignore[arg-type]
+    arguments = {name: value.tolist() for name, value in (STEP | {"y": np.array([0.3, -1.0]), "A": -np.eye(3)}).items()}
+    system = System(*(arguments[name] for name in ("A", "B0", "B2", "C2", "D20")))
+    result = lists.step(lists.init([0.1, 0.2]), system, arguments["u"], arguments["y"])  # type: ignore[arg-type]
     arrays = FriedlandTacker(**RIGHT)
     expected = arrays.step(arrays.init(np.array([0.1, 0.2])), system, np.zeros(1), np.array([0.3, -1.0]))
-    assert all(np.array_equal(a, b) for a, b in zip(found, expected, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(result, expected, strict=True))
     with pytest.raises(InputError, match=r"^A = 'no': must be real numbers"):
-        System("no", *(given[name] for name in ("B0", "B2", "C2", "D20")))  # type: ignore[arg-type]
+        System("no", *(arguments[name] for name in ("B0", "B2", "C2", "D20")))  # type: ignore[arg-type]
 
 
 def test_a_gain_that_is_not_hurwitz_is_refused_on_demand() -> None:
     """The pendulum robot's A + L C2 has s^2 + s + 1; with the sign of L turned, s^2 - s - 1."""
-    here = paper.system(0.0, 0.0)
-    one(0.005, 10.0).require_hurwitz(here)
-    wrong = FriedlandTacker(0.005, paper.A_M, paper.C_M, -paper.L, paper.GAMMA, np.eye(1))
+    system = paper.system(0.0, 0.0)
+    make_single(0.005, 10.0).require_hurwitz(system)
+    unstable = FriedlandTacker(0.005, paper.A_M, paper.C_M, -paper.L, paper.GAMMA, np.eye(1))
     with pytest.raises(InputError, match=r"^L: A \+ L C2 must be Hurwitz; it has the eigenvalue 1\.62"):
-        wrong.require_hurwitz(here)
+        unstable.require_hurwitz(system)
     undamped = FriedlandTacker(0.005, paper.A_M, paper.C_M, [[0.0], [-1.0]], paper.GAMMA, np.eye(1))  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"^L: A \+ L C2 must be Hurwitz"):
-        undamped.require_hurwitz(here)
+        undamped.require_hurwitz(system)
     with pytest.raises(InputError, match=r"^A: must have the shape \(3, 3\)"):
-        FriedlandTacker(**RIGHT).require_hurwitz(here)
+        FriedlandTacker(**RIGHT).require_hurwitz(system)
 
 
 STEP: dict[str, np.ndarray] = {
@@ -300,10 +300,10 @@ STEP: dict[str, np.ndarray] = {
 
 
 def step_with(**changed: np.ndarray) -> State:
-    given = STEP | changed
+    arguments = STEP | changed
     observer = FriedlandTacker(**RIGHT)
-    system = System(*(given[name] for name in ("A", "B0", "B2", "C2", "D20")))
-    return observer.step(observer.init(np.zeros(2)), system, given["u"], given["y"])
+    system = System(*(arguments[name] for name in ("A", "B0", "B2", "C2", "D20")))
+    return observer.step(observer.init(np.zeros(2)), system, arguments["u"], arguments["y"])
 
 
 @pytest.mark.parametrize(
@@ -327,9 +327,9 @@ def test_what_does_not_fit_is_refused_at_a_step(name: str, shape: tuple[int, ...
 
 @pytest.mark.parametrize(("name", "shape"), [("x", (2,)), ("xm", (3,)), ("T", (3, 3)), ("y", (3,))])
 def test_what_does_not_fit_is_refused_at_the_start(name: str, shape: tuple[int, ...]) -> None:
-    given: dict[str, Any] = {"y": np.zeros(2)} | {name: np.zeros(shape)}
+    arguments: dict[str, Any] = {"y": np.zeros(2)} | {name: np.zeros(shape)}
     with pytest.raises(ValueError, match=rf"^{name}: must have the shape"):
-        FriedlandTacker(**RIGHT).init(**given)
+        FriedlandTacker(**RIGHT).init(**arguments)
 
 
 def test_the_papers_row_does_not_fit() -> None:

@@ -37,7 +37,7 @@ NOT_PLVCC = {
 
 @cache
 def decision_on(name: str) -> Decision:
-    """Of one of `PLVCC`."""
+    """Decide on one of `PLVCC`."""
     return decide(PLVCC[name])
 
 
@@ -55,8 +55,8 @@ def gaussian_curvature(m1: Any) -> Any:
 def test_says_yes_where_the_curvature_is_constant(name: str) -> None:
     assert decision_on(name).plvcc
     curvature = sp.lambdify(q2, gaussian_curvature(PLVCC[name]))
-    at = [float(curvature(angle)) for angle in (-0.7, 0.1, 0.4, 1.1)]
-    assert at == pytest.approx([at[0]] * 4, rel=1e-9, abs=1e-12)
+    values = [float(curvature(angle)) for angle in (-0.7, 0.1, 0.4, 1.1)]
+    assert values == pytest.approx([values[0]] * 4, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", NOT_PLVCC)
@@ -90,16 +90,16 @@ def momenta(m1: Any, Psi: Any, duration: float = 1.0) -> np.ndarray:
 
 @pytest.mark.parametrize("name", PLVCC)
 def test_momenta_of_an_explicit_psi_do_not_change(name: str) -> None:
-    """What PLvCC is for: without forces the new momenta are constant. B_(i) is not used here."""
-    found = momenta(PLVCC[name], decision_on(name).Psi)
-    np.testing.assert_allclose(found, np.broadcast_to(found[0], found.shape), rtol=1e-7, atol=1e-9)
+    """PLvCC means that without forces the new momenta are constant. B_(i) is not used here."""
+    values = momenta(PLVCC[name], decision_on(name).Psi)
+    np.testing.assert_allclose(values, np.broadcast_to(values[0], values.shape), rtol=1e-7, atol=1e-9)
 
 
 def test_momenta_change_where_a_column_is_no_killing_field() -> None:
     m1 = 2 + sp.cos(q2)
-    found = momenta(m1, sp.eye(2))
-    assert np.ptp(found[:, 0]) < 1e-8  # q1 is cyclic: its momentum stays
-    assert np.ptp(found[:, 1]) > 1e-2
+    values = momenta(m1, sp.eye(2))
+    assert np.ptp(values[:, 0]) < 1e-8  # q1 is cyclic: its momentum stays
+    assert np.ptp(values[:, 1]) > 1e-2
 
 
 def test_full_rank_everywhere_or_on_strips() -> None:
@@ -134,8 +134,8 @@ def test_undecided_is_said() -> None:
 
 def test_symmetric_part_is_the_lie_derivative_for_a_full_inertia() -> None:
     """Step 1 does not need M = diag(m1(q2), 1): any Psi, and an M(q) drawn at random, to first order at q = 0."""
-    drawn = np.random.default_rng(0).integers(1, 100, (3, 3)).tolist()
-    u, v, w = (value + first * q1 + second * q2 for value, first, second in drawn)
+    coefficients = np.random.default_rng(0).integers(1, 100, (3, 3)).tolist()
+    u, v, w = (value + first * q1 + second * q2 for value, first, second in coefficients)
     assert plvcc.symmetric_part_is_lie_derivative(1, sp.Matrix([[u, v], [v, w]]))
 
 
@@ -176,4 +176,4 @@ def test_a_broken_proof_is_not_reproduced(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(plvcc, "condition", lambda m1: right(m1) + sp.diff(m1, q2))
     claim = plvcc.claim("sokolov2019")
     assert claim.verdict == "not reproduced"
-    assert "mixed derivatives" in claim.why
+    assert "mixed derivatives" in claim.reason

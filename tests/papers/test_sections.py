@@ -1,4 +1,4 @@
-"""What the progress bar needs of every paper's sections."""
+"""The titles and times of every paper's sections, which the progress bar needs."""
 
 from __future__ import annotations
 

@@ -1,40 +1,41 @@
-"""How the report is written: short sentences, and each condition once."""
+"""The words of the report: short sentences, and each condition once."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-from cmg_mj.papers.sentences import LONGEST, Once, sentences, too_long, words
+from cmg_mj.papers.sentences import LONGEST, SentenceLog, count_words, split_sentences, too_long
 
 DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_where_a_sentence_ends() -> None:
     text = "As in Fig. 2 it is 0.5 deg, e.g. at 200 Hz. Not at 50 Hz! (9) fails. Why?"
-    assert sentences(text) == ["As in Fig. 2 it is 0.5 deg, e.g. at 200 Hz.", "Not at 50 Hz!", "(9) fails.", "Why?"]
-    assert words("x1 = 0.5 +- 0.1 rad/s; so.") == 5
+    parts = ["As in Fig. 2 it is 0.5 deg, e.g. at 200 Hz.", "Not at 50 Hz!", "(9) fails.", "Why?"]
+    assert split_sentences(text) == parts
+    assert count_words("x1 = 0.5 +- 0.1 rad/s; so.") == 5
     assert list(too_long(f"Short. {'word ' * LONGEST}end.")) == [f"{'word ' * LONGEST}end."]
     assert not list(too_long(f"{'word ' * (LONGEST - 1)}end."))
 
 
 def test_what_was_said_is_not_said_again() -> None:
-    once = Once()
-    assert once.of("Ten motions. At 200 Hz.", "Fig. 2") == "Ten motions. At 200 Hz."
-    assert once.of("Ten motions. At 400 Hz.", "Fig. 3") == "As at Fig. 2. At 400 Hz."
-    assert once.of("At 400 Hz. Ten motions.", "Table 1") == "As at Fig. 3 and Fig. 2."
-    assert once.of("Ten motions. Ten motions.", "Fig. 2") == "Ten motions. Ten motions."
+    log = SentenceLog()
+    assert log.omit_repeats("Ten motions. At 200 Hz.", "Fig. 2") == "Ten motions. At 200 Hz."
+    assert log.omit_repeats("Ten motions. At 400 Hz.", "Fig. 3") == "As at Fig. 2. At 400 Hz."
+    assert log.omit_repeats("At 400 Hz. Ten motions.", "Table 1") == "As at Fig. 3 and Fig. 2."
+    assert log.omit_repeats("Ten motions. Ten motions.", "Fig. 2") == "Ten motions. Ten motions."
 
 
 def texts(kind: str) -> list[tuple[str, str]]:
     """Paper and text of the paragraphs of a kind in docs/reproduced.md."""
-    found, paper = [], ""
+    matches, paper = [], ""
     for paragraph in (DOCS / "reproduced.md").read_text(encoding="utf-8").split("\n\n"):
         if paragraph.startswith("## "):
             paper = paragraph
         elif match := re.match(rf"\*\*(?:{kind}):\*\* (.*)", paragraph, re.DOTALL):
-            found.append((paper, match[1]))
-    return found
+            matches.append((paper, match[1]))
+    return matches
 
 
 def test_no_sentence_of_the_report_is_long() -> None:
@@ -44,6 +45,6 @@ def test_no_sentence_of_the_report_is_long() -> None:
 
 
 def test_every_condition_stands_once_in_a_paper() -> None:
-    said = [(paper, s) for paper, text in texts("Conditions|Why not") for s in sentences(text)]
-    again = {entry for entry in said if said.count(entry) > 1 and not entry[1].startswith("As at ")}
-    assert not again
+    entries = [(paper, s) for paper, text in texts("Conditions|Why not") for s in split_sentences(text)]
+    repeats = {entry for entry in entries if entries.count(entry) > 1 and not entry[1].startswith("As at ")}
+    assert not repeats

@@ -8,7 +8,7 @@ import pytest
 from cmg_mj.controllers.backlash import Backlash
 from cmg_mj.papers.sokolov2019 import backlash
 from cmg_mj.papers.sokolov2019.cycles import cycles
-from cmg_mj.papers.sokolov2019.gap_prediction import share_of
+from cmg_mj.papers.sokolov2019.gap_prediction import describing_function
 from cmg_mj.papers.sokolov2019.rig import experiment
 
 
@@ -24,19 +24,21 @@ def test_share_is_the_fundamental_of_what_a_gap_passes(c: float) -> None:
         angle.append(angle[-1] + dt * behind(float(rate)))
     last = np.array(angle)[4000:6000]
     fundamental = 2.0 * np.mean(last * np.exp(-1j * phase[4000:6000])) * 1j
-    assert complex(fundamental) == pytest.approx(share_of(c), abs=2e-3)
+    assert complex(fundamental) == pytest.approx(describing_function(c), abs=2e-3)
 
 
 def test_cycles_on_mujoco_are_those_of_the_linear_loop() -> None:
     """All three oscillate behind the gap, (8) and (9) as the describing function foresees; nothing does without."""
-    found = cycles()
-    assert all(cycle.sustained for cycle in found.ends.values())
+    result = cycles()
+    assert all(cycle.sustained for cycle in result.ends.values())
     for name in ("linear", "luenberger"):
-        foreseen = found.foreseen[name]
-        assert foreseen is not None
-        assert found.ends[name].amplitude_deg == pytest.approx(foreseen.amplitude_deg, rel=0.15)
-        assert found.ends[name].frequency_hz == pytest.approx(foreseen.frequency_hz, rel=0.25)
-    releases = [backlash.released(name, gap) for name, gap in (("linear", 0.0), ("luenberger", 0.0), ("linear", 10.0))]
-    *without, half = backlash.cycles_of(releases)
-    assert not any(cycle.sustained for cycle in without)
-    assert half.amplitude_deg == pytest.approx(found.ends["linear"].amplitude_deg / 2.0, rel=0.05)
+        prediction = result.predicted[name]
+        assert prediction is not None
+        assert result.ends[name].amplitude_deg == pytest.approx(prediction.amplitude_deg, rel=0.15)
+        assert result.ends[name].frequency_hz == pytest.approx(prediction.frequency_hz, rel=0.25)
+    releases = [
+        backlash.make_release(name, gap) for name, gap in (("linear", 0.0), ("luenberger", 0.0), ("linear", 10.0))
+    ]
+    *small_gaps, half = backlash.find_cycles(releases)
+    assert not any(cycle.sustained for cycle in small_gaps)
+    assert half.amplitude_deg == pytest.approx(result.ends["linear"].amplitude_deg / 2.0, rel=0.05)

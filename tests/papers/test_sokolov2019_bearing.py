@@ -45,7 +45,7 @@ def test_torque_is_the_momentums_derivative() -> None:
 
 def test_the_yaw_takes_up_the_tilt_like_a_spring() -> None:
     """MuJoCo's tilt acceleration, the yaw rate being what a tilt from rest leaves: m g l - (J_d w_d)^2/(2 I_z)."""
-    found = bearing.stiffness()
+    numbers = bearing.stiffness()
     plant = load_plant(model="single_gimbal.xml", equilibrium_bias_deg=0.0, initial_tilt_deg=0.0)
     data, tilt, M = plant.new_data(), 1e-3, np.zeros((4, 4))
 
@@ -59,7 +59,7 @@ def test_the_yaw_takes_up_the_tilt_like_a_spring() -> None:
     data.qvel[0] = (upright - momentum()) / M[0, 0]
     mujoco.mj_forward(plant.model, data)
     stiffness = plant.reduced.J1 * float(data.qacc[plant.tilt]) / tilt
-    assert stiffness == pytest.approx(found.gravity - found.gyroscopic, abs=0.01)
+    assert stiffness == pytest.approx(numbers.gravity - numbers.gyroscopic, abs=0.01)
     assert stiffness < 0.0  # more than gravity takes
 
 
@@ -74,7 +74,7 @@ def test_claim_of_the_bearing_on_other_seeds(study: bearing.Study) -> None:
     figures = claim.figures
     assert figures["peak_torque_at_push_n_m"][1] > 2.0 * figures["rms_torque_before_push_n_m"][2]
     assert figures["peak_torque_of_the_pair_n_m"] < 1e-10
-    falls = {case: of["fell_fraction"] for case, of in figures["free"].items()}
+    falls = {case: case_figures["fell_fraction"] for case, case_figures in figures["free"].items()}
     assert falls == {"a push of the upright rig": 1.0, "let go 1 deg off, no push": 1.0, "let go upright, no push": 0.0}
 
 

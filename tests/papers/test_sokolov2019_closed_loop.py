@@ -19,25 +19,26 @@ from cmg_mj.papers.sokolov2019.figures_4_to_6 import (
     figure_6,
     figure_6_at_rest,
 )
-from cmg_mj.papers.sokolov2019.gap_prediction import Foreseen
-from cmg_mj.papers.sokolov2019.lag import Lags, predicted
-from cmg_mj.papers.sokolov2019.loops import Loops, better, deviation, loops, numbers, smaller, tail
+from cmg_mj.papers.sokolov2019.gap_prediction import PredictedCycle
+from cmg_mj.papers.sokolov2019.lag import Lags, predict
+from cmg_mj.papers.sokolov2019.loops import Loops, deviation, is_better, is_smaller, loops, numbers, tail
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.release import LAGS_S, Sweep, Threshold
-from cmg_mj.results.result import Outcome, Result
+from cmg_mj.results.result import Result
+from tests.papers.worlds import make_result
 
 SEED = 5_000
 WITHIN = "reproduced within stated conditions"
 
 
 @pytest.fixture(scope="module")
-def found() -> Loops:
+def runs() -> Loops:
     return loops(lambda share: None, worlds=4, seed=SEED)
 
 
 @pytest.fixture(scope="module")
 def lags() -> Lags:
-    """What test_sokolov2019_lag.py sees MuJoCo do: (8) alone oscillates by itself, from a servo lag of 20 ms on."""
+    """The lags of MuJoCo in test_sokolov2019_lag.py: (8) alone oscillates by itself, from a servo lag of 20 ms on."""
     lags_s = np.array([0.0085, *LAGS_S])
     quiet, never = Sweep(lags_s, np.zeros(12, dtype=bool), np.zeros(12)), Threshold(0.045, None)
     return Lags(
@@ -48,7 +49,7 @@ def lags() -> Lags:
         },
         thresholds={"linear": Threshold(0.0194, 0.0196), "luenberger": never, "homogeneous": never},
         latencies={},
-        predictions={name: predicted(name) for name in ("linear", "luenberger")},
+        predictions={name: predict(name) for name in ("linear", "luenberger")},
         tau=None,
         own_lag_s=0.0085,
     )
@@ -56,51 +57,54 @@ def lags() -> Lags:
 
 @pytest.fixture(scope="module")
 def cycles() -> Cycles:
-    """What test_sokolov2019_backlash.py sees MuJoCo do."""
+    """The cycles of MuJoCo in test_sokolov2019_backlash.py."""
     ends = {"linear": 0.166, "luenberger": 0.219, "homogeneous": 0.097, WITH_Y2: 0.219}
-    foreseen: dict[str, Foreseen | None] = {"linear": Foreseen(0.155, 3.2), "luenberger": Foreseen(0.205, 0.8)}
+    foreseen: dict[str, PredictedCycle | None] = {
+        "linear": PredictedCycle(0.155, 3.2),
+        "luenberger": PredictedCycle(0.205, 0.8),
+    }
     return Cycles({name: Cycle(True, size, 1.0) for name, size in ends.items()}, foreseen)
 
 
-def test_the_figures_on_other_seeds(found: Loops, lags: Lags, cycles: Cycles) -> None:
-    assert figure_4(found, lags, cycles).verdict == WITHIN
-    assert figure_5(found, lags, cycles).verdict == WITHIN
+def test_the_figures_on_other_seeds(runs: Loops, lags: Lags, cycles: Cycles) -> None:
+    assert figure_4(runs, lags, cycles).verdict == WITHIN
+    assert figure_5(runs, lags, cycles).verdict == WITHIN
     assert cause_of_figure_5(cycles).verdict == "not reproduced"
-    assert figure_6(found, cycles).verdict == "reproduced"
+    assert figure_6(runs, cycles).verdict == "reproduced"
     assert figure_6_at_rest(lags, cycles).verdict == "not reproduced"
-    assert comparison.best(found).verdict == WITHIN
-    assert comparison.model_based(found).verdict == WITHIN
+    assert comparison.best_claim(runs).verdict == WITHIN
+    assert comparison.model_based(runs).verdict == WITHIN
 
 
-def test_every_figure_shows_its_own_observers_runs(found: Loops, lags: Lags, cycles: Cycles) -> None:
+def test_every_figure_shows_its_own_observers_runs(runs: Loops, lags: Lags, cycles: Cycles) -> None:
     """Not another's: the figures, and the curves of the pictures."""
     claims = {
-        "linear": figure_4(found, lags, cycles),
-        "luenberger": figure_5(found, lags, cycles),
-        "homogeneous": figure_6(found, cycles),
+        "linear": figure_4(runs, lags, cycles),
+        "luenberger": figure_5(runs, lags, cycles),
+        "homogeneous": figure_6(runs, cycles),
     }
     for name, claim in claims.items():
-        own, gap = found.by_bias[0.25][name], found.gap[name]
-        assert claim.figures["without_backlash"] == numbers(own)
+        no_gap, gap = runs.by_bias[0.25][name], runs.gap[name]
+        assert claim.figures["without_backlash"] == numbers(no_gap)
         assert claim.figures["with_backlash"] == numbers(gap)
         assert claim.figures["cycle_amplitude_deg"] == cycles.ends[name].amplitude_deg
-        (drawn,) = claim.pictures
-        for panel, result in zip(drawn.panels[2:4], (own, gap), strict=True):
+        (figure_picture,) = claim.pictures
+        for panel, result in zip(figure_picture.panels[2:4], (no_gap, gap), strict=True):
             rates, recorded = [line.y for line in panel.lines], trajectory_of(result)
             np.testing.assert_array_equal(rates[0], recorded[f"estimate/{name}/x2_rad_s"][:, 0])
             np.testing.assert_array_equal(rates[1], recorded["x2_rad_s"][:, 0])
-    assert claims["linear"].figures["gyro"] == numbers(found.gyro)
+    assert claims["linear"].figures["gyro"] == numbers(runs.gyro)
     four = claims["linear"].figures
     assert four["main_frequency_hz"] == pytest.approx(four["predicted_frequency_hz"], rel=0.15)
     assert four["without_backlash"]["late_tilt_deviation_deg"][1] > 1.5 * four["gyro"]["late_tilt_deviation_deg"][2]
     assert claims["luenberger"].figures["fell_fraction"] == {"0_deg": 0.0, "0.25_deg": 0.0, "0.5_deg": 1.0}
 
 
-def test_only_the_runs_behind_a_gap_have_one(found: Loops) -> None:
+def test_only_the_runs_behind_a_gap_have_one(runs: Loops) -> None:
     """There the gimbal stands half a gap, 10 arcmin, off where the servo would have it behind the commands."""
 
-    def off(result: Result) -> float:
-        """How far at most ticks, world 0, while it stands [arcmin]."""
+    def arcmin(result: Result) -> float:
+        """Median distance from the setpoint, world 0, while it stands [arcmin]."""
         run = trajectory_of(result).of_worlds(slice(0, 1))
         t, u, x3 = (
             run[column][np.isfinite(run["x3_rad"].ravel())].ravel() for column in ("time_s", "u_rad_s", "x3_rad")
@@ -110,49 +114,49 @@ def test_only_the_runs_behind_a_gap_have_one(found: Loops) -> None:
         return float(np.degrees(np.median(np.abs(x3 - followed)))) * 60.0
 
     for name in OBSERVERS:
-        assert all(off(by_name[name]) < 2.5 for by_name in found.by_bias.values())
-        assert 7.0 < off(found.gap[name]) < 11.0
+        assert all(arcmin(by_name[name]) < 2.5 for by_name in runs.by_bias.values())
+        assert 7.0 < arcmin(runs.gap[name]) < 11.0
     # The same seeds: until the push the rigs differ by their bias alone.
-    one, other = (trajectory_of(found.by_bias[e]["homogeneous"]) for e in (0.0, 0.5))
-    noise = one["y1_rad"] - one["x1_rad"], other["y1_rad"] - other["x1_rad"]
+    unbiased, biased = (trajectory_of(runs.by_bias[e]["homogeneous"]) for e in (0.0, 0.5))
+    noise = unbiased["y1_rad"] - unbiased["x1_rad"], biased["y1_rad"] - biased["x1_rad"]
     assert np.corrcoef(noise[0][:100, 0], noise[1][:100, 0])[0, 1] > 0.9
 
 
-def test_the_late_window_does_not_hold_the_pushs_tail(found: Loops) -> None:
+def test_the_late_window_does_not_hold_the_pushs_tail(runs: Loops) -> None:
     for name in OBSERVERS:
-        late = deviation(found.by_bias[0.25][name])
+        late = deviation(runs.by_bias[0.25][name])
         assert late is not None
-        assert tail(found.quiet[name]) < 0.1 * late.mean
+        assert tail(runs.quiet[name]) < 0.1 * late.mean
         # An end at 7 s would be mostly tail with (9): the window is judged by what it leaves out.
-        early = trajectory_of(found.quiet[name]).between(3.0, 7.0)["x1_rad"]
-        assert np.degrees(early).std() > 5.0 * tail(found.quiet[name])
+        early = trajectory_of(runs.quiet[name]).between(3.0, 7.0)["x1_rad"]
+        assert np.degrees(early).std() > 5.0 * tail(runs.quiet[name])
 
 
-def test_verdicts_follow_the_lags_and_the_cycles(found: Loops, lags: Lags, cycles: Cycles) -> None:
-    """What they rest on, turned round."""
+def test_verdicts_follow_the_lags_and_the_cycles(runs: Loops, lags: Lags, cycles: Cycles) -> None:
+    """The lags and cycles that the verdicts rest on are exchanged."""
 
-    def turned(name: str, sustained: bool) -> Lags:
+    def replace_lags(name: str, sustained: bool) -> Lags:
         sweep = lags.sweeps[name]._replace(sustained=np.full(12, sustained))
         return lags._replace(sweeps=lags.sweeps | {name: sweep})
 
-    def changed(**ends: Cycle) -> Cycles:
+    def replace_cycles(**ends: Cycle) -> Cycles:
         return cycles._replace(ends=cycles.ends | ends)
 
-    rest = Cycle(False, 0.0, 0.1)
-    assert figure_4(found, lags, changed(linear=rest)).verdict == "not reproduced"
-    assert figure_4(found, turned("linear", True), changed(linear=rest)).verdict == "reproduced"
-    assert figure_5(found, lags, changed(luenberger=rest)).verdict == "not reproduced"
-    assert figure_5(found, turned("luenberger", True), changed(luenberger=rest)).verdict == "reproduced"
-    assert figure_6_at_rest(lags, changed(homogeneous=rest)).verdict == "reproduced"
-    quiet = changed(homogeneous=rest, linear=rest, luenberger=rest)
+    calm = Cycle(False, 0.0, 0.1)
+    assert figure_4(runs, lags, replace_cycles(linear=calm)).verdict == "not reproduced"
+    assert figure_4(runs, replace_lags("linear", True), replace_cycles(linear=calm)).verdict == "reproduced"
+    assert figure_5(runs, lags, replace_cycles(luenberger=calm)).verdict == "not reproduced"
+    assert figure_5(runs, replace_lags("luenberger", True), replace_cycles(luenberger=calm)).verdict == "reproduced"
+    assert figure_6_at_rest(lags, replace_cycles(homogeneous=calm)).verdict == "reproduced"
+    quiet = replace_cycles(homogeneous=calm, linear=calm, luenberger=calm)
     assert figure_6_at_rest(lags, quiet).verdict == "not reproduced"  # nothing for (10) to be without
-    assert cause_of_figure_5(changed(**{WITH_Y2: Cycle(True, 0.1, 1.0)})).verdict == "reproduced"
-    assert cause_of_figure_5(changed(**{WITH_Y2: Cycle(True, 0.12, 1.0)})).verdict == "not reproduced"
+    assert cause_of_figure_5(replace_cycles(**{WITH_Y2: Cycle(True, 0.1, 1.0)})).verdict == "reproduced"
+    assert cause_of_figure_5(replace_cycles(**{WITH_Y2: Cycle(True, 0.12, 1.0)})).verdict == "not reproduced"
 
 
-def test_figure_6_with_a_fall(found: Loops, cycles: Cycles) -> None:
-    fallen = replaced(found.gap["homogeneous"], found.gap["homogeneous"].values(VELOCITY), fell=1)
-    claim = figure_6(found._replace(gap=found.gap | {"homogeneous": fallen}), cycles)
+def test_figure_6_with_a_fall(runs: Loops, cycles: Cycles) -> None:
+    fallen = replace_outcomes(runs.gap["homogeneous"], runs.gap["homogeneous"].values(VELOCITY), fell=1)
+    claim = figure_6(runs._replace(gap=runs.gap | {"homogeneous": fallen}), cycles)
     assert claim.verdict == "not reproduced"
     assert claim.figures["largest_fell_fraction"] == pytest.approx(0.25)
 
@@ -162,41 +166,36 @@ def test_figure_6_with_a_fall(found: Loops, cycles: Cycles) -> None:
 VELOCITY = "velocity_rms_error_rad_s"
 
 
-def made(errors: list[float], *, fell: int = 0, tilts: list[float] | None = None) -> Result:
-    """Worlds with these velocity errors, of which the last ones fell."""
-    kinds = ["done"] * (len(errors) - fell) + ["fell"] * fell
-    rows = zip(errors, tilts or errors, strict=True)
-    summaries = [{VELOCITY: error, "tilt_rms_deg": tilt} for error, tilt in rows]
-    return Result([Outcome(kind, 5.0) for kind in kinds], summaries)  # type: ignore[arg-type]
-
-
-def replaced(result: Result, errors: np.ndarray, *, fell: int = 0) -> Result:
+def replace_outcomes(result: Result, errors: np.ndarray, *, fell: int = 0) -> Result:
     """The same recordings with other outcomes."""
-    other = made(errors.tolist(), fell=fell)
-    return Result(other.outcomes, other.summaries, result.trajectory, result.seconds)
+    made_up = make_result(errors.tolist(), fell=fell)
+    return Result(made_up.outcomes, made_up.summaries, result.trajectory, result.seconds)
 
 
 def test_smaller_is_beyond_chance_and_world_by_world() -> None:
-    low, high = made([1.0, 1.1, 1.2, 1.3]), made([1.1, 1.2, 1.3, 1.41])
-    assert smaller(low, high) is True
-    assert smaller(high, low) is False
-    mixed = made([1.3, 0.9, 1.5, 1.2])  # larger in the mean, but not in every world: its interval holds zero
+    low, high = make_result([1.0, 1.1, 1.2, 1.3]), make_result([1.1, 1.2, 1.3, 1.41])
+    assert is_smaller(low, high) is True
+    assert is_smaller(high, low) is False
+    mixed = make_result([1.3, 0.9, 1.5, 1.2])  # larger in the mean, but not in every world: its interval holds zero
     assert np.mean(mixed.values(VELOCITY)) > np.mean(low.values(VELOCITY))
-    assert smaller(low, mixed) is False
-    assert smaller(low, made([2.0] * 4, fell=3)) is None
+    assert is_smaller(low, mixed) is False
+    assert is_smaller(low, make_result([2.0] * 4, fell=3)) is None
     assert (
-        smaller(made([9.0] * 4, tilts=[1.0, 1.1, 1.0, 1.1]), made([1.0] * 4, tilts=[2.0] * 4), "tilt_rms_deg") is True
+        is_smaller(
+            make_result([9.0] * 4, tilts=[1.0, 1.1, 1.0, 1.1]), make_result([1.0] * 4, tilts=[2.0] * 4), "tilt_rms_deg"
+        )
+        is True
     )
 
 
 def test_better_counts_falls() -> None:
-    low, high = made([1.0, 1.1, 1.2, 1.3]), made([1.1, 1.2, 1.3, 1.41])
-    assert better(low, high)
-    assert not better(high, low)
-    assert better(high, made([1.0] * 4, fell=4))
-    assert not better(made([1.0] * 4, fell=4), made([1.0] * 4, fell=4))
-    assert not better(made([1.0] * 4, fell=3), made([2.0] * 4, fell=4))  # it does not stand itself
-    assert not better(made([1.0, 1.1, 1.2, 0.0], fell=1), high)
+    low, high = make_result([1.0, 1.1, 1.2, 1.3]), make_result([1.1, 1.2, 1.3, 1.41])
+    assert is_better(low, high)
+    assert not is_better(high, low)
+    assert is_better(high, make_result([1.0] * 4, fell=4))
+    assert not is_better(make_result([1.0] * 4, fell=4), make_result([1.0] * 4, fell=4))
+    assert not is_better(make_result([1.0] * 4, fell=3), make_result([2.0] * 4, fell=4))  # it does not stand itself
+    assert not is_better(make_result([1.0, 1.1, 1.2, 0.0], fell=1), high)
 
 
 def ranking(linear: Result, luenberger: Result, homogeneous: Result) -> Mapping[str, Result]:
@@ -204,36 +203,38 @@ def ranking(linear: Result, luenberger: Result, homogeneous: Result) -> Mapping[
 
 
 def test_section_6_needs_both_steps_and_no_fall() -> None:
-    worst, middle, best = (made([size, size + 0.1, size + 0.2, size + 0.31]) for size in (3.0, 2.0, 1.0))
-    assert comparison.ranked(ranking(worst, middle, best))
-    assert not comparison.ranked(ranking(middle, worst, best))  # without a model it is better than (9)
-    assert not comparison.ranked(ranking(worst, best, middle))  # (9) is better than (10)
-    assert not comparison.ranked(ranking(made([1.0] * 4, fell=4), made([2.0, 2.1, 2.0, 2.1], fell=1), best))
+    worst, middle, best = (make_result([size, size + 0.1, size + 0.2, size + 0.31]) for size in (3.0, 2.0, 1.0))
+    assert comparison.is_ranked(ranking(worst, middle, best))
+    assert not comparison.is_ranked(ranking(middle, worst, best))  # without a model it is better than (9)
+    assert not comparison.is_ranked(ranking(worst, best, middle))  # (9) is better than (10)
+    assert not comparison.is_ranked(
+        ranking(make_result([1.0] * 4, fell=4), make_result([2.0, 2.1, 2.0, 2.1], fell=1), best)
+    )
 
 
-def test_verdict_of_the_comparison_follows_the_errors(found: Loops) -> None:
-    def spoilt(by_name: Mapping[str, Result]) -> dict[str, Result]:
+def test_verdict_of_the_comparison_follows_the_errors(runs: Loops) -> None:
+    def spoil(by_name: Mapping[str, Result]) -> dict[str, Result]:
         errors = 2.0 * by_name["linear"].values(VELOCITY)
-        return {**by_name, "homogeneous": replaced(by_name["homogeneous"], errors)}
+        return {**by_name, "homogeneous": replace_outcomes(by_name["homogeneous"], errors)}
 
-    one_setting = found.by_bias | {0.25: spoilt(found.by_bias[0.25])}
-    assert comparison.best(found._replace(by_bias=one_setting)).verdict == "not reproduced"
-    everywhere = {e: spoilt(by_name) for e, by_name in found.by_bias.items()}
-    worse = found._replace(by_bias=everywhere, gap=spoilt(found.gap))
-    assert comparison.model_based(worse).verdict == "not reproduced"
+    one_setting = runs.by_bias | {0.25: spoil(runs.by_bias[0.25])}
+    assert comparison.best_claim(runs._replace(by_bias=one_setting)).verdict == "not reproduced"
+    everywhere = {e: spoil(by_name) for e, by_name in runs.by_bias.items()}
+    spoilt_results = runs._replace(by_bias=everywhere, gap=spoil(runs.gap))
+    assert comparison.model_based(spoilt_results).verdict == "not reproduced"
 
 
-def test_the_three_pictures_share_their_scales(found: Loops, lags: Lags, cycles: Cycles) -> None:
+def test_the_three_pictures_share_their_scales(runs: Loops, lags: Lags, cycles: Cycles) -> None:
     from cmg_mj.papers.scales import on_common_scales
 
-    claims = on_common_scales([figure_4(found, lags, cycles), figure_5(found, lags, cycles), figure_6(found, cycles)])
+    claims = on_common_scales([figure_4(runs, lags, cycles), figure_5(runs, lags, cycles), figure_6(runs, cycles)])
     panels = [panel for claim in claims for panel in claim.pictures[0].panels]
     assert {panel.y_label for panel in panels} >= {"tilt [deg]", "tilt rate [rad/s]"}
     for label in {panel.y_label for panel in panels}:
-        of = [panel for panel in panels if panel.y_label == label]
-        assert len(of) == 6
-        (common,) = {panel.y_range for panel in of}
+        panels_of_label = [panel for panel in panels if panel.y_label == label]
+        assert len(panels_of_label) == 6
+        (common,) = {panel.y_range for panel in panels_of_label}
         assert common is not None
-        values = np.concatenate([np.asarray(line.y) for panel in of for line in panel.lines])
+        values = np.concatenate([np.asarray(line.y) for panel in panels_of_label for line in panel.lines])
         assert common[0] < values.min() < values.max() < common[1]
         assert np.ptp(values) > 0.85 * (common[1] - common[0])

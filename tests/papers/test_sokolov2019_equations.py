@@ -46,7 +46,7 @@ def test_equations_of_motion() -> None:
 
 
 def rest_of_reduced_model(gains: np.ndarray, e: float, duration: float = 60.0) -> np.ndarray:
-    """Where the nonlinear model (3) under the law with y1 = x1 - e comes to rest: x1, x2, x3, x_e."""
+    """Integrate the nonlinear model (3) under the law with y1 = x1 - e to its rest: x1, x2, x3, x_e."""
     model = paper.printed_model()
 
     def motion(t: float, state: np.ndarray) -> list[float]:

@@ -33,22 +33,22 @@ def test_figure_3_on_other_seeds(tuning: figure_3.Tuning) -> None:
 
 def test_the_push_explains_the_error_of_9(tuning: figure_3.Tuning) -> None:
     error = tuning.error_of_9[tuning.window]
-    predicted = figure_3.predicted_error(tuning)[tuning.window]
-    assert 1.0 - np.var(error - predicted) / np.var(error) > 0.95
-    assert 1.0 - np.var(error + predicted) / np.var(error) < 0.0
+    prediction = figure_3.predict_error(tuning)[tuning.window]
+    assert 1.0 - np.var(error - prediction) / np.var(error) > 0.95
+    assert 1.0 - np.var(error + prediction) / np.var(error) < 0.0
     # The observer also takes the commanded gimbal rate for the real one, which lags: a tenth of the error.
-    assert np.ptp(predicted) == pytest.approx(np.ptp(error), rel=0.15)
+    assert np.ptp(prediction) == pytest.approx(np.ptp(error), rel=0.15)
 
 
 def test_9_and_its_form_with_y2_are_one_at_small_angles(tuning: figure_3.Tuning) -> None:
     """The observer that tells what y2 would bring must differ from (9) in y2 alone."""
     t = tuning.prepared.law.dt * np.arange(400)
     columns = {"y1_rad": 1e-3 * np.sin(5.0 * t), "y2_rad": 0.0 * t, "u_rad_s": 0.1 * np.cos(7.0 * t)}
-    one, other = (
+    nine, with_y2 = (
         replay(observer, Trajectory(columns)).x2
         for observer in (estimator("luenberger", tuning.prepared), figure_3.nine_with_y2(tuning.prepared))
     )
-    np.testing.assert_allclose(other, one, atol=2e-4 * np.abs(one).max())
+    np.testing.assert_allclose(with_y2, nine, atol=2e-4 * np.abs(nine).max())
 
 
 def test_a_failure_must_be_beyond_chance(tuning: figure_3.Tuning) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.papers.sokolov2019 import lag, paper, release
-from cmg_mj.papers.sokolov2019.rig import experiment, servo_of
+from cmg_mj.papers.sokolov2019.rig import experiment, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, rig_matrices
 from cmg_mj.results.trajectory import Trajectory
 from tests.plant import paper_model
@@ -27,46 +27,46 @@ def test_what_counts_as_sustained() -> None:
 
 
 def servo() -> Servo:
-    return servo_of(experiment().plant)
+    return read_servo(experiment().plant)
 
 
 def test_servo_is_the_models() -> None:
-    found = servo()
-    assert (found.kp, found.kv) == (85.6, 0.731)
-    assert found.inertia == pytest.approx(paper_model.I_c + paper_model.I_d, rel=1e-12)
-    assert found.damped(0.02).lag_s == found.softened(0.02).lag_s == pytest.approx(0.02)
-    soft = found.softened(0.02)
+    model_servo = servo()
+    assert (model_servo.kp, model_servo.kv) == (85.6, 0.731)
+    assert model_servo.inertia == pytest.approx(paper_model.I_c + paper_model.I_d, rel=1e-12)
+    assert model_servo.damp(0.02).lag_s == model_servo.soften(0.02).lag_s == pytest.approx(0.02)
+    soft = model_servo.soften(0.02)
     assert soft.kv == pytest.approx(2.0 * math.sqrt(soft.kp * soft.inertia))
 
 
 def test_a_servo_too_fast_for_the_integrator_is_refused() -> None:
     with pytest.raises(ValueError, match=r"kv h/I = 3\.\d+ must be at most 2\.7"):
-        release.release("linear", [servo().damped(0.06)])
+        release.release("linear", [servo().damp(0.06)])
 
 
 @pytest.mark.parametrize("lag_ms", [8.5, 15.0, 22.0])
 def test_pole_of_the_sampled_loop_is_mujocos(lag_ms: float) -> None:
     """Decay and frequency of a small release of the compiled bodies, against the eigenvalue."""
-    loop, own, dt = lag.linearised("linear")
-    varied = own.damped(1e-3 * lag_ms)
-    pole = oscillation(loop(varied), dt)
+    loop, model_servo, dt = lag.linearise("linear")
+    slow_servo = model_servo.damp(1e-3 * lag_ms)
+    pole = oscillation(loop(slow_servo), dt)
     settings = ["plant.initial_tilt_deg=0.02", "duration_s=3.0"]
-    trajectory = release.release("linear", [varied], settings)
+    trajectory = release.release("linear", [slow_servo], settings)
     t, x2 = trajectory["time_s"], trajectory["x2_rad_s"][:, 0]
-    kept = (t > 0.8) & (t < 1.6)  # when the faster poles have faded
+    window = (t > 0.8) & (t < 1.6)  # when the faster poles have faded
     # A free oscillation obeys x[k+2] = 2 r cos(w) x[k+1] - r^2 x[k], here for steps of eight ticks.
-    x = [x2[kept][8 * i :] for i in range(3)]
+    x = [x2[window][8 * i :] for i in range(3)]
     n = len(x[2])
     (a, b), *_ = np.linalg.lstsq(np.column_stack([x[1][:n], x[0][:n]]), x[2], rcond=None)
-    measured = np.log(np.roots([1.0, -a, -b]).astype(complex)[0]) / (8.0 * dt)
-    assert abs(measured.imag) == pytest.approx(pole.imag, rel=0.02)
-    assert measured.real == pytest.approx(pole.real, abs=0.15)
+    pole_on_mujoco = np.log(np.roots([1.0, -a, -b]).astype(complex)[0]) / (8.0 * dt)
+    assert abs(pole_on_mujoco.imag) == pytest.approx(pole.imag, rel=0.02)
+    assert pole_on_mujoco.real == pytest.approx(pole.real, abs=0.15)
 
 
 def test_modes_of_a_known_system() -> None:
     """Without observer, gravity or spin the servo's own poles come out."""
-    still = paper.printed_model()
-    A, B = rig_matrices(still, servo())
+    model = paper.printed_model()
+    A, B = rig_matrices(model, servo())
     assert B[4, 0] == 1.0
     s = servo()
     np.testing.assert_allclose(A[3, 2:], [-s.kp / s.inertia, -s.kv / s.inertia, s.kp / s.inertia])
@@ -101,15 +101,15 @@ def test_the_flywheels_torque_on_the_gimbal_counts(lags: lag.Lags, monkeypatch: 
     """A loop model without it predicts another threshold, and MuJoCo tells the two apart."""
     from cmg_mj.papers.sokolov2019 import sampled_loop
 
-    def without(model, servo):
+    def matrices_without(model, servo):
         A, B = rig_matrices(model, servo)
         A[3, 1] = 0.0
         return A, B
 
-    monkeypatch.setattr(sampled_loop, "rig_matrices", without)
-    predicted = lag.predicted("linear").servo_lag_s
-    assert predicted is not None
-    assert abs(predicted - (lags.thresholds["linear"].middle or 0.0)) > 1e-3
+    monkeypatch.setattr(sampled_loop, "rig_matrices", matrices_without)
+    prediction = lag.predict("linear").servo_lag_s
+    assert prediction is not None
+    assert abs(prediction - (lags.thresholds["linear"].middle or 0.0)) > 1e-3
 
 
 def test_claim_of_the_lag(lags: lag.Lags) -> None:
@@ -122,12 +122,12 @@ def test_claim_of_the_lag(lags: lag.Lags) -> None:
 
 def test_a_soft_servo_does_not_make_it_oscillate() -> None:
     """As the linearised loop says: on MuJoCo, up to 100 ms."""
-    servos = [servo().softened(lag_s) for lag_s in (0.02, 0.04, 0.07, 0.1)]
+    servos = [servo().soften(lag_s) for lag_s in (0.02, 0.04, 0.07, 0.1)]
     assert not release.is_sustained(release.release("linear", servos)).any()
 
 
 def test_luenberger_oscillates_from_64_ms_on() -> None:
     """Beyond what RK4 takes at 1 ms."""
     settings = ["plant.timestep_s=0.0005"]
-    servos = [servo().damped(lag_s) for lag_s in (0.060, 0.069)]
+    servos = [servo().damp(lag_s) for lag_s in (0.060, 0.069)]
     assert release.is_sustained(release.release("luenberger", servos, settings)).tolist() == [False, True]

@@ -39,9 +39,9 @@ def test_tau_against_a_grid() -> None:
 
 def level(printed: Sequence[float], tuned: Sequence[float]) -> NoiseLevelResult:
     """With these errors on the held-out worlds."""
-    rms, given = np.array(tuned), np.array(printed)
+    rms, printed_rms = np.array(tuned), np.array(printed)
     return NoiseLevelResult(
-        400.0, {}, {"tau": 0.02}, (), float(rms.mean()), float(given.mean()), rms, given, 1.0, 1.0, 0
+        400.0, {}, {"tau": 0.02}, (), float(rms.mean()), float(printed_rms.mean()), rms, printed_rms, 1.0, 1.0, 0
     )
 
 
@@ -52,10 +52,10 @@ def test_the_printed_values_must_be_best_on_one_recording() -> None:
     def verdict(*by_observer: Sequence[NoiseLevelResult]) -> str:
         return table_2.claim({"a push": dict(zip(OBSERVERS, by_observer, strict=True))}).verdict
 
-    within = "reproduced within stated conditions"
-    assert verdict([TIED], [TIED], [TIED]) == within
+    partly = "reproduced within stated conditions"
+    assert verdict([TIED], [TIED], [TIED]) == partly
     assert verdict([TIED], [BEATEN], [TIED]) == "not reproduced"
     assert verdict([TIED, BEATEN], [BEATEN, TIED], [TIED, TIED]) == "not reproduced"  # not at the same noise
-    assert verdict([TIED, BEATEN], [TIED, BEATEN], [TIED, BEATEN]) == within
+    assert verdict([TIED, BEATEN], [TIED, BEATEN], [TIED, BEATEN]) == partly
     assert table_2.none_better([TIED, TIED])
     assert not table_2.none_better([TIED, BEATEN])

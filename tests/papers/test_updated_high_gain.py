@@ -129,10 +129,10 @@ def test_converges_to_the_printed_observer(n: int) -> None:
     errors = []
     for steps in (800, 3200):
         dt = 1.5 / steps
-        of = example(n, dt, L0=2.0)
-        state = of.init((y(0.0),), tuple(start))
+        observer = example(n, dt, L0=2.0)
+        state = observer.init((y(0.0),), tuple(start))
         for k in range(1, steps + 1):
-            state, _ = of.step(state, (y(k * dt),), 0.7)
+            state, _ = observer.step(state, (y(k * dt),), 0.7)
         errors.append(np.abs(np.array([*state.x, state.L]) - reference).max())
     print(f"n = {n}: errors {errors}")
     assert errors[1] < 1e-3 * np.abs(reference).max()
@@ -144,10 +144,10 @@ def test_with_a_constant_gain_it_is_of_second_order_at_least() -> None:
     l, L = (4.0, 2.0, 1.0), 2.0  # noqa: E741
     A = np.array([[-l[0] * L, 1.0, 0.0], [-l[0] * l[1] * L**2, 0.0, 1.0], [-l[0] * l[1] * l[2] * L**3, 0.0, 0.0]])
     start = np.array([0.2, -1.0, 3.0])
-    of = UpdatedHighGain.plain(dt=0.005, f=[lambda u, y, x: 0.0 * y[0]] * 3, l=l, L=L)
-    state = of.init((0.0,), tuple(start))
+    observer = UpdatedHighGain.plain(dt=0.005, f=[lambda u, y, x: 0.0 * y[0]] * 3, l=l, L=L)
+    state = observer.init((0.0,), tuple(start))
     for _ in range(100):
-        state, _ = of.step(state, (0.0,), None)
+        state, _ = observer.step(state, (0.0,), None)
     assert state.x == pytest.approx(expm(0.5 * A) @ start, abs=1e-6)
     assert state.L == L
 
@@ -155,10 +155,10 @@ def test_with_a_constant_gain_it_is_of_second_order_at_least() -> None:
 def test_with_a_linear_correction_b_is_without_effect() -> None:
     ends = []
     for b in (0.1, 2.0):
-        of = example(3, 0.01, correction=BiLimitCorrection((4.0, 2.0, 1.0)), b=b)
-        state = of.init((0.1,))
+        observer = example(3, 0.01, correction=BiLimitCorrection((4.0, 2.0, 1.0)), b=b)
+        state = observer.init((0.1,))
         for k in range(50):
-            state, _ = of.step(state, (math.sin(0.1 * k),), 0.3)
+            state, _ = observer.step(state, (math.sin(0.1 * k),), 0.3)
         ends.append(state.x)
     assert ends[0] == pytest.approx(ends[1], rel=1e-12)
 
@@ -168,11 +168,12 @@ def test_updated_is_the_general_form_without_degree() -> None:
     updated = UpdatedHighGain.updated(
         dt=0.01, f=general.f, a=general.a, l=(2.0, 1.0), Omega=general.Omega, **PHI, v=(0.4,)
     )
-    assert updated.violated_conditions() == []
-    states = [of.init((0.1,)) for of in (general, updated)]
+    assert updated.list_violations() == []
+    states = [observer.init((0.1,)) for observer in (general, updated)]
     for k in range(50):
         states = [
-            of.step(state, (math.sin(0.1 * k),), 0.3)[0] for of, state in zip((general, updated), states, strict=True)
+            observer.step(state, (math.sin(0.1 * k),), 0.3)[0]
+            for observer, state in zip((general, updated), states, strict=True)
         ]
     assert (*states[0].x, states[0].L) == pytest.approx((*states[1].x, states[1].L), rel=1e-12)
     assert states[0].L > 1.65
@@ -180,16 +181,16 @@ def test_updated_is_the_general_form_without_degree() -> None:
 
 def test_arguments_are_limited_where_the_paper_limits_them() -> None:
     """f_2 on and Omega get the limited arguments; f_1 and the innovation the measurement as it is."""
-    seen: dict[str, Any] = {}
+    arguments: dict[str, Any] = {}
 
     def note(name: str, value: float) -> Any:
         def function(u: Any, y: Any, x: Any) -> float:
-            seen[name] = (u, tuple(y), tuple(x))
+            arguments[name] = (u, tuple(y), tuple(x))
             return value
 
         return function
 
-    of = example(
+    observer = example(
         3,
         0.01,
         f=(note("f1", 0.0), note("f2", 0.0), note("f3", 0.0)),
@@ -197,50 +198,50 @@ def test_arguments_are_limited_where_the_paper_limits_them() -> None:
         a=(),
         saturate=lambda y, x: ((min(y[0], 0.5),), tuple(min(v, 2.0) for v in x)),
     )
-    of.slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
-    of.step(of.init((0.9,), (1.0, 5.0, -3.0)), (0.9,), "u")
-    assert seen["f1"] == ("u", (0.9,), ())
-    of.slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
-    assert seen["f2"] == ("u", (0.5,), (2.0,))
-    assert seen["f3"] == ("u", (0.5,), (2.0, -3.0))
-    assert seen["Omega"] == ("u", (0.5,), (2.0, -3.0))
-    slope = of.slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
-    without = example(3, 0.01, f=of.f, a=()).slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
-    assert slope == without
+    observer.slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
+    observer.step(observer.init((0.9,), (1.0, 5.0, -3.0)), (0.9,), "u")
+    assert arguments["f1"] == ("u", (0.9,), ())
+    observer.slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
+    assert arguments["f2"] == ("u", (0.5,), (2.0,))
+    assert arguments["f3"] == ("u", (0.5,), (2.0, -3.0))
+    assert arguments["Omega"] == ("u", (0.5,), (2.0, -3.0))
+    slope = observer.slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
+    unlimited_slope = example(3, 0.01, f=observer.f, a=()).slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
+    assert slope == unlimited_slope
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_arrays_equal_floats_bit_by_bit(n: int) -> None:
     """With f, a and Omega that do (arithmetic alone)."""
     f = [lambda u, y, x: -u * y[0], lambda u, y, x: u * y[0] - x[0], lambda u, y, x: 0.5 * x[0] - x[1] * u][:n]
-    of = UpdatedHighGain(
+    observer = UpdatedHighGain(
         0.01, tuple(f), BiLimitCorrection((4.0, 2.0, 1.0)[3 - n :], 0.3), lambda u, y, x: abs(y[0]) + abs(u), 0.3, **PHI
     )
     rng = np.random.default_rng(0)
     y, u = rng.normal(0.0, 1.0, (40, 5)), rng.normal(0.0, 1.0, (40, 5))
 
     def walk(column: Any) -> Any:
-        def at(values: np.ndarray) -> Any:
+        def column_of(values: np.ndarray) -> Any:
             return values if column is None else float(values[column])
 
-        state = of.init((at(y[0]),))
+        state = observer.init((column_of(y[0]),))
         for k in range(1, 40):
-            state, _ = of.step(state, (at(y[k]),), at(u[k - 1]))
+            state, _ = observer.step(state, (column_of(y[k]),), column_of(u[k - 1]))
         return state
 
     many = walk(None)
     for i in range(5):
-        one = walk(i)
-        assert [float(x[i]) for x in many.x] == list(one.x)
-        assert float(many.L[i]) == one.L
-        assert all(type(number) is float for number in (*one.x, one.L))
+        single = walk(i)
+        assert [float(x[i]) for x in many.x] == list(single.x)
+        assert float(many.L[i]) == single.L
+        assert all(type(number) is float for number in (*single.x, single.L))
 
 
 @pytest.mark.parametrize("error", [1.0, 100.0])
 def test_finds_the_state_of_a_third_order_system(error: float) -> None:
     """x1 = sin t, and f3 = [x3]^1.3 grows as (6) allows for d_inf = 0.3: increments of power (1 + 0.3)/1."""
     d, dt = 0.3, 2e-4
-    of = UpdatedHighGain(
+    observer = UpdatedHighGain(
         dt,
         (lambda u, y, x: 0.0 * y[0], lambda u, y, x: 0.0 * y[0], lambda u, y, x: power(x[1], 1.0 + d) + y[1]),
         BiLimitCorrection((4.0, 2.0, 1.0), d),
@@ -251,14 +252,14 @@ def test_finds_the_state_of_a_third_order_system(error: float) -> None:
         2.0,
         v=(0.0, d),
     )
-    assert of.violated_conditions() == []
+    assert observer.list_violations() == []
 
-    def measured(t: float) -> tuple[float, float]:
+    def measurement(t: float) -> tuple[float, float]:
         return math.sin(t), -math.cos(t) - power(-math.sin(t), 1.0 + d)
 
-    state, x = of.init(measured(0.0), (0.0, 1.0 + error, -error)), (0.0, 0.0, 0.0)
+    state, x = observer.init(measurement(0.0), (0.0, 1.0 + error, -error)), (0.0, 0.0, 0.0)
     for k in range(1, round(6.0 / dt) + 1):
-        state, x = of.step(state, measured(k * dt), None)
+        state, x = observer.step(state, measurement(k * dt), None)
     assert x == pytest.approx((math.sin(6.0), math.cos(6.0), -math.sin(6.0)), abs=1e-3)
 
 
@@ -275,15 +276,15 @@ def test_a_plain_observer_runs_away_where_the_homogeneous_one_does_not() -> None
         return abs(z[1]) - 1e7
 
     setattr(escaped, "terminal", True)  # noqa: B010 - how solve_ivp wants it
-    far = solve_ivp(slope, (0.0, 1.0), [0.0, 1e3], "DOP853", rtol=1e-8, events=[escaped]).y
-    near = solve_ivp(slope, (0.0, 3.0), [0.0, 1e2], "DOP853", rtol=1e-8, atol=1e-8).y
-    assert abs(far[1, -1]) > 1e6
-    assert abs(near[1, -1]) < 1e-3
+    large_error = solve_ivp(slope, (0.0, 1.0), [0.0, 1e3], "DOP853", rtol=1e-8, events=[escaped]).y
+    small_error = solve_ivp(slope, (0.0, 3.0), [0.0, 1e2], "DOP853", rtol=1e-8, atol=1e-8).y
+    assert abs(large_error[1, -1]) > 1e6
+    assert abs(small_error[1, -1]) < 1e-3
 
 
 def test_starts_where_it_is_told() -> None:
-    of = example(3, 0.01)
-    state = of.init((0.2,))
+    observer = example(3, 0.01)
+    state = observer.init((0.2,))
     assert state.x == (0.2, 0.0, 0.0)
     assert state.L == 1.5
     assert example(3, 0.01, L0=9.0).init((0.2,), (1.0, 2.0, 3.0))[:2] == ((1.0, 2.0, 3.0), 9.0)
@@ -340,39 +341,39 @@ def test_what_does_not_fit_is_refused_at_the_start(y: Any, x: Any, message: str)
 
 def test_numpys_numbers_are_taken() -> None:
     period: Any = np.float32(0.01)
-    of = example(2, period, b=np.int64(1), correction=BiLimitCorrection((2.0, 1.0)), L0=np.float64(3.0))
-    assert [type(number) for number in (of.dt, of.b, of.L0)] == [float] * 3
-    assert of.b == 1.0
+    observer = example(2, period, b=np.int64(1), correction=BiLimitCorrection((2.0, 1.0)), L0=np.float64(3.0))
+    assert [type(number) for number in (observer.dt, observer.b, observer.L0)] == [float] * 3
+    assert observer.b == 1.0
 
 
 def test_the_step_is_stable_up_to_where_it_is_refused() -> None:
     """A linear observer by its own steps, on either side of the largest L that is taken."""
 
-    def made(L: float) -> UpdatedHighGain:
+    def make_observer(L: float) -> UpdatedHighGain:
         return UpdatedHighGain.plain(dt=0.01, f=[lambda u, y, x: 0.0 * y[0]] * 2, l=(2.0, 1.0), L=L)
 
     low, high = 1.0, 1e4
     while high - low > 1e-6 * low:
         middle = 0.5 * (low + high)
         try:
-            made(middle)
+            make_observer(middle)
             low = middle
         except InputError:
             high = middle
 
-    def after(L: float) -> float:
-        of = made(0.9 * low)
-        object.__setattr__(of, "phi2", L)  # past the check
-        state = of.init((0.0,), (1e-3, 0.0))
+    def end_error(L: float) -> float:
+        observer = make_observer(0.9 * low)
+        object.__setattr__(observer, "phi2", L)  # past the check
+        state = observer.init((0.0,), (1e-3, 0.0))
         for _ in range(2000):
-            state, _ = of.step(state, (0.0,), None)
+            state, _ = observer.step(state, (0.0,), None)
         return abs(state.x[0])
 
-    assert after(0.99 * low) < 1e-6
-    assert after(1.01 * low) > 1.0
+    assert end_error(0.99 * low) < 1e-6
+    assert end_error(1.01 * low) > 1.0
 
 
 def test_violated_conditions_are_reported_not_refused() -> None:
-    of = example(2, 0.01, correction=BiLimitCorrection((1.0, 1.0), 0.9), b=0.41, v=(0.9,))
-    assert len(of.violated_conditions()) == 4
-    assert example(2, 0.01, b=0.3).violated_conditions() == []
+    observer = example(2, 0.01, correction=BiLimitCorrection((1.0, 1.0), 0.9), b=0.41, v=(0.9,))
+    assert len(observer.list_violations()) == 4
+    assert example(2, 0.01, b=0.3).list_violations() == []

@@ -34,11 +34,11 @@ def passive(plant: Plant, *, gravity: bool = True) -> mujoco.MjModel:
 
 
 def states(
-    model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray | float = 0.0, applied: np.ndarray | float = 0.0
+    model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray | float = 0.0, torques: np.ndarray | float = 0.0
 ) -> Iterator[mujoco.MjData]:
     """All that MuJoCo computes at each row of qpos under torques at the joints. One MjData serves all."""
     data = mujoco.MjData(model)
-    for q, v, tau in zip(*np.broadcast_arrays(qpos, qvel, applied), strict=True):
+    for q, v, tau in zip(*np.broadcast_arrays(qpos, qvel, torques), strict=True):
         data.qpos[:], data.qvel[:], data.qfrc_applied[:] = q, v, tau
         mujoco.mj_forward(model, data)
         yield data

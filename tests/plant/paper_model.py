@@ -31,6 +31,9 @@ gravity_torque = m * g * l / math.sqrt(2.0)
 
 Function = Callable[..., np.ndarray]
 
+STEP = 1e-30
+"""Imaginary step of a coordinate [rad]: its square vanishes beside one."""
+
 
 def R_AB(a: sp.Expr) -> sp.Matrix:
     """Passive rotation about y. R_CD is the same."""
@@ -42,16 +45,16 @@ def R_BC(a: sp.Expr) -> sp.Matrix:
     return sp.Matrix([[1, 0, 0], [0, sp.cos(a), sp.sin(a)], [0, -sp.sin(a), sp.cos(a)]])
 
 
-def doubled_energy(inertia: Sequence[float], w: sp.Matrix) -> sp.Expr:
+def twice_body_energy(inertia: Sequence[float], w: sp.Matrix) -> sp.Expr:
     """w' diag(inertia) w, as T writes it."""
     return w.dot(sp.diag(*inertia) * w)
 
 
-def doubled_cube_energy(w_b: sp.Matrix, q: Sequence[sp.Expr], dq: Sequence[sp.Expr]) -> sp.Expr:
+def twice_module_energy(w_b: sp.Matrix, q: Sequence[sp.Expr], dq: Sequence[sp.Expr]) -> sp.Expr:
     """Gimbal's and flywheel's share of 2 T, by their angles and rates (c, d), in a frame turning with w_b."""
     w_c = sp.Matrix([dq[0], 0, 0]) + R_BC(q[0]) * w_b
     w_d = sp.Matrix([0, dq[1], 0]) + R_AB(q[1]) * w_c
-    return doubled_energy([I_d, J_d, K_d], w_d) + doubled_energy([I_c, J_c, K_c], w_c)
+    return twice_body_energy([I_d, J_d, K_d], w_d) + twice_body_energy([I_c, J_c, K_c], w_c)
 
 
 class Lagrangian:
@@ -67,39 +70,55 @@ class Lagrangian:
     @cached_property
     def kinetic(self) -> Function:
         """T(q, dq) [J]."""
-        energy = _compiled(sp.Matrix([self.T]), self.q, self.dq)
+        energy = _compile(sp.Matrix([self.T]), self.q, self.dq)
         return lambda q, dq: energy(q, dq)[..., 0, 0]
 
     @cached_property
     def potential(self) -> Function:
         """P(q) [J]."""
-        energy = _compiled(sp.Matrix([self.P]), self.q)
+        energy = _compile(sp.Matrix([self.P]), self.q)
         return lambda q: energy(q)[..., 0, 0]
 
     @cached_property
     def momenta(self) -> Function:
         """dT/d(dq)(q, dq) [N m s]; constant where neither T nor P knows the coordinate."""
-        momenta = _compiled(self._dT_ddq, self.q, self.dq)
+        momenta = _compile(self._dT_ddq, self.q, self.dq)
         return lambda q, dq: momenta(q, dq)[..., 0]
 
     @cached_property
     def mass_matrix(self) -> Function:
-        """M(q), (..., n, n) [kg m^2]."""
-        return _compiled(self._dT_ddq.jacobian(self.dq), self.q)
+        """M(q), (..., n, n) [kg m^2]: the momenta M dq, of which T is the quadratic form, at unit rates."""
+        momenta, units = self.momenta, np.eye(len(self.q))
+
+        def mass_matrix(q: np.ndarray) -> np.ndarray:
+            each = np.broadcast_to(q[..., None, :], (*q.shape, q.shape[-1]))
+            return momenta(each, np.broadcast_to(units, each.shape)).swapaxes(-1, -2)
+
+        return mass_matrix
 
     @cached_property
     def bias(self) -> Function:
-        """What the Euler-Lagrange equations (1) have besides M ddq: tau = M ddq + bias(q, dq) [N m]."""
-        dL_dq = sp.Matrix([self.T - self.P]).jacobian(self.q).T
-        bias = _compiled(self._dT_ddq.jacobian(self.q) * self.dq - dL_dq, self.q, self.dq)
-        return lambda q, dq: bias(q, dq)[..., 0]
+        """What the Euler-Lagrange equations (1) have besides M ddq: tau = M ddq + bias(q, dq) [N m].
+
+        By complex steps, which are exact to rounding: sympy takes a second for these derivatives.
+        """
+        momenta, kinetic, potential = self.momenta, self.kinetic, self.potential
+        steps = 1j * STEP * np.eye(len(self.q))
+
+        def bias(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+            turning = np.imag(momenta(q + 1j * STEP * dq, dq)) / STEP
+            stepped = q[..., None, :] + steps
+            lagrangian = kinetic(stepped, np.broadcast_to(dq[..., None, :], stepped.shape)) - potential(stepped)
+            return turning - np.imag(lagrangian) / STEP
+
+        return bias
 
     def accelerations(self, q: np.ndarray, dq: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """ddq of the Euler-Lagrange equations (1) under the generalised torques tau [rad/s^2]."""
         return np.linalg.solve(self.mass_matrix(q), (tau - self.bias(q, dq))[..., None])[..., 0]
 
 
-def _compiled(matrix: sp.Matrix, *arguments: sp.Matrix) -> Function:
+def _compile(matrix: sp.Matrix, *arguments: sp.Matrix) -> Function:
     """A matrix of expressions as a function of arrays (..., n), one for each column of symbols."""
     symbols = [symbol for argument in arguments for symbol in argument.flat()]
     entries = sp.lambdify(symbols, matrix.flat(), "numpy", cse=True)
@@ -129,20 +148,20 @@ def scissored_pair(K_a: float, *, yaw_term: bool = True) -> Lagrangian:
     tilt = q[1] + sp.pi / 4
     w_a = sp.Matrix([0, 0, dq[0]])
     w_b = sp.Matrix([0, dq[1], 0]) + R_AB(q[1]) * w_a
-    doubled = (
-        doubled_cube_energy(w_b, q[2:4], dq[2:4])
-        + doubled_cube_energy(w_b, q[4:6], dq[4:6])
-        + 2 * doubled_energy([I_b, J_b + m * l**2 / 2, K_b], w_b)
-        + doubled_energy([0, 0, K_a + m * l**2 / 2], w_a)
+    energy_twice = (
+        twice_module_energy(w_b, q[2:4], dq[2:4])
+        + twice_module_energy(w_b, q[4:6], dq[4:6])
+        + 2 * twice_body_energy([I_b, J_b + m * l**2 / 2, K_b], w_b)
+        + twice_body_energy([0, 0, K_a + m * l**2 / 2], w_a)
     )
     if yaw_term:
-        doubled += m * l**2 * sp.sin(tilt) ** 2 * dq[0] ** 2
-    return Lagrangian(q, dq, doubled / 2, sp.sqrt(2) * m * g * l * sp.cos(tilt))
+        energy_twice += m * l**2 * sp.sin(tilt) ** 2 * dq[0] ** 2
+    return Lagrangian(q, dq, energy_twice / 2, sp.sqrt(2) * m * g * l * sp.cos(tilt))
 
 
 @cache
 def flywheel_weights(first_moment: float) -> Lagrangian:
-    """What P gains if each flywheel's mass times its offset along d_1 is first_moment [kg m]. T is left out."""
+    """Add to P the weights of flywheels whose mass times offset along d_1 is first_moment [kg m]. T is omitted."""
     q, dq = _coordinates("a", "b", "c1", "d1", "c2", "d2")
     height_1, height_2 = ((R_AB(q[k + 1]) * R_BC(q[k]) * R_AB(q[1]))[0, 2] for k in (2, 4))
     return Lagrangian(q, dq, sp.S.Zero, first_moment * g * (height_1 + height_2))
@@ -153,5 +172,5 @@ def single_gimbal() -> Lagrangian:
     """The three bodies of sokolov2019: T of the six with one cube and q_a = 0. Coordinates q_b, q_c, q_d."""
     q, dq = _coordinates("b", "c", "d")
     w_b = sp.Matrix([0, dq[0], 0])
-    doubled = doubled_energy([I_b, J_b + m * l_single**2, K_b], w_b) + doubled_cube_energy(w_b, q[1:], dq[1:])
-    return Lagrangian(q, dq, doubled / 2, m * g * l_single * sp.cos(q[0] + sp.pi / 4))
+    energy_twice = twice_body_energy([I_b, J_b + m * l_single**2, K_b], w_b) + twice_module_energy(w_b, q[1:], dq[1:])
+    return Lagrangian(q, dq, energy_twice / 2, m * g * l_single * sp.cos(q[0] + sp.pi / 4))

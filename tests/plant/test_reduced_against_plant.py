@@ -87,10 +87,10 @@ def swing(plant: Plant, legs: list[tuple[float, float]]) -> Swing:
     samples = []
     for k in range(round(DURATION_S / HALF_STEP_S) + 1):
         u = rates[int(np.searchsorted(ends_s, k * HALF_STEP_S, side="right"))]
-        for module in plant.modules:
+        for module in plant.axis.modules:
             data.ctrl[module.servo], data.ctrl[module.motor] = module.direction * u, module.speed
         mujoco.mj_forward(plant.model, data)
-        module = plant.modules[0]
+        module = plant.axis.modules[0]
         samples.append(
             (
                 data.qpos[plant.tilt] - UPRIGHT,
@@ -105,19 +105,19 @@ def swing(plant: Plant, legs: list[tuple[float, float]]) -> Swing:
     return Swing(*np.array(samples).T)
 
 
-def tilt_error(reduced: ReducedModel, driven: Swing, *, constant_speed: bool = False) -> float:
+def tilt_error(reduced: ReducedModel, motion: Swing, *, constant_speed: bool = False) -> float:
     """Largest error in x1 of the reduced model, driven by a swing's gimbals and flywheels [rad]."""
-    flywheel, flywheel_acceleration = driven.flywheel, driven.flywheel_acceleration
+    flywheel, flywheel_acceleration = motion.flywheel, motion.flywheel_acceleration
     if constant_speed:  # Hypothesis 3
         flywheel, flywheel_acceleration = np.full_like(flywheel, reduced.omega_d), np.zeros_like(flywheel)
-    inputs = np.stack([driven.gimbal, driven.gimbal_rate, flywheel, flywheel_acceleration], axis=1).tolist()
+    inputs = np.stack([motion.gimbal, motion.gimbal_rate, flywheel, flywheel_acceleration], axis=1).tolist()
 
     def f(x: np.ndarray, k: int) -> np.ndarray:
         x1, x2 = x.tolist()
         return np.array([x2, tilt_acceleration(reduced, x1, x2, *inputs[k])])
 
     h = 2.0 * HALF_STEP_S
-    x = np.array([driven.tilt[0], 0.0])
+    x = np.array([motion.tilt[0], 0.0])
     worst = 0.0
     for k in range(0, len(inputs) - 1, 2):
         f1 = f(x, k)
@@ -125,7 +125,7 @@ def tilt_error(reduced: ReducedModel, driven: Swing, *, constant_speed: bool = F
         f3 = f(x + h / 2.0 * f2, k + 1)
         f4 = f(x + h * f3, k + 2)
         x = x + h / 6.0 * (f1 + 2.0 * f2 + 2.0 * f3 + f4)
-        worst = max(worst, abs(x[0] - driven.tilt[k + 2]))
+        worst = max(worst, abs(x[0] - motion.tilt[k + 2]))
     return float(worst)
 
 
@@ -143,24 +143,24 @@ SWINGS = {
 @pytest.mark.parametrize("name", SWINGS)
 def test_reduced_model_follows_the_six_bodies_through_a_swing(plant: Plant, name: str) -> None:
     """From 1 degree of tilt, fed MuJoCo's gimbal and flywheel motion: far within 1e-3 rad, if J2 is right."""
-    driven = swing(plant, SWINGS[name])
-    assert np.abs(driven.gimbal).max() > math.radians(45.0)
-    assert np.abs(driven.yaw).max() < 1e-12  # as aranovskiy2020 says under (2)
+    motion = swing(plant, SWINGS[name])
+    assert np.abs(motion.gimbal).max() > math.radians(45.0)
+    assert np.abs(motion.yaw).max() < 1e-12  # as aranovskiy2020 says under (2)
 
     true = plant.reduced
-    error = tilt_error(true, driven)
-    turned = tilt_error(replace(true, J2=-true.J2), driven)
-    constant = tilt_error(true, driven, constant_speed=True)
+    error = tilt_error(true, motion)
+    wrong_sign_error = tilt_error(replace(true, J2=-true.J2), motion)
+    constant = tilt_error(true, motion, constant_speed=True)
     print(
-        f"{name}: gimbal {np.degrees(driven.gimbal.min()):.0f} to {np.degrees(driven.gimbal.max()):.0f} deg,",
-        f"tilt {np.degrees(driven.tilt.min()):.0f} to {np.degrees(driven.tilt.max()):.0f} deg,",
-        f"flywheel {driven.flywheel.min():.1f} to {driven.flywheel.max():.1f} rad/s;",
-        f"tilt error {error:.1e} rad, J2 turned {turned:.1e}, constant omega_d {constant:.1e}",
+        f"{name}: gimbal {np.degrees(motion.gimbal.min()):.0f} to {np.degrees(motion.gimbal.max()):.0f} deg,",
+        f"tilt {np.degrees(motion.tilt.min()):.0f} to {np.degrees(motion.tilt.max()):.0f} deg,",
+        f"flywheel {motion.flywheel.min():.1f} to {motion.flywheel.max():.1f} rad/s;",
+        f"tilt error {error:.1e} rad, J2 turned {wrong_sign_error:.1e}, constant omega_d {constant:.1e}",
     )
     assert error < 1e-5
-    assert turned > 1e-3
+    assert wrong_sign_error > 1e-3
     # Hypothesis 3, with these flywheel drives, costs more than leaving out J2 would, and less than 2 degrees.
-    assert turned / 2.0 < constant < 0.035
+    assert wrong_sign_error / 2.0 < constant < 0.035
 
 
 # --- linearised ---------------------------------------------------------------------------------------------
@@ -175,12 +175,12 @@ def test_linearisation_is_the_slope_of_the_full_model(model: str) -> None:
     directions = np.zeros((3, 2 * n))
     directions[0, plant.tilt] = 1.0
     directions[1, n + plant.tilt] = 1.0
-    for module in plant.modules:
+    for module in plant.axis.modules:
         directions[2, n + module.gimbal] = module.direction
     rows = np.concatenate([qpos, qvel]) + h * np.stack([directions, -directions], axis=1).reshape(6, 2 * n)
-    forward = states(passive(plant), rows[:, :n], rows[:, n:])
-    ahead, behind = np.array([data.qacc[plant.tilt] for data in forward]).reshape(3, 2).T
-    slopes = (ahead - behind) / (2.0 * h)
+    data_at = states(passive(plant), rows[:, :n], rows[:, n:])
+    plus, minus = np.array([data.qacc[plant.tilt] for data in data_at]).reshape(3, 2).T
+    slopes = (plus - minus) / (2.0 * h)
 
     reduced = plant.reduced
     expected = np.array([reduced.A[1, 0], reduced.A[1, 1], reduced.B[1, 0]])

@@ -26,16 +26,16 @@ from tests.plant import paper_model as paper
 KP, KV = 60.0, 1.1
 
 
-def edited(where: Path, file: str, *changes: tuple[str, str]) -> Path:
+def edit(target: Path, file: str, *changes: tuple[str, str]) -> Path:
     """The scissored pair with one of its files changed."""
     for path in folder("models").glob("*.xml"):
-        shutil.copy(path, where)
-    text = (where / file).read_text()
-    for pattern, by in changes:
-        text, times = re.subn(pattern, by, text)
+        shutil.copy(path, target)
+    text = (target / file).read_text()
+    for pattern, replacement in changes:
+        text, times = re.subn(pattern, replacement, text)
         assert times, pattern
-    (where / file).write_text(text)
-    return where / "scissored_pair.xml"
+    (target / file).write_text(text)
+    return target / "scissored_pair.xml"
 
 
 def run(*settings: str) -> Trajectory:
@@ -54,20 +54,20 @@ def assert_same(by_setting: Trajectory, by_file: Trajectory) -> None:
 
 
 def test_a_servo_by_settings_is_that_of_a_file(tmp_path: Path) -> None:
-    path = edited(tmp_path, "cube.xml", ('kp="85.6" kv="0.731"', f'kp="{KP}" kv="{KV}"'))
+    path = edit(tmp_path, "cube.xml", ('kp="85.6" kv="0.731"', f'kp="{KP}" kv="{KV}"'))
     by_setting = run(f"plant.servo_stiffness_n_m_rad={KP}", f"plant.servo_damping_n_m_s_rad={KV}")
     assert_same(by_setting, run(f"plant.model={path}"))
     assert not np.array_equal(by_setting["x1_rad"], run()["x1_rad"])
 
 
 def servo_torques(plant: Plant, error: float, rate: float) -> list[float]:
-    """Of both servos with the setpoint ahead of the gimbal, which turns [N m]."""
+    """Return the torques of both servos with the setpoint ahead of the gimbal, which turns [N m]."""
     data = plant.new_data()
-    for i, module in enumerate(plant.modules):
+    for i, module in enumerate(plant.axis.modules):
         data.act[i] = data.qpos[module.gimbal] + error
         data.qvel[module.gimbal] = rate
     mujoco.mj_forward(plant.model, data)
-    return [float(data.qfrc_actuator[module.gimbal]) for module in plant.modules]
+    return [float(data.qfrc_actuator[module.gimbal]) for module in plant.axis.modules]
 
 
 @pytest.mark.parametrize("arguments", [{}, {"kp": KP}, {"kv": KV}, {"kp": KP, "kv": KV}])
@@ -80,14 +80,14 @@ def test_a_servos_torque_is_stiffness_times_error_less_damping_times_rate(argume
 
 
 def test_with_a_gear_they_count_at_the_joint(tmp_path: Path) -> None:
-    path = edited(tmp_path, "cube.xml", ('(name="gimbal_servo")', r'\1 gear="2"'))
+    path = edit(tmp_path, "cube.xml", ('(name="gimbal_servo")', r'\1 gear="2"'))
     plant = load_plant(model=str(path), servo_stiffness_n_m_rad=KP, servo_damping_n_m_s_rad=KV)
     data = plant.new_data()
-    for i, module in enumerate(plant.modules):
+    for i, module in enumerate(plant.axis.modules):
         data.act[i] = 2.0 * (data.qpos[module.gimbal] + 0.02)  # what the servo sees of a turn
         data.qvel[module.gimbal] = 0.3
     mujoco.mj_forward(plant.model, data)
-    assert data.qfrc_actuator[plant.modules[0].gimbal] == pytest.approx(KP * 0.02 - KV * 0.3, rel=1e-12)
+    assert data.qfrc_actuator[plant.axis.modules[0].gimbal] == pytest.approx(KP * 0.02 - KV * 0.3, rel=1e-12)
 
 
 def test_a_stiffer_servo_gets_a_smaller_step() -> None:
@@ -100,7 +100,7 @@ def test_a_stiffer_servo_gets_a_smaller_step() -> None:
 
 @pytest.mark.parametrize("servo", ['<velocity name="gimbal_servo" joint="gimbal" kv="0.7"/>'])
 def test_a_servo_of_another_kind_has_no_stiffness(servo: str, tmp_path: Path) -> None:
-    path = edited(tmp_path, "scissored_pair.xml", (r'act="[^"]*" ', ""))
+    path = edit(tmp_path, "scissored_pair.xml", (r'act="[^"]*" ', ""))
     text = (tmp_path / "cube.xml").read_text()
     (tmp_path / "cube.xml").write_text(re.sub(r"<intvelocity[^>]*/>", servo, text))
     for name in ("servo_stiffness_n_m_rad", "servo_damping_n_m_s_rad"):
@@ -114,7 +114,7 @@ def test_a_servo_of_another_kind_has_no_stiffness(servo: str, tmp_path: Path) ->
 
 
 def test_flywheels_by_a_setting_are_those_of_a_file(tmp_path: Path) -> None:
-    path = edited(tmp_path, "scissored_pair.xml", (r"\b314\b", "200"))
+    path = edit(tmp_path, "scissored_pair.xml", (r"\b314\b", "200"))
     by_setting = run("plant.flywheel_speed_rad_s=200", "controller.lqr.state_cost=[100.0,1.0,1.0,0.1]")
     assert_same(by_setting, run(f"plant.model={path}", "controller.lqr.state_cost=[100.0,1.0,1.0,0.1]"))
 
@@ -124,19 +124,20 @@ def test_the_momentum_is_inertia_times_speed(model: str) -> None:
     """Turned a quarter back, a wheel spins about the tilt axis: its share of the angular momentum there is J w."""
     J_d, speed = paper.J_d, 123.0
     plant = load_plant(model=model, flywheel_speed_rad_s=speed)
-    assert [abs(module.speed) for module in plant.modules] == [speed] * len(plant.modules)
+    assert [abs(module.speed) for module in plant.axis.modules] == [speed] * len(plant.axis.modules)
     assert plant.reduced.omega_d == pytest.approx(speed, rel=1e-12)
     assert plant.reduced.J_d * plant.reduced.omega_d == pytest.approx(J_d * speed, rel=1e-12)
-    as_filed = load_plant(model=model)
-    assert [module.direction for module in plant.modules] == [module.direction for module in as_filed.modules]
-    assert replace(plant.reduced, omega_d=as_filed.reduced.omega_d) == as_filed.reduced
+    default_plant = load_plant(model=model)
+    directions = [[module.direction for module in rig.axis.modules] for rig in (plant, default_plant)]
+    assert directions[0] == directions[1]
+    assert replace(plant.reduced, omega_d=default_plant.reduced.omega_d) == default_plant.reduced
     data = plant.new_data()
-    for module in plant.modules:
+    for module in plant.axis.modules:
         data.qpos[module.gimbal] = module.gimbal_zero - module.direction * math.pi / 2.0
     mujoco.mj_forward(plant.model, data)
     mujoco.mj_subtreeVel(plant.model, data)
-    momentum = data.subtree_angmom[plant.frame] @ data.xaxis[plant.tilt]
-    assert momentum == pytest.approx(len(plant.modules) * J_d * speed, rel=1e-12)
+    momentum = data.subtree_angmom[plant.axis.frame] @ data.xaxis[plant.tilt]
+    assert momentum == pytest.approx(len(plant.axis.modules) * J_d * speed, rel=1e-12)
 
 
 def test_a_gimbals_rate_turns_that_much_momentum() -> None:
@@ -145,7 +146,7 @@ def test_a_gimbals_rate_turns_that_much_momentum() -> None:
     for speed in (157.0, 314.0):
         plant = load_plant(equilibrium_bias_deg=0.0, initial_tilt_deg=0.0, flywheel_speed_rad_s=speed)
         data = plant.new_data()
-        for module in plant.modules:
+        for module in plant.axis.modules:
             data.qvel[module.gimbal] = 0.5 * module.direction
         mujoco.mj_forward(plant.model, data)
         torques.append(-float(data.qfrc_bias[plant.tilt]))
@@ -164,13 +165,13 @@ def test_changed_back_it_is_the_rig_it_was() -> None:
     plant = load_plant()
     slow = plant.changed(PlantSettings(flywheel_speed_rad_s=100.0))
     back = slow.changed(PlantSettings())
-    assert (back.modules, back.reduced) == (plant.modules, plant.reduced)
+    assert (back.axis.modules, back.reduced) == (plant.axis.modules, plant.reduced)
     assert slow.reduced.omega_d == pytest.approx(100.0)
     np.testing.assert_array_equal(back.model.key_qvel, plant.model.key_qvel)
 
 
 def test_a_motor_that_takes_no_such_speed(tmp_path: Path) -> None:
-    path = edited(tmp_path, "cube.xml", ('(name="flywheel_motor")', r'\1 ctrllimited="true" ctrlrange="-400 400"'))
+    path = edit(tmp_path, "cube.xml", ('(name="flywheel_motor")', r'\1 ctrllimited="true" ctrlrange="-400 400"'))
     assert load_plant(model=str(path), flywheel_speed_rad_s=400.0)
     complaint = r"plant\.flywheel_speed_rad_s = 401: .*'cube1/flywheel_motor' takes only -400 to 400 rad/s"
     with pytest.raises(InputError, match=complaint):
@@ -182,22 +183,22 @@ def test_a_motor_that_takes_no_such_speed(tmp_path: Path) -> None:
 INNER, OUTER = 0.05, 0.25
 
 
-def moved_sites(where: Path) -> Path:
+def move_sites(target: Path) -> Path:
     """The file with its accelerometers on the diagonal of x and z at other distances."""
 
-    def site(which: str, radius: float) -> tuple[str, str]:
-        at = radius / math.sqrt(2.0)
-        return rf'(name="accelerometer_{which}" pos=)"[^"]*"', rf'\1"{at!r} 0 {at!r}"'
+    def site(name: str, radius: float) -> tuple[str, str]:
+        coordinate = radius / math.sqrt(2.0)
+        return rf'(name="accelerometer_{name}" pos=)"[^"]*"', rf'\1"{coordinate!r} 0 {coordinate!r}"'
 
-    return edited(where, "scissored_pair.xml", site("inner", INNER), site("outer", OUTER))
+    return edit(target, "scissored_pair.xml", site("inner", INNER), site("outer", OUTER))
 
 
 def test_accelerometers_by_settings_are_those_of_a_file(tmp_path: Path) -> None:
-    path = moved_sites(tmp_path)
+    path = move_sites(tmp_path)
     plant = load_plant(accelerometer_inner_m=INNER, accelerometer_outer_m=OUTER)
-    filed = load_plant(model=str(path))
+    file_plant = load_plant(model=str(path))
     assert plant.radial_tilt == RadialTilt(INNER, OUTER)
-    for model, other in ((plant.model, filed.model), (plant.drawn_model, filed.drawn_model)):
+    for model, other in ((plant.model, file_plant.model), (plant.drawn_model, file_plant.drawn_model)):
         np.testing.assert_allclose(model.site_pos, other.site_pos, rtol=0.0, atol=1e-15)
     by_setting = run(f"plant.accelerometer_inner_m={INNER}", f"plant.accelerometer_outer_m={OUTER}")
     np.testing.assert_allclose(by_setting["y1_rad"], run(f"plant.model={path}")["y1_rad"], rtol=0.0, atol=1e-9)
@@ -218,10 +219,11 @@ def test_what_they_feel_of_a_turn_grows_with_the_distance() -> None:
 
 
 def test_one_of_them_alone() -> None:
-    filed = load_plant().radial_tilt
-    assert load_plant(accelerometer_outer_m=OUTER).radial_tilt == RadialTilt(filed.r_inner, OUTER)
+    radial_tilt = load_plant().radial_tilt
+    assert load_plant(accelerometer_outer_m=OUTER).radial_tilt == RadialTilt(radial_tilt.r_inner, OUTER)
     assert (
-        load_plant().changed(PlantSettings(accelerometer_inner_m=INNER)).changed(PlantSettings()).radial_tilt == filed
+        load_plant().changed(PlantSettings(accelerometer_inner_m=INNER)).changed(PlantSettings()).radial_tilt
+        == radial_tilt
     )
 
 
@@ -241,7 +243,7 @@ def test_the_inner_one_is_the_inner_one(arguments: tuple, complaint: str) -> Non
 
 # --- all of them ----------------------------------------------------------------------------------------------
 
-GIVEN: dict[str, Any] = {
+SETTINGS: dict[str, Any] = {
     "servo_stiffness_n_m_rad": KP,
     "servo_damping_n_m_s_rad": 0.0,
     "flywheel_speed_rad_s": 250.0,
@@ -251,9 +253,9 @@ GIVEN: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("name", GIVEN)
+@pytest.mark.parametrize("name", SETTINGS)
 def test_it_stands_in_the_resolved_scenario(name: str) -> None:
-    experiment = prepare(load_scenario("push_recovery", [f"plant.{name}={GIVEN[name]}"]))
-    assert experiment.resolved()["plant"][name] == GIVEN[name]
-    assert experiment.differences[f"plant.{name}"] == GIVEN[name]
+    experiment = prepare(load_scenario("push_recovery", [f"plant.{name}={SETTINGS[name]}"]))
+    assert experiment.resolved()["plant"][name] == SETTINGS[name]
+    assert experiment.differences[f"plant.{name}"] == SETTINGS[name]
     assert not prepare(load_scenario("push_recovery")).resolved()["plant"].get(name)

@@ -12,7 +12,7 @@ import pytest
 
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.visualization.recording.replay_recording import MAIN
-from tests.command import ROOT, Said, cmg_mj
+from tests.command import ROOT, CommandOutcome, cmg_mj
 from tests.replay.logs.motion import COLUMNS, sine, write_csv
 
 LOG = ROOT / "examples" / "data" / "stepper_encoder_gyro.csv"
@@ -26,7 +26,7 @@ def _logs(elsewhere: None) -> None:
     write_csv("sine.csv", sine())
 
 
-def replay(*arguments: object) -> Said:
+def replay(*arguments: object) -> CommandOutcome:
     return cmg_mj("replay", *arguments)
 
 
@@ -38,11 +38,11 @@ def files(folder: Path | str) -> list[str]:
 def test_the_real_log() -> None:
     """Its gyro comes 12 ms behind and is 1.5 % too small, says its .txt; a difference is half a sample late,
     of which the 0.1 ms that --delay leaves go."""
-    as_it_is = json.loads(replay(LOG, "--columns", REAL, "--observers", "linear", "--json").out)["logs"][0]
-    assert as_it_is["reference"]["lag_s"] == pytest.approx(0.012, abs=2e-4)
-    assert as_it_is["reference"]["scale"] == pytest.approx(1.015, abs=2e-3)
-    said = replay(LOG, "--columns", REAL, "--delay", 0.012, "--scale", "rate=1.015", "--json")
-    (log,) = json.loads(said.out)["logs"]
+    raw_log = json.loads(replay(LOG, "--columns", REAL, "--observers", "linear", "--json").out)["logs"][0]
+    assert raw_log["reference"]["lag_s"] == pytest.approx(0.012, abs=2e-4)
+    assert raw_log["reference"]["scale"] == pytest.approx(1.015, abs=2e-3)
+    outcome = replay(LOG, "--columns", REAL, "--delay", 0.012, "--scale", "rate=1.015", "--json")
+    (log,) = json.loads(outcome.out)["logs"]
     assert log["observers"]["finite_difference"]["lag_s"] == pytest.approx(0.0050 - 0.0001, abs=5e-5)
     assert 0.75 < log["observers"]["finite_difference"]["velocity_fit"] < 0.8
     assert 0.02 < log["observers"]["linear"]["lag_s"] < 0.03
@@ -53,9 +53,9 @@ def test_the_real_log() -> None:
 
 @pytest.mark.slow
 def test_what_it_writes() -> None:
-    said = replay("sine.csv", "--columns", PLAIN, "--out", "it")
-    assert said.status == 0
-    assert "Open the recording: rerun it/recording.rrd" in said.err
+    outcome = replay("sine.csv", "--columns", PLAIN, "--out", "it")
+    assert outcome.status == 0
+    assert "Open the recording: rerun it/recording.rrd" in outcome.err
     assert files("it") == FILES
     assert (Path("it") / "plot.png").read_bytes()[:4] == b"\x89PNG"
     summary = json.loads((Path("it") / "summary.json").read_text())
@@ -68,6 +68,7 @@ def test_what_it_writes() -> None:
 def test_its_recording() -> None:
     from rerun.chunk import RrdReader
 
+    write_csv("sine.csv", {name: values[:1000] for name, values in sine().items()})
     replay("sine.csv", "--columns", PLAIN, "--out", "it", "--observers", "linear")
     entities = {str(chunk.entity_path) for chunk in RrdReader("it/recording.rrd").stream()}
     assert {"/sine/tilt/measured", "/sine/rate/true", "/sine/rate_estimate/linear", "/summary", "/settings"} <= entities
@@ -76,9 +77,9 @@ def test_its_recording() -> None:
 
 @pytest.mark.slow
 def test_the_same_replay_goes_to_the_same_folder() -> None:
-    for wanted in ("runs/replay-sine", "runs/replay-sine", "runs/replay-sine-2"):
-        settle = ("--settle-s", "0.5") if wanted.endswith("2") else ()
-        assert f"Written to {wanted}." in replay("sine.csv", "--columns", PLAIN, *settle).err
+    for folder in ("runs/replay-sine", "runs/replay-sine", "runs/replay-sine-2"):
+        settle = ("--settle-s", "0.5") if folder.endswith("2") else ()
+        assert f"Written to {folder}." in replay("sine.csv", "--columns", PLAIN, *settle).err
 
 
 @pytest.mark.slow
@@ -86,13 +87,13 @@ def test_several_logs() -> None:
     half = {name: values[:2000] for name, values in sine().items()}
     os.mkdir("other")
     write_csv("other/sine.csv", half)
-    said = replay("sine.csv", "other/sine.csv", "--columns", PLAIN, "--out", "it", "--json", "--observers", "linear")
-    found = json.loads(said.out)
-    assert [log["samples"] for log in found["logs"]] == [4000, 2000]
-    each = [log["observers"]["linear"]["velocity_rms_error_rad_s"] for log in found["logs"]]
-    mean = found["mean"]["linear"]["velocity_rms_error_rad_s"]
-    assert mean["mean"] == pytest.approx(np.mean(each))
-    assert mean["interval"][0] <= min(each)
+    outcome = replay("sine.csv", "other/sine.csv", "--columns", PLAIN, "--out", "it", "--json", "--observers", "linear")
+    result = json.loads(outcome.out)
+    assert [log["samples"] for log in result["logs"]] == [4000, 2000]
+    errors = [log["observers"]["linear"]["velocity_rms_error_rad_s"] for log in result["logs"]]
+    mean = result["mean"]["linear"]["velocity_rms_error_rad_s"]
+    assert mean["mean"] == pytest.approx(np.mean(errors))
+    assert mean["interval"][0] <= min(errors)
     assert files("it") == [
         "plot-sine-2.png",
         "plot-sine.png",
@@ -116,7 +117,7 @@ def test_markdown_and_table_say_the_same() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "message"),
     [
         ((), "say which columns are what"),
         (("--columns", "tilt=tilt_rad"), "no time"),
@@ -146,31 +147,31 @@ def test_markdown_and_table_say_the_same() -> None:
         (("--columns", PLAIN, "--out", ""), "name a folder"),
     ],
 )
-def test_wrong_arguments(arguments: tuple, says: str) -> None:
-    assert says in replay("sine.csv", *arguments).complaint
+def test_wrong_arguments(arguments: tuple, message: str) -> None:
+    assert message in replay("sine.csv", *arguments).complaint
     assert not Path("runs").exists()
 
 
 @pytest.mark.slow
 def test_a_window_of_ones_own() -> None:
-    said = replay("sine.csv", "--columns", PLAIN, "--window", "2:4", "--json", "--observers", "linear")
-    figures = json.loads(said.out)["logs"][0]["observers"]["linear"]
+    outcome = replay("sine.csv", "--columns", PLAIN, "--window", "2:4", "--json", "--observers", "linear")
+    figures = json.loads(outcome.out)["logs"][0]["observers"]["linear"]
     assert figures["velocity_rms_error_push_rad_s"] == pytest.approx(figures["velocity_rms_error_rad_s"], rel=1e-2)
 
 
 def test_tune_on_a_log() -> None:
-    """Of a sine without noise the smallest time constant is the best; fitted on one part, scored on the other."""
+    """For a sine without noise the smallest time constant is the best; fitted on one part, scored on the other."""
     arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
-    said = cmg_mj("tune-log", *arguments, "--split", "0.3", "--json", "--out", "it")
-    found = json.loads(said.out)
-    assert found["parameters"]["tau"] == pytest.approx(0.004, rel=0.01)
-    assert found["at_a_limit"] == ["tau"]
-    assert (found["split"], found["held_out_stretches"], found["verdict"]) == (0.3, 10, "better")
+    outcome = cmg_mj("tune-log", *arguments, "--split", "0.3", "--json", "--out", "it")
+    result = json.loads(outcome.out)
+    assert result["parameters"]["tau"] == pytest.approx(0.004, rel=0.01)
+    assert result["at_a_limit"] == ["tau"]
+    assert (result["split"], result["held_out_stretches"], result["verdict"]) == (0.3, 10, "better")
     assert files("it") == ["tuned.json"]
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "message"),
     [
         (("sine.csv", "--columns", PLAIN), "Missing option '--observer'"),
         (("sine.csv", "--columns", "time=t_s,tilt=tilt_rad", "--observer", "linear"), "no reference to tune to"),
@@ -182,8 +183,8 @@ def test_tune_on_a_log() -> None:
         ((), "Missing argument 'LOG...'"),
     ],
 )
-def test_wrong_tuning(arguments: tuple, says: str) -> None:
-    assert says in cmg_mj("tune-log", *arguments).complaint
+def test_wrong_tuning(arguments: tuple, message: str) -> None:
+    assert message in cmg_mj("tune-log", *arguments).complaint
 
 
 def test_a_real_log_has_its_licence_beside_it() -> None:
@@ -201,8 +202,8 @@ def test_of_the_reference_it_says_what_matters() -> None:
     assert "(beyond what was set; to take it out: --delay -0.01" in " ".join(late.split())
     real = " ".join(replay(LOG, "--columns", REAL, "--observers", "linear").out.split())
     assert "12.10 ms behind; 1.0157 times it plus 0.0007 rad/s fits (to take it out: --delay 0.0121)." in real
-    other = dict(sine(), gyro_rad_s=np.random.default_rng(0).standard_normal(4000))
-    write_csv("other.csv", other)
+    unlike_log = dict(sine(), gyro_rad_s=np.random.default_rng(0).standard_normal(4000))
+    write_csv("other.csv", unlike_log)
     assert "is it the rate of this tilt?\n" in replay("other.csv", "--columns", PLAIN, "--observers", "linear").out
 
 
@@ -214,7 +215,7 @@ def test_one_empty_line_at_a_time() -> None:
     for text in (alone, two):
         lines = [line.strip() for line in text.strip().splitlines()]
         assert "" in lines
-        assert all(line or after for line, after in pairwise(lines))
+        assert all(line or next_line for line, next_line in pairwise(lines))
 
 
 def test_the_same_log_twice() -> None:
@@ -226,14 +227,14 @@ def test_the_same_log_twice() -> None:
 
 
 def test_its_help_has_its_examples_on_lines_of_their_own() -> None:
-    said = replay("--help").out
-    assert "\\b" not in said
-    assert "\n    cmg-mj replay runs/push_recovery-homogeneous-0\n" in said
+    output = replay("--help").out
+    assert "\\b" not in output
+    assert "\n    cmg-mj replay runs/push_recovery-homogeneous-0\n" in output
 
 
 @pytest.mark.slow
 def test_what_was_tuned_can_be_replayed() -> None:
     arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
-    said = " ".join(cmg_mj("tune-log", *arguments, "--out", "it").err.split())
-    assert "Replay it tuned: --set 'linear.tau=0.004'" in said
+    output = " ".join(cmg_mj("tune-log", *arguments, "--out", "it").err.split())
+    assert "Replay it tuned: --set 'linear.tau=0.004'" in output
     assert replay("sine.csv", "--columns", PLAIN, "--set", "linear.tau=0.004").status == 0

@@ -23,7 +23,7 @@ def experiment() -> Experiment:
 
 
 @cache
-def recorded(worlds: int | None) -> Trajectory:
+def record(worlds: int | None) -> Trajectory:
     result: Result = experiment().run() if worlds is None else experiment().run_many(worlds)
     assert result.trajectory is not None
     return result.trajectory
@@ -34,22 +34,22 @@ def recorded(worlds: int | None) -> Trajectory:
 def test_replay_is_bitwise_what_the_run_recorded(name: str, worlds: int | None) -> None:
     controller = experiment().axis_controller()
     observer = controller.open_loop_observers.get(name, controller.observer)
-    estimate = replay(observer, recorded(worlds))
+    estimate = replay(observer, record(worlds))
     for column, value in zip(("x1_rad", "x2_rad_s", "x3_rad"), estimate, strict=True):
-        original = recorded(worlds)[f"estimate/{name}/{column}"]
+        original = record(worlds)[f"estimate/{name}/{column}"]
         assert value.shape == original.shape
         np.testing.assert_array_equal(value, original)
 
 
 def test_replay_knows_what_it_is_fed_with() -> None:
     """Another command gives another estimate: the comparison above is not an empty one."""
-    moved = Trajectory({**recorded(3).columns, "u_rad_s": recorded(3)["u_rad_s"] + 0.1})
-    of = experiment().axis_controller().observer
-    assert np.abs(replay(of, moved).x2 - replay(of, recorded(3)).x2).max() > 1e-3
+    other_trajectory = Trajectory({**record(3).columns, "u_rad_s": record(3)["u_rad_s"] + 0.1})
+    estimator = experiment().axis_controller().observer
+    assert np.abs(replay(estimator, other_trajectory).x2 - replay(estimator, record(3)).x2).max() > 1e-3
 
 
 def test_it_starts_at_the_first_row_it_is_given() -> None:
-    part = recorded(3).between(0.2, 0.6)
+    part = record(3).between(0.2, 0.6)
     assert part["time_s"][0] == pytest.approx(0.2)
     assert part["time_s"][-1] == pytest.approx(0.6)
     assert len(part) == 81
@@ -60,18 +60,18 @@ def test_it_starts_at_the_first_row_it_is_given() -> None:
 
 
 def test_some_worlds_of_many() -> None:
-    chosen = recorded(3).of_worlds(np.array([True, False, True]))
-    np.testing.assert_array_equal(chosen["y1_rad"], recorded(3)["y1_rad"][:, [0, 2]])
-    np.testing.assert_array_equal(chosen["time_s"], recorded(3)["time_s"])
+    selection = record(3).of_worlds(np.array([True, False, True]))
+    np.testing.assert_array_equal(selection["y1_rad"], record(3)["y1_rad"][:, [0, 2]])
+    np.testing.assert_array_equal(selection["time_s"], record(3)["time_s"])
 
 
 def test_a_world_that_fell_is_nan_from_there_and_leaves_the_others_alone() -> None:
-    columns = {name: values.copy() for name, values in recorded(3).columns.items()}
+    columns = {name: values.copy() for name, values in record(3).columns.items()}
     for name in columns:
         if name != "time_s":
             columns[name][50:, 1] = np.nan
-    of = experiment().axis_controller().observer
-    rate, whole = replay(of, Trajectory(columns)).x2, replay(of, recorded(3)).x2
+    estimator = experiment().axis_controller().observer
+    rate, full_rate = replay(estimator, Trajectory(columns)).x2, replay(estimator, record(3)).x2
     assert np.isnan(rate[50:, 1]).all()
-    np.testing.assert_array_equal(rate[:50, 1], whole[:50, 1])
-    np.testing.assert_array_equal(rate[:, [0, 2]], whole[:, [0, 2]])
+    np.testing.assert_array_equal(rate[:50, 1], full_rate[:50, 1])
+    np.testing.assert_array_equal(rate[:, [0, 2]], full_rate[:, [0, 2]])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
-from cmg_mj.observers import OBSERVERS, Estimate, Measurement, make_observer, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement, make_observer
 from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import NO_MODEL, replay_log
 from cmg_mj.replay.logs import Log, ReadOptions, read_log
@@ -48,98 +48,107 @@ def log(tmp_path: Path, **more: np.ndarray) -> Log:
 
 def test_a_run_replays_to_its_figures(run: Path) -> None:
     """Estimates bit for bit, of the loop's observer (whose k1 is not the default) and of every open-loop observer."""
-    replayed = replay_prepared(read_log(run))
+    result = replay_prepared(read_log(run))
     summary = json.loads((run / "summary.json").read_text())
-    kept = Trajectory.load(run / "trajectory.parquet")
-    assert replayed.left_out == {}
-    assert set(replayed.estimates) == set(OBSERVERS)
-    for name, figures in replayed.summaries.items():
-        of = summary if name == "homogeneous" else {**summary["open_loop_observers"], **summary["references"]}[name]
+    trajectory = Trajectory.load(run / "trajectory.parquet")
+    assert result.left_out == {}
+    assert set(result.estimates) == set(OBSERVERS)
+    for name, figures in result.summaries.items():
+        expected = (
+            summary if name == "homogeneous" else {**summary["open_loop_observers"], **summary["references"]}[name]
+        )
         for key in KEYS:
-            assert figures[key] == pytest.approx(of[key], rel=1e-12, abs=1e-13), (name, key)
-        for signal, values in replayed.estimates.get(name, {}).items():
-            np.testing.assert_array_equal(values, kept[f"estimate/{name}/{signal}"])
+            assert figures[key] == pytest.approx(expected[key], rel=1e-12, abs=1e-13), (name, key)
+        for signal, values in result.estimates.get(name, {}).items():
+            np.testing.assert_array_equal(values, trajectory[f"estimate/{name}/{signal}"])
 
 
 def test_a_runs_file_is_the_same_as_its_folder(run: Path) -> None:
-    whole, file = read_log(run), read_log(run / "trajectory.parquet")
-    np.testing.assert_array_equal(whole["y1_rad"], file["y1_rad"])
-    assert whole.name == file.name == "a-run"
+    folder, file = read_log(run), read_log(run / "trajectory.parquet")
+    np.testing.assert_array_equal(folder["y1_rad"], file["y1_rad"])
+    assert folder.name == file.name == "a-run"
 
 
 def test_a_runs_parameters_model_and_noise_can_be_changed(run: Path) -> None:
-    recorded = read_log(run)
-    as_it_was = replay_prepared(recorded, ["homogeneous", "gyro_free"])
-    other = {"homogeneous": {"alpha": 0.9}}
-    changed = replay_prepared(recorded, ["homogeneous", "gyro_free"], parameters=other, noises={"tilt": 1.0})
+    run_log = read_log(run)
+    original = replay_prepared(run_log, ["homogeneous", "gyro_free"])
+    parameters = {"homogeneous": {"alpha": 0.9}}
+    changed = replay_prepared(run_log, ["homogeneous", "gyro_free"], parameters=parameters, noises={"tilt": 1.0})
     for name in ("homogeneous", "gyro_free"):
-        assert np.abs(changed.estimates[name]["x2_rad_s"] - as_it_was.estimates[name]["x2_rad_s"]).max() > 1e-3
+        assert np.abs(changed.estimates[name]["x2_rad_s"] - original.estimates[name]["x2_rad_s"]).max() > 1e-3
 
 
 def test_a_runs_recording_as_any_parquet(run: Path) -> None:
     """With --columns it is a log like others: the same estimates of those that need no more."""
     path = run / "trajectory.parquet"
     plain = read_log(path, ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
-    replayed = replay_log(plain, ["linear"], settle_s=0.0)
-    kept = Trajectory.load(path)["estimate/linear/x2_rad_s"]
-    np.testing.assert_allclose(replayed.estimates["linear"]["x2_rad_s"], kept, atol=1e-9)
+    result = replay_log(plain, ["linear"], settle_s=0.0)
+    trajectory = Trajectory.load(path)["estimate/linear/x2_rad_s"]
+    np.testing.assert_allclose(result.estimates["linear"]["x2_rad_s"], trajectory, atol=1e-9)
 
 
 @pytest.mark.slow
 def test_who_takes_part(tmp_path: Path) -> None:
-    """What an observer needs and what is there decide, for every combination."""
+    """The observer's needs and the log's signals decide, for every combination."""
     plain = log(tmp_path)
     t = DT * np.arange(N)
     gimbals = {"gimbal_rad": 0.01 * t, "command_rad_s": 0.01 + 0.0 * t}
-    for more, has in (
+    for more, signals in (
         ({}, set()),
         (gimbals, {"gimbals"}),
         ({"acceleration_rad_s2": -sine()["tilt_rad"]}, {"acceleration"}),
     ):
         one = log(tmp_path, **more)
         for model in (None, PAPER):
-            there = has | ({"model"} if model else set())
-            replayed = replay_log(one, model=model)
+            inputs = signals | ({"model"} if model else set())
+            result = replay_log(one, model=model)
             for kind in OBSERVERS:
-                lacks = set(needs(observer_class(kind))) - there
-                assert (kind in replayed.left_out) == bool(lacks), kind
-                assert (kind in replayed.estimates) != bool(lacks), kind
+                missing_inputs = set(needs(OBSERVER_CLASSES.find(kind))) - inputs
+                assert (kind in result.left_out) == bool(missing_inputs), kind
+                assert (kind in result.estimates) != bool(missing_inputs), kind
     assert "needs a model (--model)" in replay_log(plain).left_out["ltv"]
 
 
 def test_of_a_pendulum_without_gimbals_the_model_alone_is_enough(tmp_path: Path) -> None:
-    hanging = model_of("inertia=0.06,gravity_torque=3.4")
-    assert hanging == ReducedModel(0.06, 0.0, 0.0, 1.0, 3.4)
-    replayed = replay_log(log(tmp_path), ["homogeneous", "high_gain", "gyro_free"], model=hanging)
-    assert set(replayed.left_out) == {"gyro_free"}
+    pendulum = model_of("inertia=0.06,gravity_torque=3.4")
+    assert pendulum == ReducedModel(0.06, 0.0, 0.0, 1.0, 3.4)
+    result = replay_log(log(tmp_path), ["homogeneous", "high_gain", "gyro_free"], model=pendulum)
+    assert set(result.left_out) == {"gyro_free"}
 
 
 def test_observers_that_need_no_model_do_not_look_at_it() -> None:
     """They are given one of NaN; whatever is made of it is no number."""
     for kind in OBSERVERS:
-        if "model" not in needs(observer_class(kind)):
+        if "model" not in needs(OBSERVER_CLASSES.find(kind)):
             observer = make_observer(kind, DT, NO_MODEL, TiltNoise(1e-3, 1.0, 0.5))
             _, estimate = observer.step(observer.init(Measurement(0.1, 0.0, 0.2)), Measurement(0.11, 0.0, 0.2), 0.0)
             assert np.isfinite(list(estimate)).all(), kind
 
 
 def test_parts_are_replayed_each_from_its_start(tmp_path: Path) -> None:
-    kept = np.ones(N, dtype=bool)
-    kept[2000:2300] = False
-    parted = read_log(write_csv(tmp_path / "p.csv", {k: v[kept] for k, v in sine().items()}), ReadOptions(COLUMNS))
+    mask = np.ones(N, dtype=bool)
+    mask[2000:2300] = False
+    log_of_parts = read_log(
+        write_csv(tmp_path / "p.csv", {k: v[mask] for k, v in sine().items()}), ReadOptions(COLUMNS)
+    )
     second = read_log(write_csv(tmp_path / "s.csv", {k: v[2300:] for k, v in sine().items()}), ReadOptions(COLUMNS))
-    both, one = replay_log(parted, ["linear"], settle_s=0.5), replay_log(second, ["linear"], settle_s=0.5)
-    np.testing.assert_array_equal(both.estimates["linear"]["x2_rad_s"][2000:], one.estimates["linear"]["x2_rad_s"])
-    assert parted.scored(0.5).sum() == 1900 + 1600
+    parts_result, second_result = (
+        replay_log(log_of_parts, ["linear"], settle_s=0.5),
+        replay_log(second, ["linear"], settle_s=0.5),
+    )
+    np.testing.assert_array_equal(
+        parts_result.estimates["linear"]["x2_rad_s"][2000:], second_result.estimates["linear"]["x2_rad_s"]
+    )
+    assert log_of_parts.scored(0.5).sum() == 1900 + 1600
 
 
 def test_one_that_is_lost_is_said_and_the_others_go_on(tmp_path: Path) -> None:
-    replayed = replay_log(
+    result = replay_log(
         log(tmp_path), ["linear", "tests.replay.test_replayed:Loses", "tests.replay.test_replayed:Raises"]
     )
-    assert set(replayed.estimates) == {"linear"}
-    assert "x2_rad_s is not finite from 0.05 s on" in replayed.left_out["tests.replay.test_replayed:Loses"]
-    assert "raised ZeroDivisionError" in replayed.left_out["tests.replay.test_replayed:Raises"]
+    assert set(result.estimates) == {"linear"}
+    assert "x2_rad_s is not finite from 0.05 s on" in result.left_out["tests.replay.test_replayed:Loses"]
+    assert "raised ZeroDivisionError" in result.left_out["tests.replay.test_replayed:Raises"]
 
 
 class Loses:
@@ -166,30 +175,30 @@ def test_noise_of_two_accelerometers_follows_from_theirs(tmp_path: Path) -> None
     assert noise_of(one).tilt == pytest.approx(np.radians(0.1))
     radial = RadialTilt(0.1, 0.3)
     for density in (1.0, 200.0):
-        found = noise_of(dataclasses.replace(one, tilt=radial), accelerometer_ug_rthz=density)
+        noise = noise_of(dataclasses.replace(one, tilt=radial), {"accelerometer": density})
         white, step = density * 1e-6 * 9.80665 * np.sqrt(100.0), 9.80665 / 16384.0
         expected = radial.noise(math.hypot(white, step / math.sqrt(12.0)), 9.80665)
-        assert found.tilt == pytest.approx(expected.tilt, rel=1e-12)
-        assert found.acceleration == pytest.approx(expected.acceleration, rel=1e-12)
-        assert found.correlation == expected.correlation
+        assert noise.tilt == pytest.approx(expected.tilt, rel=1e-12)
+        assert noise.acceleration == pytest.approx(expected.acceleration, rel=1e-12)
+        assert noise.correlation == expected.correlation
 
 
-def test_the_noise_of_a_runs_accelerometers_can_be_told(run: Path) -> None:
+def test_the_noise_of_a_runs_accelerometers_can_be_set(run: Path) -> None:
     """All else of its sensors stays: told what it had, it is the run's; of its resolution the rest."""
-    recorded, of_the_run = (
+    run_log, run_noise = (
         read_log(run),
         prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2],
     )
-    assert observer_inputs(recorded, noises={"accelerometer": 300.0}).noise == of_the_run
-    more = observer_inputs(recorded, noises={"accelerometer": 600.0}).noise
-    assert more.tilt == pytest.approx(2.0 * of_the_run.tilt, rel=1e-4)
-    assert more.gimbal == of_the_run.gimbal
+    assert observer_inputs(run_log, noises={"accelerometer": 300.0}).noise == run_noise
+    more = observer_inputs(run_log, noises={"accelerometer": 600.0}).noise
+    assert more.tilt == pytest.approx(2.0 * run_noise.tilt, rel=1e-4)
+    assert more.gimbal == run_noise.gimbal
     with pytest.raises(InputError, match="give accelerometer"):
-        observer_inputs(recorded, noises={"accelerometer": 300.0, "tilt": 0.1})
+        observer_inputs(run_log, noises={"accelerometer": 300.0, "tilt": 0.1})
 
 
 @pytest.mark.parametrize(
-    ("made", "says"),
+    ("action", "message"),
     [
         (lambda: model_of("inertia=0.06"), "--model: gravity_torque is missing: mass x gravity x height"),
         (lambda: model_of("inertia=-1,gravity_torque=3"), "must be greater than 0"),
@@ -203,10 +212,10 @@ def test_the_noise_of_a_runs_accelerometers_can_be_told(run: Path) -> None:
         (lambda: parameters_of(["homogeneous.k1=x"]), "'x' is no number"),
     ],
 )
-def test_what_cannot_be(made, says: str) -> None:
-    with pytest.raises(InputError) as caught:
-        made()
-    assert says in str(caught.value)
+def test_what_cannot_be(action, message: str) -> None:
+    with pytest.raises(InputError) as info:
+        action()
+    assert message in str(info.value)
 
 
 def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
@@ -232,44 +241,44 @@ class Silent:
         return None, Estimate(y.y1, 0.0, y.y2)
 
 
-def test_a_class_that_does_not_say_what_it_needs_is_told_how_to(tmp_path: Path) -> None:
+def test_a_class_that_does_not_say_what_it_needs_gets_a_hint(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"Silent needs a model .* does not say what it needs \(needs = \(\)\)"):
         replay_log(log(tmp_path), ["tests.replay.test_replayed:Silent"])
 
 
 def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
     """Its rig (no --model), its sensors' noise and its observer's parameters: the given error is that of a replay."""
-    recorded = read_log(run)
-    study = tune_on_logs([recorded], "homogeneous", parameters=["k1"], ranges={"k1": (22.0, 24.0)}, settle_s=0.3)
+    run_log = read_log(run)
+    study = tune_on_logs([run_log], "homogeneous", parameters=["k1"], ranges={"k1": (22.0, 24.0)}, settle_s=0.3)
     assert study.start_parameters["k1"] == 23.0
     assert study.noises == [prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]]
-    half = recorded.cut(slice(len(recorded) // 2, None))
-    study = tune_on_logs([recorded], "gyro_free", parameters=["jerk"], settle_s=0.3)
+    half = run_log.cut(slice(len(run_log) // 2, None))
+    study = tune_on_logs([run_log], "gyro_free", parameters=["jerk"], settle_s=0.3)
     error = half["reference_rad_s"] - replay_prepared(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
     stretches = np.array_split(error[half.scored(0.3)], len(study.level.given_rms))
     np.testing.assert_allclose(study.level.given_rms, [np.sqrt(np.mean(s**2)) for s in stretches], rtol=1e-9)
 
 
 def test_every_log_is_tuned_with_its_own_noise(run: Path) -> None:
-    recorded = read_log(run)
+    run_log = read_log(run)
     plain = read_log(run / "trajectory.parquet", ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
     settings = {"settle_s": 0.2, "parameters": ["tau"], "ranges": {"tau": (0.01, 0.05)}}
-    own, other = tune_on_logs([recorded, plain], "linear", **settings).noises
-    assert own == prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]
-    assert other == noise_of(plain) != own
-    for noise in tune_on_logs([recorded, plain], "linear", noises={"tilt": 0.7}, **settings).noises:
+    run_noise, plain_noise = tune_on_logs([run_log, plain], "linear", **settings).noises
+    assert run_noise == prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]
+    assert plain_noise == noise_of(plain) != run_noise
+    for noise in tune_on_logs([run_log, plain], "linear", noises={"tilt": 0.7}, **settings).noises:
         assert np.degrees(noise.tilt) == pytest.approx(0.7)
 
 
 def test_runs_with_other_parameters_are_not_tuned_together(run: Path) -> None:
-    recorded = read_log(run)
-    assert recorded.scenario is not None
-    other = dict(recorded.scenario, observer={**recorded.scenario["observer"], "k1": 21.0})
+    run_log = read_log(run)
+    assert run_log.scenario is not None
+    scenario = dict(run_log.scenario, observer={**run_log.scenario["observer"], "k1": 21.0})
     with pytest.raises(InputError, match="different parameters of homogeneous"):
-        tune_on_logs([recorded, dataclasses.replace(recorded, scenario=other)], "homogeneous", settle_s=0.2)
+        tune_on_logs([run_log, dataclasses.replace(run_log, scenario=scenario)], "homogeneous", settle_s=0.2)
 
 
-def test_of_a_run_nothing_told_is_ignored(run: Path) -> None:
+def test_options_that_change_a_runs_recording_are_refused(run: Path) -> None:
     with pytest.raises(InputError, match=r"--delay: .* is a run's own recording"):
         read_log(run, ReadOptions(delay_s=0.1))
     assert read_log(run, ReadOptions(windows_s=[(0.4, 0.6)])).windows == ((0.4, 0.6),)

@@ -18,34 +18,34 @@ from tests.observers.reference import DT, NOISE, PAPER
 WHOLE = 2000
 
 
-def with_correlated_noise(noise: TiltNoise, h: float) -> float:
+def floor_with_correlated_noise(noise: TiltNoise, h: float) -> float:
     """The same floor in another form: of z = x2 - h/2 x1'', p = x1 - h^2/6 x1'', whose noises are correlated."""
     v, n, c = noise.tilt, noise.acceleration, noise.correlation * noise.tilt * noise.acceleration
     F, C = np.array([[1.0, h], [0.0, 1.0]]), np.array([[1.0, 0.0]])
-    into, d = np.array([[-h * h], [-h]]), h * h / 6.0
-    Q, R = n * n * into @ into.T, np.array([[v * v - 2.0 * d * c + d * d * n * n]])
-    S = into * (c - d * n * n)
+    input_vector, d = np.array([[-h * h], [-h]]), h * h / 6.0
+    Q, R = n * n * input_vector @ input_vector.T, np.array([[v * v - 2.0 * d * c + d * d * n * n]])
+    S = input_vector * (c - d * n * n)
     P = solve_discrete_are(F.T, C.T, Q, R, s=S)
     # x2 = z + h/2 (a - n): what p's innovation says of z and of n.
     total = (P[0, 0] + R[0, 0]).item()
     joint = np.array([[P[1, 1], 0.0], [0.0, n * n]])
-    seen = np.array([P[0, 1], c - d * n * n])
-    left = joint - np.outer(seen, seen) / total
+    covariance = np.array([P[0, 1], c - d * n * n])
+    residual = joint - np.outer(covariance, covariance) / total
     weights = np.array([1.0, -h / 2.0])
-    return math.sqrt(weights @ left @ weights)
+    return math.sqrt(weights @ residual @ weights)
 
 
 @pytest.mark.parametrize("noise", [NOISE, TiltNoise(0.0032, 0.21, 0.2), TiltNoise(1e-4, 3.0, -0.7)])
 @pytest.mark.parametrize("dt", [0.001, 0.005, 0.05])
 def test_floor_with_acceleration_in_another_form(noise: TiltNoise, dt: float) -> None:
-    assert acceleration_floor(noise, dt) == pytest.approx(with_correlated_noise(noise, dt), rel=1e-6)
+    assert acceleration_floor(noise, dt) == pytest.approx(floor_with_correlated_noise(noise, dt), rel=1e-6)
 
 
 def test_no_noise_no_floor() -> None:
     assert acceleration_floor(TiltNoise(0.0, 0.0, 0.9), DT) == 0.0
 
 
-def accelerated(noise: TiltNoise, runs: int, ticks: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def accelerate(noise: TiltNoise, runs: int, ticks: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Any motion whose acceleration runs straight between samples: y1, measured acceleration, rate, (ticks, runs)."""
     rng = np.random.default_rng(seed)
     a = np.cumsum(rng.normal(0.0, 3.0, (ticks, runs)), axis=0)
@@ -54,15 +54,15 @@ def accelerated(noise: TiltNoise, runs: int, ticks: int, seed: int) -> tuple[np.
     rate_before = np.vstack([np.zeros((1, runs)), rate[:-1]])
     tilt = np.cumsum(DT * rate_before + DT**2 * (2.0 * before + a) / 6.0, axis=0)
     r = noise.correlation
-    n, other = rng.standard_normal((2, ticks, runs))
-    return tilt + noise.tilt * (r * n + math.sqrt(1.0 - r * r) * other), a + noise.acceleration * n, rate
+    n, noise_y1 = rng.standard_normal((2, ticks, runs))
+    return tilt + noise.tilt * (r * n + math.sqrt(1.0 - r * r) * noise_y1), a + noise.acceleration * n, rate
 
 
 def squared_errors(noise: TiltNoise) -> np.ndarray:
     """Mean square, once settled, of a filter that is told some noise, on any motion and NOISE, (runs,)."""
-    known = {"rate_start": 1.0, "bias_start": 1e-9, "bias_walk": 0.0, "jerk": 0.0}
-    estimator = make_observer("gyro_free", DT, PAPER, noise, **known)
-    y1, a, rate = accelerated(NOISE, 800, 1500, seed=4)
+    parameters = {"rate_start": 1.0, "bias_start": 1e-9, "bias_walk": 0.0, "jerk": 0.0}
+    estimator = make_observer("gyro_free", DT, PAPER, noise, **parameters)
+    y1, a, rate = accelerate(NOISE, 800, 1500, seed=4)
     zero = 0.0 * y1[0]
     state, errors = estimator.init(Measurement(y1[0], zero, a[0])), []
     for k in range(1, len(y1)):
@@ -90,7 +90,7 @@ def test_another_filter_does_not(noise: TiltNoise) -> None:
 
 
 def inputs(y1: np.ndarray, edges: list[int]) -> np.ndarray:
-    """Of each sample the sums of y1 over the shares of the past, one by one, (n_rows, n_worlds, n_taps)."""
+    """Sum y1 over the shares of the past of each sample, one by one, (n_rows, n_worlds, n_taps)."""
     past = np.vstack([np.repeat(y1[:1], edges[-1], axis=0), y1])
     shares = [
         [past[edges[-1] + k - older + 1 : edges[-1] + k - newer + 1].sum(axis=0) for newer, older in pairwise(edges)]
@@ -103,21 +103,21 @@ def test_floor_of_y1_is_the_least_squares_fit() -> None:
     """In pieces, of which one world sees the first two, against NumPy's fit of all rows."""
     rng = np.random.default_rng(5)
     y1, x2 = rng.normal(0.0, 0.01, (2, 600, 2)) + 0.02
-    counted = np.ones((600, 2), dtype=bool)
-    counted[400:, 1] = False
-    pushed = counted & (np.arange(600)[:, None] >= 100)
-    pushed[350:] = False
+    run_mask = np.ones((600, 2), dtype=bool)
+    run_mask[400:, 1] = False
+    push_mask = run_mask & (np.arange(600)[:, None] >= 100)
+    push_mask[350:] = False
     floor = TiltFloor(DT, 2)
     y1[450:, 1] = np.nan
     for k in range(0, 600, 256):
-        floor.add(*(signal[k : k + 256] for signal in (y1, x2, counted, pushed)))
-    seen = inputs(y1, floor.edges)
+        floor.add(*(signal[k : k + 256] for signal in (y1, x2, run_mask, push_mask)))
+    matrix = inputs(y1, floor.edges)
     for world in range(2):
-        for result, mask in zip(floor.errors(world), (counted, pushed), strict=True):
+        for result, mask in zip(floor.errors(world), (run_mask, push_mask), strict=True):
             rows = mask[:, world]
-            taps = np.linalg.lstsq(seen[rows, world], x2[rows, world], rcond=None)[0]
-            left = seen[rows, world] @ taps - x2[rows, world]
-            assert result == pytest.approx(math.sqrt(np.mean(left**2)), rel=1e-6)
+            taps = np.linalg.lstsq(matrix[rows, world], x2[rows, world], rcond=None)[0]
+            residual = matrix[rows, world] @ taps - x2[rows, world]
+            assert result == pytest.approx(math.sqrt(np.mean(residual**2)), rel=1e-6)
 
 
 def floors_of(y1: np.ndarray, rate: np.ndarray) -> np.ndarray:
@@ -127,36 +127,36 @@ def floors_of(y1: np.ndarray, rate: np.ndarray) -> np.ndarray:
     return np.array([floor.errors(world)[0] for world in range(rate.shape[1])], dtype=float)
 
 
-def swinging(runs: int, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
+def swing(runs: int, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
     """A tilt that white torque swings, y1 and rate (ticks, runs), and the error of the filter that knows all of it."""
     rng = np.random.default_rng(seed)
     F = expm(np.array([[0.0, 1.0], [-40.0, -8.0]]) * DT)
-    into, sigma = np.array([0.0, 0.05]), 2e-3
+    input_vector, sigma = np.array([0.0, 0.05]), 2e-3
     C = np.array([[1.0, 0.0]])
-    P = solve_discrete_are(F.T, C.T, np.outer(into, into), [[sigma**2]])
-    after = P - P @ C.T @ C @ P / (P[0, 0] + sigma**2)
+    P = solve_discrete_are(F.T, C.T, np.outer(input_vector, input_vector), [[sigma**2]])
+    covariance = P - P @ C.T @ C @ P / (P[0, 0] + sigma**2)
     # The rate of x+ = F x + into w, as a filter of w.
     poles = np.poly(np.linalg.eigvals(F))
-    responses = [into, F @ into]
+    responses = [input_vector, F @ input_vector]
     w = rng.standard_normal((WHOLE + 500, runs))
     signals = []
     for part in (0, 1):
         b = [0.0, responses[0][part], responses[1][part] + poles[1] * responses[0][part]]
         signals.append(lfilter(b, poles, w, axis=0)[500:])
     tilt, rate = signals
-    return tilt + rng.normal(0.0, sigma, tilt.shape), rate, math.sqrt(after[1, 1])
+    return tilt + rng.normal(0.0, sigma, tilt.shape), rate, math.sqrt(covariance[1, 1])
 
 
 def test_the_matched_filter_reaches_the_floor_of_y1() -> None:
-    """Of a linear system with white noise no filter is better than Kalman's, and the fit comes to within a per cent."""
-    y1, rate, best = swinging(40, seed=6)
+    """No filter is better than Kalman's on a linear system with white noise, and the fit comes to within a per cent."""
+    y1, rate, best = swing(40, seed=6)
     result = math.sqrt(np.mean(floors_of(y1, rate) ** 2))
     assert 0.98 * best < result < 1.01 * best < 0.6 * rate.std()
 
 
 def test_no_differentiator_is_below_the_floor_of_y1() -> None:
     """In no world: linear ones cannot be, if their memory is no longer."""
-    y1, rate, _ = swinging(10, seed=7)
+    y1, rate, _ = swing(10, seed=7)
     least, zero = floors_of(y1, rate), 0.0 * y1[0]
     for kind, name in (("linear", "tau"), ("linear_high_gain", "epsilon")):
         for value in np.geomspace(0.01, 0.08, 4):
@@ -175,6 +175,6 @@ def test_too_few_samples_make_no_floor() -> None:
         rows = ROWS_A_TAP * (len(floor.edges) - 1) - (not enough)
         y1, x2 = rng.standard_normal((2, rows, 1))
         floor.add(y1, x2, np.ones_like(x2, dtype=bool), np.zeros_like(x2, dtype=bool))
-        whole, pushed = floor.errors(0)
-        assert (whole is not None) == enough
-        assert pushed is None
+        run_floor, push_floor = floor.errors(0)
+        assert (run_floor is not None) == enough
+        assert push_floor is None

@@ -19,8 +19,8 @@ def test_mean_interval_is_scipys() -> None:
 
 def test_mean_interval_covers_the_mean_in_95_percent_of_samples() -> None:
     rng = np.random.default_rng(1)
-    hits = [low <= 3.0 <= high for _, low, high in (mean_interval(rng.normal(3.0, 2.0, 6)) for _ in range(2000))]
-    assert stats.binomtest(sum(hits), len(hits), 0.95).pvalue > 1e-3
+    coverage = [low <= 3.0 <= high for _, low, high in (mean_interval(rng.normal(3.0, 2.0, 6)) for _ in range(2000))]
+    assert stats.binomtest(sum(coverage), len(coverage), 0.95).pvalue > 1e-3
 
 
 TIMES = 10_000
@@ -28,7 +28,7 @@ TIMES = 10_000
 
 
 def share_that_holds(mean: float, samples: np.ndarray) -> float:
-    """Of the samples, (n_samples, n_worlds), how many have the mean in their interval."""
+    """Return the share of the samples, (n_samples, n_worlds), that have the mean in their interval."""
     result = [known_interval(values) for values in samples]
     return float(np.mean([interval is not None and interval.low <= mean <= interval.high for interval in result]))
 
@@ -65,13 +65,13 @@ def test_paired_differences_cover_and_are_narrower() -> None:
 @pytest.mark.parametrize("share", [0.05, 0.2, 0.5])
 def test_the_share_of_falls_is_covered(share: float, worlds: int) -> None:
     """Wilson's interval: exactly, by the probability of every count, and in 10,000 samples."""
-    low, high = np.array([fell_interval(fell, worlds)[1:] for fell in range(worlds + 1)]).T
-    covers = (low <= share) & (share <= high)
-    exactly = stats.binom.pmf(np.arange(worlds + 1), worlds, share)[covers].sum()
+    low, high = np.array([fell_interval(n_fallen, worlds)[1:] for n_fallen in range(worlds + 1)]).T
+    is_covered = (low <= share) & (share <= high)
+    exactly = stats.binom.pmf(np.arange(worlds + 1), worlds, share)[is_covered].sum()
     assert 0.925 <= exactly <= 0.975
-    fell = np.random.default_rng(9).binomial(worlds, share, TIMES)
-    assert 0.925 <= covers[fell].mean() <= 0.975
-    assert covers[fell].mean() == pytest.approx(exactly, abs=0.01)
+    n_fallen = np.random.default_rng(9).binomial(worlds, share, TIMES)
+    assert 0.925 <= is_covered[n_fallen].mean() <= 0.975
+    assert is_covered[n_fallen].mean() == pytest.approx(exactly, abs=0.01)
 
 
 def test_ratio_interval_of_an_exact_ratio() -> None:

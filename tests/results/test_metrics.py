@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.results.metrics import Metrics
-from cmg_mj.results.tick_block import TickBlock
+from cmg_mj.results.metrics import Metrics, TickBlock
 from cmg_mj.scenario.disturbances import Push, push_windows
 from cmg_mj.scenario.schema import MetricsSettings
 
@@ -39,7 +38,7 @@ def rows(values: Any, n: int) -> np.ndarray:
     return np.broadcast_to(np.asarray(values, dtype=float), (n,))[:, None]
 
 
-def still(n: int) -> dict[str, Any]:
+def rest_signals(n: int) -> dict[str, Any]:
     """Signals of a rig that does not move."""
     return {name: rows(0.0, n) for name in SIGNALS}
 
@@ -50,12 +49,12 @@ def estimates(rates: Iterable[np.ndarray]) -> list[dict[str, np.ndarray]]:
 
 def block(estimates: list[dict[str, np.ndarray]], **signals: np.ndarray) -> TickBlock:
     """Ticks of which nothing but these signals is known."""
-    return TickBlock(**signals, y1=signals["x1"], estimates=estimates, columns=[], ended=None)
+    return TickBlock(**signals, y1=signals["x1"], estimates=estimates, columns={}, ended=None)
 
 
 def summary(run: Metrics, n: int = len(T), fell: bool = False, rates: tuple = (0.0,), **signals: Any) -> dict[str, Any]:
-    known: dict[str, Any] = {name: rows(signals.get(name, 0.0), n) for name in SIGNALS}
-    run.update(block(estimates(rows(rate, n) for rate in rates), **known))
+    columns: dict[str, Any] = {name: rows(signals.get(name, 0.0), n) for name in SIGNALS}
+    run.update(block(estimates(rows(rate, n) for rate in rates), **columns))
     return run.summary(0, stood=not fell)
 
 
@@ -109,8 +108,8 @@ def test_each_observer_has_its_own_errors() -> None:
     figures = summary(run, x2=1.0, fog=1.1, rates=(1.2, 0.6, 1.0))
     assert figures["velocity_rms_error_rad_s"] == pytest.approx(0.2)
     errors = {
-        name: (of_one["velocity_rms_error_rad_s"], of_one["velocity_rms_error_fog_rad_s"])
-        for name, of_one in figures["open_loop_observers"].items()
+        name: (observer_figures["velocity_rms_error_rad_s"], observer_figures["velocity_rms_error_fog_rad_s"])
+        for name, observer_figures in figures["open_loop_observers"].items()
     }
     assert list(errors) == ["hers", "theirs"]
     assert errors["hers"] == pytest.approx((0.4, 0.5))
@@ -159,8 +158,8 @@ def test_the_push_window_is_from_its_start_to_a_second_after_its_end() -> None:
 def test_what_two_pushes_share_counts_once() -> None:
     """2 to 3.1 s and 2.5 to 4 s are 2 to 4 s; 6 to 7.05 s stands alone. What is between them does not count."""
     pushes = (Push(6.0, 0.05), Push(2.5, 0.5), Push(2.0, 0.1))
-    within = ((T > 1.995) & (T < 3.995)) | ((T > 5.995) & (T < 7.045))
-    assert push_error(pushes, np.where(within, 0.0, 9.0)) == 0.0
+    window = ((T > 1.995) & (T < 3.995)) | ((T > 5.995) & (T < 7.045))
+    assert push_error(pushes, np.where(window, 0.0, 9.0)) == 0.0
     assert push_error(pushes, np.where((T > 2.495) & (T < 3.095), 1.0, 0.0)) == pytest.approx(math.sqrt(60 / 305))
 
 
@@ -182,7 +181,7 @@ def test_a_run_that_ends_within_the_window_is_judged_until_there() -> None:
 def test_references_are_judged_as_open_loop_observers_are() -> None:
     run = metrics(references=("zero",), pushes=(Push(2.0, 0.1),))
     x2 = rows(np.sin(T), len(T))
-    run.update(block(estimates([x2]), **still(len(T)) | {"x2": x2}), {"zero": 0.0 * x2})
+    run.update(block(estimates([x2]), **rest_signals(len(T)) | {"x2": x2}), {"zero": 0.0 * x2})
     figures: dict[str, Any] = run.summary(0, stood=True)
     assert list(figures["references"]) == ["zero"]
     assert figures["references"]["zero"]["velocity_rms_error_rad_s"] == figures["velocity_rms_rad_s"]
@@ -244,7 +243,7 @@ def test_a_run_that_ends_before_its_push_does_not_settle() -> None:
 # --- pieces, worlds and ends -------------------------------------------------------------------------------
 
 
-def restless(n: int, n_worlds: int) -> dict[str, Any]:
+def restless_signals(n: int, n_worlds: int) -> dict[str, Any]:
     rng = np.random.default_rng(9)
     signals: dict[str, Any] = {name: rng.normal(0.0, 1.0, (n, n_worlds)) for name in SIGNALS}
     signals["x1"] *= 3.0 * DEG * np.linspace(1.0, 0.1, n)[:, None]
@@ -262,24 +261,24 @@ def assert_same(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
             assert ours[name] == (None if value is None else pytest.approx(value, rel=1e-12))
 
 
-@pytest.mark.parametrize("cuts", [(1,), (256, 512), (7, 8, 9, 500), tuple(range(1, 600, 13))])
-def test_pieces_add_up_to_the_whole(cuts: tuple[int, ...]) -> None:
+@pytest.mark.parametrize("borders", [(1,), (256, 512), (7, 8, 9, 500), tuple(range(1, 600, 13))])
+def test_pieces_add_up_to_the_whole(borders: tuple[int, ...]) -> None:
     n, n_worlds = 600, 3
-    signals = restless(n, n_worlds)
+    signals = restless_signals(n, n_worlds)
     signals["x1"][250:, 1] = np.nan
     rates = [0.9 * signals["x2"], 1.2 * signals["fog"]]
-    whole, pieced = (metrics(n_worlds, 1.0, ("mine", "hers")) for _ in range(2))
-    whole.update(block(estimates(rates), **signals))
-    for part in np.split(np.arange(n), cuts):
-        pieced.update(block(estimates(rate[part] for rate in rates), **{k: v[part] for k, v in signals.items()}))
+    run, pieces = (metrics(n_worlds, 1.0, ("mine", "hers")) for _ in range(2))
+    run.update(block(estimates(rates), **signals))
+    for part in np.split(np.arange(n), borders):
+        pieces.update(block(estimates(rate[part] for rate in rates), **{k: v[part] for k, v in signals.items()}))
     for world in range(n_worlds):
-        assert_same(pieced.summary(world, False), whole.summary(world, False))
+        assert_same(pieces.summary(world, False), run.summary(world, False))
 
 
 def test_rows_after_a_worlds_end_do_not_count() -> None:
     """A batch in which world 1 ended after 250 ticks gives it the numbers of those 250 alone."""
     n, end = 600, 250
-    signals = restless(n, 2)
+    signals = restless_signals(n, 2)
     rate = 0.9 * signals["x2"]
     alone = metrics()
     alone.update(block(estimates([rate[:end, 1:]]), **{k: v[:end, 1:] for k, v in signals.items()}))
@@ -293,7 +292,7 @@ def test_rows_after_a_worlds_end_do_not_count() -> None:
 
 
 def test_worlds_do_not_mix() -> None:
-    signals = restless(300, 4)
+    signals = restless_signals(300, 4)
     batch = metrics(4)
     batch.update(block(estimates([signals["fog"]]), **signals))
     for world in range(4):
@@ -324,7 +323,7 @@ def test_bias_is_judged_from_its_time_on() -> None:
     for part in np.array_split(np.arange(len(T)), 7):
         n = len(part)
         rate, figures = {"x2_rad_s": rows(0.0, n)}, {"bias_rad": rows(bias[part], n)}
-        run.update(block([rate | figures, rate], **still(n)))
+        run.update(block([rate | figures, rate], **rest_signals(n)))
     figures: dict[str, Any] = run.summary(0, stood=True)
     assert figures["bias_deg"] == pytest.approx(1.0)
     assert figures["bias_estimate_deg"] == pytest.approx(1.1, rel=1e-12)
@@ -335,7 +334,7 @@ def test_bias_is_judged_from_its_time_on() -> None:
 def test_a_run_that_ends_before_has_no_bias_figures() -> None:
     run = metrics(bias_from_s=5.0)
     estimate = {"x2_rad_s": rows(0.0, 100), "bias_rad": rows(0.1, 100)}
-    run.update(block([estimate], **still(100)))
+    run.update(block([estimate], **rest_signals(100)))
     figures: dict[str, Any] = run.summary(0, stood=True)
     assert figures["bias_estimate_deg"] is None
     assert figures["bias_rms_error_deg"] is None

@@ -69,8 +69,8 @@ def test_the_table_has_a_row_per_observer_and_world() -> None:
 
 
 def test_the_table_of_a_group_and_of_one_world() -> None:
-    _, fell = result().split(2)
-    assert fell.table()["world"].to_pylist()[:2] == [2, 3]
+    _, fallen_worlds = result().split(2)
+    assert fallen_worlds.table()["world"].to_pylist()[:2] == [2, 3]
     alone = experiment().run(world=5, keep_trajectory=False).table()
     assert alone["world"].to_pylist() == [5] * ROWS
     assert alone["seed"].to_pylist() == [0] * ROWS
@@ -84,24 +84,24 @@ def test_references_have_values_too() -> None:
 
 
 def test_groups_are_the_worlds_in_their_order() -> None:
-    stood, fell = result().split(2)
-    assert stood.stood.all()
-    assert fell.fell.all()
-    assert fell.mean(ERROR) is None
-    assert stood.trajectory is not None
+    survivors, fallen_worlds = result().split(2)
+    assert survivors.stood.all()
+    assert fallen_worlds.fell.all()
+    assert fallen_worlds.mean(ERROR) is None
+    assert survivors.trajectory is not None
     assert result().trajectory is not None
-    np.testing.assert_array_equal(stood.trajectory["x2_rad_s"], result().trajectory["x2_rad_s"][:, :2])  # type: ignore[index]
-    assert stood.seconds == 1.0 > fell.seconds
+    np.testing.assert_array_equal(survivors.trajectory["x2_rad_s"], result().trajectory["x2_rad_s"][:, :2])  # type: ignore[index]
+    assert survivors.seconds == 1.0 > fallen_worlds.seconds
 
 
 def test_varied_rigs_are_those_of_their_own_scenarios() -> None:
     """World i at a varied setting is world i of the scenario with that setting, bit for bit."""
     alone = prepare(load_scenario("push_recovery", ["duration_s=1.0", "push=[]", "plant.equilibrium_bias_deg=1.0"]))
-    varied = experiment().run_many([5, 6], vary={"equilibrium_bias_deg": np.array([0.0, 1.0])})
-    assert varied.trajectory is not None
-    again = alone.run(world=6).trajectory
-    assert again is not None
-    np.testing.assert_array_equal(varied.trajectory["x2_rad_s"][:, 1], again["x2_rad_s"])
+    batch = experiment().run_many([5, 6], vary={"equilibrium_bias_deg": np.array([0.0, 1.0])})
+    assert batch.trajectory is not None
+    rerun = alone.run(world=6).trajectory
+    assert rerun is not None
+    np.testing.assert_array_equal(batch.trajectory["x2_rad_s"][:, 1], rerun["x2_rad_s"])
 
 
 def test_equal_settings_share_one_rig() -> None:
@@ -158,10 +158,12 @@ def test_one_world_is_one_group() -> None:
     assert math.isfinite(single.values(ERROR)[0])
 
 
-@pytest.mark.parametrize("stored", [{"observers": ["homogeneous"]}, {"layout": 3}, {"layout": {"observers": []}}, [1]])
-def test_a_trajectory_of_an_earlier_version_is_named_so(stored: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "metadata", [{"observers": ["homogeneous"]}, {"layout": 3}, {"layout": {"observers": []}}, [1]]
+)
+def test_a_trajectory_of_an_earlier_version_is_named_so(metadata: Any, tmp_path: Path) -> None:
     table = pa.table({"time_s": [0.0], "x1_rad": [0.0]}).replace_schema_metadata(
-        {b"cmg_mj": json.dumps(stored).encode()}
+        {b"cmg_mj": json.dumps(metadata).encode()}
     )
     pq.write_table(table, tmp_path / "old.parquet")
     with pytest.raises(InputError, match="of an earlier version of cmg-mj; run its scenario"):

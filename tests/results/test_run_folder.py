@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 @pytest.fixture(params=["folders change names", "files are moved"])
-def either_way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+def swap_method(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """Both ways in which a result takes its place; the first where the system can."""
     if request.param == "files are moved":
         monkeypatch.setattr(swap, "_swap_folders", lambda new, folder, lock: False)
@@ -59,16 +59,16 @@ USERS = {"notes.txt": "mine", "plot.png": "a picture", "trajectory-mine.parquet"
 
 
 @pytest.mark.parametrize("with_folders", [False, True])
-def test_a_users_files_survive_every_command(either_way: str, with_folders: bool) -> None:
-    mine = {name: text for name, text in USERS.items() if with_folders or "/" not in name}
-    for name, text in mine.items():
+def test_a_users_files_survive_every_command(swap_method: str, with_folders: bool) -> None:
+    user_files = {name: text for name, text in USERS.items() if with_folders or "/" not in name}
+    for name, text in user_files.items():
         write(text, f"it/{name}")
     os.symlink("nowhere", "it/dangling")
     inode = Path("it/notes.txt").stat().st_ino
     for command in (["run"], ["compare", "--observers", "linear,ltv", "--worlds", "1"], ["run", "--observer", "ltv"]):
         outcome = cmg_mj(command[0], quick(), *command[1:], "--out", "it")
         assert outcome.status == 0, outcome
-        assert mine.items() <= {name: (Path("it") / name).read_text() for name in mine}.items()
+        assert user_files.items() <= {name: (Path("it") / name).read_text() for name in user_files}.items()
         assert os.readlink("it/dangling") == "nowhere"
     assert Path("it/notes.txt").stat().st_ino == inode
     assert {"trajectory-linear.parquet", "trajectory-ltv.parquet"} & set(names("it")) == set()
@@ -133,7 +133,7 @@ def test_a_link_in_the_place_of_a_file_is_the_users() -> None:
         RunFolder(Path("it"), ["a"])
 
 
-def test_a_file_that_a_user_puts_there_meanwhile_stays(either_way: str) -> None:
+def test_a_file_that_a_user_puts_there_meanwhile_stays(swap_method: str) -> None:
     """The result then stands in a folder of its own."""
     fill("it", "old", "a")
     with RunFolder(Path("it"), ["a", "b"]) as folder:
@@ -166,7 +166,7 @@ def test_what_comes_while_folders_change_names_comes_along(monkeypatch: pytest.M
 # --- the old result goes, whole ------------------------------------------------------------------------------
 
 
-def test_what_a_run_before_has_written_goes(either_way: str) -> None:
+def test_what_a_run_before_has_written_goes(swap_method: str) -> None:
     fill("it", "old", "a", "b", "c")
     fill("it", "new", "b", "d")
     assert holds("it") == {"b": "new", "d": "new"}
@@ -181,7 +181,7 @@ def test_a_plot_goes_with_its_run() -> None:
     assert_whole("it")
 
 
-def test_an_interrupted_run_does_not_replace_a_complete_one(either_way: str) -> None:
+def test_an_interrupted_run_does_not_replace_a_complete_one(swap_method: str) -> None:
     assert fill("it", "half", "a", "b", complete=False) == Path("it")  # where there is none it is better than nothing
     assert fill("it", "less", "a", complete=False) == Path("it")
     assert holds("it") == {"a": "less"}
@@ -194,7 +194,7 @@ def test_an_interrupted_run_does_not_replace_a_complete_one(either_way: str) -> 
     assert holds("it") == {"a": "next", "incomplete/notes": "mine"}
 
 
-def test_what_was_set_aside_stays_until_a_complete_result_comes(either_way: str) -> None:
+def test_what_was_set_aside_stays_until_a_complete_result_comes(swap_method: str) -> None:
     with RunFolder(Path("it")) as folder:
         write("mine", "it/a")
         assert folder.write(writers("whole", "a", "b")) == Path("it/incomplete")
@@ -210,24 +210,24 @@ def test_a_result_that_has_been_deleted_is_replaced() -> None:
     assert fill("it", "half", "a", complete=False) == Path("it")
 
 
-def fails(path: Path) -> None:
+def fail(path: Path) -> None:
     path.write_text("begun")
     raise OSError(28, "No space left on device")
 
 
-def test_what_cannot_be_written_whole_replaces_nothing(either_way: str) -> None:
+def test_what_cannot_be_written_whole_replaces_nothing(swap_method: str) -> None:
     fill("it", "old", "a", "b")
-    with RunFolder(Path("it")) as folder, pytest.raises(InputError) as caught:
-        folder.write({"b": fails, **writers("new", "a")})
-    assert str(caught.value) == "it/incomplete/b: cannot be written: No space left on device"
+    with RunFolder(Path("it")) as folder, pytest.raises(InputError) as info:
+        folder.write({"b": fail, **writers("new", "a")})
+    assert str(info.value) == "it/incomplete/b: cannot be written: No space left on device"
     assert holds("it") == {"a": "old", "b": "old", "incomplete/a": "new"}
 
 
-def test_nothing_written_leaves_all_as_it_was(either_way: str) -> None:
+def test_nothing_written_leaves_all_as_it_was(swap_method: str) -> None:
     fill("it", "old", "a")
     before = everything("it")
     with RunFolder(Path("it")) as folder, pytest.raises(InputError, match=r"^it/a: cannot be written: No space"):
-        folder.write({"a": fails})
+        folder.write({"a": fail})
     assert everything("it") == before
     with RunFolder(Path("other/new")):
         pass
@@ -237,7 +237,7 @@ def test_nothing_written_leaves_all_as_it_was(either_way: str) -> None:
 # --- places --------------------------------------------------------------------------------------------------
 
 
-def here(patch: pytest.MonkeyPatch) -> Path:
+def inside_it(patch: pytest.MonkeyPatch) -> Path:
     os.chdir("it")
     return Path()
 
@@ -264,30 +264,30 @@ def without_links(patch: pytest.MonkeyPatch) -> Path:
 def without_swapping(patch: pytest.MonkeyPatch) -> Path:
     """A system that does not know of it, a mount point."""
 
-    def exchange(one: Path, other: Path) -> None:
+    def exchange(source: Path, target: Path) -> None:
         raise OSError(16, "Device or resource busy")
 
     patch.setattr(swap, "_exchange", exchange)
     return Path("it")
 
 
-PLACES = [here, by_a_link, nothing_beside_it, without_links, without_swapping]
+PLACES = [inside_it, by_a_link, nothing_beside_it, without_links, without_swapping]
 
 
 @pytest.mark.parametrize("place", PLACES, ids=lambda place: place.__name__)
 def test_places(place: Callable[[pytest.MonkeyPatch], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fill("it", "old", "a", "b")
     write("mine", "it/notes")
-    beside = sorted(os.listdir())
+    neighbours = sorted(os.listdir())
     inode = Path("it").stat().st_ino
     path = place(monkeypatch)
     with RunFolder(path) as folder:
         assert folder.write(writers("new", "a", "c")) == path
     assert holds(str(tmp_path / "it")) == {"a": "new", "c": "new", "notes": "mine"}
     assert everything(str(tmp_path / "it")) == [HIDDEN, f"{HIDDEN}/files.json", "a", "c", "notes"]
-    if place is here:
+    if place is inside_it:
         assert (tmp_path / "it").stat().st_ino == inode  # whoever stands there still does
-        assert sorted(os.listdir("..")) == beside
+        assert sorted(os.listdir("..")) == neighbours
 
 
 def test_a_folder_keeps_its_permissions() -> None:
@@ -338,6 +338,6 @@ def test_the_same_run_again_goes_to_the_same_folder() -> None:
 
 def test_a_list_tells_what_is_whose() -> None:
     cmg_mj("run", quick(), "--out", "it")
-    stored = json.loads(Path(f"it/{HIDDEN}/files.json").read_text())
-    assert stored["complete"] is True
-    assert sorted(stored["files"]) == FILES
+    file_list = json.loads(Path(f"it/{HIDDEN}/files.json").read_text())
+    assert file_list["complete"] is True
+    assert sorted(file_list["files"]) == FILES

@@ -1,4 +1,4 @@
-"""What differs from the bundled scenario: in the folder's name, the title line and the summary."""
+"""Differences from the bundled scenario: in the folder's name, the title line and the summary."""
 
 from __future__ import annotations
 
@@ -21,15 +21,16 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
 SHORT = ["--set", "duration_s=0.1", "--set", "push=[]"]
 
 
-def differing(*settings: str, name: str = "push_recovery") -> dict[str, Any]:
+def differences_of(*settings: str, name: str = "push_recovery") -> dict[str, Any]:
     return prepare(load_scenario(name, settings)).differences
 
 
 def test_nothing_differs() -> None:
-    assert differing() == {}
+    assert differences_of() == {}
     assert prepare(load_scenario("push_recovery", observer="ltv").model_copy(update={"seed": 3})).differences == {}
     assert (
-        differing("title=other", "seed=4", "plant.equilibrium_bias_deg=0.5", "controller.gains=[35, 4, -1, 0.3]") == {}
+        differences_of("title=other", "seed=4", "plant.equilibrium_bias_deg=0.5", "controller.gains=[35, 4, -1, 0.3]")
+        == {}
     )
     assert prepare(parse_scenario({"duration_s": 1.0})).differences == {}
     assert (describe_differences({}), folder_suffix({})) == ("", "")
@@ -49,7 +50,7 @@ def test_nothing_differs() -> None:
     ],
 )
 def test_one_field(setting: str, field: str, value: object, name: str) -> None:
-    result = differing(setting.replace("[ltv]", '["ltv"]'))
+    result = differences_of(setting.replace("[ltv]", '["ltv"]'))
     assert result == {field: value}
     assert folder_suffix(result) == f"-{name}"
 
@@ -77,7 +78,7 @@ def test_a_field_that_is_not_there() -> None:
 
 def test_a_scenario_of_a_users_own_differs_from_none() -> None:
     file = write("duration_s = 0.3\n[plant]\nequilibrium_bias_deg = 2.0", "my.toml")
-    assert differing("duration_s=0.5", name=file) == {}
+    assert differences_of("duration_s=0.5", name=file) == {}
 
 
 def test_a_users_version_of_a_bundled_one() -> None:
@@ -87,7 +88,7 @@ def test_a_users_version_of_a_bundled_one() -> None:
         "push_recovery.toml",
     )
     expected = {"duration_s": 0.1, "plant.equilibrium_bias_deg": 0.6, "push": []}
-    assert differing(name="push_recovery.toml") == expected
+    assert differences_of(name="push_recovery.toml") == expected
 
 
 @pytest.mark.parametrize("command", [["run"], ["compare", "--observers", "linear,homogeneous", "--worlds", 1]])
@@ -96,14 +97,14 @@ def test_folder_title_and_summary_tell(command: list[Any]) -> None:
     outcome = cmg_mj(command[0], "push_recovery", *command[1:], *settings)
     assert outcome.status == 0, outcome
     assert outcome.out.splitlines()[0].endswith(", seed 0, duration_s=0.1, equilibrium_bias_deg=1, push=none")
-    what = {"run": "homogeneous"}.get(command[0], command[0])
+    kind = {"run": "homogeneous"}.get(command[0], command[0])
     (folder,) = os.listdir("runs")
-    assert folder == f"push_recovery-{what}-0-duration_s=0.1-equilibrium_bias_deg=1-push=none"
+    assert folder == f"push_recovery-{kind}-0-duration_s=0.1-equilibrium_bias_deg=1-push=none"
     summary = json.loads(Path(f"runs/{folder}/summary.json").read_text())
     for entry in summary if isinstance(summary, list) else [summary]:
         assert entry["differs"] == {"duration_s": 0.1, "plant.equilibrium_bias_deg": 1.0, "push": []}
-    again = cmg_mj("run", f"runs/{folder}/scenario.toml")
-    assert again.out.splitlines()[0].endswith("equilibrium_bias_deg=1, push=none")
+    rerun = cmg_mj("run", f"runs/{folder}/scenario.toml")
+    assert rerun.out.splitlines()[0].endswith("equilibrium_bias_deg=1, push=none")
 
 
 def test_an_observer_that_the_bundled_scenario_does_not_suit() -> None:

@@ -119,7 +119,7 @@ def test_the_last_setting_counts() -> None:
 
 
 def test_another_observer_brings_its_own_parameters() -> None:
-    """Those of the file's observer do not pass to it; those set on the command line do."""
+    """The parameters of the file's observer do not pass to it; parameters set on the command line do."""
     file = write("[observer]\nkind = 'homogeneous'\nk1 = 30.0")
     assert load_scenario(file, observer="homogeneous").observer.parameters == {"k1": 30.0}
     assert load_scenario(file, observer="ltv").observer.parameters == {}
@@ -210,21 +210,21 @@ def test_resolving_twice_changes_nothing(fields: dict[str, Any]) -> None:
     sensors = {kind: {"rate_hz": 1000 / 3} for kind in ("accelerometer", "encoder", "fog")}
     if "plant" in fields:
         fields = {**fields, "sensors": sensors}
-    once = prepare(parse_scenario(fields)).resolved()
-    again = prepare(load_scenario(write(tomli_w.dumps(once)))).resolved()
-    assert again == once
-    assert tomllib.loads(tomli_w.dumps(once)) == once
+    resolved = prepare(parse_scenario(fields)).resolved()
+    rerun = prepare(load_scenario(write(tomli_w.dumps(resolved)))).resolved()
+    assert rerun == resolved
+    assert tomllib.loads(tomli_w.dumps(resolved)) == resolved
 
 
 def test_the_resolved_scenario_has_everything_written_out() -> None:
-    once = prepare(load_scenario("push_recovery")).resolved()
-    assert once["plant"]["model"] == "scissored_pair.xml"  # a bundled one by name, wherever it is installed
-    assert once["controller"]["gains"] == list(TABLE_2_GAINS)
+    resolved = prepare(load_scenario("push_recovery")).resolved()
+    assert resolved["plant"]["model"] == "scissored_pair.xml"  # a bundled one by name, wherever it is installed
+    assert resolved["controller"]["gains"] == list(TABLE_2_GAINS)
     friction = {"friction_n_m": 0.0, "damping_n_m_s": 0.0, "friction_width_rad_s": 0.05}
-    assert once["observer"] == {"kind": "homogeneous", "k1": 20.0, "k2": 150.0, "alpha": 0.85, **friction}
-    assert once["sensors"]["fog"]["range_deg_s"] == 490.0
-    assert set(once["versions"]) == {"cmg_mj", "mujoco", "numpy", "scipy", "python"}
-    assert once["versions"]["python"] == ".".join(map(str, sys.version_info[:3]))
+    assert resolved["observer"] == {"kind": "homogeneous", "k1": 20.0, "k2": 150.0, "alpha": 0.85, **friction}
+    assert resolved["sensors"]["fog"]["range_deg_s"] == 490.0
+    assert set(resolved["versions"]) == {"cmg_mj", "mujoco", "numpy", "scipy", "python"}
+    assert resolved["versions"]["python"] == ".".join(map(str, sys.version_info[:3]))
 
 
 def test_a_users_parameters_are_written_as_far_as_toml_can_hold_them() -> None:
@@ -240,8 +240,8 @@ def test_a_users_parameters_are_written_as_far_as_toml_can_hold_them() -> None:
 
 def test_a_users_model_is_written_with_its_whole_path() -> None:
     copy_models("here")
-    once = prepare(load_scenario(write("", "here/my.toml"))).resolved()
-    assert once["plant"]["model"] == str(Path("here/scissored_pair.xml").resolve())
+    resolved = prepare(load_scenario(write("", "here/my.toml"))).resolved()
+    assert resolved["plant"]["model"] == str(Path("here/scissored_pair.xml").resolve())
 
 
 def test_preparing_again_gives_a_fresh_controller() -> None:

@@ -40,12 +40,12 @@ def test_the_bundled_scenarios_give_no_hint(name: str) -> None:
 
 
 def test_without_sampling_and_delay_the_poles_are_those_of_the_law() -> None:
-    sampled = loop("controller.rate_hz=2000", "sensors.accelerometer.rate_hz=2000", "sensors.encoder.rate_hz=2000")
+    fast_loop = loop("controller.rate_hz=2000", "sensors.accelerometer.rate_hz=2000", "sensors.encoder.rate_hz=2000")
     model, gains = load_plant().reduced, (35.0, 4.0, -1.0, 0.3)
     np.testing.assert_allclose(
-        np.sort(np.real(sampled.poles))[1:], np.sort(np.real(closed_loop_poles(model, gains))), rtol=5e-3
+        np.sort(np.real(fast_loop.poles))[1:], np.sort(np.real(closed_loop_poles(model, gains))), rtol=5e-3
     )
-    assert sampled.distance == pytest.approx(1.0, abs=0.01)  # Table 2's gains are an LQR's, as good as
+    assert fast_loop.distance == pytest.approx(1.0, abs=0.01)  # Table 2's gains are an LQR's, as good as
 
 
 def test_an_lqr_keeps_its_distance() -> None:
@@ -56,7 +56,7 @@ def test_an_lqr_keeps_its_distance() -> None:
 def test_stable_is_what_the_loop_step_by_step_is(latency: float) -> None:
     """The linearisation stepped finely, with the command held and the signals late."""
     outcome = loop(f"sensors.accelerometer.latency_s={latency}")
-    model, K, h = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3]), 1e-4
+    model, K, h = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3]), 5e-4
     steps, period, late = int(6.0 / h), round(0.005 / h), round(latency / h)
     x = np.zeros((steps + 1, 4))
     x[0, 0], u = 0.01, 0.0
@@ -64,8 +64,8 @@ def test_stable_is_what_the_loop_step_by_step_is(latency: float) -> None:
         if k % period == 0:
             u = -K @ x[max(k - late, 0)]
         x[k + 1] = x[k] + h * (model.A_e @ x[k] + model.B_e[:, 0] * u)
-    fades = abs(x[-1, 0]) < 0.01
-    assert (outcome.words == "stable") == fades == (latency < 0.05)
+    is_stable = abs(x[-1, 0]) < 0.01
+    assert (outcome.words == "stable") == is_stable == (latency < 0.05)
 
 
 @pytest.mark.parametrize(
@@ -91,15 +91,19 @@ def test_a_latency_of_a_sensor_that_is_not_used_does_not_count() -> None:
     assert "unstable" in str(loop("sensors.fog.latency_s=0.1", "controller.feedback='fog'").hint)
 
 
-def test_half_the_flywheel_is_hinted_at_and_solved_for(half: str) -> None:
-    """With Table 2's gains it falls soon after the push; with gains made for it, it stands."""
+def test_half_the_flywheel_is_hinted_at(half: str) -> None:
+    """With Table 2's gains it falls soon after the push."""
     outcome = cmg_mj("run", "push_recovery", "--set", half, "--set", "duration_s=4", "--out", "it", "--json")
     assert "cmg-mj: hint: controller: the closed loop has little margin" in outcome.err
     assert '"outcome": "fell"' in outcome.out
+    assert "hint" in cmg_mj("check", "half.xml").out
+
+
+def test_half_the_flywheel_is_solved_for(half: str) -> None:
+    """With gains made for it, it stands."""
     solved = ["--set", "controller.lqr.state_cost=[1, 1, 1, 1]", "--set", "duration_s=4"]
     outcome = cmg_mj("run", "push_recovery", "--set", half, *solved, "--out", "it", "--json")
     assert (outcome.err, '"outcome": "done"' in outcome.out) == ("", True)
-    assert "hint" in cmg_mj("check", "half.xml").out
 
 
 @pytest.mark.slow

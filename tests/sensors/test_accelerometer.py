@@ -1,4 +1,4 @@
-"""What a cheap part and its mounting do to a reading, against closed forms: at the sensor, and in the loop.
+"""Errors of a cheap part and its mounting, against closed forms: at the sensor, and in the loop.
 
 Seeds are fixed; statistical bounds are those a correct sensor meets 999 times of 1000.
 """
@@ -30,7 +30,7 @@ from tests.sensors.test_sampled import G, assert_sigma
 
 QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
 TILT = RadialTilt(0.06717514421272202, 0.20152543263816603)
-STILL = (0.0, G, 0.0, G)
+FORCES_AT_REST = (0.0, G, 0.0, G)
 MS = 0.001
 
 
@@ -38,15 +38,15 @@ def ideal(forces: Any) -> IdealReading:
     return IdealReading(forces, [0.0], 0.0, 0.0)
 
 
-def shown(forces: Any, **errors: Any) -> np.ndarray:
-    """What parts without noise show of specific forces, (4,)."""
+def read_forces(forces: Any, **errors: Any) -> np.ndarray:
+    """Read specific forces, (4,), with parts without noise."""
     return np.array(Accelerometer(**QUIET, **errors).make_reading_function()(ideal(forces), (0.0,) * 4))
 
 
-def delivered(
+def deliver(
     sensor: Accelerometer,
     n: int,
-    forces: Callable[[float], Any] = lambda _: STILL,
+    forces: Callable[[float], Any] = lambda _: FORCES_AT_REST,
     timestep: float = MS,
     worlds: int | list[int] = 0,
 ) -> np.ndarray:
@@ -74,7 +74,7 @@ def test_each_part_is_turned_then_crossed_then_scaled_then_offset() -> None:
     offset = np.array([3e-3 * G, 0.0, -4e-3 * G, 0.0])
     for force in forces:
         expected = np.concatenate([parts[0] @ force[:2], parts[1] @ force[2:]]) + offset
-        np.testing.assert_allclose(shown(force.tolist(), bias_mg=(3.0, -4.0), **errors), expected, atol=1e-13)
+        np.testing.assert_allclose(read_forces(force.tolist(), bias_mg=(3.0, -4.0), **errors), expected, atol=1e-13)
 
 
 @pytest.mark.parametrize("tilt_deg", [-3.0, 0.0, 5.0])
@@ -83,7 +83,7 @@ def test_what_mounting_and_scale_do_to_the_tilt(tilt_deg: float) -> None:
     forces = (-G * math.sin(theta), G * math.cos(theta)) * 2
 
     def y1(**errors: Any) -> float:
-        return math.degrees(TILT(*shown(forces, **errors).tolist()))
+        return math.degrees(TILT(*read_forces(forces, **errors).tolist()))
 
     assert y1(misalignment_deg=(1.0, 1.0)) == pytest.approx(tilt_deg + 1.0, abs=1e-12)
     assert y1(scale_error=(0.01, 0.01)) == pytest.approx(tilt_deg, abs=1e-12)
@@ -110,18 +110,20 @@ EVERYTHING: dict[str, Any] = {
 def test_floats_and_arrays_show_the_same_bits(arguments: dict[str, Any]) -> None:
     """Worlds 4, 0, 7 together and each alone."""
     numbers = [4, 0, 7]
-    motion = np.random.default_rng(0).normal(size=(500, 4, 3)) + np.array(STILL)[:, None]
+    motion = np.random.default_rng(0).normal(size=(500, 4, 3)) + np.array(FORCES_AT_REST)[:, None]
     sensor = Accelerometer(**arguments)
-    batch = delivered(sensor, 40, lambda t: motion[round(t / MS)], worlds=numbers)
+    batch = deliver(sensor, 40, lambda t: motion[round(t / MS)], worlds=numbers)
     for i, number in enumerate(numbers):
-        alone = delivered(sensor, 40, lambda t, i=i: tuple(motion[round(t / MS), :, i].tolist()), worlds=number)
+        alone = deliver(sensor, 40, lambda t, i=i: tuple(motion[round(t / MS), :, i].tolist()), worlds=number)
         np.testing.assert_array_equal(batch[:, :, i], alone)
 
 
 def test_what_is_off_draws_nothing() -> None:
     """1/f noise has a stream of its own: the white noise is as it was."""
-    plain, wandering = (delivered(Accelerometer(counts_per_g=0.0, bias_instability_ug=b), 50) for b in (0.0, 1e-20))
-    np.testing.assert_allclose(plain, wandering, rtol=0.0, atol=1e-15)
+    sensor, drifting_sensor = (
+        deliver(Accelerometer(counts_per_g=0.0, bias_instability_ug=b), 50) for b in (0.0, 1e-20)
+    )
+    np.testing.assert_allclose(sensor, drifting_sensor, rtol=0.0, atol=1e-15)
 
 
 # --- skew --------------------------------------------------------------------------------------------------
@@ -131,42 +133,42 @@ def test_what_is_off_draws_nothing() -> None:
 def test_the_outers_sample_is_older_by_the_skew(skew_s: float) -> None:
     """Forces that grow with time; before the start they were what they are at the start."""
     times = np.arange(30) * 0.005
-    result = delivered(Accelerometer(skew_s=skew_s, **QUIET), 30, lambda t: (t, 2.0 * t, 3.0 * t, 4.0 * t), 0.0005)
+    result = deliver(Accelerometer(skew_s=skew_s, **QUIET), 30, lambda t: (t, 2.0 * t, 3.0 * t, 4.0 * t), 0.0005)
     np.testing.assert_allclose(result[:, :2], np.outer(times, (1.0, 2.0)), atol=1e-14)
     older = np.maximum(times - skew_s, 0.0)
     np.testing.assert_allclose(result[:, 2:], np.outer(older, (3.0, 4.0)), atol=1e-14)
 
 
 @pytest.mark.parametrize("driver", ["native", "callback"])
-@pytest.mark.parametrize(("skew_s", "at_once_hz"), [(0.0025, 400), (0.005, 200)])
+@pytest.mark.parametrize(("skew_s", "together_hz"), [(0.0025, 400), (0.005, 200)])
 def test_the_loop_meets_the_older_instant(
-    driver: Any, skew_s: float, at_once_hz: int, monkeypatch: pytest.MonkeyPatch
+    driver: Any, skew_s: float, together_hz: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A rig that nothing controls falls the same whatever the sensors show: the readings are those of the instants."""
-    read: list[tuple] = []
+    samples: list[tuple] = []
 
-    class Kept(RadialTilt):
+    class RecordingTilt(RadialTilt):
         def __call__(self, *forces: Any) -> Any:
-            read.append(forces)
+            samples.append(forces)
             return super().__call__(*forces)
 
     def readings(rate_hz: int, *settings: str) -> np.ndarray:
-        read.clear()
+        samples.clear()
         off = ["noise_density_ug_rthz=0", "counts_per_g=0", f"rate_hz={rate_hz}"]
         free = ["duration_s=0.3", "push.0.start_s=0.1", "controller.gains=[0.0,0.0,0.0,0.0]", "plant.timestep_s=0.0025"]
         sensor = [f"sensors.accelerometer.{name}" for name in (*off, *settings)]
         experiment = prepare(load_scenario("push_recovery", [*free, *sensor, f"controller.rate_hz={rate_hz}"]))
-        axis = replace(experiment.plant.axis, radial_tilt=Kept(TILT.r_inner, TILT.r_outer))
+        axis = replace(experiment.plant.axis, radial_tilt=RecordingTilt(TILT.r_inner, TILT.r_outer))
         monkeypatch.setattr(experiment.plant, "axes", (axis,))
         experiment.run(driver=driver)
-        return np.array(read[1:])  # the first was to know what tilt the offsets make at rest
+        return np.array(samples[1:])  # the first was to know what tilt the offsets make at rest
 
-    at_once = readings(at_once_hz)
+    together = readings(together_hz)
     skewed = readings(200, f"skew_s={skew_s}")
-    every = at_once_hz // 200
-    np.testing.assert_array_equal(skewed[:, :2], at_once[::every, :2])
-    np.testing.assert_array_equal(skewed[1:, 2:], at_once[every - 1 : -1 : every, 2:][: len(skewed) - 1])
-    assert np.abs(skewed[1:, 2:] - at_once[::every, 2:][1:]).max() > 0.1
+    every = together_hz // 200
+    np.testing.assert_array_equal(skewed[:, :2], together[::every, :2])
+    np.testing.assert_array_equal(skewed[1:, 2:], together[every - 1 : -1 : every, 2:][: len(skewed) - 1])
+    assert np.abs(skewed[1:, 2:] - together[::every, 2:][1:]).max() > 0.1
 
 
 # --- low-pass ----------------------------------------------------------------------------------------------
@@ -181,7 +183,7 @@ def test_noise_after_the_low_pass(bandwidth_hz: float) -> None:
 
     sensor = Accelerometer(bandwidth_hz=bandwidth_hz, rate_hz=100.0, counts_per_g=0.0)
     # Samples so far apart that they are independent, all but those of the narrowest.
-    noise = (delivered(sensor, 500, lambda _: np.zeros((4, 8)), worlds=list(range(8)))).swapaxes(0, 1).reshape(4, -1)
+    noise = (deliver(sensor, 500, lambda _: np.zeros((4, 8)), worlds=list(range(8)))).swapaxes(0, 1).reshape(4, -1)
     if bandwidth_hz > 10.0:
         assert_sigma(noise.ravel(), sensor.white_noise_sigma)
     else:
@@ -194,7 +196,7 @@ def test_noise_after_the_low_pass(bandwidth_hz: float) -> None:
 def test_noise_in_the_pass_band_is_the_datasheets() -> None:
     """400 ug/rtHz at 10 Hz, whatever is filtered above."""
     sensor = Accelerometer(bandwidth_hz=184.0, rate_hz=1000.0, counts_per_g=0.0)
-    noise = delivered(sensor, 20_000, lambda _: np.zeros((4, 2)), worlds=[0, 1])
+    noise = deliver(sensor, 20_000, lambda _: np.zeros((4, 2)), worlds=[0, 1])
     frequency, density = welch(noise, 1000.0, nperseg=1000, axis=0)
     low = (frequency > 1.0) & (frequency < 40.0)
     assert math.sqrt(density[low].mean()) == pytest.approx(400e-6 * G, rel=0.02)
@@ -206,7 +208,7 @@ def test_a_vibration_is_filtered_before_it_aliases(frequency_hz: float, alias_hz
     """At 200 Hz, 180 Hz look like 20 Hz turned round; with a low-pass, by |H(180 Hz)| less."""
     w = 2.0 * math.pi * frequency_hz
     sensor = Accelerometer(bandwidth_hz=bandwidth_hz, **QUIET)
-    result = delivered(sensor, 500, lambda t: (math.sin(w * t),) * 4)[100:, 0]
+    result = deliver(sensor, 500, lambda t: (math.sin(w * t),) * 4)[100:, 0]
     times = np.arange(100, 500) * 0.005
     waves = np.column_stack([f(2.0 * math.pi * alias_hz * times) for f in (np.sin, np.cos)])
     parts, residual, *_ = np.linalg.lstsq(waves, result)
@@ -221,7 +223,7 @@ def test_the_low_pass_lags_a_ramp_by_its_delay(bandwidth_hz: float, datasheet_ms
     delay = math.sqrt(2.0) / (2000.0 * math.tan(math.pi * bandwidth_hz / 1e3))
     assert 1e3 * delay == pytest.approx(datasheet_ms, abs=0.7)
     sensor = Accelerometer(bandwidth_hz=bandwidth_hz, skew_s=0.002, **QUIET)
-    late = np.arange(200) * 0.005 - delivered(sensor, 200, lambda t: (t,) * 4).T
+    late = np.arange(200) * 0.005 - deliver(sensor, 200, lambda t: (t,) * 4).T
     np.testing.assert_allclose(late[:2, 100:], delay, rtol=1e-9)
     np.testing.assert_allclose(late[2:, 100:], delay + 0.002, rtol=1e-9)
 
@@ -231,14 +233,14 @@ def test_a_reading_out_of_range_is_cut_before_the_low_pass() -> None:
 
     def amplitude(g: float) -> float:
         forces = lambda t: (g * G * math.sin(2.0 * math.pi * 180.0 * t),) * 4  # noqa: E731
-        return float(np.abs(delivered(Accelerometer(bandwidth_hz=94.0, **QUIET), 300, forces)[50:]).max())
+        return float(np.abs(deliver(Accelerometer(bandwidth_hz=94.0, **QUIET), 300, forces)[50:]).max())
 
     assert amplitude(3.0) < 0.95 * 3.0 * amplitude(1.0)
     assert amplitude(1.9) == pytest.approx(1.9 * amplitude(1.0), rel=1e-12)
 
 
 def test_the_low_pass_starts_settled() -> None:
-    result = delivered(Accelerometer(bandwidth_hz=5.0, **QUIET), 20, lambda _: (1.0, 2.0, 3.0, 4.0))
+    result = deliver(Accelerometer(bandwidth_hz=5.0, **QUIET), 20, lambda _: (1.0, 2.0, 3.0, 4.0))
     np.testing.assert_allclose(result, np.tile((1.0, 2.0, 3.0, 4.0), (20, 1)), rtol=1e-12)
 
 
@@ -248,10 +250,10 @@ def test_the_low_pass_starts_settled() -> None:
 def test_allan_deviation_of_the_drift_is_the_bias_instability() -> None:
     """The same whatever is averaged over, and no two channels' alike."""
     sensor = Accelerometer(bias_instability_ug=36.0, rate_hz=50.0, **QUIET)
-    noise = delivered(sensor, 20_000, lambda _: np.zeros((4, 4)), 0.005, worlds=list(range(4))).reshape(20_000, 16)
+    noise = deliver(sensor, 20_000, lambda _: np.zeros((4, 4)), 0.005, worlds=list(range(4))).reshape(20_000, 16)
     for tau_s in (0.4, 2.0, 10.0):
-        means = noise.reshape(-1, round(tau_s * 50.0), 16).mean(axis=1)
-        allan = math.sqrt(0.5 * np.mean(np.diff(means, axis=0) ** 2))
+        averages = noise.reshape(-1, round(tau_s * 50.0), 16).mean(axis=1)
+        allan = math.sqrt(0.5 * np.mean(np.diff(averages, axis=0) ** 2))
         assert 1e6 * allan / G == pytest.approx(36.0, rel=0.1), tau_s
     correlation = np.corrcoef(np.diff(noise[::50], axis=0).T)[np.triu_indices(16, 1)]
     assert np.abs(correlation).max() < 0.25
@@ -262,7 +264,7 @@ def test_the_drift_is_the_same_for_a_part_that_filters() -> None:
 
     def density(bandwidth_hz: float) -> float:
         sensor = Accelerometer(bias_instability_ug=36.0, bandwidth_hz=bandwidth_hz, **QUIET)
-        noise = delivered(sensor, 4000, lambda _: np.zeros((4, 4)), worlds=list(range(4)))
+        noise = deliver(sensor, 2000, lambda _: np.zeros((4, 8)), worlds=list(range(8)))
         frequency, result = welch(noise, 200.0, nperseg=400, axis=0)
         return float(result[(frequency > 20.0) & (frequency < 40.0)].mean())
 
@@ -289,17 +291,17 @@ def test_vibration_of_unbalanced_wheels_at_the_accelerometers() -> None:
         load_plant(equilibrium_bias_deg=0.0, initial_tilt_deg=0.0, flywheel_imbalance_kg_m=u) for u in (0.0, G_6_3)
     ]
     inertia = 2.0 * plants[0].reduced.J1
-    shaken = []
+    differences = []
     for angle in np.linspace(0.0, 2.0 * math.pi, 8, endpoint=False):
         forces = []
         for plant in plants:
             data = plant.new_data()
-            for module in plant.modules:
+            for module in plant.axis.modules:
                 data.qpos[module.flywheel] += math.copysign(angle, module.speed)
             mujoco.mj_forward(plant.model, data)
             forces.append(plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist()).accelerations)
-        shaken.append(np.subtract(*forces[::-1]))
-    tangential = np.array(shaken)[:, [0, 2]]
+        differences.append(np.subtract(*forces[::-1]))
+    tangential = np.array(differences)[:, [0, 2]]
     amplitude = np.abs(np.fft.rfft(tangential, axis=0)[1]) / 4.0
     expected = 2.0 * G_6_3 * speed**2 * lever / inertia * np.array([TILT.r_inner, TILT.r_outer])
     np.testing.assert_allclose(amplitude, expected, rtol=0.01)

@@ -1,4 +1,4 @@
-"""The cheap gyro beside its datasheet, and what it rides along on."""
+"""The cheap gyro beside its datasheet, and open loop beside a run."""
 
 from __future__ import annotations
 
@@ -25,55 +25,55 @@ def quiet(**settings: float) -> dict[str, Any]:
     return dict.fromkeys(none, 0.0) | settings
 
 
-def shown(rate: np.ndarray, dt: float = DT, seed: int = 0, world: int = 0, **settings: Any) -> np.ndarray:
-    """What a gyro shows of one world's rate, (n,) [rad/s] -> (n,) [deg/s]."""
+def read_rate(rate: np.ndarray, dt: float = DT, seed: int = 0, world: int = 0, **settings: Any) -> np.ndarray:
+    """Read one world's rate with a gyro, (n,) [rad/s] -> (n,) [deg/s]."""
     gyro = MemsGyro(**settings)
     return np.degrees(gyro.make_reading_function(dt, normals(seed, world, 3, gyro.channels))(rate[:, None])[:, 0])
 
 
 @pytest.mark.parametrize(("density", "dt", "sigma"), [(0.005, 0.005, 0.05), (0.02, 0.02, 0.1)])
 def test_white_noise_is_density_times_root_of_half_the_rate(density: float, dt: float, sigma: float) -> None:
-    noise = shown(np.zeros(20_000), dt, **quiet(noise_density_deg_s_rthz=density, calibration_s=0.0))
+    noise = read_rate(np.zeros(20_000), dt, **quiet(noise_density_deg_s_rthz=density, calibration_s=0.0))
     assert_sigma(noise, sigma)
     assert_mean(noise, 0.0, sigma)
 
 
-@pytest.mark.parametrize(("worlds", "within"), [(1, 0.1), pytest.param(8, 0.05, marks=pytest.mark.slow)])
-def test_noise_is_that_of_the_datasheet(worlds: int, within: float) -> None:
+@pytest.mark.parametrize(("worlds", "tolerance"), [(1, 0.1), pytest.param(8, 0.05, marks=pytest.mark.slow)])
+def test_noise_is_that_of_the_datasheet(worlds: int, tolerance: float) -> None:
     """PS-MPU-6000A, 6.1: 0.033 deg/s RMS from 1 to 10 Hz, and 0.005 deg/s/rtHz of white noise beyond."""
-    noise = np.stack([shown(np.zeros(80_000), world=world) for world in range(worlds)])
+    noise = np.stack([read_rate(np.zeros(80_000), world=world) for world in range(worlds)])
     frequency, density = welch(noise, 200.0, nperseg=8192)
     low = (frequency > 1.0) & (frequency < 10.0)
     width = frequency[1] - frequency[0]
-    assert math.sqrt(density[:, low].sum(axis=1).mean() * width) == pytest.approx(0.033, rel=within)
+    assert math.sqrt(density[:, low].sum(axis=1).mean() * width) == pytest.approx(0.033, rel=tolerance)
     high = frequency > 60.0
     assert math.sqrt(density[:, high].mean()) == pytest.approx(0.005, rel=0.1)
 
 
-@pytest.mark.parametrize(("worlds", "within"), [(1, 0.2), pytest.param(8, 0.1, marks=pytest.mark.slow)])
-def test_allan_deviation_of_the_flicker_is_the_bias_instability(worlds: int, within: float) -> None:
+@pytest.mark.parametrize(("worlds", "tolerance"), [(1, 0.2), pytest.param(8, 0.1, marks=pytest.mark.slow)])
+def test_allan_deviation_of_the_flicker_is_the_bias_instability(worlds: int, tolerance: float) -> None:
     """The same whatever is averaged over."""
     flicker = quiet(bias_instability_deg_h=36.0, calibration_s=0.0)
-    noise = np.stack([shown(np.zeros(80_000), world=world, **flicker) for world in range(worlds)])
+    noise = np.stack([read_rate(np.zeros(80_000), world=world, **flicker) for world in range(worlds)])
     for tau_s in (0.25, 1.0, 4.0):
-        means = noise.reshape(worlds, -1, round(tau_s / DT)).mean(axis=2)
-        allan = math.sqrt(0.5 * np.mean(np.diff(means, axis=1) ** 2))
-        assert allan * 3600.0 == pytest.approx(36.0, rel=within), tau_s
+        averages = noise.reshape(worlds, -1, round(tau_s / DT)).mean(axis=2)
+        allan = math.sqrt(0.5 * np.mean(np.diff(averages, axis=1) ** 2))
+        assert allan * 3600.0 == pytest.approx(36.0, rel=tolerance), tau_s
 
 
 def test_the_mean_at_rest_is_taken_off() -> None:
-    """What is shown before the run, for a second, is on the mean zero."""
+    """The reading before the run, for a second, is on the mean zero."""
     noise = quiet(bias_instability_deg_h=82.0, noise_density_deg_s_rthz=0.005)
-    before = shown(np.zeros(500), calibration_s=0.0, **noise)
-    after = shown(np.zeros(300), calibration_s=1.0, **noise)
-    np.testing.assert_allclose(after, before[200:] - before[:200].mean(), atol=1e-12)
+    raw = read_rate(np.zeros(500), calibration_s=0.0, **noise)
+    calibrated = read_rate(np.zeros(300), calibration_s=1.0, **noise)
+    np.testing.assert_allclose(calibrated, raw[200:] - raw[:200].mean(), atol=1e-12)
 
 
 def test_scale_offset_range_and_resolution() -> None:
     rate = np.radians(np.array([0.0, 10.0, -100.0, 300.0]))
-    assert shown(rate, **quiet(scale_error=0.03)) == pytest.approx([0.0, 10.3, -103.0, 250.0])
-    assert shown(rate, **quiet(bias_deg_s=0.5)) == pytest.approx([0.5, 10.5, -99.5, 250.0])
-    assert shown(np.radians([0.1, 0.3]), **quiet(counts_per_deg_s=2.0)) == pytest.approx([0.0, 0.5])
+    assert read_rate(rate, **quiet(scale_error=0.03)) == pytest.approx([0.0, 10.3, -103.0, 250.0])
+    assert read_rate(rate, **quiet(bias_deg_s=0.5)) == pytest.approx([0.5, 10.5, -99.5, 250.0])
+    assert read_rate(np.radians([0.1, 0.3]), **quiet(counts_per_deg_s=2.0)) == pytest.approx([0.0, 0.5])
 
 
 def test_a_world_reads_the_same_alone_and_in_a_batch_and_in_any_pieces() -> None:
@@ -91,15 +91,15 @@ def test_a_world_reads_the_same_alone_and_in_a_batch_and_in_any_pieces() -> None
 @pytest.mark.parametrize("stream", range(3))
 def test_its_noise_is_none_of_the_other_sensors(stream: int) -> None:
     rate, gyro = np.zeros((50, 1)), MemsGyro()
-    theirs = gyro.make_reading_function(DT, normals(5, 4, stream, gyro.channels))(rate)
-    assert not np.array_equal(References(gyro, DT, 5, 4).rates(rate)["mems_gyro"], theirs)
+    other_stream = gyro.make_reading_function(DT, normals(5, 4, stream, gyro.channels))(rate)
+    assert not np.array_equal(References(gyro, DT, 5, 4).rates(rate)["mems_gyro"], other_stream)
 
 
 def test_zero_is_zero() -> None:
     assert not References(MemsGyro(), DT, 0, 0).rates(np.ones((5, 1)))["zero"].any()
 
 
-def test_it_rides_along_and_changes_nothing() -> None:
+def test_it_is_open_loop_and_changes_nothing() -> None:
     """The other sensors' noise is as it was without it."""
     settings = ["duration_s=2.5"]
     plain = prepare(load_scenario("push_recovery", settings)).run()
@@ -108,7 +108,7 @@ def test_it_rides_along_and_changes_nothing() -> None:
     assert noisy.trajectory is not None
     for name, values in plain.trajectory.columns.items():
         np.testing.assert_array_equal(values, noisy.trajectory[name])
-    ours, theirs = (result.mean("velocity_fit", "mems_gyro") for result in (plain, noisy))
-    assert ours is not None
-    assert ours > 0.9
-    assert theirs == pytest.approx(0.5, abs=0.02)
+    plain_fit, noisy_fit = (result.mean("velocity_fit", "mems_gyro") for result in (plain, noisy))
+    assert plain_fit is not None
+    assert plain_fit > 0.9
+    assert noisy_fit == pytest.approx(0.5, abs=0.02)

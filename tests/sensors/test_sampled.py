@@ -1,4 +1,4 @@
-"""What the sensors make of an ideal reading, by closed forms and by statistics with confidence bounds.
+"""The sensors' readings of an ideal reading, by closed forms and by statistics with confidence bounds.
 
 Seeds are fixed, so that nothing here fails by chance; the bounds are those a correct sensor meets 999 times of 1000.
 """
@@ -25,12 +25,12 @@ from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
 
 G = 9.80665
-STILL = IdealReading((0.0, G, 0.0, G), [0.0, 0.0], 0.0, 0.0)
+READING_AT_REST = IdealReading((0.0, G, 0.0, G), [0.0, 0.0], 0.0, 0.0)
 QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
 N = 20_000
 
 
-def readings(sensor: Any, n: int, seed: int = 0, world: int = 0, ideal: IdealReading = STILL) -> np.ndarray:
+def readings(sensor: Any, n: int, seed: int = 0, world: int = 0, ideal: IdealReading = READING_AT_REST) -> np.ndarray:
     """n samples of one world, (n, channels)."""
     measure, noise = sensor.make_reading_function(), normals(seed, world, 0, sensor.channels)
     return np.array([np.atleast_1d(measure(ideal, next(noise))) for _ in range(n)])
@@ -201,15 +201,15 @@ def test_fog_without_bandwidth_shows_the_step_at_once_and_starts_settled() -> No
 # --- rates and latency -------------------------------------------------------------------------------------
 
 
-def shown_by(sensor: Fog, timestep: float, steps: int, read_every: int) -> list[float]:
+def read_gyro(sensor: Fog, timestep: float, steps: int, read_every: int) -> list[float]:
     """Readings of a gyro, at control ticks, of a rate that is the number of the physics step."""
-    sampled = SampledSensor(sensor, timestep, normals(0, 0, 2, 1), "sensors.fog", sensor.make_reading_function())
+    sampled_gyro = SampledSensor(sensor, timestep, normals(0, 0, 2, 1), "sensors.fog", sensor.make_reading_function())
     reading = []
     for step in range(steps):
-        if step % sampled.period == 0:
-            sampled.sample(step, IdealReading((), [], float(step), 0.0))
+        if step % sampled_gyro.period == 0:
+            sampled_gyro.sample(step, IdealReading((), [], float(step), 0.0))
         if step % read_every == 0:
-            reading.append(sampled.read(step))
+            reading.append(sampled_gyro.read(step))
     return reading
 
 
@@ -233,7 +233,7 @@ COUNTING = {"angle_random_walk_deg_rth": 0.0, "bandwidth_hz": 0.0, "range_deg_s"
 def test_newest_delivered_sample_at_each_tick(rate_hz: float, latency_s: float, expected: list[int]) -> None:
     """At 200 Hz control and 1 ms physics. Before the first delivery the rig stood still."""
     sensor = Fog(rate_hz=rate_hz, latency_s=latency_s, **COUNTING)
-    assert shown_by(sensor, 0.001, 26, 5) == expected
+    assert read_gyro(sensor, 0.001, 26, 5) == expected
 
 
 @pytest.mark.parametrize(
@@ -260,31 +260,31 @@ def test_the_loop_sees_late_and_slow_sensors() -> None:
     assert trajectory is not None
     np.testing.assert_allclose(trajectory["fog_rad_s"][2:], trajectory["x2_rad_s"][:-2], rtol=0.0, atol=1e-13)
     np.testing.assert_allclose(trajectory["fog_rad_s"][:2], trajectory["x2_rad_s"][0], rtol=0.0, atol=1e-13)
-    held = trajectory["x3_rad"][np.arange(100) // 4 * 4]
-    np.testing.assert_allclose(trajectory["y2_rad"], held, rtol=0.0, atol=1e-13)
+    held_angle = trajectory["x3_rad"][np.arange(100) // 4 * 4]
+    np.testing.assert_allclose(trajectory["y2_rad"], held_angle, rtol=0.0, atol=1e-13)
 
 
 # --- randomness --------------------------------------------------------------------------------------------
 
 
-def drawn(seed: int, worlds: int | list[int], stream: int, n: int, channels: int = 1) -> np.ndarray:
+def draw(seed: int, worlds: int | list[int], stream: int, n: int, channels: int = 1) -> np.ndarray:
     return np.array(list(itertools.islice(normals(seed, worlds, stream, channels), n)))
 
 
 def test_noise_depends_on_seed_and_world_alone() -> None:
     """Not on the batch, nor on the order in it, nor on whether the world runs alone; across blocks of numbers too."""
-    batch = drawn(5, [3, 0, 7], 1, 600, 4)
+    batch = draw(5, [3, 0, 7], 1, 600, 4)
     assert batch.shape == (600, 4, 3)
     for i, world in enumerate((3, 0, 7)):
-        np.testing.assert_array_equal(drawn(5, world, 1, 600, 4), batch[:, :, i])
-    np.testing.assert_array_equal(drawn(5, [7, 3], 1, 600, 4), batch[:, :, [2, 0]])
+        np.testing.assert_array_equal(draw(5, world, 1, 600, 4), batch[:, :, i])
+    np.testing.assert_array_equal(draw(5, [7, 3], 1, 600, 4), batch[:, :, [2, 0]])
     assert all(type(number) is float for number in next(normals(5, 3, 1, 4)))
 
 
 def test_streams_are_uncorrelated_standard_normals() -> None:
     """Seeds, worlds and sensors: no pair correlates, and neighbours in time do not."""
     sources = list(itertools.product((0, 1), (0, 1, 2), (0, 2)))
-    streams = [drawn(seed, world, stream, N)[:, 0] for seed, world, stream in sources]
+    streams = [draw(seed, world, stream, N)[:, 0] for seed, world, stream in sources]
     correlation = np.corrcoef(np.stack(streams))[np.triu_indices(len(streams), 1)]
     assert np.abs(correlation).max() < stats.norm.ppf(1.0 - 0.0005 / len(correlation)) / math.sqrt(N)
     for stream in streams:
@@ -294,7 +294,7 @@ def test_streams_are_uncorrelated_standard_normals() -> None:
 
 
 def test_channels_are_uncorrelated() -> None:
-    correlation = np.corrcoef(drawn(0, 0, 0, N, 4).T)[np.triu_indices(4, 1)]
+    correlation = np.corrcoef(draw(0, 0, 0, N, 4).T)[np.triu_indices(4, 1)]
     assert np.abs(correlation).max() < stats.norm.ppf(1.0 - 0.0005 / 6.0) / math.sqrt(N)
 
 

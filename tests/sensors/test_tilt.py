@@ -19,13 +19,13 @@ N_STATES = 1_000
 
 def two_accelerometers(plant: Plant, data: mujoco.MjData) -> float:
     """y1, from the x and z components of both sensors, [rad]."""
-    inner, outer = (data.sensor(f"accelerometer_{which}").data for which in ("inner", "outer"))
+    inner, outer = (data.sensor(f"accelerometer_{place}").data for place in ("inner", "outer"))
     return plant.radial_tilt(float(inner[0]), float(inner[2]), float(outer[0]), float(outer[2]))
 
 
-def one_accelerometer(data: mujoco.MjData, which: str) -> float:
-    """What a single one would take for the tilt: the direction of its specific force, [rad]."""
-    x, _, z = data.sensor(f"accelerometer_{which}").data
+def one_accelerometer(data: mujoco.MjData, place: str) -> float:
+    """Return the tilt that a single accelerometer would show: the direction of its specific force [rad]."""
+    x, _, z = data.sensor(f"accelerometer_{place}").data
     return math.atan2(-x, z)
 
 
@@ -51,17 +51,19 @@ def test_two_accelerometers_show_the_tilt_in_any_motion(model: str, bias_deg: fl
     torques = rng.uniform(-3.0, 3.0, (N_STATES, n))
     readings, accelerations = [], []
     for data in states(plant.model, qpos, qvel, torques):
-        single = [one_accelerometer(data, which) for which in ("inner", "outer")]
+        single = [one_accelerometer(data, place) for place in ("inner", "outer")]
         readings.append([data.sensor("fog").data[1], two_accelerometers(plant, data), *single])
         accelerations.append(data.qacc[[plant.yaw, plant.tilt]].copy())
     assert np.all(np.abs(accelerations).max(axis=0) > 50.0)
 
     fog, *estimates = np.array(readings).T
-    both, inner, outer = (np.abs(turns(y1 - qpos[:, plant.tilt] + plant.tilt_zero)) for y1 in estimates)
-    alone = np.degrees(np.median([inner, outer], axis=1))
-    print(f"{model}, e = {bias_deg} deg: two accelerometers off by {both.max():.1e} rad at most,", end=" ")
+    pair_errors, inner_errors, outer_errors = (
+        np.abs(turns(y1 - qpos[:, plant.tilt] + plant.tilt_zero)) for y1 in estimates
+    )
+    alone = np.degrees(np.median([inner_errors, outer_errors], axis=1))
+    print(f"{model}, e = {bias_deg} deg: two accelerometers off by {pair_errors.max():.1e} rad at most,", end=" ")
     print(f"the inner alone by {alone[0]:.0f} deg, the outer by {alone[1]:.0f} deg (median)")
-    assert both.max() < 1e-9
+    assert pair_errors.max() < 1e-9
     assert np.all(alone > 5.0)
     # The gyro's second axis is the tilt axis, and the yaw does not reach it.
     np.testing.assert_allclose(fog, qvel[:, plant.tilt], rtol=0.0, atol=1e-12)
@@ -72,15 +74,15 @@ def test_offset_of_biased_accelerometers() -> None:
     tilt, g = RadialTilt(0.06, 0.18), 9.81
     weights = (1.5, -0.5)  # r_outer/(r_outer - r_inner), -r_inner/(...)
 
-    def offset(at: float, inner: float, outer: float) -> float:
-        return tilt.offset(at, lambda f: (f[0] + inner, f[1], f[2] + outer, f[3]), g)
+    def offset(angle: float, inner: float, outer: float) -> float:
+        return tilt.offset(angle, lambda f: (f[0] + inner, f[1], f[2] + outer, f[3]), g)
 
     for bias in ((0.3, 0.0), (0.0, 0.3), (-0.2, 0.1)):
         shift = weights[0] * bias[0] + weights[1] * bias[1]
         assert offset(0.0, *bias) == pytest.approx(-math.atan2(shift, g), rel=1e-12)
     assert offset(0.2, 0.0, 0.0) == pytest.approx(0.0, abs=1e-16)
-    both = offset(0.1, 0.3, 0.3)  # alike on both: gravity turned, whatever the distances
-    assert both == pytest.approx(math.atan2(g * math.sin(0.1) - 0.3, g * math.cos(0.1)) - 0.1, rel=1e-12)
+    common_offset = offset(0.1, 0.3, 0.3)  # alike on both: gravity turned, whatever the distances
+    assert common_offset == pytest.approx(math.atan2(g * math.sin(0.1) - 0.3, g * math.cos(0.1)) - 0.1, rel=1e-12)
 
 
 ERRORS = [

@@ -52,8 +52,8 @@ def values(seed: int = 3) -> dict[str, Any]:
 
 
 def test_these_are_all_fields_that_may_differ() -> None:
-    varied = {name.replace(".0.", ".") for name in values()} - {"plant.timestep_s"}
-    assert varied | {"controller.lqr"} == BATCHED_FIELDS.keys()
+    fields = {name.replace(".0.", ".") for name in values()} - {"plant.timestep_s"}
+    assert fields | {"controller.lqr"} == BATCHED_FIELDS.keys()
 
 
 @pytest.mark.slow
@@ -80,13 +80,13 @@ def test_each_world_is_its_own_experiments(observer: str, more: tuple[str, ...])
             np.testing.assert_array_equal(column[: len(alone.trajectory[name])], alone.trajectory[name], name)
 
 
-def test_an_observer_that_is_told_the_noise_keeps_worlds_of_other_noise_apart() -> None:
+def test_an_observer_that_uses_the_noise_keeps_worlds_of_other_noise_apart() -> None:
     noise = {"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]}
     with pytest.raises(InputError, match="the sensors' noise, which gyro_free is told, differs"):
         experiment("gyro_free").run_many(2, vary=noise)
 
 
-def test_an_observer_that_is_told_the_noise_keeps_worlds_of_other_places_apart() -> None:
+def test_an_observer_that_uses_the_noise_keeps_worlds_of_other_places_apart() -> None:
     with pytest.raises(InputError, match="the sensors' noise, which kalman is told, differs"):
         experiment("kalman").run_many(2, vary={"accelerometer_outer_m": [0.2, 0.25]})
 

@@ -35,11 +35,11 @@ class Batches:
         self.sizes: list[int] = []
         run = Experiment.simulate
 
-        def counted(self_: Experiment, plants: list, *args: object, **options: object) -> Result:
+        def count_batches(self_: Experiment, plants: list, *args: object, **options: object) -> Result:
             self.sizes.append(len(plants))
             return run(self_, plants, *args, **options)  # type: ignore[arg-type]
 
-        monkeypatch.setattr(Experiment, "simulate", counted)
+        monkeypatch.setattr(Experiment, "simulate", count_batches)
 
 
 @pytest.mark.slow
@@ -106,7 +106,8 @@ class Raises:
 
 
 def test_an_observer_that_raises_stops_its_own_run_alone() -> None:
-    runs = [run_of(experiment(name), 2) for name in ("linear", f"{__name__}:Raises", "ltv")]
+    short = ("duration_s=0.5", "push=[]")
+    runs = [run_of(experiment(name, *short), 2) for name in ("linear", f"{__name__}:Raises", "ltv")]
     actual = run_side_by_side(runs)
     assert [[outcome.kind for outcome in result.outcomes] for result in actual] == [
         ["done"] * 2,

@@ -62,25 +62,25 @@ class Loop:
     """A user's own loop: physics steps, pushes by hand, and a record at the ticks."""
 
     def __init__(self, setup: Experiment, *, cold: bool = False) -> None:
-        self.of, self.plant = setup, setup.plant
+        self.setup, self.plant = setup, setup.plant
         self.controller = setup.axis_controller()
         self.data = mujoco.MjData(self.plant.model) if cold else self.plant.new_data()
         if cold:
             self.start()
-        self.noted: Any = None
+        self.last_tick: Any = None
         self.rows: list[tuple] = []
 
     def start(self) -> None:
         """The scenario's initial state as a user would set it, without any forward pass."""
         mujoco.mj_resetDataKeyframe(self.plant.model, self.data, self.plant.key)
-        tilt = math.radians(self.of.scenario.plant.initial_tilt_deg)
+        tilt = math.radians(self.setup.scenario.plant.initial_tilt_deg)
         self.data.qpos[self.plant.tilt] = self.plant.tilt_zero - self.plant.bias + tilt
 
     def push(self) -> None:
         """Set the torque of this instant."""
         t = self.data.time
         self.data.qfrc_applied[self.plant.tilt] = sum(
-            push.torque_n_m for push in self.of.scenario.push if push.start_s <= t + 1e-9 < push.end_s - 1e-9
+            push.torque_n_m for push in self.setup.scenario.push if push.start_s <= t + 1e-9 < push.end_s - 1e-9
         )
 
     def step(self, before: Callable[[], object] = lambda: None) -> None:
@@ -89,8 +89,8 @@ class Loop:
         angles = self.data.qpos.copy()
         before()
         mujoco.mj_step(self.plant.model, self.data)
-        if self.controller.tick is not self.noted:
-            self.noted = self.controller.tick
+        if self.controller.tick is not self.last_tick:
+            self.last_tick = self.controller.tick
             self.rows.append((*angles, *self.signals()))
 
     def signals(self) -> tuple[float, ...]:
@@ -99,18 +99,18 @@ class Loop:
         return (tick.y1, tick.y2, tick.fog, tick.u, tick.x_e, *tick.estimates[0])
 
     def steps(self) -> Iterator[int]:
-        return iter(range(round(self.of.scenario.duration_s / self.plant.model.opt.timestep)))
+        return iter(range(round(self.setup.scenario.duration_s / self.plant.model.opt.timestep)))
 
     def by_control(self) -> Loop:
         for _ in self.steps():
             self.step(lambda: control(self.plant, self.controller, self.data))
         return self
 
-    def by_callback(self, between: Callable[[], object] = lambda: None) -> Loop:
+    def by_callback(self, action: Callable[[], object] = lambda: None) -> Loop:
         with control_callback(self.plant, self.controller):
             for _ in self.steps():
                 self.step()
-                between()
+                action()
         return self
 
 
@@ -236,7 +236,7 @@ class Counted:
         return y.y1, Estimate(y.y1, 0.5 * (y.y1 - state) / self.dt, y.y2)
 
 
-def counting(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
+def count_steps(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
     setup = experiment((f"observer.kind={__name__}:Counted", *settings))
     controller = setup.axis_controller()
     observer: Any = controller.observer
@@ -248,24 +248,24 @@ def counting(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
 def test_observer_advances_once_a_control_period(integrator: str, rate_hz: int) -> None:
     """RK4 calls back four times a step, the others once."""
     settings = (f"plant.integrator={integrator}", f"controller.rate_hz={rate_hz}", "plant.timestep_s=0.001")
-    setup, controller, calls = counting(*settings)
+    setup, controller, calls = count_steps(*settings)
     plant, data = setup.plant, setup.plant.new_data()
-    seen: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     with control_callback(plant, controller) as callback:
 
-        def counted(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-            seen["callback"] += 1
+        def count_calls(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+            counts["callback"] += 1
             callback(model, data)
 
-        mujoco.set_mjcb_control(counted)
+        mujoco.set_mjcb_control(count_calls)
         mujoco.mj_step(plant.model, data, 400)
-    assert seen["callback"] == 400 * (4 if integrator == "RK4" else 1)
+    assert counts["callback"] == 400 * (4 if integrator == "RK4" else 1)
     assert calls == {"init": 1, "step": 400 * rate_hz // 1000 - 1}
 
 
 def test_half_steps_of_the_user_advance_it_once_too() -> None:
     """mj_step1 and mj_step2, which step RK4 models by Euler's method."""
-    setup, controller, calls = counting("plant.timestep_s=0.001")
+    setup, controller, calls = count_steps("plant.timestep_s=0.001")
     plant, data = setup.plant, setup.plant.new_data()
     with control_callback(plant, controller):
         for _ in range(200):
@@ -282,7 +282,7 @@ def other_callback(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 @contextmanager
-def somebody_elses() -> Iterator[None]:
+def other_callback_function() -> Iterator[None]:
     mujoco.set_mjcb_control(other_callback)
     try:
         yield
@@ -300,7 +300,7 @@ def test_it_takes_itself_out() -> None:
 
 def test_it_restores_what_was_there() -> None:
     setup = experiment()
-    with somebody_elses():
+    with other_callback_function():
         with control_callback(setup.plant, setup.axis_controller()) as outer:
             with control_callback(setup.plant, setup.axis_controller()) as inner:
                 assert mujoco.get_mjcb_control() is inner
@@ -311,25 +311,25 @@ def test_it_restores_what_was_there() -> None:
 
 
 def test_a_rig_loads_while_a_callback_is_installed() -> None:
-    with somebody_elses():
+    with other_callback_function():
         load_plant()
 
 
 def test_an_exception_comes_out_of_mj_step_and_takes_the_callback_out() -> None:
-    setup, controller, calls = counting("observer.fail_at=7")
+    setup, controller, calls = count_steps("observer.fail_at=7")
     plant, data = setup.plant, setup.plant.new_data()
     message = r"Counted raised KeyError: 'lost' at t = 0\.035 s"
-    with somebody_elses():
-        with pytest.raises(RunStopped, match=message) as caught, control_callback(plant, controller):
+    with other_callback_function():
+        with pytest.raises(RunStopped, match=message) as info, control_callback(plant, controller):
             mujoco.mj_step(plant.model, data, 400)
         assert mujoco.get_mjcb_control() is other_callback
-    assert isinstance(caught.value.__cause__, KeyError)
+    assert isinstance(info.value.__cause__, KeyError)
     assert calls["step"] == 7
 
 
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_the_runner_keeps_what_was_recorded_until_an_exception(driver: Any) -> None:
-    setup, _, _ = counting("observer.fail_at=7")
+    setup, _, _ = count_steps("observer.fail_at=7")
     result = setup.run(driver=driver)
     (outcome,) = result.outcomes
     assert (outcome.kind, outcome.time_s) == ("stopped", pytest.approx(0.035))
@@ -356,7 +356,7 @@ def test_commands_reach_the_servos_in_their_directions() -> None:
         assert loop.controller.tick is not None
         u = loop.controller.tick.u
         assert loop.data.ctrl[plant.axis.servos].tolist() == [u, -u]
-        assert loop.data.ctrl[[module.motor for module in plant.modules]].tolist() == [314.0, -314.0]
+        assert loop.data.ctrl[[module.motor for module in plant.axis.modules]].tolist() == [314.0, -314.0]
 
 
 def test_rollout_runs_the_callback() -> None:
@@ -369,7 +369,9 @@ def test_rollout_runs_the_callback() -> None:
         states, _ = rollout.rollout(plant.model, mujoco.MjData(plant.model), start[None], nstep=2000)
     lean = states[0, :, 1 + plant.tilt] - plant.tilt_zero  # after the time
     assert np.abs(np.degrees(lean)).max() < 3.0
-    assert np.abs(states[0, -1, 1 + plant.model.nq + plant.modules[0].flywheel] - plant.modules[0].speed) < 1.0
+    assert (
+        np.abs(states[0, -1, 1 + plant.model.nq + plant.axis.modules[0].flywheel] - plant.axis.modules[0].speed) < 1.0
+    )
 
 
 def test_leaving_steps_out_is_said() -> None:
@@ -401,3 +403,13 @@ def test_a_start_between_two_samples_of_a_slow_sensor() -> None:
     data = plant.new_data()
     data.time = 0.005
     assert control(plant, controller, data)
+
+
+def test_an_option_that_no_controller_has_is_named_with_those_it_has() -> None:
+    wrong: Any = {"seed": 1, "feedbck": "fog"}
+    with pytest.raises(InputError) as caught:
+        load_plant().controller("linear", **wrong)
+    assert str(caught.value) == (
+        "controller: 'feedbck': no such option; did you mean 'feedback'? "
+        "allowed: angle_source, axis, bias_trim_s, feedback, open_loop_observers, seed, worlds"
+    )

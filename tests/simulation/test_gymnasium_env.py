@@ -31,17 +31,17 @@ UNEVEN = [
 ]
 
 
-def acting(env: ScissoredPairEnv, seed: int, **options: Any) -> tuple[list[Tick], list[dict[str, Any]], float]:
+def act(env: ScissoredPairEnv, seed: int, **options: Any) -> tuple[list[Tick], list[dict[str, Any]], float]:
     """The bench's own controller at the environment's sensors: its ticks, the infos, the sum of rewards."""
     _, info = env.reset(seed=seed, options=options)
     controller = env.experiment.axis_controller()
     ticks, infos, total, over = [], [info], 0.0, False
     while not over:
         ticks.append(controller.decide(*info["readings"]))
-        _, reward, fell, ended, info = env.step(np.array([ticks[-1].u]))
+        _, reward, is_terminated, is_truncated, info = env.step(np.array([ticks[-1].u]))
         infos.append(info)
         total += reward
-        over = fell or ended
+        over = is_terminated or is_truncated
     return ticks, infos, total
 
 
@@ -59,15 +59,15 @@ def acting(env: ScissoredPairEnv, seed: int, **options: Any) -> tuple[list[Tick]
 def test_our_controller_gives_the_runners_trajectory(scenario: str, settings: list[str], seed: int, world: int) -> None:
     """Bit for bit: what is measured, estimated, commanded, and where the rig is."""
     env = ScissoredPairEnv(scenario, settings, in_rad_s=True)
-    ticks, infos, _ = acting(env, seed, world=world)
+    ticks, infos, _ = act(env, seed, world=world)
     result = prepare(load_scenario(scenario, [*settings, f"seed={seed}"])).run(world=world)
     trajectory = result.trajectory
     assert trajectory is not None
     assert len(ticks) == len(trajectory)
     for name, field in (("y1_rad", "y1"), ("y2_rad", "y2"), ("u_rad_s", "u"), ("fog_rad_s", "fog")):
         assert [getattr(tick, field) for tick in ticks] == trajectory[name].tolist(), name
-    in_loop = trajectory.observers[0]
-    assert [tick.estimates[0][1] for tick in ticks] == trajectory[f"estimate/{in_loop}/x2_rad_s"].tolist()
+    name_in_loop = trajectory.observers[0]
+    assert [tick.estimates[0][1] for tick in ticks] == trajectory[f"estimate/{name_in_loop}/x2_rad_s"].tolist()
     for name in ("x1_rad", "x2_rad_s", "x3_rad"):
         assert [info[name] for info in infos[:-1]] == trajectory[name].tolist(), name
     assert infos[-1]["time_s"] == pytest.approx(result.outcomes[0].time_s)
@@ -76,12 +76,12 @@ def test_our_controller_gives_the_runners_trajectory(scenario: str, settings: li
 def test_a_fall_ends_it_and_never_pays() -> None:
     """Who does nothing falls, and has less than who stands, though it is over sooner."""
     env = ScissoredPairEnv("push_recovery", ["duration_s=5.0"], in_rad_s=True)
-    _, _, standing = acting(env, 0)
+    _, _, standing = act(env, 0)
     _, info = env.reset(seed=0)
-    total, fell = 0.0, False
-    while not fell:
-        _, reward, fell, ended, info = env.step(np.zeros(1))
-        assert not ended
+    total, is_terminated = 0.0, False
+    while not is_terminated:
+        _, reward, is_terminated, is_truncated, info = env.step(np.zeros(1))
+        assert not is_truncated
         total += reward
     assert info["time_s"] < 2.0
     assert total < 2.0 * standing < 0.0
@@ -169,16 +169,16 @@ picture = env.render()
 print(picture.shape, picture.dtype, picture.std() > 10.0)
 env.close()
 """
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-W", "error", "-c", program],
         env=environment(MUJOCO_GL=os.environ.get("MUJOCO_GL", "egl")),
         cwd=ROOT,
         capture_output=True,
         text=True,
     )
-    if done.returncode and "MUJOCO_GL" not in os.environ and ("OpenGL" in done.stderr or "EGL" in done.stderr):
+    if process.returncode and "MUJOCO_GL" not in os.environ and ("OpenGL" in process.stderr or "EGL" in process.stderr):
         pytest.skip("nothing draws here")
-    assert (done.returncode, done.stdout) == (0, "(480, 640, 3) uint8 True\n"), done.stderr
+    assert (process.returncode, process.stdout) == (0, "(480, 640, 3) uint8 True\n"), process.stderr
 
 
 @pytest.mark.parametrize(
@@ -219,5 +219,5 @@ def test_a_wrong_action(action: np.ndarray) -> None:
 @pytest.mark.slow
 def test_without_gymnasium_it_says_how_to_get_it() -> None:
     program = "import sys; sys.modules['gymnasium'] = None\nimport cmg_mj.simulation.gymnasium_env"
-    done = subprocess.run([sys.executable, "-c", program], env=environment(), capture_output=True, text=True)
-    assert 'environment: gymnasium is not installed: python -m pip install "cmg_mj[gymnasium]"' in done.stderr
+    process = subprocess.run([sys.executable, "-c", program], env=environment(), capture_output=True, text=True)
+    assert 'environment: gymnasium is not installed: python -m pip install "cmg_mj[gymnasium]"' in process.stderr

@@ -68,8 +68,8 @@ def test_figures_do_not_depend_on_the_step(kind: str) -> None:
     for settings in ([], ["plant.timestep_s=0.001"]):
         experiment = prepare(load_scenario("push_recovery", ["duration_s=6", *settings], kind))
         results.append((experiment.plant.timestep, experiment.run_many(64, keep_trajectory=False)))
-    (chosen, coarse), (_, fine) = results
-    assert chosen == 0.005
+    (default_step, coarse), (_, fine) = results
+    assert default_step == 0.005
     for key, value in fine.summaries[0].items():
         if key in (*NESTED, "settle_time_s") or value is None:
             continue

@@ -31,13 +31,13 @@ def errors(result: Result, axis: str) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", RATES)
 def test_each_axis_is_estimated_as_with_the_other_locked(rate: float) -> None:
-    turning = f"plant.turn_rate_rad_s={rate}"
-    both = two_axes(turning).run_many(WORLDS, keep_trajectory=False)
-    assert both.stood.all()
+    turn_setting = f"plant.turn_rate_rad_s={rate}"
+    result = two_axes(turn_setting).run_many(WORLDS, keep_trajectory=False)
+    assert result.stood.all()
     for axis, other in (AXES, AXES[::-1]):
-        alone = two_axes(turning, f'plant.locked_axes=["{other}"]').run_many(WORLDS, keep_trajectory=False)
+        alone = two_axes(turn_setting, f'plant.locked_axes=["{other}"]').run_many(WORLDS, keep_trajectory=False)
         assert alone.stood.all()
-        assert errors(both, axis).mean() == pytest.approx(errors(alone, axis).mean(), rel=0.10)
+        assert errors(result, axis).mean() == pytest.approx(errors(alone, axis).mean(), rel=0.10)
 
 
 @pytest.mark.slow
@@ -46,17 +46,19 @@ def test_most_of_the_ceiling_tilt_on_both_axes_at_once_is_recovered_and_more_nev
     largest = min(
         math.degrees(ceiling(axis.design.rig.reduced, axis.law.rate_limit).tilt) for axis in two_axes(*CALM).axes
     )
-    for share, stands in ((0.8, True), (1.05, False)):
-        tilted = f"plant.initial_tilt_deg={share * largest}"
-        result = two_axes(*CALM, tilted, f"plant.model={model}", "duration_s=6").run_many(10, keep_trajectory=False)
-        assert result.stood.all() if stands else not result.stood.any()
+    for share, is_recovered in ((0.8, True), (1.05, False)):
+        tilt_setting = f"plant.initial_tilt_deg={share * largest}"
+        result = two_axes(*CALM, tilt_setting, f"plant.model={model}", "duration_s=6").run_many(
+            10, keep_trajectory=False
+        )
+        assert result.stood.all() if is_recovered else not result.stood.any()
 
 
 @pytest.mark.slow
-def test_a_turn_is_borne_by_gimbals_that_turn_against_it_alone() -> None:
+def test_a_turn_is_tolerated_with_gimbals_that_turn_against_it_alone() -> None:
     assert two_axes("plant.turn_rate_rad_s=3").run().outcomes[0].kind == "done"
-    without = two_axes("plant.turn_rate_rad_s=2", "controller.compensate_turning=false")
-    assert without.run().outcomes[0].fell
+    uncompensated = two_axes("plant.turn_rate_rad_s=2", "controller.compensate_turning=false")
+    assert uncompensated.run().outcomes[0].fell
     assert two_axes("plant.turn_rate_rad_s=0.5", "controller.compensate_turning=false").run().outcomes[0].kind == "done"
 
 
@@ -81,12 +83,12 @@ def test_a_gaits_torque_is_found_by_its_frequency() -> None:
         for axis, phase in zip(AXES, (0, 90), strict=True)
     )
     gait = ("push=[]", f"swing=[{swings}]", "observer.kind=adaptive")
-    without = two_axes(*gait).run_many(5, keep_trajectory=False)
+    baseline = two_axes(*gait).run_many(5, keep_trajectory=False)
     informed = two_axes(*gait, "observer.sinusoid_hz=2").run_many(5, keep_trajectory=False)
-    assert without.stood.all()
+    assert baseline.stood.all()
     assert informed.stood.all()
     for axis in AXES:
-        assert (errors(informed, axis) < 0.8 * errors(without, axis)).all()
+        assert (errors(informed, axis) < 0.8 * errors(baseline, axis)).all()
 
 
 @pytest.mark.slow
@@ -106,13 +108,13 @@ def test_one_world_of_many_and_the_callback_are_the_same_to_the_bit(duration_s: 
     many = experiment.run_many([0, 3]).trajectory
     assert many is not None
     for place, world in enumerate((0, 3)):
-        alone, called = (experiment.run(driver, world).trajectory for driver in ("native", "callback"))
-        assert alone is not None
-        assert called is not None
-        of_many = many.world(place)
-        for name in alone.columns:
-            np.testing.assert_array_equal(of_many[name], alone[name], err_msg=name)
-            np.testing.assert_array_equal(called[name], alone[name], err_msg=name)
+        native, callback = (experiment.run(driver, world).trajectory for driver in ("native", "callback"))
+        assert native is not None
+        assert callback is not None
+        batch_world = many.world(place)
+        for name in native.columns:
+            np.testing.assert_array_equal(batch_world[name], native[name], err_msg=name)
+            np.testing.assert_array_equal(callback[name], native[name], err_msg=name)
 
 
 def test_every_axis_has_noise_of_its_own() -> None:

@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Iterator
@@ -54,16 +55,16 @@ def receiver() -> Iterator[Viewer]:
     end(viewer, signal.SIGKILL)
 
 
-def end(viewer: Viewer, how: signal.Signals) -> None:
+def end(viewer: Viewer, signal_number: signal.Signals) -> None:
     """The viewer and what started it, and nothing else: they have a session of their own."""
     if viewer.process.poll() is None:
-        os.killpg(viewer.process.pid, how)
+        os.killpg(viewer.process.pid, signal_number)
         viewer.process.wait()
 
 
 def content(path: Path) -> dict[tuple[str, str], dict[Any, Any]]:
     """(entity, component) -> time [ns], None where there is none, -> value: all that a recording holds."""
-    found: dict[tuple[str, str], dict[Any, Any]] = {}
+    columns: dict[tuple[str, str], dict[Any, Any]] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a stream has no footer
         chunks = list(RrdReader(path).stream())
@@ -74,25 +75,27 @@ def content(path: Path) -> dict[tuple[str, str], dict[Any, Any]]:
         if not chunk.is_static:
             times = batch.column("sim_time").to_numpy(zero_copy_only=False).astype(np.int64).tolist()
         for name in names:
-            rows = found.setdefault((chunk.entity_path, name), {})
-            for at, value in zip(times, batch.column(name).to_pylist(), strict=True):
+            rows = columns.setdefault((chunk.entity_path, name), {})
+            for instant, value in zip(times, batch.column(name).to_pylist(), strict=True):
                 if value is not None:
-                    assert at is None or at not in rows or rows[at] == value  # a page may be written anew
-                    rows[at] = value
-    return found
+                    assert (
+                        instant is None or instant not in rows or rows[instant] == value
+                    )  # a page may be written anew
+                    rows[instant] = value
+    return columns
 
 
-def assert_alike(streamed: Path, saved: Path) -> None:
-    ours, whole = content(streamed), content(saved)
-    assert {key for key in ours if NOT_ALIKE not in key[0]} == {key for key in whole if NOT_ALIKE not in key[0]}
-    for key, rows in whole.items():
+def assert_alike(stream_path: Path, file_path: Path) -> None:
+    stream, file = content(stream_path), content(file_path)
+    assert {key for key in stream if NOT_ALIKE not in key[0]} == {key for key in file if NOT_ALIKE not in key[0]}
+    for key, rows in file.items():
         if key[0].startswith(NOT_ALIKE):
             continue
         if key[0].endswith(TWO_ENDS) and key[1] == "Scalars:scalars":
-            assert {str(value) for value in ours[key].values()} == {str(value) for value in rows.values()}
-            assert (min(ours[key]), max(ours[key])) == (min(rows), max(rows))
+            assert {str(value) for value in stream[key].values()} == {str(value) for value in rows.values()}
+            assert (min(stream[key]), max(stream[key])) == (min(rows), max(rows))
         else:
-            assert ours[key] == rows, key
+            assert stream[key] == rows, key
 
 
 @pytest.mark.parametrize(
@@ -136,9 +139,8 @@ def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: 
         result = experiment.run(**view.options())
         view.ended(report_run(experiment, result))
         save_run(RunFolder(Path("it"), []), report_run(experiment, result))
-    assert view.lost == ""
-    until_it_is_still(Path("received.rrd"))
-    assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
+    assert view.failure == ""
+    assert_received(Path("received.rrd"))
 
 
 @pytest.mark.parametrize("ticks", slow_but([1, 2, 3, 64], 64))
@@ -181,11 +183,17 @@ def rows(trajectory: Trajectory, first: int, end: int) -> Trajectory:
     return replace(trajectory, columns={name: values[first:end] for name, values in trajectory.columns.items()})
 
 
-def until_it_is_still(path: Path) -> None:
-    sizes = [-1, -2]
-    while sizes[-1] != sizes[-2]:
-        time.sleep(0.5)
-        sizes.append(path.stat().st_size)
+def assert_received(path: Path) -> None:
+    """The viewer has written all: it has been sent that, but writes when it comes to it."""
+    size = -1
+    while True:
+        try:
+            return assert_alike(path, Path("it/recording.rrd"))
+        except Exception:  # half a file may be no recording at all
+            if path.stat().st_size == size:
+                raise
+            size = path.stat().st_size
+            time.sleep(1.0)
 
 
 def column(path: Path) -> dict[str, list[float]]:
@@ -206,24 +214,21 @@ def test_the_figures_are_those_of_a_run_that_nobody_looks_at(receiver: Viewer, d
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
-def test_the_run_does_not_care_what_becomes_of_the_viewer(receiver: Viewer, how: signal.Signals) -> None:
-    """Killed, or standing still, half a second after the run began: it takes no longer than it must."""
+@pytest.mark.parametrize("signal_number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
+def test_the_run_does_not_care_what_becomes_of_the_viewer(receiver: Viewer, signal_number: signal.Signals) -> None:
+    """Killed, or standing still, while the run goes on, which ends all the same."""
     arguments = ["run", "push_recovery", *(f"--set={setting}" for setting in SHORT), "--out=it", "--json"]
     command = [*COMMAND, *arguments, "--connect", str(receiver.port), "--pace=2"]
     with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
         while Path("received.rrd").stat().st_size < 100_000:
             time.sleep(0.05)
-        began = time.monotonic()
-        os.killpg(receiver.process.pid, how)
+        os.killpg(receiver.process.pid, signal_number)
         out, err = run.communicate(timeout=HANGS_AFTER_S)
-        took = time.monotonic() - began
     assert run.returncode == 0, err
-    why = {signal.SIGKILL: GONE, signal.SIGSTOP: STUCK}[how]
-    assert err == f"cmg-mj: the viewer missed a part: {why}; the run and its files are complete\n"
+    reason = {signal.SIGKILL: GONE, signal.SIGSTOP: STUCK}[signal_number]
+    assert err == f"cmg-mj: the viewer missed a part: {reason}; the run and its files are complete\n"
     assert json.loads(out)["outcome"] == "done"
     assert len(assert_whole("it")) == 600
-    assert took < 30.0
 
 
 @pytest.mark.slow
@@ -237,36 +242,55 @@ def test_ctrl_c_keeps_what_was_recorded(receiver: Viewer, ctrl_c: None) -> None:
     assert run.returncode == 130
     assert err.splitlines()[-1].startswith("cmg-mj: interrupted at ")
     assert 0 < len(assert_whole("it")) < 2000  # the shapes come first and fill most of what was waited for
-    until_it_is_still(Path("received.rrd"))
-    assert_alike(Path("received.rrd"), Path("it/recording.rrd"))
+    assert_received(Path("received.rrd"))
 
 
 def test_a_viewer_is_heard_on_this_machine_alone(receiver: Viewer) -> None:
-    listening = subprocess.run(["ss", "-ltnH"], capture_output=True, text=True, check=True).stdout.splitlines()
-    places = [line.split()[3] for line in listening if line.split()[3].endswith(f":{receiver.port}")]
+    lines = subprocess.run(["ss", "-ltnH"], capture_output=True, text=True, check=True).stdout.splitlines()
+    places = [line.split()[3] for line in lines if line.split()[3].endswith(f":{receiver.port}")]
     assert places == [f"127.0.0.1:{receiver.port}"]
 
 
 def test_a_run_ends_and_its_viewer_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     """The command that starts one: here with a viewer that needs no screen, of which rerun has several kinds."""
     monkeypatch.setattr(viewer, "start_viewer", lambda: start_viewer(["--serve-grpc"]))
-    said = cmg_mj(
+    outcome = cmg_mj(
         "run", "push_recovery", *(f"--set={setting}" for setting in SHORT), "--live", "--pace=max", "--out=it"
     )
-    started = viewer._started[-1]
+    own_viewer = viewer._viewers[-1]
     try:
-        assert said.status == 0, said
-        assert started.process.poll() is None
+        assert outcome.status == 0, outcome
+        assert own_viewer.process.poll() is None
     finally:
-        end(started, signal.SIGKILL)
+        end(own_viewer, signal.SIGKILL)
+
+
+@pytest.fixture
+def _without_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in viewer.SCREENS:
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere no environment variable names the screen")
+@pytest.mark.usefixtures("_without_screen")
+def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No viewer is started to find that out."""
+    monkeypatch.setattr(viewer, "_start", pytest.fail)
+    message = cmg_mj("run", "push_recovery", "--live", "--out=it").complaint
+    unset = "neither WAYLAND_DISPLAY nor WAYLAND_SOCKET nor DISPLAY is set"
+    assert message.startswith(f"--live: no viewer could be started: {unset}. Where there is no screen: start rerun ")
+    assert not Path("it").exists()
 
 
 @pytest.mark.slow
-def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
-        monkeypatch.delenv(name, raising=False)
-    said = cmg_mj("run", "push_recovery", "--live", "--out=it")
-    assert said.complaint.startswith("--live: no viewer could be started: neither WAYLAND_DISPLAY nor ")
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere no environment variable names the screen")
+@pytest.mark.usefixtures("_without_screen")
+def test_a_viewer_that_finds_no_screen_is_not_taken_for_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It listens, and ends: on a busy machine seconds later."""
+    monkeypatch.setenv("DISPLAY", "nowhere:77")
+    monkeypatch.setattr(viewer, "STAYS_S", 60.0)
+    message = cmg_mj("run", "push_recovery", "--live", "--out=it").complaint
+    assert message.startswith("--live: no viewer could be started: ")
     assert not Path("it").exists()
 
 
@@ -274,14 +298,17 @@ def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPa
     ("arguments", "complaint"),
     [
         (
-            ["--connect={unused}"],
-            "--connect '{unused}': no viewer listens there (connection refused); start one with: ",
+            ["--connect={free_port}"],
+            "--connect '{free_port}': no viewer listens there (connection refused); start one with: ",
         ),
         (["--connect=localhost"], "--connect 'localhost': no address of a viewer; give PORT, HOST:PORT or "),
         (["--connect=http://localhost:1"], "--connect 'http://localhost:1': no address of a viewer; "),
         (["--connect=1:2:3"], "--connect '1:2:3': no address of a viewer; "),
         (["--connect=localhost:99999"], "--connect 'localhost:99999': no address of a viewer; "),
-        (["--connect={unused}", "--live"], "--live starts a viewer, --connect takes one that runs already: give one"),
+        (
+            ["--connect={free_port}", "--live"],
+            "--live starts a viewer, --connect takes one that runs already: give one",
+        ),
         (["--live", "--pace=fast"], "--pace 'fast': must be a number such as 0.5 or 4, or max for no limit"),
         (["--live", "--pace=-1"], "--pace '-1': must be "),
         (["--live", "--pace=nan"], "--pace 'nan': must be "),
@@ -292,9 +319,11 @@ def test_without_a_screen_it_is_said_before_the_run(monkeypatch: pytest.MonkeyPa
 def test_what_is_wrong_is_said_before_the_run(arguments: list[str], complaint: str) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        unused = probe.getsockname()[1]
-    said = cmg_mj("run", "push_recovery", "--out=it", *(argument.format(unused=unused) for argument in arguments))
-    assert said.complaint.startswith(complaint.format(unused=unused))
+        free_port = probe.getsockname()[1]
+    outcome = cmg_mj(
+        "run", "push_recovery", "--out=it", *(argument.format(free_port=free_port) for argument in arguments)
+    )
+    assert outcome.complaint.startswith(complaint.format(free_port=free_port))
     assert not Path("it").exists()
 
 

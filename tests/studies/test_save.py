@@ -58,8 +58,9 @@ def own_model() -> list[str]:
     return [write("duration_s = 0.4\n[plant]\nmodel = '../rigs/scissored_pair.xml'", "scenarios/my.toml")]
 
 
+PUSHED = ("--set", "duration_s=0.5", "--set", "push.0.start_s=0.3")
 KINDS: dict[str, Callable[[], list[str]]] = {
-    "a bundled scenario": lambda: ["push_recovery", "--seed", "3", "--set", "duration_s=2.05", "--observer", "ltv"],
+    "a bundled scenario": lambda: ["push_recovery", "--seed", "3", *PUSHED, "--observer", "ltv"],
     "a user's model": own_model,
     "a user's observer": lambda: [write(f"duration_s = 0.4\n[observer]\nkind = '{__name__}:Mine'\ngain = 0.4")],
     "lqr": lambda: [write("duration_s = 0.4\n[controller]\nlqr.state_cost = [30, 1, 0.5, 0.1]\nlqr.input_cost = 0.3")],
@@ -76,17 +77,17 @@ def test_a_written_scenario_reruns_to_the_same_bits(kind: str, monkeypatch: pyte
     arguments = KINDS[kind]()
     first = cmg_mj("run", *arguments, "--out", "first", "--json")
     assert first.status == 0, first.err
-    again = cmg_mj("run", *arguments, "--out", "again", "--json")
+    repetition = cmg_mj("run", *arguments, "--out", "again", "--json")
     write("<mujoco/>", "elsewhere/scissored_pair.xml")
     monkeypatch.chdir("elsewhere")
     rerun = cmg_mj("run", "../first/scenario.toml", "--out", "../rerun", "--json")
     assert rerun.status == 0, rerun.err
-    assert first.out == again.out == rerun.out
+    assert first.out == repetition.out == rerun.out
     monkeypatch.chdir("..")
     trajectories = [Path(f"{place}/trajectory.parquet").read_bytes() for place in ("first", "again", "rerun")]
     assert trajectories[0] == trajectories[1] == trajectories[2]
-    written = [Path(f"{place}/scenario.toml").read_text() for place in ("first", "again", "rerun")]
-    assert written[0] == written[1] == written[2]
+    scenarios = [Path(f"{place}/scenario.toml").read_text() for place in ("first", "again", "rerun")]
+    assert scenarios[0] == scenarios[1] == scenarios[2]
 
 
 def test_another_seed_is_another_run() -> None:
@@ -106,11 +107,11 @@ def test_the_callback_writes_the_same() -> None:
 
 
 def test_a_run_folder() -> None:
-    said = cmg_mj(
+    outcome = cmg_mj(
         "run", write("title = 'Mine'\nduration_s = 0.5\nopen_loop_observers = ['ltv']"), "--out", "deep/er", "--json"
     )
     trajectory = assert_whole("deep/er")
-    assert Path("deep/er/summary.json").read_text() == said.out
+    assert Path("deep/er/summary.json").read_text() == outcome.out
     assert len(trajectory) == 100
     assert trajectory.observers == ("homogeneous", "ltv")
     assert trajectory.metadata["outcome"] == {"kind": "done", "time_s": 0.5, "reason": ""}
@@ -125,9 +126,9 @@ def test_a_folder_is_written_over() -> None:
 
 
 def test_a_fall_is_a_result() -> None:
-    said = cmg_mj("run", write("duration_s = 3.0\n[plant]\nequilibrium_bias_deg = 20.0"), "--out", "it", "--json")
-    summary = json.loads(said.out)
-    assert (said.status, said.err) == (0, "")
+    outcome = cmg_mj("run", write("duration_s = 3.0\n[plant]\nequilibrium_bias_deg = 20.0"), "--out", "it", "--json")
+    summary = json.loads(outcome.out)
+    assert (outcome.status, outcome.err) == (0, "")
     assert (summary["fell"], summary["outcome"], summary["settle_time_s"]) == (True, "fell", None)
     assert len(assert_whole("it")) == pytest.approx(summary["end_time_s"] * 200, abs=1)
 
@@ -168,13 +169,15 @@ def test_numbers_json_does_not_know() -> None:
 @pytest.mark.slow
 def test_a_comparison_of_one_world_equals_single_runs() -> None:
     file = write("duration_s = 0.5\n[[push]]\nstart_s = 0.2\n[observer]\nkind = 'homogeneous'\nk1 = 30.0")
-    mine = f"{__name__}:Mine"
-    said = cmg_mj("compare", file, "--worlds", 1, "--observers", f"ltv,homogeneous,{mine}", "--json", "--out", "it")
-    assert (said.status, said.err) == (0, "")
-    compared = json.loads(said.out)
-    assert json.loads(Path("it/summary.json").read_text()) == compared
-    assert [entry["observer"] for entry in compared] == ["ltv", "homogeneous", mine, *REFERENCES]
-    for entry, name in zip(compared, ("ltv", "homogeneous", "Mine"), strict=False):
+    user_observer = f"{__name__}:Mine"
+    outcome = cmg_mj(
+        "compare", file, "--worlds", 1, "--observers", f"ltv,homogeneous,{user_observer}", "--json", "--out", "it"
+    )
+    assert (outcome.status, outcome.err) == (0, "")
+    rows = json.loads(outcome.out)
+    assert json.loads(Path("it/summary.json").read_text()) == rows
+    assert [entry["observer"] for entry in rows] == ["ltv", "homogeneous", user_observer, *REFERENCES]
+    for entry, name in zip(rows, ("ltv", "homogeneous", "Mine"), strict=False):
         single = json.loads(cmg_mj("run", file, "--observer", entry["observer"], "--json", "--out", name).out)
         shared = {key: entry[key] for key in single.keys() & entry.keys()}
         assert shared == {key: single[key] for key in shared}
@@ -220,7 +223,7 @@ def test_observers_of_one_name_from_two_places_do_not_overwrite_each_other() -> 
 
 
 def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
-    """Those without one run untrimmed; alone, they are refused (tests/inputs/)."""
+    """Observers without one run untrimmed; alone, they are refused (tests/inputs/)."""
     scenario = load_scenario("bias_estimation", ["duration_s=0.5"])
     experiments = comparison.prepare_comparison(scenario, ["linear", "adaptive", "homogeneous_adaptive"])
     assert [experiment.scenario.controller.bias_trim_s for experiment in experiments] == [0.0, 1.0, 1.0]
@@ -244,14 +247,14 @@ def test_a_comparisons_scenario_runs_to_the_same_comparison(scenario: str, obser
     settings += ["--set", "duration_s=0.4", "--set", "push=[]", "--set", "plant.equilibrium_bias_deg=0.3"]
     first = cmg_mj("compare", scenario, "--observers", observers, "--worlds", 2, "--out", "a", "--json", *settings)
     assert first.status == 0, first.err
-    again = cmg_mj("compare", "a/scenario.toml", "--out", "b", "--json")
-    assert (again.status, again.err) == (0, "")
-    assert again.out == first.out
-    assert [row["observer"] for row in json.loads(again.out)][: -len(REFERENCES)] == same
+    rerun = cmg_mj("compare", "a/scenario.toml", "--out", "b", "--json")
+    assert (rerun.status, rerun.err) == (0, "")
+    assert rerun.out == first.out
+    assert [row["observer"] for row in json.loads(rerun.out)][: -len(REFERENCES)] == same
     assert pq.read_table("a/worlds.parquet").equals(pq.read_table("b/worlds.parquet"))
-    written = tomllib.loads(Path("a/scenario.toml").read_text(encoding="utf-8"))
-    assert written == tomllib.loads(Path("b/scenario.toml").read_text(encoding="utf-8"))
-    assert written["compare"] == {"observers": same, "worlds": 2}
+    fields = tomllib.loads(Path("a/scenario.toml").read_text(encoding="utf-8"))
+    assert fields == tomllib.loads(Path("b/scenario.toml").read_text(encoding="utf-8"))
+    assert fields["compare"] == {"observers": same, "worlds": 2}
 
 
 @pytest.mark.slow
@@ -259,23 +262,23 @@ def test_options_come_before_what_the_scenario_says_to_compare() -> None:
     file = write("duration_s = 0.2\n[compare]\nobservers = ['ltv', 'linear', 'ltv']\nworlds = 3")
     plain = json.loads(cmg_mj("compare", file, "--json").out)
     assert [(row["observer"], row["worlds"]) for row in plain[: -len(REFERENCES)]] == [("ltv", 3), ("linear", 3)]
-    other = json.loads(cmg_mj("compare", file, "--json", "--observers", "homogeneous", "--worlds", 1).out)
-    assert [(row["observer"], row["worlds"]) for row in other[: -len(REFERENCES)]] == [("homogeneous", 1)]
+    rows = json.loads(cmg_mj("compare", file, "--json", "--observers", "homogeneous", "--worlds", 1).out)
+    assert [(row["observer"], row["worlds"]) for row in rows[: -len(REFERENCES)]] == [("homogeneous", 1)]
     fewer = json.loads(cmg_mj("compare", file, "--json", "--set", "compare.worlds=2").out)
     assert fewer[0]["worlds"] == 2
 
 
 def test_run_says_that_it_does_not_compare() -> None:
-    said = cmg_mj("run", write("duration_s = 0.2\n[compare]\nworlds = 3"), "--json")
-    assert (said.status, said.err) == (0, "cmg-mj: [compare] is for cmg-mj compare; this is one run\n")
-    assert json.loads(said.out)["observer"] == "homogeneous"
+    outcome = cmg_mj("run", write("duration_s = 0.2\n[compare]\nworlds = 3"), "--json")
+    assert (outcome.status, outcome.err) == (0, "cmg-mj: [compare] is for cmg-mj compare; this is one run\n")
+    assert json.loads(outcome.out)["observer"] == "homogeneous"
 
 
 @pytest.mark.slow
 def test_a_comparison_is_drawn_if_it_is_asked_for() -> None:
     file = write("duration_s = 1.0\n[plant]\nequilibrium_bias_deg = 6.0")
-    said = cmg_mj("compare", file, "--observers", "linear,luenberger", "--worlds", 3, "--plot", "--out", "it")
-    assert said.status == 0
+    outcome = cmg_mj("compare", file, "--observers", "linear,luenberger", "--worlds", 3, "--plot", "--out", "it")
+    assert outcome.status == 0
     assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -288,14 +291,14 @@ def test_a_comparison_is_drawn_if_it_is_asked_for() -> None:
 def test_a_title_of_any_letters_under_an_ascii_locale(command: str) -> None:
     Path("my.toml").write_text('title = "Stoß – 1°"\nduration_s = 0.2', encoding="utf-8")
     options = ["--observers", "linear", "--worlds", "1"] if command == "compare" else []
-    done = subprocess.run(
+    process = subprocess.run(
         [*COMMAND, command, "my.toml", "--out", "it", *options],
         env=environment(LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0"),
         capture_output=True,
         timeout=HANGS_AFTER_S,
     )
-    assert done.returncode == 0, done.stderr
-    assert b"Sto\\xdf" in done.stdout
+    assert process.returncode == 0, process.stderr
+    assert b"Sto\\xdf" in process.stdout
     assert tomllib.loads(Path("it/scenario.toml").read_text(encoding="utf-8"))["title"] == "Stoß – 1°"
 
 
@@ -306,13 +309,13 @@ def test_a_folder_and_a_file_named_in_bytes_that_are_no_letters(command: str, lo
     Path(os.fsdecode(b"my\xff.toml")).write_text("duration_s = 0.2\n[observer]\nkind = 'linear'")
     options = {"run": [], "compare": ["--observers", "linear", "--worlds", "1"], "tune": ["--worlds", "2"]}[command]
     for place in (["--out", b"it\xff"], []):
-        done = subprocess.run(
+        process = subprocess.run(
             [*COMMAND, command, b"my\xff.toml", *options, *place],
             env=environment(**locale),
             capture_output=True,
             timeout=HANGS_AFTER_S,
         )
-        assert done.returncode == 0, done.stderr
+        assert process.returncode == 0, process.stderr
     assert len(os.listdir(b"it\xff")) > 2
     assert all(name.decode().isascii() for name in os.listdir(b"runs"))
 

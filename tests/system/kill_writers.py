@@ -20,12 +20,12 @@ from cmg_mj.results.run_folder import RunFolder, swap
 from cmg_mj.results.run_folder.manifest import HIDDEN
 
 EVENTS = {"open", "os.link", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.chmod", "os.utime"}
-"""What changes files, as Python's audit hooks name it."""
+"""Events that change files, as Python's audit hooks name them."""
 
 OLD, NEW = {"a": "old", "b": "old", "c": "old"}, {"b": "new", "c": "new", "d": "new"}
 
 
-def forked(child: Callable[[], None]) -> int:
+def fork(child: Callable[[], None]) -> int:
     """Run it in a process of its own; the process."""
     process = os.fork()
     if process == 0:
@@ -38,7 +38,7 @@ def forked(child: Callable[[], None]) -> int:
     return process
 
 
-def ended(process: int) -> int:
+def wait_for(process: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
 
 
@@ -48,57 +48,57 @@ def save(texts: dict[str, str], complete: bool = True) -> None:
         folder.write(writers, complete=complete)
 
 
-def seen() -> dict[str, str]:
-    """What a plain reader finds."""
+def read_files() -> dict[str, str]:
+    """Read the files as a plain reader does."""
     return {file.name: file.read_text() for file in Path("it").iterdir() if file.is_file()}
 
 
-def at_every_event(whole: bool) -> None:
+def kill_at_every_event(swap_folders: bool) -> None:
     """Kill before every single change of a file; a result is never in parts, and the next run finds it tidy.
 
     Args:
-        whole: Folders change names; otherwise files are moved, and what is begun then is finished by the next run.
+        swap_folders: Folders change names; otherwise files are moved, and the next run finishes what is begun then.
     """
-    if not whole:
+    if not swap_folders:
         swap._swap_folders = lambda new, folder, lock: False
-    mine = {"notes": "mine"}
+    user_file = {"notes": "mine"}
     finished, kills, times_new = False, 0, 0
     while not finished:
         save(OLD)
         Path("it/notes").write_text("mine")
 
-        def dies(after: int = kills) -> None:
-            left = after
+        def save_and_die(n_events: int = kills) -> None:
+            n_remaining = n_events
 
             def hook(event: str, arguments: tuple[Any, ...]) -> None:
-                nonlocal left
+                nonlocal n_remaining
                 if event in EVENTS:
-                    if left == 0:
+                    if n_remaining == 0:
                         os.kill(os.getpid(), signal.SIGKILL)
-                    left -= 1
+                    n_remaining -= 1
 
             sys.addaudithook(hook)
             save(NEW)
 
-        status = ended(forked(dies))
+        status = wait_for(fork(save_and_die))
         assert status in (0, -signal.SIGKILL), status
         finished = status == 0
-        if whole:
-            assert seen() in (OLD | mine, NEW | mine), (kills, seen())
-        times_new += seen() == NEW | mine
+        if swap_folders:
+            assert read_files() in (OLD | user_file, NEW | user_file), (kills, read_files())
+        times_new += read_files() == NEW | user_file
         with RunFolder(Path("it")):
             pass
-        assert seen() in (OLD | mine, NEW | mine), (kills, seen())
+        assert read_files() in (OLD | user_file, NEW | user_file), (kills, read_files())
         left = sorted(str(file) for file in Path().rglob("*"))
-        assert left == sorted(["it", f"it/{HIDDEN}", f"it/{HIDDEN}/files.json", *(f"it/{name}" for name in seen())]), (
-            left
-        )
+        assert left == sorted(
+            ["it", f"it/{HIDDEN}", f"it/{HIDDEN}/files.json", *(f"it/{name}" for name in read_files())]
+        ), left
         kills += 1
     assert kills - 1 > times_new > 1, "some kills came before the new result was there, and some after"
     print(f"{kills - 1} kills")
 
 
-def at_random(times: int) -> None:
+def kill_at_random(times: int) -> None:
     """Kill whole runs being saved over one another: every file is of one and the same run."""
     from cmg_mj import parse_scenario, prepare
     from cmg_mj.studies import save as runs
@@ -110,7 +110,7 @@ def at_random(times: int) -> None:
     runs.save_run(Path("it"), runs.report_run(*results[0]))
     Path("it/notes").write_text("mine")
 
-    def for_ever() -> None:
+    def save_for_ever() -> None:
         while True:
             for experiment, result in results:
                 runs.save_run(Path("it"), runs.report_run(experiment, result))
@@ -118,11 +118,11 @@ def at_random(times: int) -> None:
     chance = random.Random(8)
     seeds = []
     for _ in range(times):
-        process = forked(for_ever)
+        process = fork(save_for_ever)
         time.sleep(chance.uniform(0.05, 0.4))
         os.kill(process, signal.SIGKILL)
-        assert ended(process) == -signal.SIGKILL
-        seeds.append(ended(forked(lambda: os._exit(10 + seed_of(Path("it"))))) - 10)
+        assert wait_for(process) == -signal.SIGKILL
+        seeds.append(wait_for(fork(lambda: os._exit(10 + seed_of(Path("it"))))) - 10)
         assert seeds[-1] in (1, 2), seeds
         assert (Path("it") / "notes").read_text() == "mine"
     runs.save_run(Path("it"), runs.report_run(*results[0]))
@@ -146,6 +146,8 @@ def seed_of(folder: Path) -> int:
 
 
 if __name__ == "__main__":
-    {"whole": lambda: at_every_event(True), "moved": lambda: at_every_event(False), "random": lambda: at_random(20)}[
-        sys.argv[1]
-    ]()
+    {
+        "whole": lambda: kill_at_every_event(True),
+        "moved": lambda: kill_at_every_event(False),
+        "random": lambda: kill_at_random(20),
+    }[sys.argv[1]]()

@@ -64,37 +64,37 @@ LONG = "duration_s = 600.0\n[controller]\nfeedback = 'truth'\n[observer]\nkind =
 def test_ends_a_run_at_the_next_clean_point(driver: str) -> None:
     """The class is found in the current folder."""
     write(OBSERVER, "pressing.py")
-    said = cmg_mj_process("run", write(LONG), "--out", "it", "--json", "--driver", driver, cwd=Path())
-    assert said.status == 130, said
-    assert said.err == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it\n"
+    outcome = cmg_mj_process("run", write(LONG), "--out", "it", "--json", "--driver", driver, cwd=Path())
+    assert outcome.status == 130, outcome
+    assert outcome.err == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it\n"
     assert len(assert_whole("it")) == 600
-    assert json.loads(said.out)["outcome"] == "interrupted"
+    assert json.loads(outcome.out)["outcome"] == "interrupted"
 
 
 @pytest.mark.slow
 def test_ends_a_measurement_of_speed() -> None:
     """The run that hears it ends as a result; no other is started."""
     write(OBSERVER, "pressing.py")
-    said = cmg_mj_process("bench", "loop", "--observers", "pressing:Interrupts", "--worlds", "2", cwd=Path())
-    assert (said.status, said.out, said.err) == (130, "", "cmg-mj: interrupted\n")
+    outcome = cmg_mj_process("bench", "loop", "--observers", "pressing:Interrupts", "--worlds", "2", cwd=Path())
+    assert (outcome.status, outcome.out, outcome.err) == (130, "", "cmg-mj: interrupted\n")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_what_ends_a_process_from_outside_counts_as_ctrl_c(name: str) -> None:
     write(OBSERVER, "pressing.py")
-    said = cmg_mj_process("run", write(LONG), "--out", "it", "--set", f"observer.signal={name}", cwd=Path())
-    assert said.status == 130, said
-    assert said.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
+    outcome = cmg_mj_process("run", write(LONG), "--out", "it", "--set", f"observer.signal={name}", cwd=Path())
+    assert outcome.status == 130, outcome
+    assert outcome.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
     assert len(assert_whole("it")) == 600
 
 
 @pytest.mark.slow
 def test_twice_ends_a_run_at_once() -> None:
     write(OBSERVER, "pressing.py")
-    said = cmg_mj_process("run", write(LONG), "--out", "it", "--set", "observer.times=2", cwd=Path())
-    assert said.status == 130, said
-    assert said.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
+    outcome = cmg_mj_process("run", write(LONG), "--out", "it", "--set", "observer.times=2", cwd=Path())
+    assert outcome.status == 130, outcome
+    assert outcome.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
     assert len(assert_whole("it")) == 599
 
 
@@ -103,13 +103,13 @@ def test_twice_ends_a_run_at_once() -> None:
 def test_is_heard_after_the_tick_however_slow_an_observer_is(command: list) -> None:
     """An observer of 0.1 s a sample: not one more sample is taken."""
     write(OBSERVER, "pressing.py")
-    said = cmg_mj_process(
+    outcome = cmg_mj_process(
         command[0], write(LONG.replace("Interrupts", "Slow")), *command[1:], "--out", "it", cwd=Path()
     )
-    assert said.status == 130, said
+    assert outcome.status == 130, outcome
     assert Path("after").read_text() == ""
     if command == ["run"]:
-        assert said.err.splitlines()[-1].startswith("cmg-mj: interrupted at 0.015 s; ")
+        assert outcome.err.splitlines()[-1].startswith("cmg-mj: interrupted at 0.015 s; ")
         assert len(assert_whole("it")) == 4
 
 
@@ -142,18 +142,18 @@ def run_python(program: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.slow
 def test_while_files_are_written_lets_them_be_finished() -> None:
     write("duration_s = 0.2")
-    done = run_python(WRITING.format(times=1))
-    assert done.returncode == 130, done
-    assert done.stderr.splitlines()[-1] == "cmg-mj: interrupted at the end; the complete run is in it"
+    process = run_python(WRITING.format(times=1))
+    assert process.returncode == 130, process
+    assert process.stderr.splitlines()[-1] == "cmg-mj: interrupted at the end; the complete run is in it"
     assert_whole("it")
 
 
 @pytest.mark.slow
 def test_twice_while_files_are_written_leaves_no_broken_one() -> None:
     write("duration_s = 0.2")
-    done = run_python(WRITING.format(times=2))
-    assert done.returncode == 130, done
-    assert done.stderr == "cmg-mj: interrupted\n"
+    process = run_python(WRITING.format(times=2))
+    assert process.returncode == 130, process
+    assert process.stderr == "cmg-mj: interrupted\n"
     assert names("it") == ["trajectory.parquet"]
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 40
 
@@ -162,11 +162,11 @@ def test_twice_while_files_are_written_leaves_no_broken_one() -> None:
 def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
     write(OBSERVER, "pressing.py")
     file = write("duration_s = 3.0\n[controller]\nfeedback = 'truth'")
-    said = cmg_mj_process(
+    outcome = cmg_mj_process(
         "compare", file, "--observers", "linear,pressing:Interrupts,ltv", "--worlds", 1, "--out", "it", cwd=Path()
     )
-    assert said.status == 130, said
-    assert said.err.splitlines()[-1] == "cmg-mj: interrupted; 1 of 3 observers are in it"
+    assert outcome.status == 130, outcome
+    assert outcome.err.splitlines()[-1] == "cmg-mj: interrupted; 1 of 3 observers are in it"
     assert names("it") == [
         "recording.rrd",
         "scenario.toml",
@@ -181,11 +181,11 @@ def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
 @pytest.mark.slow
 def test_before_the_first_observer_is_done_leaves_nothing() -> None:
     write(OBSERVER, "pressing.py")
-    said = cmg_mj_process(
+    outcome = cmg_mj_process(
         "compare", write(LONG), "--observers", "pressing:Interrupts", "--worlds", 1, "--out", "it", cwd=Path()
     )
-    assert (said.status, said.out) == (130, "")
-    assert said.err == "cmg-mj: interrupted before the first observer was done; nothing was written\n"
+    assert (outcome.status, outcome.out) == (130, "")
+    assert outcome.err == "cmg-mj: interrupted before the first observer was done; nothing was written\n"
     assert not Path("it").exists()
 
 
@@ -200,17 +200,17 @@ def test_from_outside() -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-    ) as running:
+    ) as process:
         try:
             while not Path("waiting").exists():
-                assert running.poll() is None, running.communicate()
+                assert process.poll() is None, process.communicate()
                 time.sleep(0.01)
-            running.send_signal(signal.SIGINT)
+            process.send_signal(signal.SIGINT)
             Path("pressed").touch()
-            _, err = running.communicate(timeout=HANGS_AFTER_S)
+            _, err = process.communicate(timeout=HANGS_AFTER_S)
         finally:
-            running.kill()
-    assert running.returncode == 130, err
+            process.kill()
+    assert process.returncode == 130, err
     assert err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
     assert len(assert_whole("it")) == 600
     verified = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", "it/recording.rrd"], capture_output=True)
@@ -221,10 +221,10 @@ def test_from_outside() -> None:
 def test_leaves_the_complete_result_of_a_run_before() -> None:
     write(OBSERVER, "pressing.py")
     assert cmg_mj_process("run", write("duration_s = 0.1"), "--out", "it", cwd=Path()).status == 0
-    said = cmg_mj_process("run", write(LONG), "--out", "it", cwd=Path())
-    assert said.err.splitlines()[-1] == (
+    outcome = cmg_mj_process("run", write(LONG), "--out", "it", cwd=Path())
+    assert outcome.err.splitlines()[-1] == (
         "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it/incomplete; "
-        "what it has held stays as it was"
+        "the earlier files in it stay as they were"
     )
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 20
     assert len(assert_whole("it/incomplete")) == 600
@@ -232,14 +232,14 @@ def test_leaves_the_complete_result_of_a_run_before() -> None:
 
 @pytest.mark.slow
 def test_a_study_that_cannot_begin_leaves_no_folder() -> None:
-    said = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "a/b", cwd=Path())
-    assert said.status == 2
+    outcome = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "a/b", cwd=Path())
+    assert outcome.status == 2
     assert not Path("a").exists()
 
 
 @pytest.mark.slow
 def test_a_folder_that_was_there_stays() -> None:
     Path("mine").mkdir()
-    said = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "mine", cwd=Path())
-    assert said.status == 2
+    outcome = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "mine", cwd=Path())
+    assert outcome.status == 2
     assert Path("mine").is_dir()

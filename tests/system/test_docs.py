@@ -53,7 +53,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("mkdocs", reason="the extra [docs] is not installed")
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", tmp_path / "site"],
         cwd=ROOT,
         env=environment(NO_MKDOCS_2_WARNING="1"),
@@ -61,8 +61,8 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
         text=True,
         timeout=120,
     )
-    assert done.returncode == 0, done.stderr
-    assert "WARNING" not in done.stderr
+    assert process.returncode == 0, process.stderr
+    assert "WARNING" not in process.stderr
     assert (tmp_path / "site" / "index.html").is_file()
 
 
@@ -72,10 +72,10 @@ def module(name: str, code: str, folder: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec
     assert spec.loader
-    made = importlib.util.module_from_spec(spec)
-    sys.modules[name] = made
-    spec.loader.exec_module(made)
-    return made
+    module_object = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module_object
+    spec.loader.exec_module(module_object)
+    return module_object
 
 
 def test_the_observer_of_contributing_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,11 +83,11 @@ def test_the_observer_of_contributing_is_one(tmp_path: Path, monkeypatch: pytest
     observer, test = (textwrap.dedent(block) for block in re.findall(r" *```python\n(.*?)```", text, flags=re.DOTALL))
     kind, path = re.findall(r'`"(\w+)": "([\w.:]+)",`', text)[0]
     home, _, name = path.partition(":")
-    made = module("an_observer_of_contributing", observer, tmp_path)
+    observer_module = module("an_observer_of_contributing", observer, tmp_path)
     monkeypatch.setitem(OBSERVERS, kind, f"an_observer_of_contributing:{name}")
     assert home == f"cmg_mj.observers.{kind}"
     assert f"`cmg_mj/observers/{kind}.py`" in text
-    assert made.__doc__
+    assert observer_module.__doc__
     test_contract.test_every_parameter_is_documented(kind)
     test_contract.test_step_has_no_memory_but_the_state(kind)
     test_contract.test_arrays_equal_floats_bit_by_bit(kind, 5)

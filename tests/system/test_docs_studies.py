@@ -18,8 +18,8 @@ STEPS = STUDIES / "steps.py"
 @pytest.mark.slow
 def test_the_table_of_steps() -> None:
     arguments = "--worlds 2 --observers linear --integrators RK4 --steps-ms 2.5,5 --set duration_s=0.5 --set push=[]"
-    done = subprocess.run([sys.executable, STEPS, *arguments.split()], capture_output=True, text=True, check=True)
-    rows = [line for line in done.stdout.splitlines() if line.startswith("| RK4")]
+    process = subprocess.run([sys.executable, STEPS, *arguments.split()], capture_output=True, text=True, check=True)
+    rows = [line for line in process.stdout.splitlines() if line.startswith("| RK4")]
     assert len(rows) == 2
     assert "0.00 %" in rows[0]
 
@@ -28,44 +28,44 @@ def test_the_table_of_steps() -> None:
 def test_the_tables_of_the_accelerometers_errors() -> None:
     arguments = "alone --only outer --worlds 2 --observers linear --jobs 1 --set duration_s=0.2 --set push=[]"
     command = [sys.executable, STUDIES / "sensor_errors.py", *arguments.split()]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    rows = [line.split("|")[1:-1] for line in done.stdout.splitlines() if line.startswith("| offset 5 mg, outer")]
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    rows = [line.split("|")[1:-1] for line in process.stdout.splitlines() if line.startswith("| offset 5 mg, outer")]
     assert [len(row) for row in rows] == [10, 5]
     assert float(rows[0][1]) == 0.14  # atan(0.5 * 5e-3)
-    assert "- to the MEMS gyro: in " in done.stdout
+    assert "- to the MEMS gyro: in " in process.stdout
 
 
 @pytest.mark.slow
 def test_the_tables_of_gyro_free() -> None:
     study = STEPS.with_name("gyro_free.py")
     arguments = "--worlds 2 --noise 400 --e 0.5 --parts model,taps"
-    done = subprocess.run([sys.executable, study, *arguments.split()], capture_output=True, text=True, check=True)
-    assert "| 400       |      0.01406 |     0.01268 |  9.8 % |" in done.stdout
-    assert done.stdout.count("as in the tables") == 3
+    process = subprocess.run([sys.executable, study, *arguments.split()], capture_output=True, text=True, check=True)
+    assert "| 400       |      0.01406 |     0.01268 |  9.8 % |" in process.stdout
+    assert process.stdout.count("as in the tables") == 3
 
 
 @pytest.mark.slow
 def test_the_tables_of_the_laws() -> None:
     arguments = "--worlds 2 --e 0.5 --figures-only"
     command = [sys.executable, STUDIES / "laws.py", *arguments.split()]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.count("| `lqg`  ") == 1
-    assert done.stdout.count("| (8), `kalman`") == 2
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert process.stdout.count("| `lqg`  ") == 1
+    assert process.stdout.count("| (8), `kalman`") == 2
 
 
 @pytest.mark.slow
 def test_the_tables_of_two_axes() -> None:
     command = [sys.executable, STUDIES / "two_axes.py", "--worlds", "1"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert "c = [+0, +1], [-1, +0]" in done.stdout
-    assert re.search(r"w c sin.* \| +\+0.000 \| +\+0.000 \|\n", done.stdout)
-    assert re.search(r"wheel 10 % slow +\| +0.0345 \|", done.stdout)
-    assert len(re.findall(r"\| (?:held|free)  \| 1/1 ", done.stdout)) == 4
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "c = [+0, +1], [-1, +0]" in process.stdout
+    assert re.search(r"w c sin.* \| +\+0.000 \| +\+0.000 \|\n", process.stdout)
+    assert re.search(r"wheel 10 % slow +\| +0.0345 \|", process.stdout)
+    assert len(re.findall(r"\| (?:held|free)  \| 1/1 ", process.stdout)) == 4
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("study", sorted(path.name for path in STUDIES.glob("*.toml")))
 def test_a_study_file_can_be_run(study: str) -> None:
-    said = cmg_mj("sweep", STUDIES / study, "--dry-run")
-    assert said.status == 0, said.err
-    assert " trials in " in said.out
+    outcome = cmg_mj("sweep", STUDIES / study, "--dry-run")
+    assert outcome.status == 0, outcome.err
+    assert " trials in " in outcome.out

@@ -17,7 +17,7 @@ from tests.command import HANGS_AFTER_S, ROOT, environment
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
-SAYS = {
+OUTPUT = {
     "bias_estimation": "found",
     "bicycle": "fed back by the observer: 5 of 5 stood",
     "bode_and_step": "phase margin 65.9 deg",
@@ -42,13 +42,13 @@ OPTIONS = {"mujoco_viewer": ["--headless"]}
 
 
 def test_there_is_an_example_for_each() -> None:
-    assert [path.stem for path in EXAMPLES] == sorted(SAYS)
+    assert [path.stem for path in EXAMPLES] == sorted(OUTPUT)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_runs(path: Path, tmp_path: Path) -> None:
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, path, *OPTIONS.get(path.stem, [])],
         cwd=tmp_path,
         env=environment(),
@@ -56,8 +56,8 @@ def test_runs(path: Path, tmp_path: Path) -> None:
         text=True,
         timeout=HANGS_AFTER_S,
     )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert SAYS[path.stem] in done.stdout
+    assert (process.returncode, process.stderr) == (0, "")
+    assert OUTPUT[path.stem] in process.stdout
     assert list(tmp_path.iterdir()) == []
 
 
@@ -75,7 +75,7 @@ class StandIn:
 
     def __init__(self, model: Any, data: Any, key_callback: Any) -> None:
         self.data, self.key_callback, self.synced = data, key_callback, 0
-        seen.append(self)
+        viewers.append(self)
 
     def __enter__(self) -> StandIn:
         return self
@@ -93,15 +93,15 @@ class StandIn:
             self.key_callback(ord(" "))
 
 
-seen: list[StandIn] = []
+viewers: list[StandIn] = []
 
 
 def test_the_viewers_loop_at_a_viewer(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """In real time, with a push where the key was pressed."""
     monkeypatch.setattr("mujoco.viewer.launch_passive", StandIn)
     monkeypatch.setattr(sys, "argv", ["mujoco_viewer.py"])
-    began = time.monotonic()
+    start = time.monotonic()
     runpy.run_path(str(ROOT / "examples" / "mujoco_viewer.py"))
-    assert time.monotonic() - began > 0.9
+    assert time.monotonic() - start > 0.9
     assert "pushed at 0.50 s; at 1.00 s the tilt is" in capsys.readouterr().out
-    assert seen[-1].synced == pytest.approx(1.0 / cmg_mj.load_plant(model="scissored_pair.xml").timestep, abs=1)
+    assert viewers[-1].synced == pytest.approx(1.0 / cmg_mj.load_plant(model="scissored_pair.xml").timestep, abs=1)

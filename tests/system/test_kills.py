@@ -14,18 +14,18 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("what", "kills"),
+    ("mode", "kills"),
     [("whole", 30), ("moved", 25), ("random", 20)],
     ids=["while folders change names", "while files are moved", "whole runs, at random moments"],
 )
-def test_kills(what: str, kills: int) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.system.kill_writers", what],
+def test_kills(mode: str, kills: int) -> None:
+    process = subprocess.run(
+        [sys.executable, "-m", "tests.system.kill_writers", mode],
         env=environment(),
         capture_output=True,
         text=True,
         timeout=HANGS_AFTER_S,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
-    assert int(done.stdout.split()[0]) >= kills, done.stdout
+    assert process.returncode == 0, process.stderr
+    assert int(process.stdout.split()[0]) >= kills, process.stdout

@@ -44,13 +44,13 @@ def section(title: str) -> str:
 
 
 def first_cells(text: str) -> list[str]:
-    """What stands in backticks at the beginning of a table's rows."""
+    """Return the text in backticks at the beginning of a table's rows."""
     return re.findall(r"^\| `([^`]+)` \|", text, flags=re.MULTILINE)
 
 
 def test_every_command_is_listed_once() -> None:
-    listed = re.findall(r"^cmg-mj ([\w-]+)", section("Commands"), flags=re.MULTILINE)
-    assert sorted(listed) == sorted(cli.commands)
+    names = re.findall(r"^cmg-mj ([\w-]+)", section("Commands"), flags=re.MULTILINE)
+    assert sorted(names) == sorted(cli.commands)
 
 
 def test_is_one_page() -> None:
@@ -61,7 +61,7 @@ def test_is_one_page() -> None:
 @pytest.mark.parametrize("number", range(len(SNIPPETS)))
 def test_a_snippet_runs(number: int, tmp_path: Path) -> None:
     code = SNIPPETS[number]
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code],
         cwd=tmp_path,
         env=environment(),
@@ -69,8 +69,8 @@ def test_a_snippet_runs(number: int, tmp_path: Path) -> None:
         text=True,
         timeout=HANGS_AFTER_S,
     )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert bool(done.stdout) == ("print(" in code)
+    assert (process.returncode, process.stderr) == (0, "")
+    assert bool(process.stdout) == ("print(" in code)
 
 
 @pytest.mark.slow
@@ -93,15 +93,15 @@ def test_a_command_runs(line: str) -> None:
         shutil.copytree(ROOT / "docs" / "studies", Path("docs", "studies"))
     if command == "export" or "board" in arguments:
         pytest.importorskip("casadi")
-    if "board" in arguments and (gone := missing()):
-        pytest.skip(f"not installed: {', '.join(gone)}")
+    if "board" in arguments and (missing_packages := missing()):
+        pytest.skip(f"not installed: {', '.join(missing_packages)}")
     if command == "reproduce":
         assert arguments[0] in (*PAPERS, "all", "beyond")
         return
     assert command in CHEAPER, f"{line}: say in CHEAPER how to try it"
-    said = cmg_mj(command, *arguments, *shlex.split(CHEAPER[command]))
-    assert said.status == 0, said
-    assert said.out
+    outcome = cmg_mj(command, *arguments, *shlex.split(CHEAPER[command]))
+    assert outcome.status == 0, outcome
+    assert outcome.out
 
 
 def test_the_first_command_writes_what_it_says() -> None:
@@ -113,15 +113,15 @@ def test_the_first_command_writes_what_it_says() -> None:
 
 def test_the_list_of_commands_is_complete() -> None:
     (block,) = re.findall(r"```text\n(.*?)```", section("Commands"), flags=re.DOTALL)
-    listed = {part.split()[0]: part for part in block.split("cmg-mj ")[1:]}
-    helped = re.findall(r"^  ([\w-]+) ", cmg_mj("--help").out.split("Commands:")[1], flags=re.MULTILINE)
-    assert sorted(listed) == sorted(helped)
-    for command, rest in listed.items():
+    options_of = {part.split()[0]: part for part in block.split("cmg-mj ")[1:]}
+    help_names = re.findall(r"^  ([\w-]+) ", cmg_mj("--help").out.split("Commands:")[1], flags=re.MULTILINE)
+    assert sorted(options_of) == sorted(help_names)
+    for command, rest in options_of.items():
         parts = [[command], *([command, part] for part in getattr(cli.commands[command], "commands", ()))]
-        helps = "".join(cmg_mj(*part, "--help").out.split("Options:")[1] for part in parts)
-        options = set(re.findall(r"--[\w-]+", helps)) - {"--help"}
-        named = set(re.findall(r"--[\w-]+", rest))
-        assert named == options, command
+        help_text = "".join(cmg_mj(*part, "--help").out.split("Options:")[1] for part in parts)
+        options = set(re.findall(r"--[\w-]+", help_text)) - {"--help"}
+        listed_options = set(re.findall(r"--[\w-]+", rest))
+        assert listed_options == options, command
 
 
 def test_the_tables_are_complete() -> None:
@@ -131,15 +131,15 @@ def test_the_tables_are_complete() -> None:
 
 
 def test_the_verdicts_are_those_of_the_report() -> None:
-    counted = (
+    pattern = (
         r"(\d+) claims of the papers: (\d+) reproduced, (\d+) reproduced within stated conditions, (\d+) not reproduced"
     )
-    report = re.search(counted, (ROOT / "docs" / "reproduced.md").read_text(encoding="utf-8"))
+    report = re.search(pattern, (ROOT / "docs" / "reproduced.md").read_text(encoding="utf-8"))
     assert report
     total, plain, conditions, failed = report.groups()
-    said = f"{total} claims of the papers: {plain} reproduced, {conditions} within stated conditions, "
-    said += f"{failed} not reproduced"
-    assert said in README.replace("\n", " ")
+    sentence = f"{total} claims of the papers: {plain} reproduced, {conditions} within stated conditions, "
+    sentence += f"{failed} not reproduced"
+    assert sentence in README.replace("\n", " ")
 
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])

@@ -43,26 +43,26 @@ def shell(script: str, cwd: Path) -> subprocess.CompletedProcess:
     ],
 )
 def test_streams(script: str, status: int, err: str, tmp_path: Path) -> None:
-    done = shell(script, tmp_path)
-    assert (done.returncode, done.stderr) == (status, err)
+    process = shell(script, tmp_path)
+    assert (process.returncode, process.stderr) == (status, err)
 
 
 @pytest.mark.slow
 def test_a_run_whose_output_is_closed_is_written_whole(tmp_path: Path) -> None:
     """A file that got the number of standard output would have the summary in it."""
     (tmp_path / "quick.toml").write_text("duration_s = 0.1")
-    done = shell("$CMG_MJ run quick.toml --out it >&-", tmp_path)
-    assert done.returncode == 0
+    process = shell("$CMG_MJ run quick.toml --out it >&-", tmp_path)
+    assert process.returncode == 0
     assert (tmp_path / "it" / "trajectory.parquet").read_bytes().endswith(b"PAR1")
 
 
 @pytest.mark.slow
 def test_a_current_folder_that_is_gone(tmp_path: Path) -> None:
-    gone = tmp_path / "gone"
-    gone.mkdir()
-    done = shell(
-        f"rmdir ../gone; $CMG_MJ check push_recovery >/dev/null && $CMG_MJ run push_recovery --out {tmp_path}", gone
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    process = shell(
+        f"rmdir ../gone; $CMG_MJ check push_recovery >/dev/null && $CMG_MJ run push_recovery --out {tmp_path}", folder
     )
-    assert done.returncode == 2
-    assert done.stderr == "cmg-mj: the current folder: No such file or directory\n"
+    assert process.returncode == 2
+    assert process.stderr == "cmg-mj: the current folder: No such file or directory\n"
     assert os.listdir(tmp_path) == []

@@ -42,11 +42,6 @@ def exported(controller: Controller) -> Iterator[ExportedFiles]:
     Raises:
         InputError: The controller cannot be exported.
     """
-    if controller.feedback != "observer":
-        raise InputError(
-            f"controller.feedback = {controller.feedback!r}: a board has no such sensor; it closes the loop on its own "
-            "estimate, 'observer'"
-        )
     with TemporaryDirectory(prefix="cmg_mj-board-") as folder:
         header = export(controller, Path(folder), precision="single", name=_name_of(controller))[0]
         yield ExportedFiles(header.stem, Path(folder))

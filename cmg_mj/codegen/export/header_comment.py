@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from cmg_mj.codegen.export.c_code import Precision
 from cmg_mj.controllers.controller import Controller
+from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.observers.protocol import Observer
-from cmg_mj.observers.registry import BENCH_PARAMETERS
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -35,7 +35,8 @@ def format_header_comment(name: str, controller: Controller, precision: Precisio
     observer = controller.observer
     cls = type(observer)
     first = (inspect.getdoc(cls) or "").split("\n\n")[0]
-    parameters = [parameter for parameter in inspect.signature(cls).parameters if parameter not in BENCH_PARAMETERS]
+    bench_parameters = OBSERVER_CLASSES.bench_parameters
+    parameters = [parameter for parameter in inspect.signature(cls).parameters if parameter not in bench_parameters]
     lines = [
         f"{name}: observer and control law, {precision} precision; by cmg_mj {version('cmg_mj')}.",
         "",

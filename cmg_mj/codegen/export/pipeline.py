@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
+import inspect
 import shlex
 import tempfile
 from pathlib import Path
@@ -20,6 +22,13 @@ from cmg_mj.controllers.dry_run import dry_run_observer
 from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.errors import InputError, raised
 from cmg_mj.results.run_folder.folder import write_text
+
+EXPORTED_OPTIONS = ("angle_source", "bias_trim_s")
+"""Options of a `Controller` that its C has."""
+SIMULATION_OPTIONS = ("seed", "worlds", "axis", "open_loop_observers")
+"""Options that concern the simulation around a controller alone."""
+EXPORTED_LAW_FIELDS = ("dt", "gains", "rate_limit")
+"""Fields of the law that its C has."""
 
 
 class Figures(TypedDict):
@@ -50,11 +59,7 @@ class Code(NamedTuple):
 
 def generate_code(controller: Controller, precision: Precision, name: str | None = None) -> Code:
     """Generate a controller's C and compare it with Python; see `export`."""
-    if type(controller.law) is not StateFeedback:
-        raise InputError(
-            f"law {type(controller.law).__name__}: cannot be exported: C has the law (8) alone; set "
-            "controller.kind=state_feedback"
-        )
+    _refuse_unexported(controller)
     cls = type(controller.observer)
     try:
         return _generate(controller, precision, name_of(controller.observer, name))
@@ -62,12 +67,33 @@ def generate_code(controller: Controller, precision: Precision, name: str | None
         raise InputError(f"{cls.__module__}:{cls.__qualname__} cannot be exported: {error}") from error
 
 
-def _generate(controller: Controller, precision: Precision, name: str) -> Code:
-    if controller.feedback != "observer":
+def _refuse_unexported(controller: Controller) -> None:
+    """Refuse a law, and every field of it and option of the controller, that C does not have and that is in use."""
+    law = controller.law
+    if type(law) is not StateFeedback:
         raise InputError(
-            f"controller.feedback = {controller.feedback!r}: what is exported has the observer's rate alone; set "
-            "controller.feedback=observer"
+            f"law {type(law).__name__}: cannot be exported: C has the law (8) alone; set controller.kind=state_feedback"
         )
+    options = {
+        option.name: (getattr(controller, option.name), option.default)
+        for cls in type(controller).__mro__
+        for option in inspect.signature(cls.__init__).parameters.values()
+        if option.kind is option.KEYWORD_ONLY and option.name not in EXPORTED_OPTIONS + SIMULATION_OPTIONS
+    }
+    options |= {
+        field.name: (getattr(law, field.name), field.default)
+        for field in dataclasses.fields(law)
+        if field.name not in EXPORTED_LAW_FIELDS
+    }
+    for name, (value, default) in options.items():
+        if value != default:
+            setting = f"controller.{name}"
+            raise InputError(
+                f"{setting} = {value!r}: cannot be exported: C has no such option; set {setting}={default}"
+            )
+
+
+def _generate(controller: Controller, precision: Precision, name: str) -> Code:
     try:
         for_dry_run, for_trace = copy.deepcopy(controller.observer), copy.deepcopy(controller.observer)
     except Exception as error:  # a user's observer may hold anything

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -51,10 +50,9 @@ def generate_code(controller: Controller, precision: Literal["double", "single"]
 
 def write_code(out: Path | RunFolder, code: Code) -> list[Path]:
     """Write the files of a generated code."""
-    from cmg_mj.results.run_folder import RunFolder
-    from cmg_mj.results.run_folder.folder import write_text
+    from cmg_mj.results.run_folder.folder import claimed, write_text
 
-    with nullcontext(out) if isinstance(out, RunFolder) else RunFolder(out, code.files) as folder:
+    with claimed(out, code.files) as folder:
         place = folder.write(
             {name: lambda path, text=text: write_text(path, text) for name, text in code.files.items()},
             all_or_none=True,  # the example needs the code, and the code its test vector to be believed

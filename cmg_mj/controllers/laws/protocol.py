@@ -1,4 +1,4 @@
-"""What a control law is: a frozen value with `init` and `step`, discrete in time, elementwise in the worlds."""
+"""The protocol of a control law: a frozen value with `init` and `step`, discrete in time, elementwise in the worlds."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, nearest
-from cmg_mj.observers.protocol import Estimate, Measurement, State
+from cmg_mj.observers.protocol import Estimate, Measurement, State, check_needs
 
 
 class FeedbackState(Estimate):
@@ -79,7 +78,7 @@ class Law(Protocol):
 
 
 NEEDS = ("estimate",)
-"""What a law may need beside y: what the observer, or in its place the gyro, says."""
+"""Inputs that a law may need beside y: the estimate, which the observer or in its place the gyro gives."""
 
 
 def needs(law: Law | type[Law]) -> tuple[str, ...]:
@@ -88,8 +87,4 @@ def needs(law: Law | type[Law]) -> tuple[str, ...]:
     Raises:
         InputError: It names something else.
     """
-    named = tuple(getattr(law, "needs", NEEDS))
-    for name in named:
-        if name not in NEEDS:
-            raise InputError(f"needs = {named!r}: there is no {name!r}; {nearest(str(name), NEEDS)}")
-    return named
+    return check_needs(getattr(law, "needs", NEEDS), NEEDS)

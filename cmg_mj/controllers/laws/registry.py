@@ -16,26 +16,10 @@ LAWS = {
 }
 """Name a user types -> dotted path of the class."""
 
-BENCH_PARAMETERS = ("dt", "model", "noise", "rate_limit")
-"""What the bench gives: dt and the limit to every law, the others to those that take them."""
-
-OF_LAWS = UserClassKind("law", "controller", LAWS, BENCH_PARAMETERS, {"init": "y", "step": "state, y, x, u"})
-"""How a law is found, checked and made."""
-
-
-def law_class(kind: str) -> type:
-    """Find a law's class.
-
-    Args:
-        kind: A name of `LAWS`, or `package.module:Class`.
-
-    Returns:
-        The class.
-
-    Raises:
-        InputError: There is no such law, or its module cannot be imported.
-    """
-    return OF_LAWS.find(kind)
+LAW_CLASSES = UserClassKind(
+    "law", "controller", LAWS, ("dt", "rate_limit"), ("model", "noise"), {"init": "y", "step": "state, y, x, u"}
+)
+"""Finds, checks and makes laws."""
 
 
 def make_law(
@@ -57,11 +41,7 @@ def make_law(
     Raises:
         InputError: Unknown law or parameter, or a parameter that the law refuses.
     """
-    OF_LAWS.check_names(kind, parameters)
-    signature = OF_LAWS.takes(kind)
-    bench_arguments: dict[str, Any] = {"dt": dt, "rate_limit": rate_limit}
-    bench_arguments |= {name: value for name, value in (("model", model), ("noise", noise)) if name in signature}
-    law = OF_LAWS.make(kind, bench_arguments, parameters)
-    if any(getattr(law, name, None) != bench_arguments[name] for name in ("dt", "rate_limit")):
+    law = LAW_CLASSES.make(kind, {"dt": dt, "rate_limit": rate_limit, "model": model, "noise": noise}, parameters)
+    if (getattr(law, "dt", None), getattr(law, "rate_limit", None)) != (dt, rate_limit):
         raise InputError(f"law {kind}: must keep dt and rate_limit, which it is given, under these names")
     return law

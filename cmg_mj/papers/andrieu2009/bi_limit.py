@@ -21,7 +21,7 @@ from cmg_mj.papers.require import require_number, require_positive
 
 
 def weights(n: int, d_inf: float) -> list[float]:
-    """r_inf,i = 1 - d_inf (n - i) for i = 1..n+1, (18): the weights at infinity, and r_inf,n + d_inf as the last."""
+    """Return r_inf,i = 1 - d_inf (n - i), i = 1..n+1, (18): the weights at infinity, r_inf,n + d_inf last."""
     return [1.0 - d_inf * (n - i) for i in range(1, n + 2)]
 
 
@@ -63,10 +63,10 @@ class BiLimitCorrection:
             )
         roots = np.roots([1.0, *self.linear_gains])
         if roots.real.max() > -1e-12 * np.abs(roots).max():  # the roots of a marginal case come with rounding errors
-            listed = ", ".join(f"{root:.3g}" for root in roots)
+            root_list = ", ".join(f"{root:.3g}" for root in roots)
             raise InputError(
                 "l: s^n + l_1 s^(n-1) + l_1 l_2 s^(n-2) + ... + l_1...l_n, the linear part of K, must be Hurwitz; "
-                f"its roots are {listed}"
+                f"its roots are {root_list}"
             )
 
     @property
@@ -86,7 +86,7 @@ class BiLimitCorrection:
         return tuple(r[i + 1] / r[i] for i in range(self.n))
 
     def __call__(self, e1: Scalar) -> tuple[Scalar, ...]:
-        """The n components of K(e1), elementwise."""
+        """Return the n components of K(e1), elementwise."""
         K, s = [], e1
         for l_i, exponent in zip(self.l, self.exponents, strict=True):
             s = l_i * s
@@ -97,7 +97,7 @@ class BiLimitCorrection:
 
 
 def largest_b(n: int, d_inf: float, v: Sequence[float] = ()) -> float:
-    """The bound below which (21) and (22) hold.
+    """Return the bound below which (21) and (22) hold.
 
     Args:
         n: Dimension.
@@ -115,8 +115,8 @@ def largest_b(n: int, d_inf: float, v: Sequence[float] = ()) -> float:
     return min(bounds)
 
 
-def violated_conditions(n: int, d_inf: float, b: float, v: Sequence[float] = ()) -> list[str]:
-    """Which of the inequalities (21), (22) that the proof of Theorem 1 needs do not hold.
+def list_violations(n: int, d_inf: float, b: float, v: Sequence[float] = ()) -> list[str]:
+    """List the inequalities (21), (22), needed by the proof of Theorem 1, that do not hold.
 
     Args:
         n: Dimension.
@@ -144,6 +144,6 @@ def violated_conditions(n: int, d_inf: float, b: float, v: Sequence[float] = ())
 
 
 def _growth_ratios(n: int, d_inf: float) -> list[tuple[int, int, float]]:
-    """i, j and the left side of (21), for 1 <= j <= i <= n."""
+    """Return i, j and the left side of (21), for 1 <= j <= i <= n."""
     r = weights(n, d_inf)
     return [(i, j, r[i] / r[j - 1]) for i in range(1, n + 1) for j in range(1, i + 1)]

@@ -9,49 +9,45 @@ import numpy as np
 
 from cmg_mj.papers.andrieu2009.bioreactor import Bioreactor
 from cmg_mj.papers.andrieu2009.paper import HBAR, HBAR_OF_OBSERVERS, NOISE, U_MAX, P
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim, OnShare, obtain
 
 ROUNDING = 1e-9
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """(14), (15), Omega_1, Omega_2 and their order, the noise."""
-    parts = [invariance, coordinates, increments, order_of_bounds, noise_level]
-    found = []
-    for i, part in enumerate(parts):
-        on_share(i / len(parts))
-        found.append(part())
-    return found
+    """Judge (14), (15), Omega_1, Omega_2 and their order, the noise."""
+    return obtain([invariance, coordinates, increments, order_of_bounds, noise_level], on_share)
 
 
 def least_inflow(reactor: Bioreactor, u_min: float, u_max: float, points: int = 401) -> float:
-    """Smallest component of the flow into M_eta over its boundary and all inputs; not negative if it is invariant."""
+    """Return the least component of the flow into M_eta over its boundary and all inputs, not below 0 if invariant."""
     u = np.linspace(u_min, u_max, points)[:, None]
     share = np.linspace(0.0, 1.0, points)[None, :]
     eps1, eps2 = reactor.eps1, reactor.eps2
-    left, _ = reactor.slope(eps1, eps2 + (1.0 - eps1 - eps2) * share, u)
-    _, lower = reactor.slope(eps1 + (1.0 - eps1 - eps2) * share, eps2, u)
+    left_inflow, _ = reactor.slope(eps1, eps2 + (1.0 - eps1 - eps2) * share, u)
+    _, lower_inflow = reactor.slope(eps1 + (1.0 - eps1 - eps2) * share, eps2, u)
     eta1 = eps1 + (1.0 - eps1 - eps2) * share
-    outer = np.add(*reactor.slope(eta1, 1.0 - eta1, u))
-    return float(min(left.min(), lower.min(), -outer.max()))
+    outer_flow = np.add(*reactor.slope(eta1, 1.0 - eta1, u))
+    return float(min(left_inflow.min(), lower_inflow.min(), -outer_flow.max()))
 
 
 def invariance() -> Claim:
-    """M_eta."""
+    """Judge M_eta."""
     inflow = {hbar: least_inflow(Bioreactor(hbar), Bioreactor(hbar).u_min, U_MAX) for hbar in (HBAR, HBAR_OF_OBSERVERS)}
-    too_strong = least_inflow(Bioreactor(HBAR), Bioreactor(HBAR).u_min, 1.1 * U_MAX)
+    inflow_at_larger_input = least_inflow(Bioreactor(HBAR), Bioreactor(HBAR).u_min, 1.1 * U_MAX)
     reactor = Bioreactor(HBAR)
     return Claim(
         place="Section 3, (14), M_eta",
-        says="M_eta = {eta1 >= eps1, eta2 >= eps2, eta1 + eta2 <= 1} is forward invariant for u in [u_min, u_max].",
-        found="On its boundary the flow points inward or along it for hbar = 1 and 0.8 (least inflow "
+        statement="M_eta = {eta1 >= eps1, eta2 >= eps2, eta1 + eta2 <= 1} is forward invariant for u in [u_min, "
+        "u_max].",
+        result="On its boundary the flow points inward or along it for hbar = 1 and 0.8 (least inflow "
         f"{inflow[HBAR]:.1g} and {inflow[HBAR_OF_OBSERVERS]:.1g}, zero up to rounding at the corners for which eps1, "
-        f"eps2 are made). Inputs 10 % above u_max lead out: {too_strong:.2g}. With u_min = 0.01, u_max = 0.7: eps1 = "
-        f"{reactor.eps1:.5f}, eps2 = {reactor.eps2:.5f}.",
+        f"eps2 are made). Inputs 10 % above u_max lead out: {inflow_at_larger_input:.2g}. With u_min = 0.01, u_max = "
+        f"0.7: eps1 = {reactor.eps1:.5f}, eps2 = {reactor.eps2:.5f}.",
         holds=min(inflow.values()) > -ROUNDING,
         figures={
             "least_inflow_per_time": {str(hbar): value for hbar, value in inflow.items()},
-            "least_inflow_too_large_input_per_time": too_strong,
+            "least_inflow_too_large_input_per_time": inflow_at_larger_input,
             "eps1": reactor.eps1,
             "eps2": reactor.eps2,
         },
@@ -59,7 +55,7 @@ def invariance() -> Claim:
 
 
 def coordinate_errors(hbar: float, count: int = 2000, seed: int = 0) -> tuple[float, float]:
-    """(15) against the chain rule along (14), by central differences of F; and F's inverse. Largest relative errors."""
+    """Return the largest relative errors of (15) along (14), by central differences of F, and of F's inverse."""
     reactor = Bioreactor(hbar)
     rng = np.random.default_rng(seed)
     eta1, eta2, _ = 0.02 + 0.94 * rng.dirichlet((1.0, 1.0, 1.0), count).T
@@ -67,22 +63,22 @@ def coordinate_errors(hbar: float, count: int = 2000, seed: int = 0) -> tuple[fl
     x2 = reactor.to_x2(eta1, eta2)
     slope1, slope2 = reactor.slope(eta1, eta2, u)
     span = 1e-4
-    ahead = reactor.to_x2(eta1 + span * slope1, eta2 + span * slope2)
-    behind = reactor.to_x2(eta1 - span * slope1, eta2 - span * slope2)
-    numeric = (ahead - behind) / (2.0 * span)
-    error = np.abs(reactor.f2(eta1, x2, u) - numeric).max() / np.abs(numeric).max()
+    x2_ahead = reactor.to_x2(eta1 + span * slope1, eta2 + span * slope2)
+    x2_behind = reactor.to_x2(eta1 - span * slope1, eta2 - span * slope2)
+    numeric_slope = (x2_ahead - x2_behind) / (2.0 * span)
+    error = np.abs(reactor.f2(eta1, x2, u) - numeric_slope).max() / np.abs(numeric_slope).max()
     return float(error), float(np.abs(reactor.to_eta2(eta1, x2) / eta2 - 1.0).max())
 
 
 def coordinates() -> Claim:
-    """(15)."""
+    """Judge (15)."""
     errors = [coordinate_errors(hbar) for hbar in (HBAR, HBAR_OF_OBSERVERS)]
     slope, inverse = (max(column) for column in zip(*errors, strict=True))
     return Claim(
         place="Section 3, (15)",
-        says="In the coordinates x = F(eta) the system has the explicit observability canonical form, with f2 a "
+        statement="In the coordinates x = F(eta) the system has the explicit observability canonical form, with f2 a "
         "cubic in x2.",
-        found=f"At 2000 random states and inputs x2' along (14) equals (15) to {slope:.1e} of its largest value "
+        result=f"At 2000 random states and inputs x2' along (14) equals (15) to {slope:.1e} of its largest value "
         f"(central differences), for hbar = 1 and 0.8; F's inverse returns eta2 to {inverse:.1e}.",
         holds=slope < 1e-6 and inverse < 1e-9,
         figures={"largest_f2_error_ratio": slope, "largest_inverse_error_ratio": inverse},
@@ -97,7 +93,7 @@ class Increments(NamedTuple):
     by_Omega2_printed: float
     """Omega_2 ending in m2 x2^(2-p), as printed."""
     by_Omega2_local: float
-    """With c_inf at each point in place of its maximum."""
+    """Omega_2 with c_inf at each point in place of its maximum."""
     by_Omega2_local_printed: float
     c_inf: float
     slope_over_Omega2: float
@@ -110,107 +106,108 @@ class Increments(NamedTuple):
 
 @functools.cache
 def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> Increments:
-    """Both inequalities of section 3 over a grid of (u, x1, x2, x2_hat)."""
+    """Evaluate both inequalities of section 3 over a grid of (u, x1, x2, x2_hat)."""
     reactor = Bioreactor(hbar)
     x1, x2, u = (grid[..., None] for grid in reactor.domain(points))
     low, high = reactor.x2_bounds(x1)
     x2_hat = low + (high - low) * np.linspace(0.0, 1.0, points)
     d = np.abs(x2 - x2_hat)
-    apart = d > 1e-9  # nearer, the increments are rounding errors
-    left = np.where(apart, np.abs(reactor.f2(x1, x2, u) - reactor.f2(x1, x2_hat, u)), 0.0)
+    distinct = d > 1e-9  # nearer, the increments are rounding errors
+    increment = np.where(distinct, np.abs(reactor.f2(x1, x2, u) - reactor.f2(x1, x2_hat, u)), 0.0)
     _, _, m2, m3 = reactor.coefficients(x1, u)
     c_inf = reactor.c_inf(p, points)
     local = np.abs((m2 + m3 * x2_hat) * x2 ** (1.0 - p) + m3 * x2 ** (2.0 - p))
     # The bounds do not depend on x2: one value of it will do.
-    at = x1[:, :1], x2_hat[:, :1], u[:, :1]
-    Omega1 = reactor.Omega1(at[2], at[0], at[1])
-    Omega2, printed = (reactor.Omega2(at[2], at[0], at[1], p, as_printed=flag) for flag in (False, True))
-    slope = np.abs(reactor.f2_slope(at[0], at[1], at[2]))
+    point = u[:, :1], x1[:, :1], x2_hat[:, :1]
+    Omega1 = reactor.Omega1(*point)
+    Omega2, Omega2_printed = (reactor.Omega2(*point, p, with_misprint=flag) for flag in (False, True))
+    slope = np.abs(reactor.f2_slope(*point[1:], point[0]))
 
-    def worst(Omega: np.ndarray, c: np.ndarray | float) -> float:
-        return float((left / np.where(apart, Omega * d + c * d ** (1.0 + p), 1.0)).max())
+    def largest_quotient(Omega: np.ndarray, c: np.ndarray | float) -> float:
+        return float((increment / np.where(distinct, Omega * d + c * d ** (1.0 + p), 1.0)).max())
 
-    above = Omega2 / Omega1
+    ratio = Omega2 / Omega1
     return Increments(
-        worst(Omega1, 0.0),
-        worst(Omega2, c_inf),
-        worst(printed, c_inf),
-        worst(Omega2, local),
-        worst(printed, local),
+        largest_quotient(Omega1, 0.0),
+        largest_quotient(Omega2, c_inf),
+        largest_quotient(Omega2_printed, c_inf),
+        largest_quotient(Omega2, local),
+        largest_quotient(Omega2_printed, local),
         c_inf,
         float((slope / Omega2).max()),
-        float((slope / printed).max()),
-        float(above.max()),
-        float((above > 1.0 + ROUNDING).mean()),
+        float((slope / Omega2_printed).max()),
+        float(ratio.max()),
+        float((ratio > 1.0 + ROUNDING).mean()),
         float(Omega1.max() / reactor.df2_max),
     )
 
 
 def increments() -> Claim:
-    """The two inequalities, and the misprint."""
-    found = increments_over_domain(HBAR_OF_OBSERVERS)
-    holds = max(found.by_Omega1, found.by_Omega2, found.by_Omega2_local) <= 1.0 + ROUNDING
-    misprint = found.by_Omega2_local_printed > 1.0 + ROUNDING or found.slope_over_Omega2_printed > 1.0 + ROUNDING
-    corrected = (
+    """Judge the two inequalities, and the misprint."""
+    quotients = increments_over_domain(HBAR_OF_OBSERVERS)
+    bounds_hold = max(quotients.by_Omega1, quotients.by_Omega2, quotients.by_Omega2_local) <= 1.0 + ROUNDING
+    misprint = max(quotients.by_Omega2_local_printed, quotients.slope_over_Omega2_printed) > 1.0 + ROUNDING
+    correction = (
         "With m3, not m2, in the last term of Omega_2: only then is it the first of the two terms into which the "
         "secant's slope is parted."
     )
     return Claim(
         place="Section 3, Omega_1, Omega_2, c_inf",
-        says="|f2(x2) - f2(x2_hat)| is at most Omega_1 |x2 - x2_hat|, and at most Omega_2 |x2 - x2_hat| + c_inf |x2 "
-        "- x2_hat|^(1+p).",
-        found="Over a grid of 32^4 points of the domain (hbar = 0.8, p = 0.9) the left side is at most "
-        f"{found.by_Omega1:.4f} and {found.by_Omega2:.4f} of the right sides, c_inf being {found.c_inf:.0f}. With m2 "
-        f"in Omega_2, as printed, the second inequality holds as well ({found.by_Omega2_printed:.4f}), because so "
-        "large a c_inf covers everything. With c_inf taken at each point it fails as printed "
-        f"({found.by_Omega2_local_printed:.3f}) and holds corrected ({found.by_Omega2_local:.4f}); and as printed, "
-        f"Omega_2 does not bound |df2/dx2| (factor {found.slope_over_Omega2_printed:.3f}; corrected "
-        f"{found.slope_over_Omega2:.4f}).",
-        holds=holds,
-        conditions=corrected if misprint else "",
-        otherwise=corrected,
-        figures={f"{name}_ratio" if name != "c_inf" else name: value for name, value in found._asdict().items()},
+        statement="|f2(x2) - f2(x2_hat)| is at most Omega_1 |x2 - x2_hat|, and at most Omega_2 |x2 - x2_hat| + c_inf "
+        "|x2 - x2_hat|^(1+p).",
+        result="Over a grid of 32^4 points of the domain (hbar = 0.8, p = 0.9) the left side is at most "
+        f"{quotients.by_Omega1:.4f} and {quotients.by_Omega2:.4f} of the right sides, c_inf being "
+        f"{quotients.c_inf:.0f}. With m2 in Omega_2, as printed, the second inequality holds as well "
+        f"({quotients.by_Omega2_printed:.4f}), because so large a c_inf covers everything. With c_inf taken at each "
+        f"point it fails as printed ({quotients.by_Omega2_local_printed:.3f}) and holds corrected "
+        f"({quotients.by_Omega2_local:.4f}); and as printed, Omega_2 does not bound |df2/dx2| (factor "
+        f"{quotients.slope_over_Omega2_printed:.3f}; corrected {quotients.slope_over_Omega2:.4f}).",
+        holds=bounds_hold,
+        conditions=correction if misprint else "",
+        otherwise=correction,
+        figures={f"{name}_ratio" if name != "c_inf" else name: value for name, value in quotients._asdict().items()},
     )
 
 
 def order_of_bounds() -> Claim:
-    """df2/dx2 <= Omega_2 <= Omega_1 <= df2_max."""
-    found = increments_over_domain(HBAR_OF_OBSERVERS)
-    exact = increments_over_domain(HBAR)
+    """Judge df2/dx2 <= Omega_2 <= Omega_1 <= df2_max."""
+    quotients = increments_over_domain(HBAR_OF_OBSERVERS)
+    exact_quotients = increments_over_domain(HBAR)
     df2_max = Bioreactor(HBAR_OF_OBSERVERS).df2_max
-    excess = found.Omega2_over_Omega1 - 1.0
-    others = max(found.slope_over_Omega2, found.Omega1_over_largest) <= 1.0 + ROUNDING
-    exceeded = (
-        f"Omega_2 <= Omega_1 fails at {1e2 * found.share_Omega2_above_Omega1:.2g} % of the points for hbar = 0.8, "
-        f"by at most {1e2 * excess:.2g} %; the largest quotient for hbar = 1 is {exact.Omega2_over_Omega1:.6f}."
+    excess = quotients.Omega2_over_Omega1 - 1.0
+    other_bounds_hold = max(quotients.slope_over_Omega2, quotients.Omega1_over_largest) <= 1.0 + ROUNDING
+    violation = (
+        f"Omega_2 <= Omega_1 fails at {1e2 * quotients.share_Omega2_above_Omega1:.2g} % of the points for hbar = 0.8, "
+        f"by at most {1e2 * excess:.2g} %; the largest quotient for hbar = 1 is "
+        f"{exact_quotients.Omega2_over_Omega1:.6f}."
     )
     return Claim(
         place="Section 3, order of the bounds",
-        says="df2/dx2 <= Omega_2 <= Omega_1 <= df2_max over the whole domain.",
-        found=f"df2_max = {df2_max:.2f}. Largest quotients on the grid: |df2/dx2|/Omega_2 "
-        f"{found.slope_over_Omega2:.6f}, Omega_2/Omega_1 {found.Omega2_over_Omega1:.6f}, Omega_1/df2_max "
-        f"{found.Omega1_over_largest:.4f}.",
-        holds=others and excess < 0.01,
-        conditions=exceeded if excess > ROUNDING else "",
-        otherwise=exceeded,
+        statement="df2/dx2 <= Omega_2 <= Omega_1 <= df2_max over the whole domain.",
+        result=f"df2_max = {df2_max:.2f}. Largest quotients on the grid: |df2/dx2|/Omega_2 "
+        f"{quotients.slope_over_Omega2:.6f}, Omega_2/Omega_1 {quotients.Omega2_over_Omega1:.6f}, Omega_1/df2_max "
+        f"{quotients.Omega1_over_largest:.4f}.",
+        holds=other_bounds_hold and excess < 0.01,
+        conditions=violation if excess > ROUNDING else "",
+        otherwise=violation,
         figures={
             "df2_max_per_time": df2_max,
-            "slope_over_Omega2_ratio": found.slope_over_Omega2,
-            "Omega2_over_Omega1_ratio": found.Omega2_over_Omega1,
-            "share_Omega2_above_Omega1": found.share_Omega2_above_Omega1,
-            "Omega1_over_df2_max_ratio": found.Omega1_over_largest,
+            "slope_over_Omega2_ratio": quotients.slope_over_Omega2,
+            "Omega2_over_Omega1_ratio": quotients.Omega2_over_Omega1,
+            "share_Omega2_above_Omega1": quotients.share_Omega2_above_Omega1,
+            "Omega1_over_df2_max_ratio": quotients.Omega1_over_largest,
         },
     )
 
 
 def noise_level() -> Claim:
-    """10 % of the domain."""
+    """Judge the noise, said to be 10 % of the domain."""
     reactor = Bioreactor(HBAR)
     tenth = 0.1 * (1.0 - reactor.eps2 - reactor.eps1)
     return Claim(
         place="Section 3.1, the noise",
-        says=f"The noise on eta1 has the standard deviation {NOISE}, said to be a tenth of the range of eta1.",
-        found=f"With eps1, eps2 from the paper's own formulas 10 % of [eps1, 1 - eps2] is {tenth:.4f}; {NOISE} is "
+        statement=f"The noise on eta1 has the standard deviation {NOISE}, said to be a tenth of the range of eta1.",
+        result=f"With eps1, eps2 from the paper's own formulas 10 % of [eps1, 1 - eps2] is {tenth:.4f}; {NOISE} is "
         f"{100.0 * 0.1 * NOISE / tenth:.1f} % of it.",
         holds=abs(tenth - NOISE) < 0.005,
         otherwise=f"The two figures do not agree. All else here uses {NOISE}; Fig. 2's order holds with either.",

@@ -14,7 +14,7 @@ from cmg_mj.papers.claim import Claim
 
 
 def theorem_2() -> Claim:
-    """Theorem 2, and Definition 1."""
+    """Judge Theorem 2, and Definition 1."""
     sizes, dimensions = (1e-3, 1.0, 1e3), (1, 2, 3)
     ends, limits = {}, {}
     for n in dimensions:
@@ -24,34 +24,34 @@ def theorem_2() -> Claim:
             ends[f"n={n}, d_inf={d_inf:g}"] = chain_errors(K, sizes, 3, 40.0)
             if d_inf:
                 limits[f"n={n}, d_inf={d_inf:g}"] = [max(limits_error(K, scale)) for scale in (1e4, 1e8, 1e12)]
-    worst = max(ends.values())
-    shrinking = all(a > b > c for a, b, c in limits.values())
-    growing = chain_errors(BiLimitCorrection((1.0, 2.0, 0.9), 0.2), (1.0,), 3, 40.0)
+    largest_end = max(ends.values())
+    limits_shrink = all(a > b > c for a, b, c in limits.values())
+    growth = chain_errors(BiLimitCorrection((1.0, 2.0, 0.9), 0.2), (1.0,), 3, 40.0)
     by_simulation = (
         "Convergence is shown by simulation from random errors, the construction of W for two dimensions only, by the "
         "claim on (19) and (20)."
     )
     return Claim(
         place="Section 4.2, Theorem 2 (and Definition 1)",
-        says="There is a K, homogeneous in the bi-limit, with which the error of a chain of integrators converges, "
-        "for any n and any d_inf in [0, 1/(n-1)).",
-        found="With l_i = 2^(n-i), n = 1, 2, 3, d_inf = 0 and half and 0.9 of its limit, errors of 1e-3, 1 and 1e3 "
-        f"shrink to at most {worst:.1e} of their length within tau = 40. K, dilated by 1e4, 1e8, 1e12, approaches its "
-        "approximations at 0 and infinity every time. Not every l will do: with l = (1, 2, 0.9), whose linear part "
-        f"is Hurwitz, and d_inf = 0.2, an error of 1 is {growing:.0f} times as long by then.",
-        holds=worst < 1e-3 and shrinking,
+        statement="There is a K, homogeneous in the bi-limit, with which the error of a chain of integrators "
+        "converges, for any n and any d_inf in [0, 1/(n-1)).",
+        result="With l_i = 2^(n-i), n = 1, 2, 3, d_inf = 0 and half and 0.9 of its limit, errors of 1e-3, 1 and 1e3 "
+        f"shrink to at most {largest_end:.1e} of their length within tau = 40. K, dilated by 1e4, 1e8, 1e12, "
+        "approaches its approximations at 0 and infinity every time. Not every l will do: with l = (1, 2, 0.9), whose "
+        f"linear part is Hurwitz, and d_inf = 0.2, an error of 1 is {growth:.0f} times as long by then.",
+        holds=largest_end < 1e-3 and limits_shrink,
         conditions=by_simulation,
         otherwise=by_simulation,
         figures={
             "largest_final_error_ratio": ends,
             "deviation_from_limits_ratio": limits,
-            "poor_l_final_error_ratio": growing,
+            "poor_l_final_error_ratio": growth,
         },
     )
 
 
 def limits_error(correction: BiLimitCorrection, scale: float) -> tuple[float, float]:
-    """Definition 1: how far K, dilated, is from its approximations at 0 and at infinity, on |e1| <= 1.
+    """Measure, by Definition 1, the errors of K, dilated, from its approximations at 0 and at infinity, |e1| <= 1.
 
     Args:
         correction: K.
@@ -62,15 +62,15 @@ def limits_error(correction: BiLimitCorrection, scale: float) -> tuple[float, fl
     """
     e1 = np.linspace(-1.0, 1.0, 41)
     r = weights(correction.n, correction.d_inf)
-    near = far = 0.0
+    zero_error = inf_error = 0.0
     linear, power = e1, e1
     dilated = correction(e1 / scale), correction(scale ** r[0] * e1)
     for i in range(correction.n):
         linear = correction.l[i] * linear
         power = signed_power(correction.l[i] * power, r[i + 1] / r[i])
-        near = max(near, float(np.abs(scale * dilated[0][i] + linear).max() / np.abs(linear).max()))
-        far = max(far, float(np.abs(dilated[1][i] / scale ** r[i + 1] + power).max() / np.abs(power).max()))
-    return near, far
+        zero_error = max(zero_error, float(np.abs(scale * dilated[0][i] + linear).max() / np.abs(linear).max()))
+        inf_error = max(inf_error, float(np.abs(dilated[1][i] / scale ** r[i + 1] + power).max() / np.abs(power).max()))
+    return zero_error, inf_error
 
 
 def chain_errors(
@@ -83,13 +83,13 @@ def chain_errors(
         sizes: Lengths of E at the start.
         count: Random directions for each.
         span: Time tau to run.
-        seed: Of the directions.
+        seed: Seed of the directions.
 
     Returns:
         The worst length at the end, over the length at the start; infinite if a solution could not be followed.
     """
     rng = np.random.default_rng(seed)
-    n, worst = correction.n, 0.0
+    n, largest_ratio = correction.n, 0.0
 
     def slope(_: float, E: np.ndarray) -> list[float]:
         *numbers, last = correction(float(E[0]))
@@ -106,10 +106,10 @@ def chain_errors(
             except OverflowError:
                 return math.inf
             end = float(np.linalg.norm(solution.y[:, -1]))
-            worst = max(worst, end / size if solution.success and math.isfinite(end) else math.inf)
-    return worst
+            largest_ratio = max(largest_ratio, end / size if solution.success and math.isfinite(end) else math.inf)
+    return largest_ratio
 
 
 def recursive_l(n: int, ratio: float = 2.0) -> tuple[float, ...]:
-    """l_i = ratio^(n - i)."""
+    """Return l_i = ratio^(n - i)."""
     return tuple(ratio ** (n - i) for i in range(1, n + 1))

@@ -15,31 +15,31 @@ SEEN_NOISE = 0.05
 """An observer feels the noise if that changes its estimate by so much of its error."""
 
 
-def correction(run: Run, found: Replay) -> Claim:
-    """What the homogeneous terms do in the example."""
+def correction(run: Run, nominal: Replay) -> Claim:
+    """Judge the part of the homogeneous terms in the example."""
     model = Bioreactor(HBAR_OF_OBSERVERS)
     linear = replay(HOMOGENEOUS, run, model, p=0.0)
-    allowed = 0.5 * largest_b(2, P, (P,))
-    inside = replay(HOMOGENEOUS, run, model, b=allowed)
+    b_inside = 0.5 * largest_b(2, P, (P,))
+    bounded = replay(HOMOGENEOUS, run, model, b=b_inside)
     late = run.t > 5.0
-    largest = float(found.argument[late].max())
+    largest = float(nominal.argument[late].max())
     after_q1 = largest * 0.01
     share_q1, share_q2 = largest ** (1.0 / (1.0 - P) - 1.0), after_q1**P
-    rms, rms_linear, rms_inside = (float(rms_late(run, part.eta2_error).mean()) for part in (found, linear, inside))
-    difference = float(np.abs(found.eta2_error - linear.eta2_error)[late].max())
+    rms, rms_linear, rms_inside = (float(rms_late(run, part.eta2_error).mean()) for part in (nominal, linear, bounded))
+    difference = float(np.abs(nominal.eta2_error - linear.eta2_error)[late].max())
     return Claim(
         place="Section 3.1, the homogeneous correction",
-        says="In Fig. 2 the homogeneous correction is linear for all that matters: the third observer is the best "
+        statement="In Fig. 2 the homogeneous correction is linear for all that matters: the third observer is the best "
         "because of Omega_2.",
-        found=f"The argument of q1 is at most {largest:.1e} after t = 5: its power 1/(1-p) = 10 adds {share_q1:.0e} "
+        result=f"The argument of q1 is at most {largest:.1e} after t = 5: its power 1/(1-p) = 10 adds {share_q1:.0e} "
         f"of the linear term, and q2's power 1.9 adds {share_q2:.1e}. With a linear correction and the same Omega_2 "
         f"the RMS error is {rms_linear:.5f} against {rms:.5f}, and no error differs by more than {difference:.1e}. "
-        f"With b = {allowed:.4f}, inside (21) and (22), it is {rms_inside:.5f}.",
+        f"With b = {b_inside:.4f}, inside (21) and (22), it is {rms_inside:.5f}.",
         holds=difference < 0.01 * rms,
         conditions="With the parameters of section 3.1. What homogeneity gives is the right to use Omega_2; where the "
         "correction matters is large errors, as in Theorem 1 on system (1).",
         otherwise="The correction has its part in it.",
-        ours=True,
+        is_ours=True,
         figures={
             "largest_argument": largest,
             "q1_power_term_ratio": share_q1,
@@ -49,43 +49,44 @@ def correction(run: Run, found: Replay) -> Claim:
             "rms_error_eta2_b_inside_conditions": rms_inside,
             "largest_difference_eta2": difference,
             "b_of_the_paper": B,
-            "b_inside_conditions": allowed,
+            "b_inside_conditions": b_inside,
         },
     )
 
 
-def simple_copy(done: Study) -> Claim:
-    """Footnote 1."""
-    errors = copy_errors(done.run, Bioreactor(HBAR_OF_OBSERVERS))
+def simple_copy(study: Study) -> Claim:
+    """Judge Footnote 1."""
+    errors = copy_errors(study.run, Bioreactor(HBAR_OF_OBSERVERS))
     copy = errors[1]
-    error = float(rms_late(done.run, copy).mean())
-    best = float(rms_by_kind(done.run, done.found)[2].mean())
+    error = float(rms_late(study.run, copy).mean())
+    best_rms = float(rms_by_kind(study.run, study.nominal)[2].mean())
     # What the noise does: the same seed with noise and without.
-    late = done.run.t > 5.0
+    late = study.run.t > 5.0
     by_noise = {
-        kind: float(np.sqrt(np.mean((part.eta2_error[late, 0] - done.quiet[kind].eta2_error[late, 0]) ** 2)))
-        for kind, part in done.found.items()
+        kind: float(np.sqrt(np.mean((part.eta2_error[late, 0] - study.quiet[kind].eta2_error[late, 0]) ** 2)))
+        for kind, part in study.nominal.items()
     }
     least = min(by_noise.values())
     # (eta1 + eta2)' = u (1 - eta1 - eta2) whatever hbar is.
-    start, end = np.searchsorted(done.run.t, (10.0, 20.0))
+    start, end = np.searchsorted(study.run.t, (10.0, 20.0))
     total = np.abs(errors.sum(axis=0))
-    left = float(np.median(total[end] / total[start]))
-    slow = float(np.exp(-0.02 * 10.0))
+    share_left = float(np.median(total[end] / total[start]))
+    expected_share = float(np.exp(-0.02 * 10.0))
     return Claim(
         place="Footnote 1",
-        says="A model of the plant that just runs along feels no noise, but how fast its error fades is not ours to "
-        "choose.",
-        found="A copy of (14) with hbar = 0.8 does not use the measurement; the noise changes the observers' estimates "
-        f"by {least:.4f} RMS and more. From t = 10 to 20, at u = 0.02, the copy's error of eta1 + eta2 keeps "
-        f"{left:.3f} of its size, as exp(-0.02 * 10) = {slow:.3f} demands, whatever one would like. In this example it "
-        f"does no harm: after t = 5 the copy's RMS error is {error:.3f}, the best observer's {best:.3f}.",
-        holds=abs(left - slow) < 0.01 and least > SEEN_NOISE * best,
+        statement="A model of the plant that just runs along feels no noise, but how fast its error fades is not ours "
+        "to choose.",
+        result="A copy of (14) with hbar = 0.8 does not use the measurement; the noise changes the observers' "
+        f"estimates by {least:.4f} RMS and more. From t = 10 to 20, at u = 0.02, the copy's error of eta1 + eta2 keeps "
+        f"{share_left:.3f} of its size, as exp(-0.02 * 10) = {expected_share:.3f} demands, whatever one would like. In "
+        f"this example it does no harm: after t = 5 the copy's RMS error is {error:.3f}, the best observer's "
+        f"{best_rms:.3f}.",
+        holds=abs(share_left - expected_share) < 0.01 and least > SEEN_NOISE * best_rms,
         otherwise="The copy is not as the footnote says.",
         figures={
             "rms_change_by_noise_eta2": by_noise,
-            "share_left_after_slow_input": left,
+            "share_left_after_slow_input": share_left,
             "rms_error_eta2_copy": error,
-            "rms_error_eta2_best_observer": best,
+            "rms_error_eta2_best_observer": best_rms,
         },
     )

@@ -24,7 +24,7 @@ MARGIN = 0.02
 """c1 and c2 must be at least so large, because the states tried leave some out."""
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """The first pair with which both hold."""
 
     d_inf: float
@@ -35,43 +35,43 @@ class Found(NamedTuple):
 
 
 def exponent_of_scaling(d_inf: float) -> float:
-    """b, half of what (21) and (22) allow with v_2 = d_inf, and 1 at most."""
+    """Return b, half of what (21) and (22) allow with v_2 = d_inf, and 1 at most."""
     return min(1.0, 0.5 * largest_b(2, d_inf, (d_inf,)))
 
 
-def search(d_inf: float) -> Found | None:
+def search(d_inf: float) -> SearchResult | None:
     """Look for K and W with d_W = 2 + d_inf."""
     b = exponent_of_scaling(d_inf)
     for l1 in L1:
         for sigma in SIGMAS:
             W = Lyapunov(BiLimitCorrection((l1, 1.0), d_inf), sigma, 2.0 + d_inf)
             if min(decay(W, b, SPREAD)) > MARGIN:
-                return Found(d_inf, b, l1, sigma, decay(W, b, SPREAD, states(FINE, ANGLES)))
+                return SearchResult(d_inf, b, l1, sigma, decay(W, b, SPREAD, states(FINE, ANGLES)))
     return None
 
 
 def claim() -> Claim:
-    """(19) and (20)."""
-    found = {d_inf: search(d_inf) for d_inf in DEGREES}
-    known = [one for one in found.values() if one is not None]
+    """Judge (19) and (20)."""
+    results = {d_inf: search(d_inf) for d_inf in DEGREES}
+    pairs = [pair for pair in results.values() if pair is not None]
     rows = [
-        (f"{one.d_inf:g}", f"{one.b:.3g}", f"{one.l1:g}", f"{one.sigma:g}", *(f"{c:.3f}" for c in one.decay))
-        for one in known
+        (f"{pair.d_inf:g}", f"{pair.b:.3g}", f"{pair.l1:g}", f"{pair.sigma:g}", *(f"{c:.3f}" for c in pair.decay))
+        for pair in pairs
     ]
     return Claim(
         place="Section 4.2, (19) and (20)",
-        says="There are K and a proper W, homogeneous in the bi-limit, that satisfy (19) and (20) for all A(t) within "
-        "(17) and the B of section 4.3.",
-        found=f"For n = 2, A1 and A2 within {SPREAD:g} of 1 and d_W = 2 + d_inf, a K and a W are found for "
-        f"{len(known)} of {len(found)} d_inf. c1 and c2 are the largest constants at {len(FINE)} scales from "
+        statement="There are K and a proper W, homogeneous in the bi-limit, that satisfy (19) and (20) for all A(t) "
+        "within (17) and the B of section 4.3.",
+        result=f"For n = 2, A1 and A2 within {SPREAD:g} of 1 and d_W = 2 + d_inf, a K and a W are found for "
+        f"{len(pairs)} of {len(results)} d_inf. c1 and c2 are the largest constants at {len(FINE)} scales from "
         f"{FINE[0]:.0e} to {FINE[-1]:.0e}, {ANGLES} directions and more each.",
         table=markdown.table(("d_inf", "b", "l1", "sigma", "c1", "c2"), rows, text_columns=0),
-        holds=len(known) == len(found) and all(min(one.decay) > 0.0 for one in known),
+        holds=len(pairs) == len(results) and all(min(pair.decay) > 0.0 for pair in pairs),
         conditions="For two dimensions, by numbers; a d_inf near its limit asks for a larger l1.",
         otherwise="For some d_inf none was found, which does not say that there is none.",
         figures={
-            "c1_by_d_inf": {str(one.d_inf): one.decay.c1 for one in known},
-            "c2_by_d_inf": {str(one.d_inf): one.decay.c2 for one in known},
-            "l1_by_d_inf": {str(one.d_inf): one.l1 for one in known},
+            "c1_by_d_inf": {str(pair.d_inf): pair.decay.c1 for pair in pairs},
+            "c2_by_d_inf": {str(pair.d_inf): pair.decay.c2 for pair in pairs},
+            "l1_by_d_inf": {str(pair.d_inf): pair.l1 for pair in pairs},
         },
     )

@@ -13,45 +13,45 @@ from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 RATES = ("df2_max", "Omega_1", "Omega_2", "df2/dx2")
 
 
-def ordered_rates(done: Study) -> tuple[np.ndarray, np.ndarray]:
-    """Means of df2_max, Omega_1, Omega_2, df2/dx2 over windows and seeds, (4 rates, 4 windows); whether in order."""
-    rates = [done.found[kind].rate for kind in KINDS]
-    means = np.array([window_means(done.run, rate).mean(axis=1) for rate in (*rates, done.rate)])
+def ordered_rates(study: Study) -> tuple[np.ndarray, np.ndarray]:
+    """Return the means of `RATES` over windows and seeds, (4 rates, 4 windows), and the windows in order."""
+    rates = [study.nominal[kind].rate for kind in KINDS]
+    means = np.array([window_means(study.run, rate).mean(axis=1) for rate in (*rates, study.rate)])
     return means, np.asarray(np.all(np.diff(means, axis=0) <= 0.0, axis=0))
 
 
-def figure_1(done: Study) -> Claim:
-    """The estimates of the local incremental rate."""
-    means, holds = ordered_rates(done)
-    gains = {kind: window_means(done.run, done.found[kind].L).mean(axis=1) for kind in (UPDATED, HOMOGENEOUS)}
-    tracked = [gains[kind] / (PHI2 + PHI3 / PHI1 * means[i]) for i, kind in enumerate((UPDATED, HOMOGENEOUS), start=1)]
+def figure_1(study: Study) -> Claim:
+    """Judge the estimates of the local incremental rate."""
+    means, in_order = ordered_rates(study)
+    gains = {kind: window_means(study.run, study.nominal[kind].L).mean(axis=1) for kind in (UPDATED, HOMOGENEOUS)}
+    ratios = [gains[kind] / (PHI2 + PHI3 / PHI1 * means[i]) for i, kind in enumerate((UPDATED, HOMOGENEOUS), start=1)]
 
     def words(values: np.ndarray) -> str:
         return ", ".join(f"{value:.2f}" for value in values)
 
     return Claim(
         place="Fig. 1",
-        says="With noise, too, the means come as df2_max >= Omega_1 >= Omega_2 >= df2/dx2.",
-        found=f"Means over t = 5-10, 15-20, 28-35, 42-50 and {done.run.y.shape[1]} seeds: df2_max {words(means[0])}; "
-        f"Omega_1 {words(means[1])}; Omega_2 {words(means[2])}; df2/dx2 {words(means[3])}: in order in {holds.sum()} "
-        f"of 4 windows. L is {min(map(np.min, tracked)):.3f} to {max(map(np.max, tracked)):.3f} times phi2 + "
-        "(phi3/phi1) Omega, as (13) says.",
-        holds=bool(holds.all()),
+        statement="With noise, too, the means come as df2_max >= Omega_1 >= Omega_2 >= df2/dx2.",
+        result=f"Means over t = 5-10, 15-20, 28-35, 42-50 and {study.run.y.shape[1]} seeds: df2_max "
+        f"{words(means[0])}; Omega_1 {words(means[1])}; Omega_2 {words(means[2])}; df2/dx2 {words(means[3])}: in order "
+        f"in {in_order.sum()} of 4 windows. L is {min(map(np.min, ratios)):.3f} to "
+        f"{max(map(np.max, ratios)):.3f} times phi2 + (phi3/phi1) Omega, as (13) says.",
+        holds=bool(in_order.all()),
         otherwise="The means are not in order in every window.",
         figures={f"{name}_mean_per_time": row.tolist() for name, row in zip(RATES, means, strict=True)}
-        | {"L_over_tracked_ratio": [row.tolist() for row in tracked]},
-        pictures=[_picture(done, means)],
+        | {"L_over_tracked_ratio": [row.tolist() for row in ratios]},
+        pictures=[_picture(study, means)],
     )
 
 
-def _picture(done: Study, means: np.ndarray) -> Picture:
-    t = done.run.t
-    curves = [done.found[kind].rate[:, 0] for kind in KINDS] + [done.rate[:, 0]]
+def _picture(study: Study, means: np.ndarray) -> Picture:
+    t = study.run.t
+    curves = [study.nominal[kind].rate[:, 0] for kind in KINDS] + [study.rate[:, 0]]
     middles = [(start + end) / 2.0 for start, end in WINDOWS]
 
-    def lines(which: tuple[int, ...]) -> list[Line]:
-        thin = [Line(t, curves[i], RATES[i], color=i, width=0.8 if i in (1, 2) else 1.6) for i in which]
-        return thin + [Line(middles, means[i], "", "ko", width=0.0) for i in which]
+    def lines(indices: tuple[int, ...]) -> list[Line]:
+        rate_lines = [Line(t, curves[i], RATES[i], color=i, width=0.8 if i in (1, 2) else 1.6) for i in indices]
+        return rate_lines + [Line(middles, means[i], "", "ko", width=0.0) for i in indices]
 
     return Picture(
         "andrieu2009-fig-1",

@@ -31,32 +31,32 @@ STRONG = 0.7
 
 
 def share_in_order(rms: np.ndarray) -> float:
-    """Share of the seeds in which constant > updated > updated and homogeneous."""
+    """Return the share of the seeds in which constant > updated > updated and homogeneous."""
     return float((np.diff(rms, axis=0) < 0.0).all(axis=0).mean())
 
 
-def figure_2(done: Study) -> Claim:
-    """The estimation errors."""
-    rms, loud = rms_by_kind(done.run, done.found), rms_by_kind(done.run, done.loud)
+def figure_2(study: Study) -> Claim:
+    """Judge the estimation errors."""
+    rms, loud = rms_by_kind(study.run, study.nominal), rms_by_kind(study.run, study.loud)
     share, share_loud = share_in_order(rms), share_in_order(loud)
     n = rms.shape[1]
     means, loud_means = rms.mean(axis=1), loud.mean(axis=1)
-    unstated = (
+    remark = (
         "Initial values are not given: the plant's and the observers' are drawn from M_eta for each seed, and the "
         "error is counted from t = 5. The noise is a new value every 10 ms, running straight in between. That the "
         "third is best is due to Omega_2, not to the homogeneous correction (see the claim on the correction)."
     )
     return Claim(
         place="Fig. 2",
-        says="The observer with Omega_2 and homogeneity gives the best estimate of eta2, the updated gain with "
+        statement="The observer with Omega_2 and homogeneity gives the best estimate of eta2, the updated gain with "
         "Omega_1 the second, the constant gain the worst.",
-        found=f"RMS error of eta2 after t = 5, mean of {n} seeds: {means[0]:.3f}, {means[1]:.3f}, {means[2]:.3f} "
+        result=f"RMS error of eta2 after t = 5, mean of {n} seeds: {means[0]:.3f}, {means[1]:.3f}, {means[2]:.3f} "
         f"(constant, updated, updated and homogeneous); in this order in {round(share * n)} of {n} seeds. With noise "
         f"of 10 % of the domain ({LOUD}): {loud_means[0]:.3f}, {loud_means[1]:.3f}, {loud_means[2]:.3f}; "
         f"{round(share_loud * n)} of {n}.",
         holds=share >= LEAST_SEEDS,
-        conditions=unstated,
-        otherwise=unstated,
+        conditions=remark,
+        otherwise=remark,
         figures={
             "rms_error_eta2": dict(zip(KINDS, means.tolist(), strict=True)),
             "rms_error_eta2_standard_deviation": dict(zip(KINDS, rms.std(axis=1, ddof=1).tolist(), strict=True)),
@@ -64,12 +64,12 @@ def figure_2(done: Study) -> Claim:
             "rms_error_eta2_with_10_percent_noise": dict(zip(KINDS, loud_means.tolist(), strict=True)),
             "share_of_seeds_in_order_with_10_percent_noise": share_loud,
         },
-        pictures=[_picture(done)],
+        pictures=[_picture(study)],
     )
 
 
-def _picture(done: Study) -> Picture:
-    mean_of_first = running_mean(done.run.t, done.found[CONSTANT].eta2_error[:, 0])
+def _picture(study: Study) -> Picture:
+    mean_of_first = running_mean(study.run.t, study.nominal[CONSTANT].eta2_error[:, 0])
     return Picture(
         "andrieu2009-fig-2",
         "andrieu2009, Fig. 2: error of eta2 given by each observer (one seed; black in (a): running mean over 1)",
@@ -77,8 +77,8 @@ def _picture(done: Study) -> Picture:
             Panel(
                 "eta2 error [-]",
                 [
-                    Line(done.run.t, done.found[kind].eta2_error[:, 0], kind, color=i, width=0.8 if i else 0.25),
-                    *([] if i else [Line(done.run.t, mean_of_first, "mean over 1", "k-")]),
+                    Line(study.run.t, study.nominal[kind].eta2_error[:, 0], kind, color=i, width=0.8 if i else 0.25),
+                    *([] if i else [Line(study.run.t, mean_of_first, "mean over 1", "k-")]),
                 ],
                 f"({'abc'[i]})",
                 TIME,
@@ -90,120 +90,121 @@ def _picture(done: Study) -> Picture:
 
 
 def running_mean(t: np.ndarray, values: np.ndarray, span: float = 1.0) -> np.ndarray:
-    """Mean over a span of time about each sample, (n,)."""
+    """Return the mean over a span of time about each sample, (n,)."""
     return uniform_filter1d(values, max(1, round(span / float(t[1] - t[0]))), mode="nearest")
 
 
-def biases(run: Run, found: dict[str, Replay]) -> np.ndarray:
-    """Mean error of eta2, (3 observers, 4 windows)."""
-    return np.array([window_means(run, found[kind].eta2_error).mean(axis=1) for kind in KINDS])
+def biases(run: Run, replays: dict[str, Replay]) -> np.ndarray:
+    """Return the mean error of eta2, (3 observers, 4 windows)."""
+    return np.array([window_means(run, replays[kind].eta2_error).mean(axis=1) for kind in KINDS])
 
 
-def bias(done: Study) -> Claim:
-    """The order of the biases in Fig. 2."""
-    shown, quiet = biases(done.run, done.found), biases(done.quiet_run, done.quiet)
-    in_order = [(np.diff(values, axis=0) <= 0.0).all(axis=0) for values in (shown, quiet)]
+def bias(study: Study) -> Claim:
+    """Judge the order of the biases in Fig. 2."""
+    noisy, quiet = biases(study.run, study.nominal), biases(study.quiet_run, study.quiet)
+    in_order = [(np.diff(values, axis=0) <= 0.0).all(axis=0) for values in (noisy, quiet)]
     rows = [
         (kind, noise, *(f"{value:.4f}" for value in row))
-        for noise, values in (("as in Fig. 2", shown), ("without", quiet))
+        for noise, values in (("as in Fig. 2", noisy), ("without", quiet))
         for kind, row in zip(KINDS, values, strict=True)
     ]
     return Claim(
         place="Section 3.1, bias in Fig. 2",
-        says="The larger an observer's estimate of the rate, the larger the bias of its error.",
-        found="A larger estimate goes with a larger mean error of eta2 in "
+        statement="The larger an observer's estimate of the rate, the larger the bias of its error.",
+        result="A larger estimate goes with a larger mean error of eta2 in "
         f"{in_order[0].sum()} of 4 windows with noise, {in_order[1].sum()} of 4 without.",
         table=markdown.table(("observer", "noise", *WINDOW_NAMES), rows, text_columns=2),
         holds=bool(np.all(in_order)),
         otherwise="The means are not in order in every window.",
-        figures={"bias_eta2": shown.tolist(), "bias_eta2_without_noise": quiet.tolist()},
+        figures={"bias_eta2": noisy.tolist(), "bias_eta2_without_noise": quiet.tolist()},
     )
 
 
-def bias_left(done: Study) -> np.ndarray:
-    """Share of the bias that is left where the observers know hbar, (3 observers, 4 windows)."""
-    return np.abs(biases(done.run, done.exact) / biases(done.run, done.found))
+def bias_left(study: Study) -> np.ndarray:
+    """Return the share of the bias that is left where the observers know hbar, (3 observers, 4 windows)."""
+    return np.abs(biases(study.run, study.exact) / biases(study.run, study.nominal))
 
 
-def bias_of_constant_gain(done: Study) -> Claim:
-    """What makes the constant gain's bias."""
-    left = bias_left(done)[0]
+def bias_of_constant_gain(study: Study) -> Claim:
+    """Judge the cause of the constant gain's bias."""
+    shares_left = bias_left(study)[0]
     return Claim(
         place="Section 3.1, bias of the constant gain",
-        says="The bias of the observer with constant gain in Fig. 2 is due to the error in hbar.",
-        found=f"With hbar exact {left.min():.0%} to {left.max():.0%} of it remain in the four windows.",
-        holds=bool((left < HALF).all()),
+        statement="The bias of the observer with constant gain in Fig. 2 is due to the error in hbar.",
+        result=f"With hbar exact {shares_left.min():.0%} to {shares_left.max():.0%} of it remain in the four windows.",
+        holds=bool((shares_left < HALF).all()),
         otherwise="It is made by the noise, which sends the estimate from end to end of the domain, where the limits "
         "cut off one side more than the other.",
-        figures={"share_left_with_exact_hbar": left.tolist()},
+        figures={"share_left_with_exact_hbar": shares_left.tolist()},
     )
 
 
-def bias_of_updated_gains(done: Study) -> Claim:
-    """What makes the biases of the two whose gain is updated."""
-    left = bias_left(done)[1:]
-    due = np.all(left < HALF, axis=0).tolist()
-    windows = [name for name, so in zip(WINDOW_NAMES, due, strict=True) if so]
-    others = [name for name, so in zip(WINDOW_NAMES, due, strict=True) if not so]
+def bias_of_updated_gains(study: Study) -> Claim:
+    """Judge the cause of the biases of the two observers with updated gain."""
+    shares_left = bias_left(study)[1:]
+    due = np.all(shares_left < HALF, axis=0).tolist()
+    windows = [name for name, is_due in zip(WINDOW_NAMES, due, strict=True) if is_due]
+    other_windows = [name for name, is_due in zip(WINDOW_NAMES, due, strict=True) if not is_due]
     return Claim(
         place="Section 3.1, bias of the updated gains",
-        says="The biases of the observers with updated gain in Fig. 2 are due to the error in hbar.",
-        found="With hbar exact there remain "
+        statement="The biases of the observers with updated gain in Fig. 2 are due to the error in hbar.",
+        result="With hbar exact there remain "
         + "; ".join(
-            f"{', '.join(f'{value:.0%}' for value in row)} ({kind})" for kind, row in zip(KINDS[1:], left, strict=True)
+            f"{', '.join(f'{value:.0%}' for value in row)} ({kind})"
+            for kind, row in zip(KINDS[1:], shares_left, strict=True)
         )
         + ".",
         holds=any(due),
-        conditions=f"Less than half remains for both in {', '.join(windows)}; not in {', '.join(others)}, where the "
-        "bias itself is small."
-        if others
+        conditions=f"Less than half remains for both in {', '.join(windows)}; not in {', '.join(other_windows)}, where "
+        "the bias itself is small."
+        if other_windows
         else "",
         otherwise="Half of it or more remains in every window.",
-        figures={"share_left_with_exact_hbar": dict(zip(KINDS[1:], left.tolist(), strict=True))},
+        figures={"share_left_with_exact_hbar": dict(zip(KINDS[1:], shares_left.tolist(), strict=True))},
     )
 
 
-def spread_correlation(done: Study) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """Standard deviation of the errors beside the estimates used.
+def spread_correlation(study: Study) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Return the standard deviation of the errors beside the estimates used.
 
     Returns:
         Spreads (3 observers, 4 windows), rates (3, 4), the rank correlation over all twelve, the least over the three
         observers of one window.
     """
-    spreads = np.array([window_spreads(done.run, done.found[kind].eta2_error).mean(axis=1) for kind in KINDS])
-    rates = np.array([window_means(done.run, done.found[kind].rate).mean(axis=1) for kind in KINDS])
+    spreads = np.array([window_spreads(study.run, study.nominal[kind].eta2_error).mean(axis=1) for kind in KINDS])
+    rates = np.array([window_means(study.run, study.nominal[kind].rate).mean(axis=1) for kind in KINDS])
 
     def correlation(a: np.ndarray, b: np.ndarray) -> float:
         return float(np.asarray(spearmanr(a.round(6), b)[0]))
 
-    within = min(correlation(rates[:, i], spreads[:, i]) for i in range(len(WINDOWS)))
-    return spreads, rates, correlation(rates.ravel(), spreads.ravel()), within
+    least_in_a_window = min(correlation(rates[:, i], spreads[:, i]) for i in range(len(WINDOWS)))
+    return spreads, rates, correlation(rates.ravel(), spreads.ravel()), least_in_a_window
 
 
-def spread(done: Study) -> Claim:
-    """The thickness of the curves in Fig. 2."""
-    spreads, rates, over_all, within = spread_correlation(done)
+def spread(study: Study) -> Claim:
+    """Judge the thickness of the curves in Fig. 2."""
+    spreads, rates, overall, in_window = spread_correlation(study)
     ratio = spreads[:, [0, 2]].mean() / spreads[:, [1, 3]].mean()
-    across = (
+    remark = (
         "Across the observers of one window. Across windows the input matters as much: at large u the spread is "
         f"{ratio:.0f} times that at small u, since eta2 follows more steeply from x2 there."
     )
     return Claim(
         place="Section 3.1, standard deviation in Fig. 2",
-        says="The larger an observer's estimate of the rate, the more its error scatters.",
-        found="Standard deviation about a straight line in each window. Its rank correlation with the estimate is at "
-        f"least {within:.2f} over the observers of a window, {over_all:.2f} over all twelve.",
+        statement="The larger an observer's estimate of the rate, the more its error scatters.",
+        result="Standard deviation about a straight line in each window. Its rank correlation with the estimate is at "
+        f"least {in_window:.2f} over the observers of a window, {overall:.2f} over all twelve.",
         table=markdown.table(
             ("observer", *WINDOW_NAMES),
             [(kind, *(f"{value:.4f}" for value in row)) for kind, row in zip(KINDS, spreads, strict=True)],
         ),
-        holds=within >= STRONG and over_all > 0.0,
-        conditions="" if over_all >= STRONG else across,
-        otherwise=across,
+        holds=in_window >= STRONG and overall > 0.0,
+        conditions="" if overall >= STRONG else remark,
+        otherwise=remark,
         figures={
             "error_standard_deviation_eta2": spreads.tolist(),
             "estimate_mean_per_time": rates.tolist(),
-            "rank_correlation_over_all": over_all,
-            "least_rank_correlation_in_a_window": within,
+            "rank_correlation_over_all": overall,
+            "least_rank_correlation_in_a_window": in_window,
         },
     )

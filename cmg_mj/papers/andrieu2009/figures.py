@@ -13,11 +13,11 @@ SEEDS = 20
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Section 3.1."""
-    done = study(SEEDS)
+    """Judge section 3.1."""
+    results = study(SEEDS)
     on_share(0.7)
-    found = [figure_1(done), figure_2(done), bias(done), bias_of_constant_gain(done)]
-    found += [bias_of_updated_gains(done), spread(done)]
-    found.append(correction(done.run, done.found[HOMOGENEOUS]))
+    figure_claims = [figure_1(results), figure_2(results), bias(results), bias_of_constant_gain(results)]
+    figure_claims += [bias_of_updated_gains(results), spread(results)]
+    figure_claims.append(correction(results.run, results.nominal[HOMOGENEOUS]))
     on_share(0.95)
-    return [*found, simple_copy(done)]
+    return [*figure_claims, simple_copy(results)]

@@ -29,32 +29,32 @@ LAST = 14.0
 class Escape(NamedTuple):
     """An observer beside a solution that escapes."""
 
-    left: np.ndarray
+    share_left: np.ndarray
     """Share of the solution's time of existence that is left, (n,)."""
     error: np.ndarray
     """|x2_hat - x2|/x2, (n,)."""
     end_time: float
     """When the solution ends."""
     moved: float
-    """By how much y has moved until then; infinite if without bound."""
+    """Distance that y has moved until then; infinite if without bound."""
 
 
-def solution(p: float, x2: float, left: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-    """x2' = x2^(1+p), x1(0) = 0: x1 and x2, in closed form.
+def solution(p: float, x2: float, share_left: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    """Solve x2' = x2^(1+p), x1(0) = 0 for x1 and x2, in closed form.
 
     Args:
         p: Power, not 1.
         x2: x2(0) > 0.
-        left: Share left of the time of existence x2(0)^-p/p.
+        share_left: Share left of the time of existence x2(0)^-p/p.
     """
     end = x2**-p / p
     power = 1.0 - 1.0 / p
-    x1 = p ** (-1.0 / p) * end**power * (1.0 - np.asarray(left) ** power) / power
-    return x1, (p * end * np.asarray(left)) ** (-1.0 / p)
+    x1 = p ** (-1.0 / p) * end**power * (1.0 - np.asarray(share_left) ** power) / power
+    return x1, (p * end * np.asarray(share_left)) ** (-1.0 / p)
 
 
 def observer(p: float) -> UpdatedHighGain:
-    """(7), (8) for (1) with g = 0, u = 0, in continuous time; d_inf = 0.5 whatever p is, as Theorem 1 wants it."""
+    """Make (7), (8) for (1) with g = 0, u = 0, in continuous time; d_inf = 0.5 whatever p is, as Theorem 1 wants it."""
     return UpdatedHighGain(
         1e-3,
         (lambda u, y, x: 0.0 * y[0], lambda u, y, x: paper.f2(0.0, x[0], 0.0, p)),
@@ -75,60 +75,60 @@ def escape(p: float, x2: float, x2_hat: float = 0.0, tolerance: float = 1e-6) ->
         p: Power.
         x2: x2(0).
         x2_hat: Its estimate at the start; x1 is known.
-        tolerance: Of the integrator.
+        tolerance: Tolerance of the integrator.
 
     Returns:
         The errors.
     """
-    of, end = observer(p), x2**-p / p
+    follower, end = observer(p), x2**-p / p
 
     def slope(s: float, z: np.ndarray) -> list[float]:
-        left = math.exp(-s)
-        x1, _ = solution(p, x2, left)
+        share_left = math.exp(-s)
+        x1, _ = solution(p, x2, share_left)
         L = math.exp(z[2])
-        first, second = of.slope((z[0], z[1]), L, (float(x1),), None)
-        growth = of.phi1 * (of.phi2 - L) + of.phi3 * of.Omega(None, (float(x1),), (z[1],))
-        return [end * left * first, end * left * second, end * left * growth]
+        first, second = follower.slope((z[0], z[1]), L, (float(x1),), None)
+        growth = follower.phi1 * (follower.phi2 - L) + follower.phi3 * follower.Omega(None, (float(x1),), (z[1],))
+        return [end * share_left * first, end * share_left * second, end * share_left * growth]
 
-    found = solve_ivp(
-        slope, (0.0, LAST), [0.0, x2_hat, math.log(of.phi2)], "Radau", rtol=tolerance, atol=1e-3 * tolerance
+    result = solve_ivp(
+        slope, (0.0, LAST), [0.0, x2_hat, math.log(follower.phi2)], "Radau", rtol=tolerance, atol=1e-3 * tolerance
     )
-    assert found.success, found.message
-    left = np.exp(-found.t)
-    error = np.abs(found.y[1] / solution(p, x2, left)[1] - 1.0)
-    return Escape(left, error, end, x2 ** (1.0 - p) / (p - 1.0) if p > 1.0 else math.inf)
+    assert result.success, result.message
+    share_left = np.exp(-result.t)
+    error = np.abs(result.y[1] / solution(p, x2, share_left)[1] - 1.0)
+    return Escape(share_left, error, end, x2 ** (1.0 - p) / (p - 1.0) if p > 1.0 else math.inf)
 
 
 def no_observer_beyond_1() -> Claim:
-    """The remark on p > 1."""
+    """Judge the remark on p > 1."""
     runs = {p: [escape(p, start) for start in STARTS] for p in (INSIDE, BEYOND)}
-    ends = {p: [float(run.error[-1]) for run in of] for p, of in runs.items()}
+    ends = {p: [float(run.error[-1]) for run in escapes] for p, escapes in runs.items()}
     moved = [run.moved for run in runs[BEYOND]]
-    missed = [error > MISSED for error in ends[BEYOND]]
-    count = sum(missed)
+    misses = [error > MISSED for error in ends[BEYOND]]
+    count = sum(misses)
     one_observer = (
         "One observer, (7) and (8) with d_inf = 0.5, l = (2, 1), phi1 = 0.5, phi2 = 2, phi3 = 1, g = 0, without input, "
         "started at the measured x1 and x2_hat = 0. The statement is one about all observers, proved elsewhere "
         "(Astolfi and Praly 2006); this shows what stands in their way, it is no proof."
     )
-    first = f" From x2(0) = {STARTS[missed.index(True)]:g} on it is missed." if count else ""
+    first = f" From x2(0) = {STARTS[misses.index(True)]:g} on it is missed." if count else ""
     return Claim(
         place="Section 2.1",
-        says="Once p exceeds 1, and with u = 0, no observer whatever can be sure to find x2 before the solution of (1) "
-        "ends.",
-        found=f"With p = {BEYOND} a solution from x2(0) = {STARTS[0]:g} to {STARTS[-1]:g} escapes at t = "
+        statement="Once p exceeds 1, and with u = 0, no observer whatever can be sure to find x2 before the solution "
+        "of (1) ends.",
+        result=f"With p = {BEYOND} a solution from x2(0) = {STARTS[0]:g} to {STARTS[-1]:g} escapes at t = "
         f"{runs[BEYOND][0].end_time:.2g} to {runs[BEYOND][-1].end_time:.2g}, by when y has moved by "
         f"{moved[0]:.2g} to {moved[-1]:.2g} only. A millionth of that time before the end the relative error of x2 is "
         f"above {MISSED} in {count} of {len(STARTS)}, {max(ends[BEYOND]):.2f} at worst.{first} With p = {INSIDE} "
         "solutions escape as well, but y with them: the same observer then finds x2 from every start, to "
         f"{max(ends[INSIDE]):.0e}.",
-        holds=max(ends[INSIDE]) < FOUND and missed[-1],
+        holds=max(ends[INSIDE]) < FOUND and misses[-1],
         conditions=one_observer,
         otherwise=one_observer,
         figures={
             "x2_at_start": list(STARTS),
             "relative_error_of_x2_at_the_end_by_p": {str(p): values for p, values in ends.items()},
-            "escape_time_by_p": {str(p): [run.end_time for run in of] for p, of in runs.items()},
+            "escape_time_by_p": {str(p): [run.end_time for run in escapes] for p, escapes in runs.items()},
             "output_moves_by_p_1_5": moved,
             "missed_count": count,
         },
@@ -141,7 +141,7 @@ def _picture(runs: dict[float, list[Escape]]) -> Picture:
         Panel(
             "|error of x2|/x2 [-]",
             [
-                Line(1.0 / run.left, run.error, f"x2(0) = {start:g}", color=i)
+                Line(1.0 / run.share_left, run.error, f"x2(0) = {start:g}", color=i)
                 for i, (start, run) in enumerate(zip(STARTS, runs[p], strict=True))
             ],
             f"({letter}) p = {p}",

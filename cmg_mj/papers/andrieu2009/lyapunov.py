@@ -20,7 +20,7 @@ from cmg_mj.elementwise import signed_power
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection
 
 SCALES = np.geomspace(1e-8, 1e8, 65)
-"""Of the states, from where W is that of its limit at 0 to where it is that at infinity."""
+"""Scales of the states, from where W is that of its limit at 0 to where it is that at infinity."""
 ANGLES = 120
 
 
@@ -32,12 +32,12 @@ class States(NamedTuple):
 
 
 def states(scales: np.ndarray = SCALES, angles: int = ANGLES) -> States:
-    """On squares of all scales, denser where s1 and s2 are nearly alike, and where one of them is small."""
+    """Return states on squares of all scales, denser where s1 and s2 are nearly alike or one of them is small."""
     share = np.linspace(-1.0, 1.0, angles)
-    near = np.concatenate([share, np.geomspace(1e-3, 1.0, 40), 1.0 - np.geomspace(1e-3, 1.0, 40)])
-    ends = np.ones_like(near)
-    s1 = np.concatenate([ends, -ends, near, near])
-    s2 = np.concatenate([near, near, ends, -ends])
+    shares = np.concatenate([share, np.geomspace(1e-3, 1.0, 40), 1.0 - np.geomspace(1e-3, 1.0, 40)])
+    ends = np.ones_like(shares)
+    s1 = np.concatenate([ends, -ends, shares, shares])
+    s2 = np.concatenate([shares, shares, ends, -ends])
     return States(*(np.multiply.outer(scales, s).ravel() for s in (s1, s2)))
 
 
@@ -57,49 +57,49 @@ class Lyapunov:
 
     @property
     def powers(self) -> tuple[float, float]:
-        """Of h."""
+        """The two powers in h."""
         r1 = 1.0 - self.K.d_inf
         return self.d_W - 1.0, self.d_W / r1 - 1.0
 
     def q1(self, s: np.ndarray) -> np.ndarray:
-        """q1, whose two terms are one if d_inf = 0."""
+        """Return q1, whose two terms are one if d_inf = 0."""
         return s if not self.K.d_inf else s + signed_power(s, self.K.exponents[0])
 
     def q1_slope(self, s: np.ndarray) -> np.ndarray:
-        """Its derivative."""
+        """Return the derivative of q1."""
         a = self.K.exponents[0]
         return np.ones_like(s) if not self.K.d_inf else 1.0 + a * np.abs(s) ** (a - 1.0)
 
     def h(self, s: np.ndarray) -> np.ndarray:
-        """The integrand of W."""
+        """Return the integrand of W."""
         first, second = self.powers
         return signed_power(s, first) + signed_power(s, second)
 
     def h_slope(self, s: np.ndarray) -> np.ndarray:
-        """Its derivative."""
+        """Return the derivative of h."""
         first, second = self.powers
         return first * np.abs(s) ** (first - 1.0) + second * np.abs(s) ** (second - 1.0)
 
     def H(self, s: np.ndarray) -> np.ndarray:
-        """Its integral."""
+        """Return the integral of h."""
         first, second = (power + 1.0 for power in self.powers)
         return np.abs(s) ** first / first + np.abs(s) ** second / second
 
-    def E(self, at: States) -> tuple[np.ndarray, np.ndarray]:
-        """e1 and e2."""
-        return at.s1 / self.K.l[0], self.q1(at.s2)
+    def E(self, grid: States) -> tuple[np.ndarray, np.ndarray]:
+        """Return e1 and e2."""
+        return grid.s1 / self.K.l[0], self.q1(grid.s2)
 
-    def W(self, at: States) -> np.ndarray:
-        """W, (n,)."""
-        first = self.H(at.s1) - self.H(at.s2) - self.h(at.s2) * (at.s1 - at.s2)
-        return first + self.sigma * np.abs(self.q1(at.s2)) ** self.d_W / self.d_W
+    def W(self, grid: States) -> np.ndarray:
+        """Return W, (n,)."""
+        first = self.H(grid.s1) - self.H(grid.s2) - self.h(grid.s2) * (grid.s1 - grid.s2)
+        return first + self.sigma * np.abs(self.q1(grid.s2)) ** self.d_W / self.d_W
 
-    def gradient(self, at: States) -> tuple[np.ndarray, np.ndarray]:
-        """dW/de1 and dW/de2, each (n,)."""
-        by_s2 = -self.h_slope(at.s2) * (at.s1 - at.s2) / self.q1_slope(at.s2)
+    def gradient(self, grid: States) -> tuple[np.ndarray, np.ndarray]:
+        """Return dW/de1 and dW/de2, each (n,)."""
+        by_s2 = -self.h_slope(grid.s2) * (grid.s1 - grid.s2) / self.q1_slope(grid.s2)
         return (
-            self.K.l[0] * (self.h(at.s1) - self.h(at.s2)),
-            by_s2 + self.sigma * signed_power(self.q1(at.s2), self.d_W - 1.0),
+            self.K.l[0] * (self.h(grid.s1) - self.h(grid.s2)),
+            by_s2 + self.sigma * signed_power(self.q1(grid.s2), self.d_W - 1.0),
         )
 
 
@@ -110,25 +110,26 @@ class Decay(NamedTuple):
     c2: float
 
 
-def decay(W: Lyapunov, b: float, spread: float = 0.0, at: States | None = None) -> Decay:
+def decay(W: Lyapunov, b: float, spread: float = 0.0, grid: States | None = None) -> Decay:
     """Try (19) and (20).
 
     Args:
         W: The function.
         b: Exponent of the scaling: B = diag(b, 1 + b) in (20).
         spread: A1 and A2 are anywhere in [1 - spread, 1 + spread]; both sides of (19) are linear in them.
-        at: Where; by default on all scales.
+        grid: States tried; by default on all scales.
 
     Returns:
         c1 and c2.
     """
-    at = states() if at is None else at
-    apart = np.abs(at.s1 - at.s2) > 1e-9 * np.maximum(np.abs(at.s1), np.abs(at.s2))  # else W is rounding errors
-    at = States(at.s1[apart], at.s2[apart])
-    (e1, e2), (by_e1, by_e2), value = W.E(at), W.gradient(at), W.W(at)
+    grid = states() if grid is None else grid
+    # Where s1 and s2 are nearer, W is rounding errors.
+    distinct = np.abs(grid.s1 - grid.s2) > 1e-9 * np.maximum(np.abs(grid.s1), np.abs(grid.s2))
+    grid = States(grid.s1[distinct], grid.s2[distinct])
+    (e1, e2), (by_e1, by_e2), value = W.E(grid), W.gradient(grid), W.W(grid)
     k1, k2 = W.K(e1)
     slopes = by_e1 * (e2 + k1), by_e2 * k2
     largest = sum(np.maximum((1.0 - spread) * part, (1.0 + spread) * part) for part in slopes)
     bound = value + value ** ((W.d_W + W.K.d_inf) / W.d_W)
-    grows = by_e1 * b * e1 + by_e2 * (1.0 + b) * e2
-    return Decay(float((-largest / bound).min()), float((grows / value).min()))
+    growth = by_e1 * b * e1 + by_e2 * (1.0 + b) * e2
+    return Decay(float((-largest / bound).min()), float((growth / value).min()))

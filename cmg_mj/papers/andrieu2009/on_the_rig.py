@@ -34,64 +34,64 @@ VELOCITY, TILT = "velocity_rms_error_rad_s", "tilt_rms_deg"
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Velocity RMS errors beside those of aranovskiy2020's observers; how idle the update of the gain is."""
+    """Judge the velocity RMS errors beside those of aranovskiy2020's observers; how idle the update of the gain is."""
     on_share(0.0)
-    found = in_the_loop(list(KINDS), WORLDS, SEED)
-    return [compared(found), idle(found["high_gain"])]
+    results = run_kinds(list(KINDS), WORLDS, SEED)
+    return [comparison_claim(results), idle_claim(results["high_gain"])]
 
 
 def experiment(label: str, seed: int) -> Experiment:
-    """One of `KINDS` in the loop of push_recovery, e = 0.5 degrees."""
+    """Prepare one of `KINDS` in the loop of push_recovery, e = 0.5 degrees."""
     kind, settings = KINDS[label]
     return prepare(load_scenario("push_recovery", [f"seed={seed}", *settings], kind))
 
 
-def in_the_loop(labels: Sequence[str], worlds: int, seed: int) -> dict[str, Result]:
+def run_kinds(labels: Sequence[str], worlds: int, seed: int) -> dict[str, Result]:
     """Run some of `KINDS`."""
     return dict(
         zip(labels, run_side_by_side([run_of(experiment(label, seed), worlds) for label in labels]), strict=True)
     )
 
 
-def compared(found: dict[str, Result]) -> Claim:
-    """Who is how good."""
-    errors = {label: result.values(VELOCITY) for label, result in found.items()}
-    stood = {label: int(result.stood.sum()) for label, result in found.items()}
+def comparison_claim(results: dict[str, Result]) -> Claim:
+    """Compare the errors of `KINDS` in the loop."""
+    errors = {label: result.values(VELOCITY) for label, result in results.items()}
+    standing_counts = {label: int(result.stood.sum()) for label, result in results.items()}
     worlds = len(errors["high_gain"])
-    behind = {label: known_interval(errors["high_gain"] - errors[label]) for label in errors if label != "high_gain"}
+    excess = {label: known_interval(errors["high_gain"] - errors[label]) for label in errors if label != "high_gain"}
 
     def words(label: str, difference: Interval | None) -> str:
         if difference is None:
             return f"{label} not comparable"
         word = "larger" if difference.low > 0.0 else "smaller" if difference.high < 0.0 else "not different"
-        return f"{label} {plus_minus(difference, signed=True)} ({word})"
+        return f"{label} {plus_minus(difference, with_sign=True)} ({word})"
 
     def means(key: str) -> str:
-        return "; ".join(f"{label} {format_figure(key, result.mean(key))}" for label, result in found.items())
+        return "; ".join(f"{label} {format_figure(key, result.mean(key))}" for label, result in results.items())
 
-    setup = (
+    remark = (
         "The scenario push_recovery, e = 0.5 deg, default noise; parameters tuned on the gyro's "
         "loop with other seeds (docs/studies/tune_high_gain.py), for d_inf = 0 as well. Like (10) and (11) it takes "
         "the bias for a tilting torque."
     )
     return Claim(
         place="On the rig",
-        says="The observer, as `high_gain`, holds the scissored pair through the push.",
-        found=f"high_gain holds it in {stood['high_gain']} of {worlds} worlds. Velocity RMS error [rad/s]: "
+        statement="The observer, as `high_gain`, holds the scissored pair through the push.",
+        result=f"high_gain holds it in {standing_counts['high_gain']} of {worlds} worlds. Velocity RMS error [rad/s]: "
         f"{means(VELOCITY)}. Less theirs, over the worlds in which both stand: "
-        + "; ".join(words(label, difference) for label, difference in behind.items())
+        + "; ".join(words(label, difference) for label, difference in excess.items())
         + f". Tilt RMS [deg]: {means(TILT)}.",
-        holds=stood["high_gain"] == worlds,
-        conditions=setup,
-        otherwise=setup,
+        holds=standing_counts["high_gain"] == worlds,
+        conditions=remark,
+        otherwise=remark,
         figures={
-            "stood_count": stood,
-            VELOCITY: {label: result.mean(VELOCITY) for label, result in found.items()},
-            TILT: {label: result.mean(TILT) for label, result in found.items()},
-            "high_gain_less_other_rad_s": {label: d and list(d) for label, d in behind.items()},
+            "stood_count": standing_counts,
+            VELOCITY: {label: result.mean(VELOCITY) for label, result in results.items()},
+            TILT: {label: result.mean(TILT) for label, result in results.items()},
+            "high_gain_less_other_rad_s": {label: d and list(d) for label, d in excess.items()},
         },
         pictures=[_picture(errors)],
-        ours=True,
+        is_ours=True,
     )
 
 
@@ -107,32 +107,32 @@ def _picture(errors: dict[str, np.ndarray]) -> Picture:
     return Picture("andrieu2009-rig", title, [panel])
 
 
-def idle(result: Result) -> Claim:
-    """The update of the gain has nothing to do."""
-    recorded = trajectory_of(result)
+def idle_claim(result: Result) -> Claim:
+    """Judge whether the update of the gain has nothing to do."""
+    trajectory = trajectory_of(result)
     rig = experiment("high_gain", SEED)
     observer = make_observer("high_gain", rig.law.dt, rig.plant.reduced)
     assert isinstance(observer, HighGain)
-    _, _, damping = rig.plant.reduced.terms(recorded["y1_rad"], recorded["y2_rad"])
-    Omega = np.abs(recorded["u_rad_s"] * damping)
-    largest, typical = float(np.nanmax(Omega)), float(np.sqrt(np.nanmean(Omega**2)))
+    _, _, damping = rig.plant.reduced.terms(trajectory["y1_rad"], trajectory["y2_rad"])
+    Omega = np.abs(trajectory["u_rad_s"] * damping)
+    largest, rms = float(np.nanmax(Omega)), float(np.sqrt(np.nanmean(Omega**2)))
     gain = largest_gain(np.nan_to_num(Omega), observer, rig.law.dt)
     fastest = float(np.abs(np.roots([1.0, observer.l1, observer.l1 * observer.l2])).max())
     return Claim(
         place="On the rig, the gain",
-        says="On the scissored pair, whose f2 hardly depends on the rate, the update of the gain is idle.",
-        found=f"Along the {Omega.shape[1]} runs Omega = |u damping| is at most {largest:.5f} 1/s, RMS {typical:.5f} "
+        statement="On the scissored pair, whose f2 hardly depends on the rate, the update of the gain is idle.",
+        result=f"Along the {Omega.shape[1]} runs Omega = |u damping| is at most {largest:.5f} 1/s, RMS {rms:.5f} "
         f"1/s, against {fastest:.0f} 1/s of the observer's linear part; L stays between {observer.phi2:g} and "
         f"{gain:.4f}.",
         holds=gain < 1.05 * observer.phi2,
         otherwise="L moves by more than 5 %.",
-        figures={"largest_Omega_1_s": largest, "rms_Omega_1_s": typical, "largest_L": gain, "linear_rate_1_s": fastest},
-        ours=True,
+        figures={"largest_Omega_1_s": largest, "rms_Omega_1_s": rms, "largest_L": gain, "linear_rate_1_s": fastest},
+        is_ours=True,
     )
 
 
 def largest_gain(Omega: np.ndarray, observer: HighGain, period: float) -> float:
-    """The largest L of the runs: the observer's own update along their Omega, (n_ticks, n_worlds) [1/s]."""
+    """Return the largest L of the runs: the observer's own update along their Omega, (n_ticks, n_worlds) [1/s]."""
     L = largest = np.full(Omega.shape[1], observer.phi2)
     for row in Omega:
         L = updated_gain(L, row, period, observer.phi1, observer.phi2, observer.phi3)

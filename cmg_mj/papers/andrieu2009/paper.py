@@ -6,12 +6,12 @@ from cmg_mj.elementwise import Scalar, signed_power
 
 
 def f2(g: Scalar, x2: Scalar, u: Scalar, p: float) -> Scalar:
-    """x2' of (1), with the value of g at x1."""
+    """Return x2' of (1), with the value of g at x1."""
     return g * x2 + signed_power(x2, 1.0 + p) + u
 
 
 def Omega(g: Scalar, x2_hat: Scalar, p: float) -> Scalar:
-    """(9) for (1), section 2.1: Gamma(u, y) = |g(y)| + 1 + p, v_2 = p."""
+    """Return (9) for (1), section 2.1: Gamma(u, y) = |g(y)| + 1 + p, v_2 = p."""
     return (abs(g) + 1.0 + p) * (1.0 + abs(x2_hat) ** p)
 
 
@@ -26,5 +26,5 @@ L1, L2 = 0.01, 0.01
 
 
 def dilution(t: float) -> float:
-    """The input u, section 3.1."""
+    """Return the input u, section 3.1."""
     return 0.410 if t < 10.0 else 0.02 if t < 20.0 else 0.6 if t < 35.0 else 0.1

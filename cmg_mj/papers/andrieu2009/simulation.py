@@ -45,7 +45,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Replay:
-    """What an observer makes of a run.
+    """An observer's estimates along a run.
 
     Attributes:
         x2: Estimate of x2, (n, seeds).
@@ -86,26 +86,26 @@ def run_plant(seeds: Sequence[int], noise: float | Sequence[float] = NOISE, dt: 
         starts.append([np.array([plant.eps1, plant.eps2]) + room * rng.dirichlet((1.0, 1.0, 1.0))[:2] for _ in "ab"])
         disturbances.append(np.interp(t, np.arange(coarse + 1) * NOISE_PERIOD, rng.normal(size=coarse + 1)))
     start, estimate = np.moveaxis(np.array(starts), 0, -1)
-    eta = _integrated(plant, start, u, dt)
+    eta = _integrate(plant, start, u, dt)
     return Run(t, u, eta, eta[0] + noise * np.array(disturbances).T, estimate)
 
 
-def _integrated(model: Bioreactor, start: np.ndarray, u: np.ndarray, dt: float) -> np.ndarray:
-    """(14) from a start (2, runs) with inputs held from sample to sample, (2, n, runs)."""
+def _integrate(model: Bioreactor, start: np.ndarray, u: np.ndarray, dt: float) -> np.ndarray:
+    """Integrate (14) from a start (2, runs) with inputs held from sample to sample, (2, n, runs)."""
     eta = np.empty((2, len(u), start.shape[1]))
     eta[:, 0] = state = start
     for k in range(len(u) - 1):
-        eta[:, k + 1] = state = runge_kutta(lambda z, held=u[k]: np.array(model.slope(z[0], z[1], held)), state, dt)
+        eta[:, k + 1] = state = runge_kutta(lambda z, u_k=u[k]: np.array(model.slope(z[0], z[1], u_k)), state, dt)
     return eta
 
 
 def copy_errors(run: Run, model: Bioreactor) -> np.ndarray:
-    """Error of a copy of (14) without correction, from the observers' start, (2, n, seeds)."""
-    return run.eta - _integrated(model, run.start, run.u, float(run.t[1]))
+    """Return the error of a copy of (14) without correction, from the observers' start, (2, n, seeds)."""
+    return run.eta - _integrate(model, run.start, run.u, float(run.t[1]))
 
 
 def runge_kutta(slope: Callable[[np.ndarray], np.ndarray], state: np.ndarray, dt: float) -> np.ndarray:
-    """One classical step."""
+    """Take one classical step."""
     p = slope(state)
     q = slope(state + 0.5 * dt * p)
     r = slope(state + 0.5 * dt * q)
@@ -113,7 +113,7 @@ def runge_kutta(slope: Callable[[np.ndarray], np.ndarray], state: np.ndarray, dt
 
 
 def make_observer(kind: str, model: Bioreactor, dt: float, *, p: float = P, b: float = B) -> UpdatedHighGain:
-    """One of the three observers with the paper's parameters.
+    """Make one of the three observers with the paper's parameters.
 
     Args:
         kind: CONSTANT, UPDATED or HOMOGENEOUS.
@@ -181,39 +181,39 @@ def replay(kind: str, run: Run, model: Bioreactor, *, p: float = P, b: float = B
     return Replay(x[1], run.eta[1] - eta2, rate, L, argument)
 
 
-def of_seeds(part: Run | Replay, columns: slice) -> Any:
-    """The same of some of the seeds."""
-    shared = ("t", "u")
-    return replace(part, **{f.name: getattr(part, f.name)[..., columns] for f in fields(part) if f.name not in shared})
+def select_seeds(part: Run | Replay, columns: slice) -> Any:
+    """Return a part of some of the seeds."""
+    common = ("t", "u")
+    return replace(part, **{f.name: getattr(part, f.name)[..., columns] for f in fields(part) if f.name not in common})
 
 
 def replays(run: Run, model: Bioreactor) -> dict[str, Replay]:
-    """All three observers on one run."""
+    """Replay all three observers on one run."""
     return {kind: replay(kind, run, model) for kind in KINDS}
 
 
 def incremental_rate(run: Run, model: Bioreactor) -> np.ndarray:
-    """df2/dx2 of the f2 that the observers bound, at the true state, (n, seeds)."""
+    """Return df2/dx2 of the f2 that the observers bound, at the true state, (n, seeds)."""
     x1 = model.limit_x1(run.eta[0])
     x2 = model.limit_x2(x1, Bioreactor(HBAR).to_x2(*run.eta))
     return model.f2_slope(x1, x2, run.u)
 
 
-def in_windows(run: Run, values: np.ndarray) -> list[np.ndarray]:
-    """The samples in each window, (samples, seeds)."""
+def split_windows(run: Run, values: np.ndarray) -> list[np.ndarray]:
+    """Return the samples in each window, (samples, seeds)."""
     return [values[(run.t >= start) & (run.t < end)] for start, end in WINDOWS]
 
 
 def window_means(run: Run, values: np.ndarray) -> np.ndarray:
-    """Mean over each window, (4, seeds)."""
-    return np.array([part.mean(axis=0) for part in in_windows(run, values)])
+    """Return the mean over each window, (4, seeds)."""
+    return np.array([part.mean(axis=0) for part in split_windows(run, values)])
 
 
 def window_spreads(run: Run, values: np.ndarray) -> np.ndarray:
-    """Standard deviation over each window about a straight line through it, (4, seeds)."""
-    return np.array([detrend(part, axis=0).std(axis=0) for part in in_windows(run, values)])
+    """Return the standard deviation over each window about a straight line through it, (4, seeds)."""
+    return np.array([detrend(part, axis=0).std(axis=0) for part in split_windows(run, values)])
 
 
 def rms_late(run: Run, values: np.ndarray) -> np.ndarray:
-    """RMS after 5, one number a seed."""
+    """Return the RMS after 5, one number a seed."""
     return np.sqrt(np.mean(values[run.t > 5.0] ** 2, axis=0))

@@ -13,10 +13,10 @@ from cmg_mj.papers.andrieu2009.simulation import (
     Replay,
     Run,
     incremental_rate,
-    of_seeds,
     replays,
     rms_late,
     run_plant,
+    select_seeds,
 )
 
 LOUD = 0.0986
@@ -27,45 +27,36 @@ class Study(NamedTuple):
     """All simulations of the bioreactor: columns are seeds."""
 
     run: Run
-    found: dict[str, Replay]
-    """With the paper's noise and error of hbar."""
+    nominal: dict[str, Replay]
+    """Runs with the paper's noise and error of hbar."""
     loud: dict[str, Replay]
-    """With noise of 10 % of the domain."""
+    """Runs with noise of 10 % of the domain."""
     quiet_run: Run
     quiet: dict[str, Replay]
     """Without noise, one run."""
     exact: dict[str, Replay]
-    """With noise, without error of hbar."""
+    """Runs with noise, without error of hbar."""
     rate: np.ndarray
     """df2/dx2, (n, seeds)."""
 
 
 def study(seeds: int, seed: int = 0, dt: float = 0.01) -> Study:
-    """Simulate. All noise levels are columns of the same arrays, which costs no time.
-
-    Args:
-        seeds: How many.
-        seed: The first of them.
-        dt: Sample period.
-
-    Returns:
-        The simulations.
-    """
+    """Simulate. All noise levels are columns of the same arrays, which costs no time."""
     numbers = [*range(seed, seed + seeds)] * 2 + [seed]
     noise = [NOISE] * seeds + [LOUD] * seeds + [0.0]
-    everything = run_plant(numbers, noise, dt)
+    whole_run = run_plant(numbers, noise, dt)
     model = Bioreactor(HBAR_OF_OBSERVERS)
-    parts = replays(everything, model)
+    whole_replays = replays(whole_run, model)
     first, second, last = slice(0, seeds), slice(seeds, 2 * seeds), slice(2 * seeds, None)
-    run, quiet_run = of_seeds(everything, first), of_seeds(everything, last)
+    run, quiet_run = select_seeds(whole_run, first), select_seeds(whole_run, last)
 
-    def columns(which: slice) -> dict[str, Replay]:
-        return {kind: of_seeds(part, which) for kind, part in parts.items()}
+    def columns(selection: slice) -> dict[str, Replay]:
+        return {kind: select_seeds(part, selection) for kind, part in whole_replays.items()}
 
     exact = replays(run, Bioreactor(HBAR))
     return Study(run, columns(first), columns(second), quiet_run, columns(last), exact, incremental_rate(run, model))
 
 
-def rms_by_kind(run: Run, found: dict[str, Replay]) -> np.ndarray:
-    """RMS error of eta2 after t = 5, (3 observers, seeds)."""
-    return np.array([rms_late(run, found[kind].eta2_error) for kind in KINDS])
+def rms_by_kind(run: Run, by_kind: dict[str, Replay]) -> np.ndarray:
+    """Return the RMS error of eta2 after t = 5, (3 observers, seeds)."""
+    return np.array([rms_late(run, by_kind[kind].eta2_error) for kind in KINDS])

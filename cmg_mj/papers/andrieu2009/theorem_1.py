@@ -26,13 +26,13 @@ Runs = dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
 def theorem_1() -> Claim:
-    """The three observers from large errors, and with a disturbance."""
+    """Judge the three observers from large errors, and with a disturbance."""
     runs = {kind: recoveries(kind, START_ERRORS) for kind in (PLAIN, UPDATED)}
     t, error, L = recoveries(HOMOGENEOUS, START_ERRORS, NOISE_AMPLITUDES)
     n = len(START_ERRORS)
     runs[HOMOGENEOUS] = t, error[:, :n], L[:, :n]
     ends = {kind: [_finite(value) for value in np.abs(error[-1])] for kind, (_, error, _) in runs.items()}
-    failed = {kind: sum(value is None or value > 1e-3 for value in values) for kind, values in ends.items()}
+    failures = {kind: sum(value is None or value > 1e-3 for value in values) for kind, values in ends.items()}
     largest = {kind: float(np.nanmax(L)) for kind, (_, _, L) in runs.items()}
     balls = [float(np.abs(error[t > 5.0, n + i]).max()) for i in range(len(NOISE_AMPLITUDES))]
     shrinks = all(a > 5.0 * b for a, b in itertools.pairwise(balls))
@@ -41,21 +41,21 @@ def theorem_1() -> Claim:
     )
     return Claim(
         place="Section 2, Theorem 1 on system (1)",
-        says="For p in [0, 1) the observer (7), (8) converges along bounded solutions of (1), to a ball that shrinks "
-        "with the disturbances.",
-        found=f"p = 0.5, x1 = sin t, errors of x2 from 1 to 1000 at the start: all {n} runs end below 1e-3, the worst "
-        f"at {max(value or 0.0 for value in ends[HOMOGENEOUS]):.1e} at t = 10. With a measurement disturbance of "
+        statement="For p in [0, 1) the observer (7), (8) converges along bounded solutions of (1), to a ball that "
+        "shrinks with the disturbances.",
+        result=f"p = 0.5, x1 = sin t, errors of x2 from 1 to 1000 at the start: all {n} runs end below 1e-3, the "
+        f"worst at {max(value or 0.0 for value in ends[HOMOGENEOUS]):.1e} at t = 10. With a measurement disturbance of "
         f"amplitude 0.1, 0.01, 0.001 the error stays below {balls[0]:.2g}, {balls[1]:.2g}, {balls[2]:.2g}. A constant "
-        f"gain of 12 with linear correction fails in {failed[PLAIN]} of {n}; updated, with linear correction, in "
-        f"{failed[UPDATED]}, but its gain has to rise to {largest[UPDATED]:.0f}, against {largest[HOMOGENEOUS]:.0f} "
+        f"gain of 12 with linear correction fails in {failures[PLAIN]} of {n}; updated, with linear correction, in "
+        f"{failures[UPDATED]}, but its gain has to rise to {largest[UPDATED]:.0f}, against {largest[HOMOGENEOUS]:.0f} "
         "with the homogeneous one.",
-        holds=failed[HOMOGENEOUS] == 0 and shrinks,
+        holds=failures[HOMOGENEOUS] == 0 and shrinks,
         conditions=by_simulation,
         otherwise=by_simulation,
         figures={
             "final_error_x2": ends,
             "largest_gain": largest,
-            "failed_count": failed,
+            "failed_count": failures,
             "error_bound_by_disturbance": dict(zip(map(str, NOISE_AMPLITUDES), balls, strict=True)),
         },
         pictures=[_picture(runs, max(largest.values()))],
@@ -93,7 +93,7 @@ def _finite(value: float) -> float | None:
 
 
 def system_1(kind: str, dt: float, p: float = 0.5) -> UpdatedHighGain:
-    """An observer for (1) with g(y) = y - 1, u being measured along with y."""
+    """Make an observer for (1) with g(y) = y - 1, u being measured along with y."""
 
     def g(y: np.ndarray) -> np.ndarray:
         return y - 1.0
@@ -137,12 +137,12 @@ def recoveries(
     u = -x1 - (x1 - 1.0) * x2 - signed_power(x2, 1.0 + p)
     y = x1[:, None] + amplitude * np.sin(20.0 * t)[:, None]
     observer = system_1(kind, dt, p)
-    one = np.ones_like(start)
-    state = observer.init((y[0], u[0] * one), (x1[0] * one, x2[0] + start))
-    found, gains = [state.x[1] - x2[0]], [state.L]
+    ones = np.ones_like(start)
+    state = observer.init((y[0], u[0] * ones), (x1[0] * ones, x2[0] + start))
+    x2_errors, gains = [state.x[1] - x2[0]], [state.L]
     with np.errstate(all="ignore"):  # one of them may diverge
         for k in range(1, len(t)):
-            state, x = observer.step(state, (y[k], u[k] * one), None)
-            found.append(x[1] - x2[k])
+            state, x = observer.step(state, (y[k], u[k] * ones), None)
+            x2_errors.append(x[1] - x2[k])
             gains.append(state.L)
-    return t, np.array(found), np.array(gains)
+    return t, np.array(x2_errors), np.array(gains)

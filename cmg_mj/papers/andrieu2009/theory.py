@@ -9,42 +9,32 @@ import numpy as np
 
 from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.papers.andrieu2009 import equations_11_12, equations_19_20
-from cmg_mj.papers.andrieu2009.bi_limit import largest_b, violated_conditions
+from cmg_mj.papers.andrieu2009.bi_limit import largest_b, list_violations
 from cmg_mj.papers.andrieu2009.chain_of_integrators import theorem_2
 from cmg_mj.papers.andrieu2009.finite_escape import no_observer_beyond_1
 from cmg_mj.papers.andrieu2009.increments import exponent_of_6, increments, linear_increments
 from cmg_mj.papers.andrieu2009.paper import B, P
 from cmg_mj.papers.andrieu2009.theorem_1 import theorem_1
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim, OnShare, obtain
 from cmg_mj.results import markdown
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Sections 1, 2 and 4."""
-    parts = [
-        lambda: [linear_increments(), increments(), exponent_of_6()],
-        lambda: [no_observer_beyond_1(), scaling_conditions(), gain_tracking()],
-        lambda: [theorem_2()],
-        lambda: [equations_19_20.claim()],
-        lambda: [theorem_1()],
-        equations_11_12.claims,
-    ]
-    found: list[Claim] = []
-    for i, part in enumerate(parts):
-        on_share(i / len(parts))
-        found += part()
-    return found
+    """Judge sections 1, 2 and 4."""
+    parts = [linear_increments, increments, exponent_of_6, no_observer_beyond_1, scaling_conditions, gain_tracking]
+    parts += [theorem_2, equations_19_20.claim, theorem_1]
+    return [*obtain(parts, on_share), *equations_11_12.claims()]
 
 
 def scaling_conditions() -> Claim:
-    """(21), (22) and the parameters of section 3.1."""
-    lines = violated_conditions(2, P, B, (P,))
+    """Judge (21), (22) and the parameters of section 3.1."""
+    lines = list_violations(2, P, B, (P,))
     bound = largest_b(2, P, (P,))
     return Claim(
         place="Section 4.3, (21), (22)",
-        says=f"b satisfies (21), (22), and section 3.1 uses b = {B} with p = {P}.",
-        found=f"For n = 2 both ask for b < (1 - p)/p = {bound:.4f}. With the printed values {len(lines)} inequalities "
-        "do not hold.",
+        statement=f"b satisfies (21), (22), and section 3.1 uses b = {B} with p = {P}.",
+        result=f"For n = 2 both ask for b < (1 - p)/p = {bound:.4f}. With the printed values {len(lines)} "
+        "inequalities do not hold.",
         table=markdown.table(("inequality", "is not so"), [line.split(": ", 1) for line in lines], text_columns=2),
         holds=not lines,
         otherwise="The parameters of the simulation are outside the theorem's proof. It does no harm there: the "
@@ -55,7 +45,7 @@ def scaling_conditions() -> Claim:
 
 
 def tracking_error(rate: float, phi1: float = 0.5, phi2: float = 1.0, phi3: float = 1.0) -> tuple[float, float]:
-    """L behind phi2 + phi3/phi1 Omega for Omega = 2 + sin(rate t): the largest error, and the least L - phi2."""
+    """Track Omega = 2 + sin(rate t): return the largest |L - phi2 - phi3/phi1 Omega| and the least L - phi2."""
     dt = 0.01
     t = np.arange(0.0, 20.0 + 4.0 * math.pi / rate, dt)
     Omega = 2.0 + np.sin(rate * t)
@@ -69,19 +59,19 @@ def tracking_error(rate: float, phi1: float = 0.5, phi2: float = 1.0, phi3: floa
 
 
 def gain_tracking() -> Claim:
-    """(13) and the remark that L does not fall below phi2."""
+    """Judge (13) and the remark that L does not fall below phi2."""
     rates = (0.4, 0.2, 0.1, 0.05)
     errors, least = zip(*(tracking_error(rate) for rate in rates), strict=True)
     quotients = [a / b for a, b in itertools.pairwise(errors)]
     proportional = all(1.6 < quotient < 2.4 for quotient in quotients)
-    above = min(least) >= 0.0
+    stays_above = min(least) >= 0.0
     return Claim(
         place="Section 2.2, (13)",
-        says="L tracks phi2 + (phi3/phi1) Omega up to an error proportional to |Omega'|, and from L(0) >= phi2 stays "
-        "at or above phi2.",
-        found=f"For Omega = 2 + sin(w t) the largest error falls from {errors[0]:.3f} at w = {rates[0]} by factors "
+        statement="L tracks phi2 + (phi3/phi1) Omega up to an error proportional to |Omega'|, and from L(0) >= phi2 "
+        "stays at or above phi2.",
+        result=f"For Omega = 2 + sin(w t) the largest error falls from {errors[0]:.3f} at w = {rates[0]} by factors "
         f"{', '.join(f'{quotient:.2f}' for quotient in quotients)} as w is halved; the least L - phi2 is "
         f"{min(least):.2g}.",
-        holds=proportional and above,
+        holds=proportional and stays_above,
         figures={"omega_rate_rad_per_time": list(rates), "largest_error_of_L": list(errors)},
     )

@@ -16,7 +16,7 @@ from cmg_mj.elementwise import Scalar, signed_power
 from cmg_mj.errors import InputError, shown
 from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.observers.model_copy import require_stable_step
-from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b, violated_conditions
+from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b, list_violations
 from cmg_mj.papers.require import require_number, require_positive
 
 Signals = tuple[Scalar, ...]
@@ -37,7 +37,7 @@ class State(NamedTuple):
     y: Signals
 
 
-def _unlimited(y: Signals, x: Signals) -> tuple[Signals, Signals]:
+def _pass_through(y: Signals, x: Signals) -> tuple[Signals, Signals]:
     return y, x
 
 
@@ -49,7 +49,7 @@ class UpdatedHighGain:
     L takes its exact solution over each half of the step for the Omega at its beginning.
 
     Theorem 1 asks for phi1 small and phi2, phi3 large enough: how far depends on constants that only its proof
-    bounds, so they are the user's to choose. What can be checked is `violated_conditions`; the paper's own example
+    bounds, so they are the user's to choose. What can be checked is `list_violations`; the paper's own example
     violates them, so that they are refused only on demand. Where all a_i are 1, gains are refused with which the
     linear part is unstable in a Runge-Kutta step at the gain at the start; how large L gets depends on Omega.
 
@@ -79,7 +79,7 @@ class UpdatedHighGain:
     phi3: float
     a: tuple[Callable[[Signals], Scalar], ...] = ()
     v: tuple[float, ...] = ()
-    saturate: Saturate = _unlimited
+    saturate: Saturate = _pass_through
     L0: float | None = None
     strict: bool = False
 
@@ -89,14 +89,14 @@ class UpdatedHighGain:
         n = self.correction.n
         for name in ("dt", "b", "phi1", "phi2", "phi3"):
             object.__setattr__(self, name, require_positive(name, getattr(self, name)))
-        for name, allowed in (("f", (n,)), ("a", (0, n)), ("v", (0, n - 1))):
-            given = getattr(self, name)
-            if not isinstance(given, Sequence | np.ndarray):
-                what = "numbers" if name == "v" else "functions"
-                raise InputError(f"{name} = {shown(given)}: must be a tuple of {allowed[-1]} {what}")
-            if len(given) not in allowed:
-                raise InputError(f"{name}: has {len(given)} elements, but l says n = {n}: must have {allowed[-1]}")
-            object.__setattr__(self, name, tuple(given))
+        for name, lengths in (("f", (n,)), ("a", (0, n)), ("v", (0, n - 1))):
+            elements = getattr(self, name)
+            if not isinstance(elements, Sequence | np.ndarray):
+                kind = "numbers" if name == "v" else "functions"
+                raise InputError(f"{name} = {shown(elements)}: must be a tuple of {lengths[-1]} {kind}")
+            if len(elements) not in lengths:
+                raise InputError(f"{name}: has {len(elements)} elements, but l says n = {n}: must have {lengths[-1]}")
+            object.__setattr__(self, name, tuple(elements))
         self._check_functions()
         for j, v_j in enumerate(self.v, start=2):
             if not 0.0 <= require_number(f"v_{j}", v_j) < 1.0 / (j - 1):
@@ -109,8 +109,8 @@ class UpdatedHighGain:
             names = "l, phi2" if self.L0 is None else "l, L0"
             poles = np.roots([1.0, *self.correction.linear_gains])
             require_stable_step(names, (self.L0 or self.phi2) * poles, self.dt)
-        if self.strict and (violated := self.violated_conditions()):
-            raise InputError(f"b = {self.b:g}: {'; '.join(violated)} (Theorem 1)")
+        if self.strict and (violations := self.list_violations()):
+            raise InputError(f"b = {self.b:g}: {'; '.join(violations)} (Theorem 1)")
 
     def _check_functions(self) -> None:
         """Refuse what cannot be called."""
@@ -120,21 +120,21 @@ class UpdatedHighGain:
                 raise InputError(f"{name} = {shown(function)}: must be a function")
 
     @classmethod
-    def plain(cls, *, dt: float, f: Sequence[Function], l: Sequence[float], L: float, **others: Any) -> UpdatedHighGain:  # noqa: E741
-        """The classical high-gain observer: linear correction, constant gain.
+    def plain(cls, *, dt: float, f: Sequence[Function], l: Sequence[float], L: float, **extras: Any) -> UpdatedHighGain:  # noqa: E741
+        """Make the classical high-gain observer: linear correction, constant gain.
 
         Args:
             dt: Sample period [s].
             f: f_1..f_n.
             l: l_1..l_n.
             L: The gain.
-            **others: a, saturate.
+            **extras: a, saturate.
 
         Returns:
             The observer with d_inf = 0 and Omega = 0. With a linear K, b is without effect.
         """
         correction = BiLimitCorrection(tuple(l))
-        return cls(dt, tuple(f), correction, lambda u, y, x: 0.0 * y[0], 1.0, 1.0, L, 1.0, **others)
+        return cls(dt, tuple(f), correction, lambda u, y, x: 0.0 * y[0], 1.0, 1.0, L, 1.0, **extras)
 
     @classmethod
     def updated(
@@ -148,9 +148,9 @@ class UpdatedHighGain:
         phi2: float,
         phi3: float,
         v: Sequence[float] = (),
-        **others: Any,
+        **extras: Any,
     ) -> UpdatedHighGain:
-        """The updated high-gain observer: linear correction, gain by (8).
+        """Make the updated high-gain observer: linear correction, gain by (8).
 
         Args:
             dt: Sample period [s].
@@ -161,23 +161,23 @@ class UpdatedHighGain:
             phi2: See `updated_gain`.
             phi3: See `updated_gain`.
             v: Exponents with which Omega grows.
-            **others: a, saturate, L0.
+            **extras: a, saturate, L0.
 
         Returns:
             The observer with d_inf = 0. With a linear K, b is without effect; it is chosen to satisfy (22).
         """
         b = min(1.0, 0.5 * largest_b(len(l), 0.0, v))
-        return cls(dt, tuple(f), BiLimitCorrection(tuple(l)), Omega, b, phi1, phi2, phi3, v=tuple(v), **others)
+        return cls(dt, tuple(f), BiLimitCorrection(tuple(l)), Omega, b, phi1, phi2, phi3, v=tuple(v), **extras)
 
-    def violated_conditions(self) -> list[str]:
-        """A line for each of the inequalities (21), (22) that does not hold."""
-        return violated_conditions(self.correction.n, self.correction.d_inf, self.b, self.v)
+    def list_violations(self) -> list[str]:
+        """List the inequalities (21), (22) that do not hold."""
+        return list_violations(self.correction.n, self.correction.d_inf, self.b, self.v)
 
     def init(self, y: Signals, x: Signals | None = None) -> State:
-        """The state at the first sample.
+        """Return the state at the first sample.
 
         Args:
-            y: What is measured: the output, and after it whatever other measured signals f, a and Omega take.
+            y: Measurement: the output, and after it whatever other measured signals f, a and Omega take.
             x: Estimate to start from, x_1..x_n; (y, 0, ..., 0) if left out.
 
         Returns:
@@ -200,22 +200,22 @@ class UpdatedHighGain:
 
         Args:
             state: The state at sample k-1.
-            y: What is measured at sample k; it ran straight since sample k-1.
+            y: Measurement at sample k; it ran straight since sample k-1.
             u: Known inputs, held since sample k-1.
 
         Returns:
             The state and the estimate x_1..x_n at sample k.
         """
-        h, (x, L, before) = self.dt, state
-        middle = tuple(0.5 * (p + q) for p, q in zip(before, y, strict=True))
-        Omega = self._rate(u, before, x)
+        h, (x, L, y_before) = self.dt, state
+        middle = tuple(0.5 * (p + q) for p, q in zip(y_before, y, strict=True))
+        Omega = self._incremental_rate(u, y_before, x)
         L_middle = updated_gain(L, Omega, 0.5 * h, self.phi1, self.phi2, self.phi3)
         L_end = updated_gain(L_middle, Omega, 0.5 * h, self.phi1, self.phi2, self.phi3)
 
-        p = self.slope(x, L, before, u)
-        q = self.slope(_moved(x, 0.5 * h, p), L_middle, middle, u)
-        r = self.slope(_moved(x, 0.5 * h, q), L_middle, middle, u)
-        s = self.slope(_moved(x, h, r), L_end, y, u)
+        p = self.slope(x, L, y_before, u)
+        q = self.slope(_advance(x, 0.5 * h, p), L_middle, middle, u)
+        r = self.slope(_advance(x, 0.5 * h, q), L_middle, middle, u)
+        s = self.slope(_advance(x, h, r), L_end, y, u)
         x = tuple(
             x_i + h / 6.0 * (p_i + 2.0 * (q_i + r_i) + s_i)
             for x_i, p_i, q_i, r_i, s_i in zip(x, p, q, r, s, strict=True)
@@ -223,7 +223,7 @@ class UpdatedHighGain:
         return State(x, L_end, tuple(y)), x
 
     def slope(self, x: Signals, L: Scalar, y: Signals, u: Any) -> Signals:
-        """The right-hand side of (7)."""
+        """Return the right-hand side of (7)."""
         n = self.correction.n
         limited_y, limited_x = self.saturate(y, x[1:])
         scale = signed_power(L, self.b)
@@ -231,16 +231,16 @@ class UpdatedHighGain:
         slopes = []
         for i in range(n):
             scale = L * scale  # L^(i + 1 + b)
-            known = self.f[i](u, limited_y, limited_x[:i]) if i else self.f[0](u, y, ())
-            along = x[i + 1] + scale * K[i] if i + 1 < n else scale * K[i]
-            slopes.append(known + (self.a[i](y) * along if self.a else along))
+            f_i = self.f[i](u, limited_y, limited_x[:i]) if i else self.f[0](u, y, ())
+            chain_term = x[i + 1] + scale * K[i] if i + 1 < n else scale * K[i]
+            slopes.append(f_i + (self.a[i](y) * chain_term if self.a else chain_term))
         return tuple(slopes)
 
-    def _rate(self, u: Any, y: Signals, x: Signals) -> Scalar:
+    def _incremental_rate(self, u: Any, y: Signals, x: Signals) -> Scalar:
         limited_y, limited_x = self.saturate(y, x[1:])
         return self.Omega(u, limited_y, limited_x)
 
 
-def _moved(x: Signals, span: float, slope: Signals) -> Signals:
-    """The point x + span slope."""
+def _advance(x: Signals, span: float, slope: Signals) -> Signals:
+    """Return the point x + span slope."""
     return tuple(x_i + span * slope_i for x_i, slope_i in zip(x, slope, strict=True))

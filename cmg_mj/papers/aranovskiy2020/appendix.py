@@ -7,5 +7,5 @@ from cmg_mj.papers.claim import Claim, OnShare
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Its proof, checked symbolically."""
+    """Judge the proof, checked symbolically."""
     return [plvcc.claim("aranovskiy2020")]

@@ -51,7 +51,7 @@ class TenByEuler:
         drift, gain, damping = self.model.terms(*y)
         a = -u * damping
         off1, off3 = x1 - y.y1, x3 - y.y2
-        now = Estimate(
+        estimate = Estimate(
             x1 + dt * (x2 - h11 * off1),
             x2 + dt * (a * x2 + drift + u * gain - h12 * off1),
             x3 + dt * (u - h33 * off3),
@@ -61,14 +61,14 @@ class TenByEuler:
             # Two halves: the series of the exact step wants a short one.
             for _ in range(2):
                 h11, h12, h22 = exact_step(h11, h12, h22, q1, q2, a, dt / 2.0)
-            return Ten(*now, h11, h12, h22, (h33 + up) / (down * h33 + 1.0)), now
+            return Ten(*estimate, h11, h12, h22, (h33 + up) / (down * h33 + 1.0)), estimate
         return Ten(
-            *now,
+            *estimate,
             h11 + dt * (2.0 * h12 - h11 * h11 + q1),
             h12 + dt * (h22 + a * h12 - h11 * h12),
             h22 + dt * (2.0 * a * h22 - h12 * h12 + q2),
             h33 + dt * (q3 - h33 * h33),
-        ), now
+        ), estimate
 
 
 class Eleven(NamedTuple):
@@ -100,8 +100,8 @@ class ElevenByEuler:
         k1, k2, alpha = TABLE_2["homogeneous"].values()
         drift, gain, damping = self.model.terms(*y)
         by_alpha, by_other = signed_powers(x1 - y.y1, alpha)
-        now = Eleven(
+        estimate = Eleven(
             x1 + self.dt * (x2 - k1 * by_alpha),
             x2 + self.dt * (drift + u * (gain - damping * x2) - k2 * by_other),
         )
-        return now, Estimate(now.x1, now.x2, y.y2)
+        return estimate, Estimate(estimate.x1, estimate.x2, y.y2)

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.words import listed_and
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import KEYS, format_figure
@@ -19,7 +19,7 @@ Numbers = Mapping[str, np.ndarray]
 """Observer -> a measure in the loop, (n_worlds,); NaN for a world that did not stand. Less is better."""
 
 AngleSource = Literal["measured", "estimated"]
-"""Which angles the law is fed with."""
+"""The angles that the law is fed with."""
 
 Order = Literal["holds", "is inverted", "does not hold"]
 
@@ -32,56 +32,49 @@ MEASURES = (JUDGED, "velocity_rms_error_push_rad_s", "tilt_rms_deg", "command_rm
 
 
 def differences(numbers: Numbers) -> list[Interval | None]:
-    """The worse's less the better's, world by world, of each of `PAIRS`."""
+    """Subtract the better's numbers from the worse's, world by world, for each of `PAIRS`."""
     return [known_interval(numbers[worse] - numbers[better]) for worse, better in PAIRS]
 
 
-def order_of(numbers: Numbers) -> Order:
-    """Whether homogeneous < ltv < linear beyond chance, the other way round, or neither."""
-    found = differences(numbers)
-    if all(step is not None and step.low > 0.0 for step in found):
+def judge_order(numbers: Numbers) -> Order:
+    """Judge the order homogeneous < ltv < linear: it holds beyond chance, is inverted, or neither."""
+    steps = differences(numbers)
+    if all(step is not None and step.low > 0.0 for step in steps):
         return "holds"
-    if all(step is not None and step.high < 0.0 for step in found):
+    if all(step is not None and step.high < 0.0 for step in steps):
         return "is inverted"
     return "does not hold"
 
 
-class Measured(NamedTuple):
+class Measure(NamedTuple):
     """One measure, with the law on either kind of angles."""
 
     key: str
     numbers: Mapping[AngleSource, Numbers]
-    """Which angles -> observer -> numbers."""
+    """Angle source -> observer -> numbers."""
 
     @property
     def orders(self) -> dict[AngleSource, Order]:
-        """Which angles -> the order."""
-        return {angles: order_of(numbers) for angles, numbers in self.numbers.items()}
+        """Angle source -> the order."""
+        return {angles: judge_order(numbers) for angles, numbers in self.numbers.items()}
 
     @property
-    def best(self) -> dict[AngleSource, str]:
-        """Which angles -> the observer with the least mean over the worlds that stood."""
+    def best_observers(self) -> dict[AngleSource, str]:
+        """Angle source -> the observer with the least mean over the worlds that stood."""
         return {
             angles: min(numbers, key=lambda name: float(np.nanmean(numbers[name])))
             for angles, numbers in self.numbers.items()
         }
 
-    def everywhere(self, order: Order) -> bool:
-        """Whether the order is that one on all angles."""
+    def has_order(self, order: Order) -> bool:
+        """Return true if the order is this one on all angles."""
         return set(self.orders.values()) == {order}
 
 
-def measured(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[Measured]:
-    """Read the measures off the runs.
-
-    Args:
-        results: Which angles the law is fed with -> observer -> runs.
-
-    Returns:
-        One a measure.
-    """
+def read_measures(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[Measure]:
+    """Read the measures off the runs: angle source -> observer -> runs."""
     return [
-        Measured(
+        Measure(
             key,
             {
                 angles: {name: result.values(key) for name, result in by_name.items()}
@@ -92,70 +85,64 @@ def measured(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[Measur
     ]
 
 
-def order(found: list[Measured]) -> Claim:
-    """Section V's ranking.
-
-    Args:
-        found: The measures, that of `JUDGED` among them.
-
-    Returns:
-        The claim.
-    """
-    judged = next(measure for measure in found if measure.key == JUDGED)
-    worlds = len(next(iter(judged.numbers.values()))["linear"])
+def order(measures: list[Measure]) -> Claim:
+    """Judge Section V's ranking by the measures, that of `JUDGED` among them."""
+    verdict_measure = next(measure for measure in measures if measure.key == JUDGED)
+    worlds = len(next(iter(verdict_measure.numbers.values()))["linear"])
     return Claim(
         place="Section V, the comparison",
-        says="The homogeneous differentiator performs best, the time-varying observer second, the linear one last.",
-        found=(
+        statement="The homogeneous differentiator performs best, the time-varying observer second, the linear one "
+        "last.",
+        result=(
             f"Means over {worlds} seeds of (11), (10), (9); an order is one if both steps of it are beyond chance, "
-            f"world by world. {' '.join(_in_words(measure) for measure in found)}"
+            f"world by world. {' '.join(_in_words(measure) for measure in measures)}"
         ),
-        holds=judged.everywhere("holds"),
+        holds=verdict_measure.has_order("holds"),
         conditions=(
-            f"{_by_measure(found)} At e = 0.5 deg and 400 ug/rtHz under this push. At low noise or large bias the "
+            f"{_by_measure(measures)} At e = 0.5 deg and 400 ug/rtHz under this push. At low noise or large bias the "
             "order turns round, because (11) mistakes the bias for a rate most: the map over noise and bias is in "
             "docs/results.md."
         ),
         otherwise="The map over noise and bias in docs/results.md shows where the order holds.",
         figures={
             f"{worse}_less_{better}_{angles}_angles_{measure.key}": step
-            for measure in found
+            for measure in measures
             for angles, numbers in measure.numbers.items()
             for (worse, better), step in zip(PAIRS, differences(numbers), strict=True)
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(measures)],
     )
 
 
-def _in_words(measure: Measured) -> str:
-    """One measure's means and order on each kind of angles."""
+def _in_words(measure: Measure) -> str:
+    """Write one measure's means and order on each kind of angles."""
     parts = []
     for angles, numbers in measure.numbers.items():
         means = [known_interval(numbers[name]) for name in ("homogeneous", "ltv", "linear")]
-        shown = ", ".join(format_figure(measure.key, None if mean is None else mean.mean) for mean in means)
-        parts.append(f"{shown} with the law on {angles} angles, where the order {measure.orders[angles]}")
+        means_text = ", ".join(format_figure(measure.key, None if mean is None else mean.mean) for mean in means)
+        parts.append(f"{means_text} with the law on {angles} angles, where the order {measure.orders[angles]}")
     label = KEYS[measure.key].heading
     return f"{label[0].upper()}{label[1:]}: {'; '.join(parts)}."
 
 
-def _by_measure(found: list[Measured]) -> str:
-    """By which measures the order is what."""
+def _by_measure(measures: list[Measure]) -> str:
+    """Say by which measures the order holds or is inverted."""
     sentences = []
     words: dict[Order, str] = {"holds": "the order holds", "is inverted": "it is inverted: (9), (10), (11)"}
-    for kind, said in words.items():
-        by = [f"the {KEYS[measure.key].label}" for measure in found if measure.everywhere(kind)]
-        if by:
-            sentences.append(f"By {listed_and(by)} {said}.")
-    for measure in found:
-        if not (measure.everywhere("holds") or measure.everywhere("is inverted")):
-            best = listed_and(sorted({OBSERVERS[name] for name in measure.best.values()}))
-            sentences.append(f"By the {KEYS[measure.key].label} it does not hold: best is {best}.")
+    for kind, wording in words.items():
+        labels = [f"the {KEYS[measure.key].label}" for measure in measures if measure.has_order(kind)]
+        if labels:
+            sentences.append(f"By {join_with_and(labels)} {wording}.")
+    for measure in measures:
+        if not (measure.has_order("holds") or measure.has_order("is inverted")):
+            best_equations = join_with_and(sorted({OBSERVERS[name] for name in measure.best_observers.values()}))
+            sentences.append(f"By the {KEYS[measure.key].label} it does not hold: best is {best_equations}.")
     return " ".join(sentences)
 
 
-def _picture(found: list[Measured]) -> Picture:
+def _picture(measures: list[Measure]) -> Picture:
     panels = []
-    for i, measure in enumerate(found):
+    for i, measure in enumerate(measures):
         most = max(float(np.nanmax(values)) for numbers in measure.numbers.values() for values in numbers.values())
         for angles, numbers in measure.numbers.items():
             marks = [
@@ -168,5 +155,5 @@ def _picture(found: list[Measured]) -> Picture:
         "aranovskiy2020-section-5",
         "aranovskiy2020, Section V: measures of the closed loop, world by world",
         panels,
-        columns=len(next(iter(found)).numbers),
+        columns=len(next(iter(measures)).numbers),
     )

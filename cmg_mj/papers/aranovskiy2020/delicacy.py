@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from cmg_mj.observers import Measurement
-from cmg_mj.papers.aranovskiy2020.forms_of_10 import METHODS, euler_against_exact, matrix_of, ours
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import METHODS, compare_euler, make_exact, matrix_of
 from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
 from cmg_mj.papers.claim import Claim, OnShare
@@ -31,21 +31,21 @@ class Transient(NamedTuple):
     """H12 sample by sample, (n_samples,)."""
 
 
-def transient(method: str, rate_hz: float, span_s: float = 0.2, single: bool = False) -> Transient:
+def transient(method: str, rate_hz: float, span_s: float = 0.2, single_precision: bool = False) -> Transient:
     """Integrate the Riccati equation beside its exact solution.
 
     Args:
         method: One of `METHODS`.
         rate_hz: Steps a second.
-        span_s: How long [s], but at least 50 steps.
-        single: Whether in single precision, which is what the paper's STM32F746 computes in hardware.
+        span_s: Simulated time [s], but at least 50 steps.
+        single_precision: Whether in single precision, which is what the paper's STM32F746 computes in hardware.
 
     Returns:
         What was met.
     """
     h, A = 1.0 / rate_hz, A_prime()
     E = expm(h * np.block([[-A.T, C.T @ C], [Q, A]]))
-    H, truth = H_0.astype(np.float32 if single else np.float64), H_0
+    H, truth = H_0.astype(np.float32 if single_precision else np.float64), H_0
     _, steady = settled_gains()
     least, error, path = math.inf, 0.0, []
     for _ in range(max(50, round(span_s * rate_hz))):
@@ -64,21 +64,21 @@ Sweeps = Mapping[str, Mapping[float, Transient]]
 """Method -> rate [Hz] -> what was met."""
 
 
-def lowest_rate(method: str, swept: Mapping[float, Transient], good: Callable[[Transient], bool]) -> float | None:
-    """The rate above which a method does well, by bisection to 0.1 Hz; None if it does at the lowest tried [Hz]."""
-    bad = [rate for rate, found in swept.items() if not good(found)]
-    if not bad:
+def lowest_rate(method: str, sweep: Mapping[float, Transient], passes: Callable[[Transient], bool]) -> float | None:
+    """Return the rate above which a method passes, by bisection to 0.1 Hz; None if it does at the lowest tried [Hz]."""
+    failing_rates = [rate for rate, result in sweep.items() if not passes(result)]
+    if not failing_rates:
         return None
-    low, high = max(bad), min((rate for rate in swept if rate > max(bad)), default=math.inf)
+    low, high = max(failing_rates), min((rate for rate in sweep if rate > max(failing_rates)), default=math.inf)
     while math.isfinite(high) and high - low > 0.1:
         middle = (low + high) / 2.0
-        low, high = (low, middle) if good(transient(method, middle)) else (middle, high)
+        low, high = (low, middle) if passes(transient(method, middle)) else (middle, high)
     return high
 
 
 def matrices_along(run: Trajectory) -> np.ndarray:
-    """H of this package's observer along a run, from the second sample on, (n_ticks - 1, 3, 3)."""
-    observer = ours()
+    """Return H of this package's observer along a run, from the second sample on, (n_ticks - 1, 3, 3)."""
+    observer = make_exact()
     y1, y2, u = (run[name].tolist() for name in ("y1_rad", "y2_rad", "u_rad_s"))
     state, matrices = observer.init(Measurement(y1[0], y2[0])), []
     for k in range(1, len(y1)):
@@ -92,13 +92,13 @@ def _down_to(rate: float | None) -> str:
 
 
 def delicacy(seed: int = SEED_OF_10) -> Claim:
-    """Condition and definiteness of H over step size and method."""
-    swept = {name: {rate: transient(name, rate) for rate in RATES_HZ} for name in METHODS}
-    definite = {name: lowest_rate(name, swept[name], lambda t: t.least > 0.0) for name in METHODS}
-    finite = {name: lowest_rate(name, swept[name], lambda t: math.isfinite(t.error)) for name in METHODS}
+    """Judge the condition and definiteness of H over step size and method."""
+    sweeps = {name: {rate: transient(name, rate) for rate in RATES_HZ} for name in METHODS}
+    definite = {name: lowest_rate(name, sweeps[name], lambda t: t.least > 0.0) for name in METHODS}
+    finite = {name: lowest_rate(name, sweeps[name], lambda t: math.isfinite(t.error)) for name in METHODS}
     at_200 = {name: transient(name, 1.0 / DT) for name in METHODS}
-    single = {name: transient(name, 1.0 / DT, single=True) for name in ("explicit Euler", "Runge-Kutta 4")}
-    estimate = euler_against_exact(seed)
+    float32 = {name: transient(name, 1.0 / DT, single_precision=True) for name in ("explicit Euler", "Runge-Kutta 4")}
+    comparison = compare_euler(seed)
     matrices = matrices_along(run_of_10(seed))
     condition = float(np.linalg.cond(matrices).max())
     least = float(np.linalg.eigvalsh(matrices).min())
@@ -107,17 +107,19 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
     ours_fine = at_200["exact step (ours)"].error < 1e-8 and definite["exact step (ours)"] is None
     return Claim(
         place="Remark 1, delicacy",
-        says="The Riccati equation is sensitive to the numerical method; six decades between Q's entries amplify it.",
-        found=(
+        statement="The Riccati equation is sensitive to the numerical method; six decades between Q's entries amplify "
+        "it.",
+        result=(
             "From H_0 = I at rest, H stays positive definite with explicit Euler "
             f"{_down_to(definite['explicit Euler'])}, with Runge-Kutta 4 {_down_to(definite['Runge-Kutta 4'])}, with "
-            f"the exact step {_down_to(definite['exact step (ours)'])}. At 200 Hz H12 is off, by its steady value, by "
-            f"up to {at_200['explicit Euler'].error:.0%} (Euler), {at_200['Runge-Kutta 4'].error:.1e} (Runge-Kutta 4) "
-            f"and {at_200['exact step (ours)'].error:.0e} (exact); in single precision by "
-            f"{single['explicit Euler'].error:.0%} and {single['Runge-Kutta 4'].error:.1e}. Along a closed-loop run "
-            f"H's condition number rises to {condition:.2g}, its least eigenvalue stays above {least:.2f}; all "
-            f"twelve equations by Euler would change the estimated rate by {estimate.difference:.3f} rad/s RMS and "
-            f"its error from {estimate.error:.3f} to {estimate.other_error:.3f} rad/s."
+            f"the exact step {_down_to(definite['exact step (ours)'])}. At 200 Hz H12 is off, by its steady "
+            f"value, by up to {at_200['explicit Euler'].error:.0%} (Euler), {at_200['Runge-Kutta 4'].error:.1e} "
+            f"(Runge-Kutta 4) and {at_200['exact step (ours)'].error:.0e} (exact); in single precision by "
+            f"{float32['explicit Euler'].error:.0%} and {float32['Runge-Kutta 4'].error:.1e}. Along "
+            f"a closed-loop run H's condition number rises to {condition:.2g}, its least eigenvalue stays above "
+            f"{least:.2f}; all twelve equations by Euler would change the estimated rate by "
+            f"{comparison.difference:.3f} rad/s RMS and its error from {comparison.error:.3f} to "
+            f"{comparison.other_error:.3f} rad/s."
         ),
         holds=euler_first and rk4_fine and ours_fine,
         conditions=(
@@ -130,23 +132,23 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
             "definite_above_hz": definite,
             "finite_above_hz": finite,
             "error_of_H12_at_200_hz": {name: t.error for name, t in at_200.items()},
-            "error_of_H12_at_200_hz_single": {name: t.error for name, t in single.items()},
-            "rate_changed_by_euler_rad_s": estimate.difference,
-            "rate_error_euler_rad_s": estimate.other_error,
-            "rate_error_exact_rad_s": estimate.error,
+            "error_of_H12_at_200_hz_single": {name: t.error for name, t in float32.items()},
+            "rate_changed_by_euler_rad_s": comparison.difference,
+            "rate_error_euler_rad_s": comparison.other_error,
+            "rate_error_exact_rad_s": comparison.error,
             "condition_along_run": condition,
             "least_eigenvalue_along_run": least,
         },
-        pictures=[_picture(swept, at_200)],
+        pictures=[_picture(sweeps, at_200)],
     )
 
 
-def _picture(swept: Sweeps, at_200: Mapping[str, Transient]) -> Picture:
+def _picture(sweeps: Sweeps, at_200: Mapping[str, Transient]) -> Picture:
     errors, least, paths = [], [], []
-    for i, (name, by_rate) in enumerate(swept.items()):
-        found = by_rate.values()
-        finite = [t.error if math.isfinite(t.error) else math.nan for t in found]
-        positive = [t.least if t.least > 0.0 else math.nan for t in found]
+    for i, (name, by_rate) in enumerate(sweeps.items()):
+        transients = by_rate.values()
+        finite = [t.error if math.isfinite(t.error) else math.nan for t in transients]
+        positive = [t.least if t.least > 0.0 else math.nan for t in transients]
         path = np.concatenate([[0.0], at_200[name].path[:24]])
         errors.append(Line(RATES_HZ, finite, name, color=i))
         least.append(Line(RATES_HZ, positive, name, color=i, style="o-" if i < 2 else "--"))
@@ -165,5 +167,5 @@ def _picture(swept: Sweeps, at_200: Mapping[str, Transient]) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The delicacy."""
+    """Judge the delicacy."""
     return [delicacy()]

@@ -9,8 +9,8 @@ import numpy as np
 
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.recorded import pushed, rms, trajectory_of
-from cmg_mj.papers.words import listed_and, plus_minus
+from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
+from cmg_mj.papers.words import join_with_and, plus_minus
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
@@ -24,7 +24,7 @@ COMPARABLE = 1.5
 """Errors within this factor count as comparable."""
 
 
-class Riding(NamedTuple):
+class OpenLoopRuns(NamedTuple):
     """The observers open loop, on one motion."""
 
     whole: dict[str, np.ndarray]
@@ -35,7 +35,7 @@ class Riding(NamedTuple):
     """World 0."""
 
 
-def riding_along(worlds: int, seed: int) -> Riding:
+def run_open_loop(worlds: int, seed: int) -> OpenLoopRuns:
     """Run the tuning experiment with the three observers in open loop."""
     scenario = load_scenario(
         "observer_tuning", [f"seed={seed}", 'open_loop_observers=["ltv", "homogeneous"]'], "linear"
@@ -45,75 +45,76 @@ def riding_along(worlds: int, seed: int) -> Riding:
 
     def errors(trajectory: Trajectory) -> dict[str, np.ndarray]:
         gyro = trajectory["fog_rad_s"]
-        off = {name: rms(trajectory[f"estimate/{name}/x2_rad_s"] - gyro) for name in OBSERVERS}
-        return off | {"zero": rms(gyro)}
+        rms_errors = {name: rms(trajectory[f"estimate/{name}/x2_rad_s"] - gyro) for name in OBSERVERS}
+        return rms_errors | {"zero": rms(gyro)}
 
-    return Riding(errors(whole), errors(window), whole.world(0))
+    return OpenLoopRuns(errors(whole), errors(window), whole.world(0))
 
 
 def largest_by_smallest(errors: Mapping[str, Interval]) -> float:
-    """How far apart the three observers' errors are, as their ratio."""
+    """Return the largest of the three observers' errors by the smallest."""
     means = [errors[name].mean for name in OBSERVERS]
     return max(means) / min(means)
 
 
 def figure_4(worlds: int = WORLDS, seed: int = SEED) -> Claim:
-    """Are the three comparable, from the push to a second after it?
+    """Judge whether the three are comparable, from the push to a second after it.
 
     Over the whole run, most of which is stillness, they are judged by their noise: there zero is closer than any.
     """
-    riding = riding_along(worlds, seed)
-    whole = {name: mean_interval(values) for name, values in riding.whole.items()}
-    after = {name: mean_interval(values) for name, values in riding.after_push.items()}
-    spread, spread_after = largest_by_smallest(whole), largest_by_smallest(after)
+    runs = run_open_loop(worlds, seed)
+    whole_errors = {name: mean_interval(values) for name, values in runs.whole.items()}
+    push_errors = {name: mean_interval(values) for name, values in runs.after_push.items()}
+    spread, spread_after = largest_by_smallest(whole_errors), largest_by_smallest(push_errors)
     return Claim(
         place="Fig. 4",
-        says="With the loop closed on the gyro and a push at 2 s, the three tuned observers are comparable open loop.",
-        found=(
+        statement="With the loop closed on the gyro and a push at 2 s, the three tuned observers are comparable open "
+        "loop.",
+        result=(
             f"RMS of the estimated rate less the gyro's, {worlds} seeds, with 95 % intervals [rad/s]. From the push "
-            f"to a second after it: {_listed(after)}; the largest is {spread_after:.2f} times the smallest. Over all "
-            f"10 s: {_listed(whole)}; {spread:.2f} times."
+            f"to a second after it: {_list_errors(push_errors)}; the largest is {spread_after:.2f} times the smallest. "
+            f"Over all 10 s: {_list_errors(whole_errors)}; {spread:.2f} times."
         ),
         holds=spread_after < COMPARABLE,
-        conditions=f"From our push to a second after it (1 N m for 0.1 s, e = 0.5 deg). {_against_zero(after)}",
+        conditions=f"From our push to a second after it (1 N m for 0.1 s, e = 0.5 deg). {_zero_sentence(push_errors)}",
         otherwise=(
             "In the second after our push (1 N m for 0.1 s, e = 0.5 deg) they are not. (10) and (11) know the command "
-            f"but not the push, and take the command's effect for a rate. {_against_zero(after)} Over the whole run, "
-            f"most of which is stillness, they are{'' if spread < COMPARABLE else ' not'} comparable; "
-            f"there {_closer(whole)}."
+            f"but not the push, and take the command's effect for a rate. {_zero_sentence(push_errors)} Over the whole "
+            f"run, most of which is stillness, they are{'' if spread < COMPARABLE else ' not'} comparable; "
+            f"there {_describe_zero(whole_errors)}."
         ),
         figures={
-            **{f"rms_{name}_rad_s": found for name, found in whole.items()},
-            **{f"rms_after_push_{name}_rad_s": found for name, found in after.items()},
+            **{f"rms_{name}_rad_s": interval for name, interval in whole_errors.items()},
+            **{f"rms_after_push_{name}_rad_s": interval for name, interval in push_errors.items()},
             "largest_by_smallest": spread,
             "largest_by_smallest_after_push": spread_after,
         },
-        pictures=[_picture(riding.example)],
+        pictures=[_picture(runs.example)],
     )
 
 
-def _beaten(errors: Mapping[str, Interval]) -> list[str]:
-    """The equations that an estimate of zero is closer than."""
+def _find_beaten(errors: Mapping[str, Interval]) -> list[str]:
+    """Return the equations that an estimate of zero is closer than."""
     return [equation for name, equation in OBSERVERS.items() if errors[name].mean > errors["zero"].mean]
 
 
-def _closer(errors: Mapping[str, Interval]) -> str:
-    beaten = _beaten(errors)
-    return f"an estimate of zero is closer than {listed_and(beaten)}" if beaten else "all are closer than zero"
+def _describe_zero(errors: Mapping[str, Interval]) -> str:
+    beaten = _find_beaten(errors)
+    return f"an estimate of zero is closer than {join_with_and(beaten)}" if beaten else "all are closer than zero"
 
 
-def _against_zero(errors: Mapping[str, Interval]) -> str:
-    said = _closer(errors)
-    return f"{said[0].upper()}{said[1:]}."
+def _zero_sentence(errors: Mapping[str, Interval]) -> str:
+    sentence = _describe_zero(errors)
+    return f"{sentence[0].upper()}{sentence[1:]}."
 
 
-def _listed(found: Mapping[str, Interval]) -> str:
-    named = OBSERVERS | {"zero": "an estimate of zero"}
-    return ", ".join(f"{label} {plus_minus(found[name])}" for name, label in named.items())
+def _list_errors(errors: Mapping[str, Interval]) -> str:
+    labels = OBSERVERS | {"zero": "an estimate of zero"}
+    return ", ".join(f"{label} {plus_minus(errors[name])}" for name, label in labels.items())
 
 
 def _picture(example: Trajectory) -> Picture:
-    t, shaded = example["time_s"], pushed(example)
+    t, shaded = example["time_s"], push_intervals(example)
     panels = [
         Panel("tilt y1 [deg]", [Line(t, np.degrees(example["y1_rad"]), "measured", width=0.7)], "(a)", shaded=shaded),
         Panel("command u [rad/s]", [Line(t, example["u_rad_s"], "u", color=3, width=0.7)], shaded=shaded),
@@ -130,5 +131,5 @@ def _picture(example: Trajectory) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Fig. 4."""
+    """Judge Fig. 4."""
     return [figure_4()]

@@ -11,7 +11,7 @@ from cmg_mj.papers.aranovskiy2020.comparison import AngleSource
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.recorded import pushed, trajectory_of
+from cmg_mj.papers.recorded import loop_panels, trajectory_of
 from cmg_mj.papers.scales import on_common_scales
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.results.intervals import known_interval
@@ -22,40 +22,41 @@ from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 FIGURES = {"linear": "Fig. 5", "ltv": "Fig. 6", "homogeneous": "Fig. 7"}
 ANGLES: tuple[AngleSource, AngleSource] = ("measured", "estimated")
-"""Which angles the law is fed with."""
+"""The angles that the law is fed with."""
 SEED = 72_001
 WORLDS = 20
 
 
-def in_the_loop(
+def close_loops(
     observers: Sequence[str], angles: AngleSource, worlds: int, seed: int, duration_s: float = DURATION_S
 ) -> dict[str, Result]:
-    """Each observer's estimate in the law, a push at 2 s."""
+    """Close the loop on each observer, a push at 2 s."""
     settings = [f'controller.angle_source="{angles}"']
     runs = [run_of(push_recovery(observer, seed, settings, duration_s), worlds) for observer in observers]
     return dict(zip(observers, run_side_by_side(runs), strict=True))
 
 
 def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
-    """One of Figs 5 to 7."""
+    """Judge one of Figs 5 to 7."""
     error = {angles: known_interval(result.values("velocity_rms_error_rad_s")) for angles, result in results.items()}
     tilt = {angles: known_interval(result.values("tilt_rms_deg")) for angles, result in results.items()}
-    fell = {angles: float(result.fell.mean()) for angles, result in results.items()}
-    settled = {angles: float(np.isfinite(result.values("settle_time_s")).mean()) for angles, result in results.items()}
-    listed = " ".join(
+    falls = {angles: float(result.fell.mean()) for angles, result in results.items()}
+    settles = {angles: float(np.isfinite(result.values("settle_time_s")).mean()) for angles, result in results.items()}
+    sentences = " ".join(
         f"On {angles} angles the velocity RMS error is {plus_minus(error[angles])} rad/s, the tilt RMS "
-        f"{plus_minus(tilt[angles], 3)} deg; {fell[angles]:.0%} fall, {settled[angles]:.0%} settle within 1 deg."
+        f"{plus_minus(tilt[angles], 3)} deg; {falls[angles]:.0%} fall, {settles[angles]:.0%} settle within "
+        "1 deg."
         for angles in results
     )
     worlds = len(results["measured"].outcomes)
     return Claim(
         place=FIGURES[name],
-        says=f"With the estimate of {OBSERVERS[name]} in the law the rig stands, and recovers from a push.",
-        found=(
+        statement=f"With the estimate of {OBSERVERS[name]} in the law the rig stands, and recovers from a push.",
+        result=(
             f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, the law on measured or "
-            f"on estimated angles. {listed}"
+            f"on estimated angles. {sentences}"
         ),
-        holds=max(fell.values()) == 0.0 and min(settled.values()) == 1.0,
+        holds=max(falls.values()) == 0.0 and min(settles.values()) == 1.0,
         otherwise="It falls in some worlds, or does not settle.",
         figures={
             key: value
@@ -63,8 +64,8 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
             for key, value in (
                 (f"velocity_rms_error_{angles}_angles_rad_s", error[angles]),
                 (f"tilt_rms_{angles}_angles_deg", tilt[angles]),
-                (f"fell_fraction_{angles}_angles", fell[angles]),
-                (f"settled_fraction_{angles}_angles", settled[angles]),
+                (f"fell_fraction_{angles}_angles", falls[angles]),
+                (f"settled_fraction_{angles}_angles", settles[angles]),
             )
         },
         pictures=[_picture(name, {angles: trajectory_of(result).world(0) for angles, result in results.items()})],
@@ -72,39 +73,28 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
 
 
 def _picture(name: str, examples: Mapping[AngleSource, Trajectory]) -> Picture:
-    """Two columns: the law on measured angles, the law on estimated ones."""
-    rows: list[list[Panel]] = [[], [], [], []]
+    """Draw two columns: the law on measured angles, the law on estimated ones."""
+    columns = []
     for angles, example in examples.items():
-        t, shaded = example["time_s"], pushed(example)
-        tilt = [
-            Line(t, np.degrees(example["y1_rad"]), "measured y1", color=7, width=0.6),
-            Line(t, np.degrees(example["x1_rad"]), "true x1", color=0),
-        ]
-        rates = [
-            Line(t, example[f"estimate/{name}/x2_rad_s"], f"estimate of {OBSERVERS[name]}", color=1, width=0.6),
-            Line(t, example["x2_rad_s"], "true x2", color=0),
-        ]
-        gimbal = [Line(t, np.degrees(example["x3_rad"]), "true x3", color=0)]
-        command = [Line(t, example["u_rad_s"], "u", color=3, width=0.6)]
-        rows[0].append(Panel("tilt [deg]", tilt, f"{angles} angles", shaded=shaded))
-        rows[1].append(Panel("tilt rate [rad/s]", rates, shaded=shaded))
-        rows[2].append(Panel("gimbal angle [deg]", gimbal, shaded=shaded))
-        rows[3].append(Panel("command u [rad/s]", command, shaded=shaded))
+        column = loop_panels(example, name, OBSERVERS[name], f"{angles} angles", 0.6)
+        gimbal = [Line(example["time_s"], np.degrees(example["x3_rad"]), "true x3", color=0)]
+        column.insert(2, Panel("gimbal angle [deg]", gimbal, shaded=column[0].shaded))
+        columns.append(column)
     number = FIGURES[name].removeprefix("Fig. ")
     return Picture(
         f"aranovskiy2020-fig-{number}",
         f"aranovskiy2020, Fig. {number}: the loop closed on {OBSERVERS[name]}, the law on measured and on estimated "
         "angles",
-        [panel for row in rows for panel in row],
+        [panel for row in zip(*columns, strict=True) for panel in row],
         columns=2,
     )
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The three figures, and what Section V concludes from the same runs."""
+    """Judge the three figures, and what Section V concludes from the same runs."""
     results: dict[AngleSource, dict[str, Result]] = {}
     for i, angles in enumerate(ANGLES):
-        results[angles] = in_the_loop(list(OBSERVERS), angles, WORLDS, SEED)
+        results[angles] = close_loops(list(OBSERVERS), angles, WORLDS, SEED)
         on_share((i + 1) / 3.0)
     exact = {
         second_place.TEN: results["measured"]["ltv"].values("velocity_rms_error_rad_s"),
@@ -113,6 +103,6 @@ def claims(on_share: OnShare) -> list[Claim]:
     errors = second_place.all_errors(exact, WORLDS, SEED)
     return [
         *on_common_scales([figure(name, {angles: results[angles][name] for angles in ANGLES}) for name in FIGURES]),
-        comparison.order(comparison.measured(results)),
+        comparison.order(comparison.read_measures(results)),
         second_place.cause(errors),
     ]

@@ -22,12 +22,12 @@ Method = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 
 
 def euler(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
-    """One explicit Euler step."""
+    """Take one explicit Euler step."""
     return H + H.dtype.type(h) * riccati_slope(H, A)
 
 
 def rk4(H: np.ndarray, A: np.ndarray, h: float, first: np.ndarray | None = None) -> np.ndarray:
-    """One classical Runge-Kutta step."""
+    """Take one classical Runge-Kutta step."""
     t = H.dtype.type(h)
     k1 = riccati_slope(H, A, first)
     k2 = riccati_slope(H + t / 2 * k1, A, first)
@@ -36,17 +36,17 @@ def rk4(H: np.ndarray, A: np.ndarray, h: float, first: np.ndarray | None = None)
 
 
 def rk4_as_printed(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
-    """The same with the printed first term, H A^T with A of (6)."""
+    """Take the step with the printed first term, H A^T with A of (6)."""
     return rk4(H, A, h, printed_model().A)
 
 
 def exact_step(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
-    """One sample of this package's observer at rest, where A is that of `A_prime()`."""
-    observer = ours(h)
-    still = Measurement(0.0, 0.0)
+    """Take one sample of this package's observer at rest, where A is that of `A_prime()`."""
+    observer = make_exact(h)
+    rest_measurement = Measurement(0.0, 0.0)
     entries = {"h11": H[0, 0], "h12": H[0, 1], "h22": H[1, 1], "h33": H[2, 2]}
-    state = observer.init(still)._replace(**{name: float(value) for name, value in entries.items()})
-    return matrix_of(observer.step(state, still, 0.0)[0])
+    state = observer.init(rest_measurement)._replace(**{name: float(value) for name, value in entries.items()})
+    return matrix_of(observer.step(state, rest_measurement, 0.0)[0])
 
 
 METHODS: dict[str, Method] = {
@@ -60,13 +60,13 @@ METHODS: dict[str, Method] = {
 
 
 @cache
-def ours(dt: float = DT) -> LinearTimeVarying:
-    """This package's (10)."""
+def make_exact(dt: float = DT) -> LinearTimeVarying:
+    """Make this package's (10)."""
     return LinearTimeVarying(dt=dt, model=printed_model())
 
 
 def matrix_of(state: State) -> np.ndarray:
-    """H of this package's observer, (3, 3)."""
+    """Return H of this package's observer, (3, 3)."""
     return np.array([[state.h11, state.h12, 0.0], [state.h12, state.h22, 0.0], [0.0, 0.0, state.h33]], dtype=float)
 
 
@@ -91,7 +91,7 @@ class Plain:
         return (x, self.method(H, A, self.dt)), x
 
 
-class Compared(NamedTuple):
+class Comparison(NamedTuple):
     """Two forms of (10) along a closed-loop run, from 0.2 s on."""
 
     difference: float
@@ -102,15 +102,15 @@ class Compared(NamedTuple):
     """RMS error of the other [rad/s]."""
 
 
-def compared(one: Observer, other: Observer, seed: int) -> Compared:
+def compare(form: Observer, other_form: Observer, seed: int) -> Comparison:
     """Replay both on a run with (10) in the loop."""
     run = run_of_10(seed)
     later = run["time_s"] > 0.2
     truth = run["x2_rad_s"][later]
-    rate, other_rate = (replay(form, run).x2[later] for form in (one, other))
-    return Compared(*(float(rms(off)) for off in (other_rate - rate, rate - truth, other_rate - truth)))
+    rate, other_rate = (replay(observer, run).x2[later] for observer in (form, other_form))
+    return Comparison(*(float(rms(error)) for error in (other_rate - rate, rate - truth, other_rate - truth)))
 
 
-def euler_against_exact(seed: int) -> Compared:
-    """What all twelve equations by explicit Euler change."""
-    return compared(ours(), Plain(euler), seed)
+def compare_euler(seed: int) -> Comparison:
+    """Compare all twelve equations by explicit Euler with the exact form."""
+    return compare(make_exact(), Plain(euler), seed)

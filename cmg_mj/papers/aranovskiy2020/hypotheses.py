@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.mismatch import MISMATCHES, Mismatch, Ran, run_all
+from cmg_mj.papers.aranovskiy2020.mismatch import MISMATCHES, Mismatch, MismatchRuns, run_all
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S
-from cmg_mj.papers.aranovskiy2020.yaw_momentum import balanced_yaw_rate, foreseen_yaw_rate
+from cmg_mj.papers.aranovskiy2020.yaw_momentum import balanced_yaw_rate, predict_yaw_rate
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.recorded import pushed, rms, trajectory_of
+from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.results.intervals import Interval, ratio_interval
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
@@ -20,13 +20,13 @@ WORLDS = 4
 
 
 class Yaw(NamedTuple):
-    """What body A does under one mismatch."""
+    """The motion of body A under one mismatch."""
 
     drift_deg: float
     """Largest turn, mean over the worlds."""
     rate_rad_s: float
     """Largest rate, mean over the worlds."""
-    foreseen_deg: float
+    predicted_deg: float
     """Largest turn as foreseen from the symmetric rig; NaN if it is not."""
     balance: float
     """Largest miss of the rate by conservation, by the largest rate."""
@@ -36,26 +36,26 @@ class Yaw(NamedTuple):
     """Tilt RMS by that of the symmetric rig."""
 
 
-def yaw_of(ran: Ran, mismatch: Mismatch, size: float) -> Yaw:
+def measure_yaw(runs: MismatchRuns, mismatch: Mismatch, size: float) -> Yaw:
     """Measure one mismatch."""
-    broken = ran.broken[mismatch.kind, size]
-    run = trajectory_of(broken)
+    mismatched = runs.broken[mismatch.kind, size]
+    run = trajectory_of(mismatched)
     rate, angle = run["rate/yaw_rad_s"], run["angle/yaw_rad"]
     largest = np.abs(rate).max(axis=0)
-    miss = np.abs(balanced_yaw_rate(ran.plant, run) - rate).max(axis=0)
-    foreseen = math.nan
-    if mismatch.foreseen:
-        foretold = foreseen_yaw_rate(mismatch.kind, size, ran.plant, trajectory_of(ran.symmetric))
+    miss = np.abs(balanced_yaw_rate(runs.plant, run) - rate).max(axis=0)
+    predicted_deg = math.nan
+    if mismatch.is_predictable:
+        predicted_rate = predict_yaw_rate(mismatch.kind, size, runs.plant, trajectory_of(runs.symmetric))
         step = float(run["time_s"][1] - run["time_s"][0])
-        foreseen = float(np.degrees(np.abs(np.cumsum(foretold, axis=0) * step).max(axis=0)).mean())
+        predicted_deg = float(np.degrees(np.abs(np.cumsum(predicted_rate, axis=0) * step).max(axis=0)).mean())
 
     def ratio(key: str) -> Interval:
-        return ratio_interval(broken.values(key), ran.symmetric.values(key))
+        return ratio_interval(mismatched.values(key), runs.symmetric.values(key))
 
     return Yaw(
         float(np.degrees(np.abs(angle).max(axis=0)).mean()),
         float(largest.mean()),
-        foreseen,
+        predicted_deg,
         float((miss / largest).max()),
         ratio("velocity_rms_error_rad_s"),
         ratio("tilt_rms_deg"),
@@ -65,15 +65,15 @@ def yaw_of(ran: Ran, mismatch: Mismatch, size: float) -> Yaw:
 # --- claims ---------------------------------------------------------------------------------------------------
 
 
-def symmetric_claim(ran: Ran) -> Claim:
-    """Hypotheses 1 and 2 kept."""
-    turn = float(np.degrees(np.abs(trajectory_of(ran.symmetric)["angle/yaw_rad"]).max()))
+def symmetric_claim(runs: MismatchRuns) -> Claim:
+    """Judge Hypotheses 1 and 2 kept."""
+    turn = float(np.degrees(np.abs(trajectory_of(runs.symmetric)["angle/yaw_rad"]).max()))
     return Claim(
         place="Hypotheses 1 and 2",
-        says="With symmetric gimbals, flywheels and commands no torque acts on body A: it stands still.",
-        found=(
+        statement="With symmetric gimbals, flywheels and commands no torque acts on body A: it stands still.",
+        result=(
             f"With the thrust bearing free, a push and sensor noise, body A turns by at most {turn:.0e} deg in "
-            f"{DURATION_S:g} s over {len(ran.symmetric.outcomes)} seeds: rounding."
+            f"{DURATION_S:g} s over {len(runs.symmetric.outcomes)} seeds: rounding."
         ),
         holds=turn < 1e-6,
         otherwise="It turns.",
@@ -81,29 +81,29 @@ def symmetric_claim(ran: Ran) -> Claim:
     )
 
 
-def broken_claim(ran: Ran) -> Claim:
-    """Hypotheses 1 and 2 broken."""
-    found = {(m, size): yaw_of(ran, m, size) for m in MISMATCHES for size in m.sizes}
-    ratios = [y.foreseen_deg / y.drift_deg for y in found.values() if not math.isnan(y.foreseen_deg)]
-    small = [(m, m.sizes[-2]) for m in MISMATCHES]
-    velocity = max(abs(y.velocity.mean - 1.0) for y in found.values())
-    tilt = max(abs(y.tilt.mean - 1.0) for y in found.values())
-    balance = max(y.balance for y in found.values())
-    listed = ", ".join(f"{found[key].drift_deg:.1f} deg for {_size(*key)}" for key in small)
+def broken_claim(runs: MismatchRuns) -> Claim:
+    """Judge Hypotheses 1 and 2 broken."""
+    yaws = {(m, size): measure_yaw(runs, m, size) for m in MISMATCHES for size in m.sizes}
+    ratios = [y.predicted_deg / y.drift_deg for y in yaws.values() if not math.isnan(y.predicted_deg)]
+    examples = [(m, m.sizes[-2]) for m in MISMATCHES]
+    velocity = max(abs(y.velocity.mean - 1.0) for y in yaws.values())
+    tilt = max(abs(y.tilt.mean - 1.0) for y in yaws.values())
+    balance = max(y.balance for y in yaws.values())
+    turns_text = ", ".join(f"{yaws[key].drift_deg:.1f} deg for {_size(*key)}" for key in examples)
     return Claim(
         place="After Hypothesis 3",
-        says=(
+        statement=(
             "If Hypotheses 1 and 2 are violated the reduced model is off by an unknown term; the experiments show the "
             "assumptions to be reasonable for the velocity estimation."
         ),
-        found=(
+        result=(
             f"The second cube changed on purpose, {WORLDS} seeds a case, the same push. In {DURATION_S:g} s body A "
-            f"turns by up to {listed}. Conservation of the momentum about the vertical gives its rate to "
+            f"turns by up to {turns_text}. Conservation of the momentum about the vertical gives its rate to "
             f"{balance:.1%} of the largest; from the symmetric rig's run the turn is foreseen to {min(ratios):.2f} to "
             f"{max(ratios):.2f} of what it is. The velocity RMS error changes by at most {velocity:.1%} and the tilt "
-            f"RMS by at most {tilt:.0%}; {ran.fell} worlds fall."
+            f"RMS by at most {tilt:.0%}; {runs.fell} worlds fall."
         ),
-        holds=ran.fell == 0 and velocity < 0.1,
+        holds=runs.fell == 0 and velocity < 0.1,
         conditions=(
             "For the tilt and its estimate, up to the mismatches tried. Body A itself does not stay: on a bearing "
             "without friction it turns while the gimbals are out, and stays where it was left."
@@ -112,41 +112,41 @@ def broken_claim(ran: Ran) -> Claim:
         figures={
             _size(m, size): {
                 "turn_deg": y.drift_deg,
-                "turn_foreseen_deg": None if math.isnan(y.foreseen_deg) else y.foreseen_deg,
+                "turn_foreseen_deg": None if math.isnan(y.predicted_deg) else y.predicted_deg,
                 "largest_rate_rad_s": y.rate_rad_s,
                 "conservation_miss": y.balance,
                 "velocity_rms_error_by_symmetric": y.velocity,
                 "tilt_rms_by_symmetric": y.tilt,
             }
-            for (m, size), y in found.items()
+            for (m, size), y in yaws.items()
         },
-        pictures=[_picture(ran, found)],
+        pictures=[_picture(runs, yaws)],
     )
 
 
 def _size(mismatch: Mismatch, size: float) -> str:
-    return f"{mismatch.kind} {mismatch.shown * size:g} {mismatch.unit}"
+    return f"{mismatch.kind} {mismatch.display_factor * size:g} {mismatch.unit}"
 
 
-def _picture(ran: Ran, found: dict[tuple[Mismatch, float], Yaw]) -> Picture:
-    symmetric = trajectory_of(ran.symmetric)
-    t, shaded = symmetric["time_s"], pushed(symmetric.world(0))
+def _picture(runs: MismatchRuns, yaws: dict[tuple[Mismatch, float], Yaw]) -> Picture:
+    symmetric = trajectory_of(runs.symmetric)
+    t, shaded = symmetric["time_s"], push_intervals(symmetric.world(0))
     rates, turns, sweep = [], [], []
     for i, mismatch in enumerate(MISMATCHES):
         size = mismatch.sizes[-2]
-        run = trajectory_of(ran.broken[mismatch.kind, size])
+        run = trajectory_of(runs.broken[mismatch.kind, size])
         rates.append(Line(t, run["rate/yaw_rad_s"][:, 0], _size(mismatch, size), color=i))
         turns.append(Line(t, np.degrees(run["angle/yaw_rad"][:, 0]), color=i))
-        if mismatch.foreseen:
-            foretold = foreseen_yaw_rate(mismatch.kind, size, ran.plant, symmetric)[:, 0]
-            rates.append(Line(t, foretold, "" if i else "foreseen", "k--", width=0.8))
-            turns.append(Line(t, np.degrees(np.cumsum(foretold) * (t[1] - t[0])), style="k--", width=0.8))
+        if mismatch.is_predictable:
+            predicted_rate = predict_yaw_rate(mismatch.kind, size, runs.plant, symmetric)[:, 0]
+            rates.append(Line(t, predicted_rate, "" if i else "foreseen", "k--", width=0.8))
+            turns.append(Line(t, np.degrees(np.cumsum(predicted_rate) * (t[1] - t[0])), style="k--", width=0.8))
         largest = mismatch.sizes[-1]
         x = [s / largest for s in mismatch.sizes]
-        label = f"{mismatch.kind}, 1 is {mismatch.shown * largest:g} {mismatch.unit}"
-        sweep.append(Line(x, [found[mismatch, s].drift_deg for s in mismatch.sizes], label, "o-", color=i))
-        if mismatch.foreseen:
-            sweep.append(Line(x, [found[mismatch, s].foreseen_deg for s in mismatch.sizes], style="kx"))
+        label = f"{mismatch.kind}, 1 is {mismatch.display_factor * largest:g} {mismatch.unit}"
+        sweep.append(Line(x, [yaws[mismatch, s].drift_deg for s in mismatch.sizes], label, "o-", color=i))
+        if mismatch.is_predictable:
+            sweep.append(Line(x, [yaws[mismatch, s].predicted_deg for s in mismatch.sizes], style="kx"))
     return Picture(
         "aranovskiy2020-hypotheses",
         "aranovskiy2020, Hypotheses 1 and 2 broken: what thrust bearing A does (dashed and x: foreseen)",
@@ -159,34 +159,34 @@ def _picture(ran: Ran, found: dict[tuple[Mismatch, float], Yaw]) -> Picture:
     )
 
 
-def hypothesis_3(ran: Ran) -> Claim:
-    """The flywheels' speed is constant."""
-    plant, run = ran.plant, trajectory_of(ran.symmetric)
+def hypothesis_3(runs: MismatchRuns) -> Claim:
+    """Judge whether the flywheels' speed is constant."""
+    plant, run = runs.plant, trajectory_of(runs.symmetric)
     names = plant.joint_names
-    speeds = np.stack([np.abs(run[f"rate/{names[module.flywheel]}_rad_s"]) for module in plant.modules])
-    nominal = abs(plant.modules[0].speed)
-    off = float(np.abs(speeds - nominal).max())
-    gimbal = max(float(np.abs(run[f"rate/{names[module.gimbal]}_rad_s"]).max()) for module in plant.modules)
+    speeds = np.stack([np.abs(run[f"rate/{names[module.flywheel]}_rad_s"]) for module in plant.axis.modules])
+    nominal = abs(plant.axis.modules[0].speed)
+    speed_error = float(np.abs(speeds - nominal).max())
+    gimbal = max(float(np.abs(run[f"rate/{names[module.gimbal]}_rad_s"]).max()) for module in plant.axis.modules)
     tilt = float(np.abs(run["x2_rad_s"]).max())
     model = plant.reduced
     spin_up = np.gradient(speeds[0], run["time_s"], axis=0)
     D = model.J1 + model.J2 * np.sin(run["x3_rad"]) ** 2
-    left_out = model.J_d * np.sin(run["x3_rad"]) * spin_up / D
+    omitted_term = model.J_d * np.sin(run["x3_rad"]) * spin_up / D
     acceleration = np.gradient(run["x2_rad_s"], run["time_s"], axis=0)
-    share = float(rms(left_out.ravel()) / rms(acceleration.ravel()))
+    share = float(rms(omitted_term.ravel()) / rms(acceleration.ravel()))
     return Claim(
         place="Hypothesis 3",
-        says="The flywheels' speed is held constant and far above the rates of tilt and gimbals.",
-        found=(
-            f"With a speed loop of 0.11 s and at most 0.5 N m the speed strays by at most {off:.2f} rad/s "
-            f"({off / nominal:.2%}) under the push. It is {nominal / max(gimbal, tilt):.0f} times the fastest gimbal "
-            f"rate ({gimbal:.2f} rad/s) and {nominal / tilt:.0f} times the fastest tilt rate. The term with omega_d' "
-            f"that (3) leaves out is {share:.2%} of the tilt acceleration (RMS)."
+        statement="The flywheels' speed is held constant and far above the rates of tilt and gimbals.",
+        result=(
+            f"With a speed loop of 0.11 s and at most 0.5 N m the speed strays by at most {speed_error:.2f} rad/s "
+            f"({speed_error / nominal:.2%}) under the push. It is {nominal / max(gimbal, tilt):.0f} times the fastest "
+            f"gimbal rate ({gimbal:.2f} rad/s) and {nominal / tilt:.0f} times the fastest tilt rate. The term with "
+            f"omega_d' that (3) leaves out is {share:.2%} of the tilt acceleration (RMS)."
         ),
-        holds=off / nominal < 0.01 and share < 0.01 and nominal > 10.0 * max(gimbal, tilt),
+        holds=speed_error / nominal < 0.01 and share < 0.01 and nominal > 10.0 * max(gimbal, tilt),
         otherwise="The speed strays too far.",
         figures={
-            "largest_speed_error_rad_s": off,
+            "largest_speed_error_rad_s": speed_error,
             "speed_by_fastest_gimbal_rate": nominal / gimbal,
             "speed_by_fastest_tilt_rate": nominal / tilt,
             "omitted_term_share": share,
@@ -195,8 +195,8 @@ def hypothesis_3(ran: Ran) -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Hypotheses 1 and 2 kept, then broken, and Hypothesis 3."""
+    """Judge Hypotheses 1 and 2 kept, then broken, and Hypothesis 3."""
     on_share(0.0)
-    ran = run_all(MISMATCHES, WORLDS, SEED, DURATION_S)
+    runs = run_all(MISMATCHES, WORLDS, SEED, DURATION_S)
     on_share(0.9)
-    return [symmetric_claim(ran), broken_claim(ran), hypothesis_3(ran)]
+    return [symmetric_claim(runs), broken_claim(runs), hypothesis_3(runs)]

@@ -6,22 +6,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.papers.aranovskiy2020.retuned import DEFAULT_NOISE, Studies, level_at, worth_it
+from cmg_mj.papers.aranovskiy2020.retuned import DEFAULT_NOISE, Studies, beats_zero, level_at
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.words import listed_and
+from cmg_mj.papers.words import join_with_and, with_ends
 from cmg_mj.studies.tuning import NoiseLevelResult
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 ROUNDED = 1.05
-"""What printing a parameter to one digit costs: tau = 0.02 stands for 0.015 to 0.025."""
+"""The cost of printing a parameter to one digit: tau = 0.02 stands for 0.015 to 0.025."""
 
 
 def is_best(level: NoiseLevelResult) -> bool:
-    """Whether the given parameters are the best ones: a tie with the tuned, or as near as rounding."""
+    """Return true if the given parameters are the best ones: a tie with the tuned, or as near as rounding."""
     return level.verdict == "tie" or level.ratio.mean <= ROUNDED
 
 
-class Together(NamedTuple):
+class JointExperiment(NamedTuple):
     """The three observers in one experiment: one push on one rig, recorded at one noise."""
 
     push: str
@@ -35,82 +35,79 @@ class Together(NamedTuple):
         return f"{self.push}, {self.noise_ug_rthz:g} ug/rtHz"
 
     @property
-    def worst(self) -> float:
+    def largest_ratio(self) -> float:
         """Table 2's error by that of the tuned, of the observer of which it is largest."""
         return max(level.ratio.mean for level in self.levels.values())
 
     @property
-    def worth_it(self) -> bool:
-        """Whether all three, tuned, are closer to the gyro than zero: nobody tunes where the best is not to move."""
-        return all(worth_it(level) for level in self.levels.values())
+    def beats_zero(self) -> bool:
+        """True if all three, tuned, are closer to the gyro than zero: nobody tunes where the best is not to move."""
+        return all(beats_zero(level) for level in self.levels.values())
 
     @property
-    def best(self) -> list[str]:
+    def best_observers(self) -> list[str]:
         """The observers whose given parameters are the best ones."""
         return [name for name, level in self.levels.items() if is_best(level)]
 
 
-def experiments(studies: Studies) -> Iterator[Together]:
-    """All that were tried."""
+def experiments(studies: Studies) -> Iterator[JointExperiment]:
+    """Generate all experiments that were tried."""
     for push, by_name in studies.items():
         for level in by_name["linear"].levels:
             noise = level.noise_ug_rthz
-            yield Together(push, noise, {name: level_at(study, noise) for name, study in by_name.items()})
+            yield JointExperiment(push, noise, {name: level_at(study, noise) for name, study in by_name.items()})
 
 
-def listed(together: Sequence[Together]) -> str:
-    """Experiments push by push: `1 N m, e = 0.5 deg at 100, 200; 0.3 N m, e = 0 at 100 ug/rtHz`."""
+def list_experiments(joint_experiments: Sequence[JointExperiment]) -> str:
+    """List experiments push by push: `1 N m, e = 0.5 deg at 100, 200; 0.3 N m, e = 0 at 100 ug/rtHz`."""
     noises: dict[str, list[str]] = {}
-    for each in together:
-        noises.setdefault(each.push, []).append(f"{each.noise_ug_rthz:g}")
-    return "; ".join(f"{push} at {', '.join(at)}" for push, at in noises.items()) + " ug/rtHz"
+    for experiment in joint_experiments:
+        noises.setdefault(experiment.push, []).append(f"{experiment.noise_ug_rthz:g}")
+    return "; ".join(f"{push} at {', '.join(densities)}" for push, densities in noises.items()) + " ug/rtHz"
 
 
-def nearest_joint(studies: Studies) -> Together:
-    """The experiment at which the worst of the three loses least, of those worth tuning in if there are any."""
-    tried = list(experiments(studies))
-    return min([together for together in tried if together.worth_it] or tried, key=lambda together: together.worst)
+def nearest_joint(studies: Studies) -> JointExperiment:
+    """Return the experiment at which the worst of the three loses least, of those worth tuning in if there are any."""
+    candidates = list(experiments(studies))
+    return min([case for case in candidates if case.beats_zero] or candidates, key=lambda case: case.largest_ratio)
 
 
 def joint_claim(studies: Studies) -> Claim:
-    """Whether one experiment has all three lines of Table 2."""
-    found, tried = nearest_joint(studies), list(experiments(studies))
-    worth = [together for together in tried if together.worth_it]
-    least = min(tried, key=lambda together: together.worst)
-    ratios = "; ".join(
-        f"{OBSERVERS[name]} {level.ratio.mean:.3f} ({level.ratio.low:.3f} to {level.ratio.high:.3f})"
-        for name, level in found.levels.items()
-    )
-    others = [OBSERVERS[name] for name in found.levels if name not in found.best]
+    """Judge whether one experiment has all three lines of Table 2."""
+    nearest, candidates = nearest_joint(studies), list(experiments(studies))
+    tunable = [experiment for experiment in candidates if experiment.beats_zero]
+    least = min(candidates, key=lambda experiment: experiment.largest_ratio)
+    ratios = "; ".join(f"{OBSERVERS[name]} {with_ends(level.ratio)}" for name, level in nearest.levels.items())
+    misfits = [OBSERVERS[name] for name in nearest.levels if name not in nearest.best_observers]
     return Claim(
         place="Table 2, the three together",
-        says="The three observers were tuned on the same collected data: Fig. 4's one experiment.",
-        found=(
-            f"{len(studies)} pushes at several noises, {len(tried)} experiments, each recorded once for all three. In "
-            f"{len(worth)} of them all three can be tuned to follow the gyro better than an estimate of zero does. Of "
-            f"these Table 2's lines come nearest to being the best together at {found.words}. There Table 2's error by "
-            f"that of the tuned is {ratios}. Zero left aside it is {least.words}, where the worst has "
-            f"{least.worst:.2f} times the error of the tuned. {_apart(studies)}"
+        statement="The three observers were tuned on the same collected data: Fig. 4's one experiment.",
+        result=(
+            f"{len(studies)} pushes at several noises, {len(candidates)} experiments, each recorded once for all "
+            f"three. In {len(tunable)} of them all three can be tuned to follow the gyro better than an estimate of "
+            f"zero does. Of these Table 2's lines come nearest to being the best together at {nearest.words}. There "
+            f"Table 2's error by that of the tuned is {ratios}. Zero left aside it is {least.words}, where the worst "
+            f"has {least.largest_ratio:.2f} times the error of the tuned. {_describe_separate_optima(studies)}"
         ),
-        holds=found.worth_it and not others,
-        conditions=f"At {found.words} (the bench's own noise is {DEFAULT_NOISE:g}); the paper gives neither.",
+        holds=nearest.beats_zero and not misfits,
+        conditions=f"At {nearest.words} (the bench's own noise is {DEFAULT_NOISE:g}); the paper gives neither.",
         otherwise=(
-            f"No experiment tried has all three: where the worst loses least, {listed_and(others)} is not the best."
-            if others
+            f"No experiment tried has all three: where the worst loses least, {join_with_and(misfits)} is not the best."
+            if misfits
             else "Where all three are the best, an estimate of zero is better still."
         )
         + " The paper gives neither its push nor its noise.",
         figures={
-            "experiment": found.words,
-            "worst_table_2_by_tuned_error": {together.words: together.worst for together in tried},
-            "worth_tuning_in": [together.words for together in worth],
+            "experiment": nearest.words,
+            "worst_table_2_by_tuned_error": {experiment.words: experiment.largest_ratio for experiment in candidates},
+            "worth_tuning_in": [experiment.words for experiment in tunable],
         },
         pictures=[_picture(studies)],
     )
 
 
-def _apart(studies: Studies) -> str:
-    """Where each line is best by itself."""
+def _describe_separate_optima(studies: Studies) -> str:
+    """Name the noise at which each line is best by itself."""
     push = next(iter(studies))
     parts = []
     for name, study in studies[push].items():

@@ -8,10 +8,8 @@ import numpy as np
 
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT
+from cmg_mj.papers.aranovskiy2020.rig import DT, replay_at_rest
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.replay import replay
-from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 76_000
@@ -19,31 +17,27 @@ TAUS_S = (0.01, 0.015, 0.02, 0.03, 0.05, 0.08)
 
 
 class Trade(NamedTuple):
-    """What (9) does with one time constant."""
+    """Lag and noise gain of (9) with one time constant."""
 
     lag_s: float
-    """How late the estimate of a steadily rising rate is [s]."""
+    """Delay of the estimate of a steadily rising rate [s]."""
     noise_gain_1_s: float
     """RMS of the estimate by that of a white noise measured [1/s]."""
 
 
 def trade(tau: float, seed: int = SEED) -> Trade:
     """Replay (9) on a steadily accelerated tilt, and on noise."""
-    time, settled = np.arange(2000) * DT, 400
+    time, settling_ticks = np.arange(2000) * DT, 400
     acceleration = 0.3
     noise = np.random.default_rng(seed).normal(0.0, 1.0, (len(time), 8))
     y1 = np.column_stack([acceleration * time**2 / 2.0, noise])
-    still = np.zeros_like(y1)
-    x2 = replay(
-        make_observer("linear", DT, printed_model(), tau=tau),
-        Trajectory({"time_s": time, "y1_rad": y1, "y2_rad": still, "u_rad_s": still}),
-    ).x2
+    x2 = replay_at_rest(make_observer("linear", DT, printed_model(), tau=tau), y1).x2
     late = time[-1] - x2[-1, 0] / acceleration
-    return Trade(float(late), float(np.sqrt(np.mean(x2[settled:, 1:] ** 2))))
+    return Trade(float(late), float(np.sqrt(np.mean(x2[settling_ticks:, 1:] ** 2))))
 
 
-def foreseen(tau: float) -> Trade:
-    """From G = s/(tau s + 1)^2, whose phase falls with the slope 2 tau.
+def predict_trade(tau: float) -> Trade:
+    """Predict the trade by G = s/(tau s + 1)^2, whose phase falls with the slope 2 tau.
 
     A sample of noise is a triangle in time, two samples wide: the weights are the impulse response's means over it. For
     samples short beside tau their squares add up to dt/(4 tau^3).
@@ -58,43 +52,43 @@ def foreseen(tau: float) -> Trade:
 
 
 def lag_claim(seed: int = SEED) -> Claim:
-    """A longer tau: less noise, more lag."""
-    found = {tau: trade(tau, seed) for tau in TAUS_S}
-    lag_off = max(abs(t.lag_s / foreseen(tau).lag_s - 1.0) for tau, t in found.items())
-    noise_off = max(abs(t.noise_gain_1_s / foreseen(tau).noise_gain_1_s - 1.0) for tau, t in found.items())
-    gains = [t.noise_gain_1_s for t in found.values()]
-    taus = ", ".join(f"{tau:g}" for tau in found)
-    lags = ", ".join(f"{1e3 * t.lag_s:.0f}" for t in found.values())
-    noises = ", ".join(f"{t.noise_gain_1_s:.2f}" for t in found.values())
+    """Judge a longer tau: less noise, more lag."""
+    trades = {tau: trade(tau, seed) for tau in TAUS_S}
+    lag_error = max(abs(t.lag_s / predict_trade(tau).lag_s - 1.0) for tau, t in trades.items())
+    noise_error = max(abs(t.noise_gain_1_s / predict_trade(tau).noise_gain_1_s - 1.0) for tau, t in trades.items())
+    gains = [t.noise_gain_1_s for t in trades.values()]
+    taus = ", ".join(f"{tau:g}" for tau in trades)
+    lags = ", ".join(f"{1e3 * t.lag_s:.0f}" for t in trades.values())
+    noises = ", ".join(f"{t.noise_gain_1_s:.2f}" for t in trades.values())
     return Claim(
         place="(9), lag and noise",
-        says="A filter with the differentiator reduces noise, but lag distorts the estimate: tau trades them.",
-        found=(
+        statement="A filter with the differentiator reduces noise, but lag distorts the estimate: tau trades them.",
+        result=(
             f"With tau = {taus} s the lag on a steady acceleration is {lags} ms. The noise gain, the RMS of the "
-            f"estimate by that of white noise in y1 at 200 Hz, is {noises} 1/s. The lag is 2 tau to {lag_off:.1g}, the "
-            f"noise gain that of the transfer function to {noise_off:.1%}. For a long tau it falls as "
+            f"estimate by that of white noise in y1 at 200 Hz, is {noises} 1/s. The lag is 2 tau to {lag_error:.1g}, "
+            f"the noise gain that of the transfer function to {noise_error:.1%}. For a long tau it falls as "
             "sqrt(dt/(4 tau^3))."
         ),
-        holds=lag_off < 0.01 and noise_off < 0.05 and gains == sorted(gains, reverse=True),
+        holds=lag_error < 0.01 and noise_error < 0.05 and gains == sorted(gains, reverse=True),
         otherwise="Lag or noise is not what the transfer function says.",
         figures={
             "tau_s": list(TAUS_S),
-            "lag_s": [t.lag_s for t in found.values()],
+            "lag_s": [t.lag_s for t in trades.values()],
             "noise_gain_1_s": gains,
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(trades)],
     )
 
 
-def _picture(found: dict[float, Trade]) -> Picture:
+def _picture(trades: dict[float, Trade]) -> Picture:
     fine = np.geomspace(TAUS_S[0], TAUS_S[-1], 50)
     lags = [
-        Line(TAUS_S, [1e3 * t.lag_s for t in found.values()], "measured", "o", color=1),
-        Line(fine, [1e3 * foreseen(tau).lag_s for tau in fine], "2 tau", color=7),
+        Line(TAUS_S, [1e3 * t.lag_s for t in trades.values()], "measured", "o", color=1),
+        Line(fine, [1e3 * predict_trade(tau).lag_s for tau in fine], "2 tau", color=7),
     ]
     noise = [
-        Line(TAUS_S, [t.noise_gain_1_s for t in found.values()], "measured", "o", color=1),
-        Line(fine, [foreseen(tau).noise_gain_1_s for tau in fine], "of the transfer function", color=7),
+        Line(TAUS_S, [t.noise_gain_1_s for t in trades.values()], "measured", "o", color=1),
+        Line(fine, [predict_trade(tau).noise_gain_1_s for tau in fine], "of the transfer function", color=7),
     ]
     x = "tau [s]"
     return Picture(
@@ -105,5 +99,5 @@ def _picture(found: dict[float, Trade]) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The trade."""
+    """Judge the trade."""
     return [lag_claim()]

@@ -18,45 +18,45 @@ from cmg_mj.papers.linear_check import (
 
 
 def linearisation() -> Claim:
-    """(6) and the controllability of (A_e, B_e)."""
+    """Judge (6) and the controllability of (A_e, B_e)."""
     model = printed_model()
     error = finite_difference_error(model)
     margin = controllability_margin(model.A_e, model.B_e)
-    still = dataclasses.replace(model, omega_d=0.0)
-    without = controllability_margin(still.A_e, still.B_e)
+    still_model = dataclasses.replace(model, omega_d=0.0)
+    no_spin = controllability_margin(still_model.A_e, still_model.B_e)
     return Claim(
         place="(6), Section III",
-        says="A and B linearise (4); the pair (A_e, B_e) with the integrator is controllable.",
-        found=(
+        statement="A and B linearise (4); the pair (A_e, B_e) with the integrator is controllable.",
+        result=(
             f"Central differences of (4) give A and B to {error:.1e}. The controllability matrix of (A_e, B_e) has "
             f"full rank: its least singular value is {margin:.1e} of the largest; with the flywheels at rest it is "
-            f"{without:.0e}."
+            f"{no_spin:.0e}."
         ),
-        holds=error < 1e-6 and margin > 1e-9 and without < 1e-15,
-        figures={"finite_difference_error": error, "rank_margin": margin, "rank_margin_flywheels_at_rest": without},
+        holds=error < 1e-6 and margin > 1e-9 and no_spin < 1e-15,
+        figures={"finite_difference_error": error, "rank_margin": margin, "rank_margin_flywheels_at_rest": no_spin},
     )
 
 
 def law_equilibria() -> Claim:
-    """Equilibria of (7) and (8) on the linearisation."""
+    """Judge equilibria of (7) and (8) on the linearisation."""
     model = printed_model()
     rest_7, poles_7 = equilibrium(model.A, model.B, np.array(K_E[:3]), 1.0)
     rest_8, poles_8 = equilibrium(model.A_e, model.B_e, np.array(K_E), 1.0)
     x3, x_e = gimbal_rest(1.0), integrator_rest(1.0)
-    off = max(np.abs(rest_7 - [0.0, 0.0, x3]).max() / abs(x3), np.abs(rest_8 - [0.0, 0.0, 0.0, x_e]).max() / x_e)
+    error = max(np.abs(rest_7 - [0.0, 0.0, x3]).max() / abs(x3), np.abs(rest_8 - [0.0, 0.0, 0.0, x_e]).max() / x_e)
     stable = max(np.real(poles_7).max(), np.real(poles_8).max()) < 0.0
     return Claim(
         place="(7), (8)",
-        says=(
+        statement=(
             "Static feedback leaves the gimbal off by k1/k3 e; with the integrator x goes to zero and x_e settles at "
             "k_e1/k_e4 e (both printed with a minus)."
         ),
-        found=(
+        result=(
             f"Per radian of e, (7) rests at x3 = {rest_7[2]:+.1f} and (8) at x = 0 with x_e = {rest_8[3]:+.1f} s; the "
-            f"closed forms agree to {off:.0e}. Poles of (7): {poles_in_words(poles_7)}; of (8): "
+            f"closed forms agree to {error:.0e}. Poles of (7): {poles_in_words(poles_7)}; of (8): "
             f"{poles_in_words(poles_8)} 1/s."
         ),
-        holds=off < 1e-9 and stable,
+        holds=error < 1e-9 and stable,
         conditions=(
             "With y1 = x1 - e the bias enters (7) and (8) as +k1 e: both offsets have a plus where a minus is printed."
         ),
@@ -71,5 +71,5 @@ def law_equilibria() -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """(6), and (7) with (8)."""
+    """Judge (6), and (7) with (8)."""
     return [linearisation(), law_equilibria()]

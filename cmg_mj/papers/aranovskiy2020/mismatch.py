@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from cmg_mj.papers.aranovskiy2020.rig import push_recovery
+from cmg_mj.papers.aranovskiy2020.rig import push_recovery, run_on_rigs
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.result import Result
 
@@ -19,22 +19,22 @@ Change = Callable[[Plant, float], None]
 
 
 def slower_flywheel(plant: Plant, share: float) -> None:
-    """The second flywheel turns slower by a share (Hypothesis 2 and 3: unequal speeds)."""
-    module, model = plant.modules[1], plant.model
+    """Slow the second flywheel down by a share (Hypothesis 2 and 3: unequal speeds)."""
+    module, model = plant.axis.modules[1], plant.model
     model.key_ctrl[plant.key, module.motor] *= 1.0 - share
     model.key_qvel[plant.key, module.flywheel] *= 1.0 - share
 
 
 def gimbal_offset(plant: Plant, offset_deg: float) -> None:
-    """The second gimbal starts off its place (Hypothesis 2)."""
-    module, model = plant.modules[1], plant.model
+    """Start the second gimbal off its place (Hypothesis 2)."""
+    module, model = plant.axis.modules[1], plant.model
     model.key_qpos[plant.key, module.gimbal] += module.direction * math.radians(offset_deg)
     model.key_act[plant.key, model.actuator_actadr[module.servo]] += module.direction * math.radians(offset_deg)
 
 
 def servo_gain(plant: Plant, share: float) -> None:
-    """The second servo turns its gimbal farther than commanded, by a share (Hypothesis 1)."""
-    module, model = plant.modules[1], plant.model
+    """Let the second servo turn its gimbal farther than commanded, by a share (Hypothesis 1)."""
+    module, model = plant.axis.modules[1], plant.model
     gear = 1.0 / (1.0 + share)
     zero = model.key_qpos[plant.key, module.gimbal]
     # Its setpoint counts in angle times gear, from where the gimbal starts.
@@ -43,8 +43,8 @@ def servo_gain(plant: Plant, share: float) -> None:
 
 
 def gimbal_friction(plant: Plant, torque_n_m: float) -> None:
-    """The second gimbal has dry friction, the first none (Hypothesis 1)."""
-    plant.model.dof_frictionloss[plant.modules[1].gimbal] = torque_n_m
+    """Give the second gimbal dry friction, the first none (Hypothesis 1)."""
+    plant.model.dof_frictionloss[plant.axis.modules[1].gimbal] = torque_n_m
 
 
 @dataclass(frozen=True)
@@ -53,30 +53,30 @@ class Mismatch:
 
     Attributes:
         kind: Its name.
-        change: What it does to a rig.
-        sizes: How large it is.
-        unit: Of the sizes.
-        shown: Number by which a size is multiplied to be shown in that unit.
-        foreseen: Whether `foreseen_yaw_rate` has it.
+        change: Function that breaks a rig so.
+        sizes: Sizes of the mismatch that are tried.
+        unit: Unit of the sizes.
+        display_factor: Number by which a size is multiplied to be shown in that unit.
+        is_predictable: Whether `predict_yaw_rate` has it.
     """
 
     kind: str
     change: Change
     sizes: Sequence[float]
     unit: str
-    shown: float
-    foreseen: bool = True
+    display_factor: float
+    is_predictable: bool = True
 
 
 MISMATCHES = (
     Mismatch("flywheel speed", slower_flywheel, (0.01, 0.02, 0.05, 0.1), "%", 100.0),
     Mismatch("gimbal offset", gimbal_offset, (1.0, 2.0, 5.0, 10.0), "deg", 1.0),
     Mismatch("servo gain", servo_gain, (0.02, 0.05, 0.1, 0.2), "%", 100.0),
-    Mismatch("gimbal friction", gimbal_friction, (0.1, 0.3, 1.0), "N m", 1.0, foreseen=False),
+    Mismatch("gimbal friction", gimbal_friction, (0.1, 0.3, 1.0), "N m", 1.0, is_predictable=False),
 )
 
 
-class Ran(NamedTuple):
+class MismatchRuns(NamedTuple):
     """Symmetric and broken rigs on the same noise and push."""
 
     plant: Plant
@@ -88,13 +88,13 @@ class Ran(NamedTuple):
 
     @property
     def fell(self) -> int:
-        """How many worlds fell."""
+        """Number of worlds that fell."""
         return int(sum(result.fell.sum() for result in (self.symmetric, *self.broken.values())))
 
 
 def run_all(
     mismatches: Sequence[Mismatch], worlds: int, seed: int, duration_s: float, settings: Sequence[str] = ()
-) -> Ran:
+) -> MismatchRuns:
     """Run every mismatch in some worlds, all at once, with (11) in the loop and the push of Figs 5 to 7."""
     # A rig is changed after its step has been chosen, and friction wants a short one to conserve momentum.
     experiment = push_recovery("homogeneous", seed, ["plant.timestep_s=0.001", *settings], duration_s)
@@ -102,7 +102,6 @@ def run_all(
     rigs = [load_plant(experiment.scenario.plant) for _ in range(1 + len(cases))]
     for rig, (mismatch, size) in zip(rigs[1:], cases, strict=True):
         mismatch.change(rig, size)
-    plants = [rig for rig in rigs for _ in range(worlds)]
-    symmetric, *broken = experiment.run_many([*range(worlds)] * len(rigs), plants=plants).split(len(rigs))
+    symmetric, *broken = run_on_rigs(experiment, rigs, worlds)
     kinds = [(mismatch.kind, size) for mismatch, size in cases]
-    return Ran(rigs[0], symmetric, dict(zip(kinds, broken, strict=True)))
+    return MismatchRuns(rigs[0], symmetric, dict(zip(kinds, broken, strict=True)))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.forms_of_10 import Compared, Method, Plain, compared, rk4, rk4_as_printed
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import Comparison, Method, Plain, compare, rk4, rk4_as_printed
 from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime
 from cmg_mj.papers.aranovskiy2020.rig import SEED_OF_10
 from cmg_mj.papers.claim import Claim, OnShare
@@ -14,22 +14,22 @@ from cmg_mj.papers.claim import Claim, OnShare
 SETTLING_S = 8.0
 """The slowest entry, H33, takes 1 s to fall by e^2 [s]."""
 HARMLESS = 0.05
-"""Of the rate's error: if the misprint changes the rate by less, it does not matter which equation the authors ran."""
+"""Share of the rate's error: if the misprint changes the rate by less, either equation may have been run."""
 
 
 class Misprint(NamedTuple):
-    """What the printed Riccati equation changes."""
+    """The changes that the printed Riccati equation makes."""
 
-    corrected: np.ndarray
+    corrected_H: np.ndarray
     """H where the corrected equation settles at rest, (3, 3)."""
-    printed: np.ndarray
+    printed_H: np.ndarray
     """H where the printed one does, (3, 3)."""
-    rate: Compared
+    rate: Comparison
     """The corrected form and the printed one along a closed-loop run."""
 
 
-def settled(method: Method, h: float = 1e-3) -> np.ndarray:
-    """H where a method settles at rest, (3, 3)."""
+def settle(method: Method, h: float = 1e-3) -> np.ndarray:
+    """Return H where a method settles at rest, (3, 3)."""
     H = H_0
     for _ in range(round(SETTLING_S / h)):
         H = method(H, A_prime(), h)
@@ -38,23 +38,23 @@ def settled(method: Method, h: float = 1e-3) -> np.ndarray:
 
 def misprint(seed: int = SEED_OF_10) -> Misprint:
     """Integrate both equations, at rest and along a run, with Runge-Kutta 4."""
-    along = compared(Plain(rk4), Plain(rk4_as_printed), seed)
-    return Misprint(settled(rk4), settled(rk4_as_printed), along)
+    comparison = compare(Plain(rk4), Plain(rk4_as_printed), seed)
+    return Misprint(settle(rk4), settle(rk4_as_printed), comparison)
 
 
 def misprint_claim(seed: int = SEED_OF_10) -> Claim:
-    """The Riccati equation as printed."""
-    H, printed, rate = misprint(seed)
-    asymmetry = float(abs(printed[0, 1] - printed[1, 0]) / printed[1, 0])
-    gain = float(np.abs(printed[:, ::2] - H[:, ::2]).max() / np.abs(H[:, ::2]).max())
+    """Judge the Riccati equation as printed."""
+    H, printed_H, rate = misprint(seed)
+    asymmetry = float(abs(printed_H[0, 1] - printed_H[1, 0]) / printed_H[1, 0])
+    gain = float(np.abs(printed_H[:, ::2] - H[:, ::2]).max() / np.abs(H[:, ::2]).max())
     return Claim(
         place="After (10), the Riccati equation",
-        says="The symmetric gain matrix of (10) is the solution of H' = H A^T + A' H - H C^T C H + Q.",
-        found=(
-            f"With A of (6) as printed, H settles at rest with H12 = {printed[0, 1]:.1f} and H21 = "
-            f"{printed[1, 0]:.1f}: not symmetric, by {asymmetry:.1%}. With A'^T in A^T's place both are "
+        statement="The symmetric gain matrix of (10) is the solution of H' = H A^T + A' H - H C^T C H + Q.",
+        result=(
+            f"With A of (6) as printed, H settles at rest with H12 = {printed_H[0, 1]:.1f} and H21 = "
+            f"{printed_H[1, 0]:.1f}: not symmetric, by {asymmetry:.1%}. With A'^T in A^T's place both are "
             f"{H[1, 0]:.1f}. The observer uses H C^T alone, of which the largest change is {gain:.2%} of its largest "
-            f"entry (H11 {H[0, 0]:.2f}, printed {printed[0, 0]:.2f}). Along a closed-loop run the rate changes by "
+            f"entry (H11 {H[0, 0]:.2f}, printed {printed_H[0, 0]:.2f}). Along a closed-loop run the rate changes by "
             f"{rate.difference:.4f} rad/s RMS (H by Runge-Kutta 4, the estimate by "
             f"Euler), its error from {rate.error:.4f} to {rate.other_error:.4f} rad/s."
         ),
@@ -67,8 +67,8 @@ def misprint_claim(seed: int = SEED_OF_10) -> Claim:
         ),
         otherwise="As printed it is not symmetric, and the observer would be another one.",
         figures={
-            "H12_printed": float(printed[0, 1]),
-            "H21_printed": float(printed[1, 0]),
+            "H12_printed": float(printed_H[0, 1]),
+            "H21_printed": float(printed_H[1, 0]),
             "H12": float(H[0, 1]),
             "largest_change_of_gain_share": gain,
             "rate_changed_rad_s": rate.difference,
@@ -79,5 +79,5 @@ def misprint_claim(seed: int = SEED_OF_10) -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The misprint."""
+    """Judge the misprint."""
     return [misprint_claim()]

@@ -13,6 +13,7 @@ import numpy as np
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.papers.aranovskiy2020.paper import gimbal_torque, printed_model
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.linear_check import model_difference
 from cmg_mj.plant.plant import Plant, load_plant
 
 SEED = 70_000
@@ -20,25 +21,24 @@ SEED = 70_000
 
 @cache
 def balanced_rig() -> Plant:
-    """The scissored pair without a bias."""
+    """Return the scissored pair without a bias."""
     return load_plant(equilibrium_bias_deg=0.0)
 
 
 def table_1() -> Claim:
-    """The constants of the compiled six-body model beside those of Table 1."""
-    ours, paper = balanced_rig().reduced, printed_model()
-    names = ("J1", "J2", "J_d", "omega_d", "gravity_torque")
-    off = max(abs(getattr(ours, name) / getattr(paper, name) - 1.0) for name in names)
+    """Judge the constants of the compiled six-body model beside those of Table 1."""
+    paper = printed_model()
+    error = model_difference(balanced_rig().reduced, paper)
     pole = math.sqrt(paper.gravity_torque / paper.J1)
     return Claim(
         place="Table 1",
-        says="Masses, lengths and inertias of the rig, from which J1 and J2 below (2) follow.",
-        found=(
+        statement="Masses, lengths and inertias of the rig, from which J1 and J2 below (2) follow.",
+        result=(
             f"J1 = {paper.J1:.6f} kg m^2, J2 = {paper.J2:.2e} kg m^2, "
             f"J_d omega_d = {paper.J_d * paper.omega_d:.4f} N m s, m g l/sqrt(2) = {paper.gravity_torque:.4f} N m, "
-            f"unstable pole {pole:.2f} 1/s. Read off the compiled six-body model they agree to {off:.1e}."
+            f"unstable pole {pole:.2f} 1/s. Read off the compiled six-body model they agree to {error:.1e}."
         ),
-        holds=off < 1e-9,
+        holds=error < 1e-9,
         conditions=(
             "m is printed as the total mass, but T and P use it as the mass of each half; read so, they fit together."
         ),
@@ -49,7 +49,7 @@ def table_1() -> Claim:
             "spin_momentum_n_m_s": paper.J_d * paper.omega_d,
             "gravity_torque_n_m": paper.gravity_torque,
             "unstable_pole_1_s": pole,
-            "largest_relative_difference": off,
+            "largest_relative_difference": error,
         },
     )
 
@@ -58,11 +58,11 @@ class Residuals(NamedTuple):
     """The six-body model's accelerations less the reduced model's, RMS over random states [rad/s^2]; then torques."""
 
     tilt: float
-    """With the flywheels' own acceleration counted."""
+    """The tilt's, with the flywheels' own acceleration counted."""
     tilt_as_printed: float
-    """As (3) is printed, which takes omega_d' for zero (Hypothesis 3)."""
+    """The tilt's, by (3) as printed, which takes omega_d' for zero (Hypothesis 3)."""
     tilt_turned_J2: float
-    """With J2's sign turned: what the comparison can tell apart."""
+    """The tilt's, with J2's sign turned: a difference that the comparison must see."""
     yaw: float
     """Acceleration of body A, which Hypotheses 1 and 2 say is zero."""
     size: float
@@ -70,7 +70,7 @@ class Residuals(NamedTuple):
     torque: float
     """The gimbal's torque less tau_c of (2) [N m]."""
     torque_turned_J2: float
-    """With the sign of its last term turned [N m]."""
+    """The same with the sign of the last term turned [N m]."""
     torque_without_flywheel: float
     """Without the flywheel's term, which is what the servo has to bear [N m]."""
     torque_size: float
@@ -78,15 +78,7 @@ class Residuals(NamedTuple):
 
 
 def residuals(states: int, seed: int) -> Residuals:
-    """Compare (3) with MuJoCo at random symmetric states, under random symmetric torques.
-
-    Args:
-        states: How many.
-        seed: Of the random numbers.
-
-    Returns:
-        The residuals.
-    """
+    """Compare (3) with MuJoCo at random symmetric states, under random symmetric torques."""
     plant = balanced_rig()
     model = copy(plant.model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
@@ -101,7 +93,7 @@ def residuals(states: int, seed: int) -> Residuals:
         gimbal_torque_n_m, motor_torque = rng.uniform(-1.0, 1.0), rng.uniform(-0.2, 0.2)
         mujoco.mj_resetDataKeyframe(model, data, plant.key)
         data.qpos[plant.tilt], data.qvel[plant.tilt] = plant.tilt_zero + x1, x2
-        for module in plant.modules:
+        for module in plant.axis.modules:
             data.qpos[module.gimbal], data.qvel[module.gimbal] = (
                 module.gimbal_zero + module.direction * x3,
                 module.direction * u,
@@ -110,23 +102,23 @@ def residuals(states: int, seed: int) -> Residuals:
             data.qfrc_applied[module.gimbal] = module.direction * gimbal_torque_n_m
             data.qfrc_applied[module.flywheel] = math.copysign(1.0, module.speed) * motor_torque
         mujoco.mj_forward(model, data)
-        spin_up = data.qacc[plant.modules[0].flywheel] * math.copysign(1.0, plant.modules[0].speed)
+        spin_up = data.qacc[plant.axis.modules[0].flywheel] * math.copysign(1.0, plant.axis.modules[0].speed)
 
-        def f2(J2: float, at: tuple = (x1, x2, x3, u), speed: float = speed) -> float:
-            return ReducedModel(reduced.J1, J2, reduced.J_d, speed, reduced.gravity_torque).tilt_acceleration(*at)
+        def f2(J2: float, state: tuple = (x1, x2, x3, u), speed: float = speed) -> float:
+            return ReducedModel(reduced.J1, J2, reduced.J_d, speed, reduced.gravity_torque).tilt_acceleration(*state)
 
         q = float(data.qacc[plant.tilt])
         # d/dt of J_d omega_d sin x3, of which (3) has the part with x3'.
         by_spin_up = reduced.J_d * math.sin(x3) * float(spin_up) / (reduced.J1 + reduced.J2 * math.sin(x3) ** 2)
-        off, off_turned = q - f2(reduced.J2), q - f2(-reduced.J2)
-        module = plant.modules[0]
+        difference, difference_turned = q - f2(reduced.J2), q - f2(-reduced.J2)
+        module = plant.axis.modules[0]
         turning = module.direction * float(data.qacc[module.gimbal])
         miss = gimbal_torque_n_m - gimbal_torque(x2, x3, turning, speed)
         last = gimbal_torque(x2, x3, 0.0, 0.0)  # that of J2 alone
         flywheel = gimbal_torque(x2, x3, 0.0, speed) - last
         rows.append(
             (
-                *(off - by_spin_up, off, off_turned - by_spin_up, data.qacc[plant.yaw], q),
+                *(difference - by_spin_up, difference, difference_turned - by_spin_up, data.qacc[plant.yaw], q),
                 *(miss, miss + 2.0 * last, miss + flywheel, gimbal_torque_n_m),
             )
         )
@@ -134,11 +126,12 @@ def residuals(states: int, seed: int) -> Residuals:
 
 
 def equations_2_to_4(r: Residuals, states: int) -> Claim:
-    """(3) and (4) against MuJoCo's six bodies."""
+    """Judge (3) and (4) against MuJoCo's six bodies."""
     return Claim(
         place="(2) to (4)",
-        says="Under Hypotheses 1 to 3 the six bodies move as one pendulum with one gimbal, and body A stands still.",
-        found=(
+        statement="Under Hypotheses 1 to 3 the six bodies move as one pendulum with one gimbal, and body A stands "
+        "still.",
+        result=(
             f"At {states} random symmetric states the six-body model's tilt acceleration (RMS {r.size:.1f} rad/s^2) "
             f"equals (3) to {r.tilt:.1e} once J_d omega_d' sin x3 is added, and body A's is {r.yaw:.1e}. With motor "
             f"torques up to 0.2 N m what (3) leaves out is {r.tilt_as_printed:.2f} rad/s^2; J2's sign turned would be "
@@ -153,11 +146,12 @@ def equations_2_to_4(r: Residuals, states: int) -> Claim:
 
 
 def gimbals_line(r: Residuals, states: int) -> Claim:
-    """The second line of (2), which the velocity servos make superfluous later."""
+    """Judge the second line of (2), which the velocity servos make superfluous later."""
     return Claim(
         place="(2), tau_c",
-        says="A gimbal's torque is (I_c + I_d) omega_c' + J_d omega_b omega_d sin q_c + J2 sin(2 q_c) omega_b^2/2.",
-        found=(
+        statement="A gimbal's torque is (I_c + I_d) omega_c' + J_d omega_b omega_d sin q_c + J2 sin(2 q_c) "
+        "omega_b^2/2.",
+        result=(
             f"At the same {states} states, under gimbal torques of {r.torque_size:.2f} N m RMS, the six bodies have it "
             f"to {r.torque:.1e} N m. With the sign of the last term turned it would be {r.torque_turned_J2:.1e} off. "
             f"The flywheel's term, which a servo has to bear while the rig tilts, is {r.torque_without_flywheel:.2f} "
@@ -173,7 +167,7 @@ def gimbals_line(r: Residuals, states: int) -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Table 1, and (2) to (4)."""
+    """Judge Table 1, and (2) to (4)."""
     states = 500
-    found = residuals(states, SEED)
-    return [table_1(), equations_2_to_4(found, states), gimbals_line(found, states)]
+    rms = residuals(states, SEED)
+    return [table_1(), equations_2_to_4(rms, states), gimbals_line(rms, states)]

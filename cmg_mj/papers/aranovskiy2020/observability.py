@@ -14,13 +14,13 @@ from cmg_mj.papers.linear_check import rank_margin
 
 
 def observability_margin(a: float, outputs: np.ndarray = C) -> float:
-    """Rank margin of [C; C A'; C A'^2], for the outputs C."""
+    """Return the rank margin of [C; C A'; C A'^2], for the outputs C."""
     A = A_prime(a)
     return rank_margin(np.vstack([outputs, outputs @ A, outputs @ A @ A]))
 
 
 def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, float]:
-    """Least and largest eigenvalue of the observability Gramian over every span of a run.
+    """Return the least and largest eigenvalue of the observability Gramian over every span of a run.
 
     Phi(t, s) of A' has the first row [1, phi, 0] with phi' = exp(integral of a): Simpson's rule over the span, a held
     between ticks.
@@ -39,10 +39,10 @@ def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, floa
     weights *= dt / 3.0
     least, largest = math.inf, 0.0
     for start in range(len(a) - n):
-        held = a[start : start + n]
-        growth = np.exp(np.concatenate([[0.0], np.cumsum(held * dt)]))
+        a_span = a[start : start + n]
+        growth = np.exp(np.concatenate([[0.0], np.cumsum(a_span * dt)]))
         with np.errstate(invalid="ignore", divide="ignore"):
-            step = np.where(np.abs(held) < 1e-9, dt, np.expm1(held * dt) / held)
+            step = np.where(np.abs(a_span) < 1e-9, dt, np.expm1(a_span * dt) / a_span)
         phi = np.concatenate([[0.0], np.cumsum(growth[:-1] * step)])
         gramian = np.array([[span_s, weights @ phi], [weights @ phi, weights @ phi**2]])
         values = np.linalg.eigvalsh(gramian)
@@ -51,7 +51,7 @@ def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, floa
 
 
 def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
-    """The uniform observability that (10) needs."""
+    """Judge the uniform observability that (10) needs."""
     grid = [
         (u, y2)
         for u in np.linspace(-StateFeedback.rate_limit, StateFeedback.rate_limit, 21)
@@ -59,30 +59,30 @@ def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
     ]
     dampings = [float(damping(u, float(y2))) for u, y2 in grid]
     margin = min(observability_margin(a) for a in dampings)
-    without = max(observability_margin(a, C[1:]) for a in dampings)
+    margin_without_tilt = max(observability_margin(a, C[1:]) for a in dampings)
     run = run_of_10(seed)
     least, largest = gramian_bounds(np.asarray(damping(run["u_rad_s"], run["y2_rad"])), DT, span_s)
-    worst = [gramian_bounds(np.full(round(span_s / DT) + 1, a), DT, span_s) for a in (min(dampings), max(dampings))]
-    bound = min(pair[0] for pair in worst), max(pair[1] for pair in worst)
+    extremes = [gramian_bounds(np.full(round(span_s / DT) + 1, a), DT, span_s) for a in (min(dampings), max(dampings))]
+    bound = min(pair[0] for pair in extremes), max(pair[1] for pair in extremes)
     return Claim(
         place="After (10)",
-        says="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
-        found=(
+        statement="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
+        result=(
             "[C; C A'; C A'^2] has rank 3 for every u and y2: its rows hold e1, e3 and e2, whatever a = -u J2 sin(2 "
             f"y2)/D is (least by largest singular value at least {margin:.2f}; without the tilt measured "
-            f"{without:.0e}). Uniformity needs a bounded a besides, which the rate limit gives: |a| <= "
+            f"{margin_without_tilt:.0e}). Uniformity needs a bounded a besides, which the rate limit gives: |a| <= "
             f"{max(map(abs, dampings)):.4f} 1/s. Over every {span_s:g} s of a closed-loop run the Gramian's "
             f"eigenvalues lie between {least:.5f} and {largest:.5f}; for any a within the bound, between "
             f"{bound[0]:.5f} and {bound[1]:.5f}."
         ),
-        holds=margin > 0.1 and without < 1e-12 and bound[0] > 0.0 and math.isfinite(bound[1]),
+        holds=margin > 0.1 and margin_without_tilt < 1e-12 and bound[0] > 0.0 and math.isfinite(bound[1]),
         conditions=(
             "Pointwise observability alone is not uniform; a bounded u, as the servos have it, closes the gap."
         ),
         otherwise="The pair is not observable for some u and y2, or not uniformly.",
         figures={
             "rank_margin": margin,
-            "rank_margin_without_tilt": without,
+            "rank_margin_without_tilt": margin_without_tilt,
             "largest_damping_1_s": max(map(abs, dampings)),
             "span_s": span_s,
             "gramian_along_run": [least, largest],
@@ -92,5 +92,5 @@ def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The uniform observability that (10) needs."""
+    """Judge the uniform observability that (10) needs."""
     return [observability()]

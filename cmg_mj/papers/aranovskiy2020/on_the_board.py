@@ -1,4 +1,4 @@
-"""What the observers of aranovskiy2020 cost on the processor of its rig, an STM32F746, as far as an emulator can say.
+"""The cost of aranovskiy2020's observers on its rig's processor, an STM32F746, as far as an emulator can say.
 
 `on_the_board.json` stands in where the cross-compiler, the emulator or CasADi is missing; `python -m
 cmg_mj.papers.aranovskiy2020.record_on_the_board` writes it anew.
@@ -27,11 +27,11 @@ class Instructions(NamedTuple):
     """Instructions of an update of the observer alone, the median along a run.
 
     Attributes:
-        of: By observer, those of the package and (10) written out.
+        by_observer: By observer, those of the package and (10) written out.
         counted_here: Whether they were counted now, or read from the file.
     """
 
-    of: dict[str, float]
+    by_observer: dict[str, float]
     counted_here: bool
 
 
@@ -43,15 +43,15 @@ def count() -> dict[str, float]:
         )
         for name in OBSERVERS
     }
-    counted = {name: cost_of(run, run.axis_controller())["step_instructions"] for name, run in runs.items()}
+    counts = {name: cost_of(run, run.axis_controller())["step_instructions"] for name, run in runs.items()}
     of_10 = runs["ltv"]
     for name, method in PLAIN.items():
-        counted[name] = cost_of(of_10, of_10.axis_controller(observer=Plain(method)))["step_instructions"]
-    return counted
+        counts[name] = cost_of(of_10, of_10.axis_controller(observer=Plain(method)))["step_instructions"]
+    return counts
 
 
 def instructions() -> Instructions:
-    """Counted where that can be done, recorded elsewhere."""
+    """Count the instructions where that can be done; elsewhere read the recorded ones."""
     if available():
         return Instructions(count(), True)
     return Instructions(json.loads(RECORDED.read_text(encoding="utf-8")), False)

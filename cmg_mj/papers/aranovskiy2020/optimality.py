@@ -14,22 +14,22 @@ from cmg_mj.papers.claim import Claim, OnShare
 
 
 class Inverse(NamedTuple):
-    """What return difference says of a gain."""
+    """The answer of the return difference for a gain."""
 
     least: float
     """min over w of |1 + K (jw - A)^-1 B|."""
     optimal: bool
-    """Whether some Q >= 0 makes K the LQR gain (Kalman 1964: the minimum is not below 1)."""
+    """True if some Q >= 0 makes K the LQR gain (Kalman 1964: the minimum is not below 1)."""
     Q: np.ndarray | None
     """Such a Q, (n, n), of rank 1."""
     recovered: float
-    """How far the Riccati equation's gain for that Q is off, relative."""
+    """Relative error of the Riccati equation's gain for that Q."""
     diagonal: np.ndarray
     """The one diagonal of Q that would give K: with a negative entry no diagonal Q >= 0 does."""
 
 
 def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
-    """Is K the LQR gain of x' = A x + B u for some cost x' Q x + u^2?
+    """Decide whether K is the LQR gain of x' = A x + B u for some cost x' Q x + u^2.
 
     With d the open-loop and p the closed-loop polynomial and n_i/d the transfer function to x_i, a cost Q = diag(q)
     gives |p(jw)|^2 - |d(jw)|^2 = sum of q_i |n_i(jw)|^2, and Q = c c' gives |sum of c_i n_i|^2.
@@ -57,8 +57,8 @@ def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
     if not optimal:
         return Inverse(float(np.sqrt(ratio.min())), False, None, math.inf, diagonal)
     # Spectral factor: the half of the roots of gap(-s^2) to the left.
-    left = [-np.sqrt(-w) if np.sqrt(-w).real > 0.0 else np.sqrt(-w) for w in roots.astype(complex)]
-    factor = math.sqrt(abs(gap[0])) * np.real(np.poly(left))
+    left_roots = [-np.sqrt(-w) if np.sqrt(-w).real > 0.0 else np.sqrt(-w) for w in roots.astype(complex)]
+    factor = math.sqrt(abs(gap[0])) * np.real(np.poly(left_roots))
     c = np.linalg.solve(numerators[:, 1:].T, factor)
     Q = np.outer(c, c)
     P = solve_continuous_are(A, B, Q, np.eye(1))
@@ -67,7 +67,7 @@ def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
 
 
 def _squared(polynomial: np.ndarray) -> np.ndarray:
-    """|p(jw)|^2 as a polynomial in w^2, highest power first."""
+    """Return |p(jw)|^2 as a polynomial in w^2, highest power first."""
     n = len(polynomial) - 1
     mirrored = polynomial * (-1.0) ** (n - np.arange(n + 1))
     even = np.convolve(polynomial, mirrored)[::2]  # p(s) p(-s) in s^2
@@ -80,18 +80,18 @@ class Diagonal(NamedTuple):
     Q: np.ndarray
     """Its entries, none below 0, (n,)."""
     gain: np.ndarray
-    """What it gives, with R = 1, (n,)."""
+    """Its gain with R = 1, (n,)."""
     off: float
     """Largest difference from the printed gain, by half a unit of the digit it is printed with: 1 is rounding's."""
 
 
 def lqr_gain(A: np.ndarray, B: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
-    """The gain for Q = diag(diagonal), R = 1, (n,)."""
+    """Return the gain for Q = diag(diagonal), R = 1, (n,)."""
     return (B.T @ solve_continuous_are(A, B, np.diag(diagonal), np.eye(1)))[0]
 
 
 LEAST_WEIGHT = 1e-3
-"""Of a diagonal Q: a state that hardly counts."""
+"""Least weight in a diagonal Q: a state that hardly counts."""
 
 
 def nearest_diagonal(
@@ -105,7 +105,7 @@ def nearest_diagonal(
         K: The gain as printed, (n,).
         rounding: Half a unit of the digit that each entry of it is printed with, (n,).
         start: A diagonal near the one sought, (n,); entries below 0.01 count as 0.01.
-        searches: How often the search starts again from where it ended: a simplex may collapse.
+        searches: Number of starts of the search, each from where it ended: a simplex may collapse.
 
     Returns:
         The best that was found.
@@ -120,59 +120,59 @@ def nearest_diagonal(
         except LinAlgError:  # Q with entries too far apart for the solver
             return math.inf
 
-    best = np.log(np.maximum(start, 0.01))
+    optimum = np.log(np.maximum(start, 0.01))
     for _ in range(searches):
-        best = minimize(off, best, method="Nelder-Mead", options={"maxiter": 150, "xatol": 1e-3, "fatol": 1e-3}).x
-    return Diagonal(weights(best), lqr_gain(A, B, weights(best)), off(best))
+        optimum = minimize(off, optimum, method="Nelder-Mead", options={"maxiter": 150, "xatol": 1e-3, "fatol": 1e-3}).x
+    return Diagonal(weights(optimum), lqr_gain(A, B, weights(optimum)), off(optimum))
 
 
 def lqr_gains() -> Claim:
-    """Whether Table 2's K_e is an LQR gain."""
+    """Judge whether Table 2's K_e is an LQR gain."""
     model = printed_model()
     K = np.array(K_E)
-    found = inverse_optimality(model.A_e, model.B_e, K)
-    near = nearest_diagonal(model.A_e, model.B_e, K, np.array(K_E_ROUNDING), found.diagonal)
-    negative = [f"q{i + 1} = {q:.3g}" for i, q in enumerate(found.diagonal) if q < 0.0]
+    inverse = inverse_optimality(model.A_e, model.B_e, K)
+    nearest = nearest_diagonal(model.A_e, model.B_e, K, np.array(K_E_ROUNDING), inverse.diagonal)
+    negative = [f"q{i + 1} = {q:.3g}" for i, q in enumerate(inverse.diagonal) if q < 0.0]
     digits = (
         f"No diagonal Q does it exactly: the only candidate has {', '.join(negative)}. "
         if negative
-        else "A diagonal Q does it exactly: " + ", ".join(f"{q:.3g}" for q in found.diagonal) + ". "
+        else "A diagonal Q does it exactly: " + ", ".join(f"{q:.3g}" for q in inverse.diagonal) + ". "
     )
-    some = (
-        f"and a Q >= 0 of rank 1 returns K_e from the Riccati equation to {found.recovered:.0e}"
-        if found.optimal
+    recovery = (
+        f"and a Q >= 0 of rank 1 returns K_e from the Riccati equation to {inverse.recovered:.0e}"
+        if inverse.optimal
         else "so no Q >= 0 has it"
     )
-    weights = ", ".join(f"{q:.3g}" for q in near.Q)
-    gains = ", ".join(f"{gain:.4g}" for gain in near.gain)
+    weights = ", ".join(f"{q:.3g}" for q in nearest.Q)
+    gains = ", ".join(f"{gain:.4g}" for gain in nearest.gain)
     return Claim(
         place="Table 2, K_e",
-        says="K_e = [35, 4, -1, 0.3] are LQR gains; the weights are not given.",
-        found=(
-            f"The return difference |1 + K_e (jw - A_e)^-1 B_e| is nowhere below {found.least:.6f}: K_e "
-            f"{'is' if found.optimal else 'is not'} optimal for some quadratic cost, {some}. {digits}"
-            f"To the digits printed Q = diag({weights}), R = 1 {'does' if near.off < 1.0 else 'comes nearest'}: it "
-            f"gives ({gains}), off K_e by at most {near.off:.2f} of half a unit of the last digit."
+        statement="K_e = [35, 4, -1, 0.3] are LQR gains; the weights are not given.",
+        result=(
+            f"The return difference |1 + K_e (jw - A_e)^-1 B_e| is nowhere below {inverse.least:.6f}: K_e "
+            f"{'is' if inverse.optimal else 'is not'} optimal for some quadratic cost, {recovery}. {digits}"
+            f"To the digits printed Q = diag({weights}), R = 1 {'does' if nearest.off < 1.0 else 'comes nearest'}: it "
+            f"gives ({gains}), off K_e by at most {nearest.off:.2f} of half a unit of the last digit."
         ),
-        holds=found.optimal and found.recovered < 1e-6,
+        holds=inverse.optimal and inverse.recovered < 1e-6,
         conditions=(
             ""
-            if near.off < 1.0
+            if nearest.off < 1.0
             else "The cost is not a weighted sum of squares of the single states, not even to the digits printed."
         ),
         otherwise="They are no LQR gains.",
         figures={
-            "least_return_difference": found.least,
-            "recovered_gain_relative_error": found.recovered if found.optimal else None,
-            "Q": None if found.Q is None else found.Q.tolist(),
-            "diagonal_candidate": found.diagonal.tolist(),
-            "diagonal_within_rounding": near.Q.tolist(),
-            "gain_within_rounding": near.gain.tolist(),
-            "difference_by_rounding": near.off,
+            "least_return_difference": inverse.least,
+            "recovered_gain_relative_error": inverse.recovered if inverse.optimal else None,
+            "Q": None if inverse.Q is None else inverse.Q.tolist(),
+            "diagonal_candidate": inverse.diagonal.tolist(),
+            "diagonal_within_rounding": nearest.Q.tolist(),
+            "gain_within_rounding": nearest.gain.tolist(),
+            "difference_by_rounding": nearest.off,
         },
     )
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The gains of (8)."""
+    """Judge the gains of (8)."""
     return [lqr_gains()]

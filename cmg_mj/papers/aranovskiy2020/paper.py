@@ -1,4 +1,4 @@
-"""What aranovskiy2020 prints: Tables 1 and 2, the reduced model, where the law rests, the observer (10)."""
+"""aranovskiy2020 as printed: Tables 1 and 2, the reduced model, where the law rests, the observer (10)."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ OBSERVERS = {"linear": "(9)", "ltv": "(10)", "homogeneous": "(11)"}
 """The paper's three by the bench's names, and their equations."""
 
 Q, H_0 = np.diag(TABLE_2["ltv"]["Q"]), np.diag(TABLE_2["ltv"]["H0"])
-"""Of (10), (3, 3)."""
+"""Q and H(0) of (10), (3, 3)."""
 
 C = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """After (10): tilt and gimbal angle are measured."""
@@ -49,7 +49,7 @@ C = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 @cache
 def printed_model() -> ReducedModel:
-    """J1, J2, J_d omega_d and m g l/sqrt(2) by the closed forms below (2), from Table 1's numbers alone."""
+    """Return J1, J2, J_d omega_d and m g l/sqrt(2) by the closed forms below (2), from Table 1's numbers alone."""
     t = TABLE_1
     return ReducedModel(
         J1=t["I_d"] + t["J_b"] + t["K_c"] + t["m"] * t["l"] ** 2 / 2.0,
@@ -61,7 +61,7 @@ def printed_model() -> ReducedModel:
 
 
 def gimbal_torque(x2: float, x3: float, gimbal_acceleration: float, omega_d: float) -> float:
-    """tau_c, the second line of (2), with q_c = x3 + pi/2 [N m].
+    """Return tau_c, the second line of (2), with q_c = x3 + pi/2 [N m].
 
     Args:
         x2: omega_b [rad/s].
@@ -73,9 +73,9 @@ def gimbal_torque(x2: float, x3: float, gimbal_acceleration: float, omega_d: flo
         The torque on one gimbal.
     """
     q_c = x3 + math.pi / 2.0
-    own = (TABLE_1["I_c"] + TABLE_1["I_d"]) * gimbal_acceleration
-    turned = 0.5 * printed_model().J2 * math.sin(2.0 * q_c) * x2**2
-    return own + TABLE_1["J_d"] * x2 * omega_d * math.sin(q_c) + turned
+    inertial_torque = (TABLE_1["I_c"] + TABLE_1["I_d"]) * gimbal_acceleration
+    tilt_torque = 0.5 * printed_model().J2 * math.sin(2.0 * q_c) * x2**2
+    return inertial_torque + TABLE_1["J_d"] * x2 * omega_d * math.sin(q_c) + tilt_torque
 
 
 def gimbal_rest(e: float) -> float:
@@ -91,7 +91,7 @@ def integrator_rest(e: float) -> float:
 
 
 def damping(u: float | np.ndarray, y2: float | np.ndarray) -> float | np.ndarray:
-    """A = -u J2 sin(2 y2)/(J1 + J2 sin(y2)^2), the one entry of A' in (10) that varies [1/s]."""
+    """Return a = -u J2 sin(2 y2)/(J1 + J2 sin(y2)^2), the one entry of A' in (10) that varies [1/s]."""
     return -u * printed_model().terms(0.0, y2)[2]
 
 
@@ -106,7 +106,7 @@ def riccati_slope(H: np.ndarray, A: np.ndarray, first: np.ndarray | None = None)
     Args:
         H: The gain matrix, (3, 3).
         A: A', (3, 3).
-        first: What stands transposed in the first term instead: A of (6) is printed there. (3, 3).
+        first: Matrix that stands transposed in the first term instead: A of (6) is printed there. (3, 3).
 
     Returns:
         The slope.

@@ -1,4 +1,4 @@
-"""Where the closed loop of aranovskiy2020 rests: (7), (8) and the text after (10), on the six-body model."""
+"""The rest of aranovskiy2020's closed loop: (7), (8) and the text after (10), on the six-body model."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ import numpy as np
 
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import K_E, gimbal_rest, integrator_rest, printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT, push_recovery
+from cmg_mj.papers.aranovskiy2020.rig import DT, push_recovery, replay_at_rest
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
-from cmg_mj.replay import replay
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
@@ -31,7 +30,7 @@ TRUE_RATE = "the true rate, (8)"
 
 
 class Case(NamedTuple):
-    """What the law is fed with."""
+    """The law's inputs in one case."""
 
     observer: str
     settings: Sequence[str]
@@ -61,25 +60,25 @@ class Rest(NamedTuple):
     example: Trajectory
     """World 0."""
 
-    def at_zero(self, expected_x_e: float) -> bool:
-        """Whether x rests at zero and the integrator where it should, within a twentieth of e and of the offset."""
+    def is_at_zero(self, expected_x_e: float) -> bool:
+        """Return true if x rests at zero and the integrator where it should, to a twentieth of e and of the offset."""
         return abs(self.x1.mean) < BIAS_DEG / 20.0 and abs(self.x_e.mean / expected_x_e - 1.0) < 0.05
 
 
-def rests_of(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> list[Rest]:
+def find_rests(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> list[Rest]:
     """Let the rig come to rest, without a push: a case of `CASES`, how many worlds, and settings beside its own."""
-    still = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
+    common = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
     runs = []
     for case, worlds, extra in cases:
         observer, settings, *_ = CASES[case]
-        runs.append(run_of(push_recovery(observer, seed, [*still, *settings, *extra], DURATION_S), worlds))
+        runs.append(run_of(push_recovery(observer, seed, [*common, *settings, *extra], DURATION_S), worlds))
     results = run_side_by_side(runs)
     return [
-        _rest(CASES[case].observer, trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)
+        _average(CASES[case].observer, trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)
     ]
 
 
-def _rest(observer: str, trajectory: Trajectory) -> Rest:
+def _average(observer: str, trajectory: Trajectory) -> Rest:
     late = trajectory["time_s"] >= DURATION_S - AVERAGED_S
 
     def mean(name: str, factor: float = 1.0) -> Interval:
@@ -91,7 +90,7 @@ def _rest(observer: str, trajectory: Trajectory) -> Rest:
 
 
 def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple[float, float]:
-    """What an observer makes of the rig at rest on average: y2 = 0, u = 0, y1 = -e and white noise.
+    """Replay an observer on the rig at rest on average: y2 = 0, u = 0, y1 = -e and white noise.
 
     The noise matters to (11) alone: its gains fall with the size of its error, so that noise adds to its bias.
 
@@ -99,7 +98,7 @@ def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple
         observer: Its name.
         e_deg: The bias [deg].
         sigma: Standard deviation of y1's noise [rad].
-        seed: Of the noise.
+        seed: Seed of the noise.
 
     Returns:
         The means of its x1 [rad] and x2 [rad/s].
@@ -107,8 +106,7 @@ def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple
     ticks, settling, copies = 1200, 400, 64
     noise = np.random.default_rng(seed).normal(0.0, sigma, (ticks, copies))
     noise = np.hstack([noise, -noise])  # whose mean is zero
-    columns = {"y1_rad": noise - math.radians(e_deg), "y2_rad": np.zeros_like(noise), "u_rad_s": np.zeros_like(noise)}
-    estimate = replay(make_observer(observer, DT, printed_model()), Trajectory(columns))
+    estimate = replay_at_rest(make_observer(observer, DT, printed_model()), noise - math.radians(e_deg))
     return float(estimate.x1[settling:].mean()), float(estimate.x2[settling:].mean())
 
 
@@ -123,18 +121,18 @@ def expected_integrator(case: str, e_deg: float, sigma: float, seed: int = SEED)
 
 
 def laws_claim(rest: Rest, static: Rest) -> Claim:
-    """(8), and (7), which has no integrator."""
+    """Judge (8), and (7), which has no integrator."""
     x_e, x3 = integrator_rest(math.radians(BIAS_DEG)), gimbal_rest(BIAS_DEG)
     return Claim(
         place="(7), (8) on the rig",
-        says="Without the integrator the gimbal rests away from zero; with it x converges to zero.",
-        found=(
+        statement="Without the integrator the gimbal rests away from zero; with it x converges to zero.",
+        result=(
             f"Six bodies, e = {BIAS_DEG:g} deg, the true rate in the law. k4 = 0: x3 rests at {static.x3.mean:.2f} "
             f"deg (k1/k3 e = {x3:.2f}). With K_e, mean over the last {AVERAGED_S:g} s of {DURATION_S:g}, {WORLDS} "
-            f"seeds: tilt {plus_minus(rest.x1, signed=True)} deg, gimbal {rest.x3.mean:+.2f} deg, x_e = "
+            f"seeds: tilt {plus_minus(rest.x1, with_sign=True)} deg, gimbal {rest.x3.mean:+.2f} deg, x_e = "
             f"{rest.x_e.mean:.3f} rad s (+k_e1/k_e4 e = {x_e:.3f})."
         ),
-        holds=rest.at_zero(x_e) and abs(static.x3.mean / x3 - 1.0) < 0.05,
+        holds=rest.is_at_zero(x_e) and abs(static.x3.mean / x3 - 1.0) < 0.05,
         conditions="With the signs that follow from y1 = x1 - e: k1/k3 e and +k_e1/k_e4 e.",
         otherwise="They rest elsewhere.",
         figures={
@@ -149,40 +147,33 @@ def laws_claim(rest: Rest, static: Rest) -> Claim:
 
 
 def observers_claim(rests: Mapping[str, Rest]) -> Claim:
-    """With an observer in the law, which the bias biases.
-
-    Args:
-        rests: By case, the true rate among them.
-
-    Returns:
-        The claim.
-    """
-    observed = {case: rest for case, rest in rests.items() if case != TRUE_RATE}
+    """Judge the rests by case, with an observer in the law, which the bias biases."""
+    observer_rests = {case: rest for case, rest in rests.items() if case != TRUE_RATE}
     example = rests[TRUE_RATE].example
     sigma = float(np.std(example["y1_rad"] - example["x1_rad"]))
-    expected = {case: expected_integrator(case, BIAS_DEG, sigma) for case in observed}
+    expected_x_e = {case: expected_integrator(case, BIAS_DEG, sigma) for case in observer_rests}
     quiet = steady("homogeneous", BIAS_DEG, 0.0)[1]
-    listed = "; ".join(
-        f"{case}: rate estimated {rest.x2_estimated.mean:+.4f} rad/s, tilt {plus_minus(rest.x1, signed=True)} "
-        f"deg, x_e {rest.x_e.mean:.3f} rad s ({expected[case]:.3f} expected)"
-        for case, rest in observed.items()
+    observers_text = "; ".join(
+        f"{case}: rate estimated {rest.x2_estimated.mean:+.4f} rad/s, tilt {plus_minus(rest.x1, with_sign=True)} "
+        f"deg, x_e {rest.x_e.mean:.3f} rad s ({expected_x_e[case]:.3f} expected)"
+        for case, rest in observer_rests.items()
     )
     return Claim(
         place="After (10), the equilibrium",
-        says="The integral action makes x = 0 the equilibrium even with an observer whose estimate e biases.",
-        found=(
-            f"The same rig with an observer in the law, {WORLDS} seeds. {listed}. Without noise (11) would estimate "
-            f"{quiet:+.4f} rad/s: its gains fall with the size of its error, so noise adds to its bias."
+        statement="The integral action makes x = 0 the equilibrium even with an observer whose estimate e biases.",
+        result=(
+            f"The same rig with an observer in the law, {WORLDS} seeds. {observers_text}. Without noise (11) would "
+            f"estimate {quiet:+.4f} rad/s: its gains fall with the size of its error, so noise adds to its bias."
         ),
-        holds=all(rest.at_zero(expected[case]) for case, rest in observed.items()),
+        holds=all(rest.is_at_zero(expected_x_e[case]) for case, rest in observer_rests.items()),
         otherwise="The rest is not where it should be.",
         figures={
             key: value
-            for case, rest in observed.items()
+            for case, rest in observer_rests.items()
             for key, value in (
                 (f"tilt_rest {case}_deg", rest.x1),
                 (f"integrator_rest {case}_rad_s", rest.x_e),
-                (f"integrator_expected {case}_rad_s", expected[case]),
+                (f"integrator_expected {case}_rad_s", expected_x_e[case]),
                 (f"rate_estimated {case}_rad_s", rest.x2_estimated),
             )
         },
@@ -204,9 +195,9 @@ def _picture(rests: Mapping[str, Rest]) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The laws with the true rate, then with observers."""
+    """Judge the laws with the true rate, then with observers."""
     without_integrator = (TRUE_RATE, 2, ["controller.gains=[35.0, 4.0, -1.0, 0.0]"])
-    *found, static = rests_of([*((case, WORLDS, ()) for case in CASES), without_integrator], SEED)
+    *case_rests, static = find_rests([*((case, WORLDS, ()) for case in CASES), without_integrator], SEED)
     on_share(0.9)
-    rests = dict(zip(CASES, found, strict=True))
+    rests = dict(zip(CASES, case_rests, strict=True))
     return [laws_claim(rests[TRUE_RATE], static), observers_claim(rests)]

@@ -26,10 +26,10 @@ class Push:
     """One push on one rig, recorded at several sensor noises.
 
     Attributes:
-        words: How it is called.
+        words: Its name in the report.
         settings: Settings `section.field=value` of the tuning experiment that differ.
         noise_ug_rthz: Noise densities [ug/sqrt(Hz)], the same for every observer.
-        share: Of the time that all take.
+        share: Share of the time that all take.
     """
 
     words: str
@@ -39,12 +39,12 @@ class Push:
 
 
 def _gentle(torque_n_m: float) -> list[str]:
-    """A weaker push on a rig without bias, of which (11) has less to learn."""
+    """Return a weaker push on a rig without bias, of which (11) has less to learn."""
     return [f"push.0.torque_n_m={torque_n_m}", "plant.equilibrium_bias_deg=0.0"]
 
 
 STRONG = Push("1 N m, e = 0.5 deg", [], (100.0, 200.0, DEFAULT_NOISE, 3200.0), 0.45)
-"""That of Figs 5 to 7."""
+"""The push of Figs 5 to 7."""
 PUSHES = (
     STRONG,
     Push("0.3 N m, e = 0", _gentle(0.3), (100.0, 200.0, DEFAULT_NOISE), 0.33),
@@ -53,58 +53,46 @@ PUSHES = (
 
 
 @dataclass(frozen=True)
-class Tuned:
-    """What is tuned of an observer.
+class Tuning:
+    """The parameters of an observer that are tuned.
 
     Attributes:
         observer: Its name.
         equation: Its number in the paper.
-        parameters: What is tuned of it.
-        printed: Table 2's line.
-        share: Of the time that the three take.
+        parameters: Parameters that are tuned.
+        table_line: Table 2's line.
+        share: Share of the time that the three take.
     """
 
     observer: str
     equation: str
     parameters: Sequence[str]
-    printed: str
+    table_line: str
     share: float
 
 
-LINEAR = Tuned("linear", "(9)", ["tau"], "tau = 0.02", 0.15)
-LTV = Tuned("ltv", "(10)", ["Q[1]"], "Q = diag(1, 5e6, 1)", 0.4)
-HOMOGENEOUS = Tuned("homogeneous", "(11)", ["k1", "k2", "alpha"], "[k1, k2, alpha] = [20, 150, 0.85]", 0.45)
+LINEAR = Tuning("linear", "(9)", ["tau"], "tau = 0.02", 0.15)
+LTV = Tuning("ltv", "(10)", ["Q[1]"], "Q = diag(1, 5e6, 1)", 0.4)
+HOMOGENEOUS = Tuning("homogeneous", "(11)", ["k1", "k2", "alpha"], "[k1, k2, alpha] = [20, 150, 0.85]", 0.45)
 CASES = (LINEAR, LTV, HOMOGENEOUS)
 
 Studies = Mapping[str, Mapping[str, TuningResult]]
 """Words of the push -> observer -> its study."""
 
 
-def _scenario(case: Tuned, push: Push, seed: int) -> Scenario:
+def _scenario(case: Tuning, push: Push, seed: int) -> Scenario:
     return load_scenario("observer_tuning", [f"seed={seed}", *push.settings], case.observer)
 
 
-def study_of(
-    case: Tuned,
+def tune_case(
+    case: Tuning,
     push: Push,
     seed: int,
     worlds: int,
     recorded: Callable[..., Recorded] | None = None,
     on_share: OnShare | None = None,
 ) -> TuningResult:
-    """Tune one observer.
-
-    Args:
-        case: Which, and what of it.
-        push: The experiment, and at which noises.
-        seed: Of the noise.
-        worlds: How many are fitted, and as many held out.
-        recorded: Hands out the recordings.
-        on_share: Called with the share done.
-
-    Returns:
-        The study.
-    """
+    """Tune one observer on the recordings of one push, as many worlds fitted as held out."""
     return tune(
         _scenario(case, push, seed),
         worlds=worlds,
@@ -118,43 +106,43 @@ def study_of(
 
 
 def all_studies(
-    seed: int, worlds: int, on_share: OnShare, pushes: Sequence[Push] = PUSHES, cases: Sequence[Tuned] = CASES
+    seed: int, worlds: int, on_share: OnShare, pushes: Sequence[Push] = PUSHES, cases: Sequence[Tuning] = CASES
 ) -> dict[str, dict[str, TuningResult]]:
     """Tune every observer on the same recordings of every push."""
     studies: dict[str, dict[str, TuningResult]] = {}
-    wanted = [each for p in pushes for each in halves(_scenario(cases[0], p, seed), worlds, p.noise_ug_rthz)]
-    recorded, done = recorder(wanted, warm_up_s=WARM_UP_S), 0.0
+    recordings = [half for p in pushes for half in halves(_scenario(cases[0], p, seed), worlds, p.noise_ug_rthz)]
+    recorded, share_done = recorder(recordings, warm_up_s=WARM_UP_S), 0.0
     for push in pushes:
         studies[push.words] = {}
         for case in cases:
-            whole = push.share * case.share
+            case_share = push.share * case.share
 
-            def share(part: float, before: float = done, whole: float = whole) -> None:
-                on_share(before + part * whole)
+            def share(part: float, before: float = share_done, case_share: float = case_share) -> None:
+                on_share(before + part * case_share)
 
-            studies[push.words][case.observer] = study_of(case, push, seed, worlds, recorded, share)
-            done += whole
+            studies[push.words][case.observer] = tune_case(case, push, seed, worlds, recorded, share)
+            share_done += case_share
     return studies
 
 
 def level_at(study: TuningResult, noise_ug_rthz: float) -> NoiseLevelResult:
-    """The level of one noise."""
+    """Return the level of one noise."""
     return next(level for level in study.levels if level.noise_ug_rthz == noise_ug_rthz)
 
 
-def worth_it(level: NoiseLevelResult) -> bool:
-    """Whether the tuned observer is closer to the gyro than an estimate of zero, on the held-out worlds."""
+def beats_zero(level: NoiseLevelResult) -> bool:
+    """Return true if the tuned observer is closer to the gyro than an estimate of zero, on the held-out worlds."""
     return float(level.rms.mean()) < level.zero_rms
 
 
-def in_the_loop(tried: Sequence[tuple[Tuned, NoiseLevelResult, Push]], worlds: int, seed: int) -> list[Interval]:
+def loop_ratios(trials: Sequence[tuple[Tuning, NoiseLevelResult, Push]], worlds: int, seed: int) -> list[Interval]:
     """Velocity RMS error in the closed loop, Table 2's by the tuned, world by world, under that push and noise."""
     runs = []
-    for case, level, push in tried:
+    for case, level, push in trials:
         noise = f"sensors.accelerometer.noise_density_ug_rthz={level.noise_ug_rthz}"
         names = dict.fromkeys(name.partition("[")[0] for name in level.sizes)
-        tuned = [f"observer.{name}={json.dumps(level.parameters[name])}" for name in names]
-        for settings in ([], tuned):
+        tuned_settings = [f"observer.{name}={json.dumps(level.parameters[name])}" for name in names]
+        for settings in ([], tuned_settings):
             runs.append(run_of(push_recovery(case.observer, seed, [*push.settings, noise, *settings]), worlds))
-    found = [result.values("velocity_rms_error_rad_s") for result in run_side_by_side(runs, keep_trajectory=False)]
-    return [ratio_interval(given, tuned) for given, tuned in zip(found[::2], found[1::2], strict=True)]
+    errors = [result.values("velocity_rms_error_rad_s") for result in run_side_by_side(runs, keep_trajectory=False)]
+    return [ratio_interval(table, tuned) for table, tuned in zip(errors[::2], errors[1::2], strict=True)]

@@ -22,55 +22,50 @@ CASES: Mapping[str, tuple[str, Sequence[str]]] = {
     TEN_EXACT_GAIN: (f"{_HERE}:TenByEuler", ["observer.exact_gain=true"]),
     ELEVEN_BY_EULER: (f"{_HERE}:ElevenByEuler", []),
 }
-"""Which form -> the observer in the loop and its settings."""
+"""Form -> the observer in the loop and its settings."""
 
 Errors = Mapping[str, np.ndarray]
-"""Which form -> velocity RMS error in the loop, (n_worlds,) [rad/s]; NaN for a world that did not stand."""
+"""Form -> velocity RMS error in the loop, (n_worlds,) [rad/s]; NaN for a world that did not stand."""
 
 
 def errors_of(forms: Sequence[str], worlds: int, seed: int) -> dict[str, np.ndarray]:
     """Close the loop on some of `CASES`, the push and noise of Figs 5 to 7, the law on measured angles."""
-    prepared = [push_recovery(observer, seed, settings) for observer, settings in (CASES[form] for form in forms)]
-    results = run_side_by_side([run_of(each, worlds) for each in prepared], keep_trajectory=False)
+    experiments = [push_recovery(observer, seed, settings) for observer, settings in (CASES[form] for form in forms)]
+    results = run_side_by_side([run_of(experiment, worlds) for experiment in experiments], keep_trajectory=False)
     return {form: result.values("velocity_rms_error_rad_s") for form, result in zip(forms, results, strict=True)}
 
 
-def all_errors(known: Errors, worlds: int, seed: int) -> dict[str, np.ndarray]:
-    """The errors of every form, those that are known among them."""
-    return dict(known) | errors_of([form for form in CASES if form not in known], worlds, seed)
+def all_errors(known_errors: Errors, worlds: int, seed: int) -> dict[str, np.ndarray]:
+    """Return the errors of every form, those that are known among them."""
+    return dict(known_errors) | errors_of([form for form in CASES if form not in known_errors], worlds, seed)
 
 
 def cause(errors: Errors) -> Claim:
-    """What Section V puts the second place of (10) down to.
+    """Judge the cause that Section V gives for the second place of (10).
 
     Partly is more than nothing and less than all: by one method for both, the distance between (10) and (11) must be
     larger by Euler's than by an exact one, and must not vanish by the exact one.
-
-    Args:
-        errors: Of all `CASES`, the same worlds.
-
-    Returns:
-        The claim.
     """
     exact = known_interval(errors[TEN] - errors[ELEVEN])
     by_euler = known_interval(errors[TEN_BY_EULER] - errors[ELEVEN_BY_EULER])
     method = known_interval((errors[TEN_BY_EULER] - errors[TEN]) - (errors[ELEVEN_BY_EULER] - errors[ELEVEN]))
     gain = known_interval(errors[TEN_BY_EULER] - errors[TEN_EXACT_GAIN])
     share = None if method is None or by_euler is None else method.mean / by_euler.mean
-    told = "-" if share is None else f"{share:.0%}"
+    share_text = "-" if share is None else f"{share:.0%}"
     return Claim(
         place="Section V, the cause of the second place",
-        says="That (10) comes after (11) is partly due to the numerical computations that (10) takes.",
-        found=(
+        statement="That (10) comes after (11) is partly due to the numerical computations that (10) takes.",
+        result=(
             f"The loop closed on either, {len(errors[TEN])} seeds, e = 0.5 deg, 400 ug/rtHz, the law on measured "
             f"angles. Velocity RMS error of (10) less that of (11): {plus_minus(exact)} rad/s with exact steps, "
             f"{plus_minus(by_euler)} with one explicit Euler step a sample in both. The method makes "
-            f"{plus_minus(method)} of it, {told}. With H by Euler, too, (10) has "
-            f"{plus_minus(gain, signed=True)} rad/s more error than with the exact H and Euler in the estimate alone."
+            f"{plus_minus(method)} of it, {share_text}. With H by Euler, too, (10) has "
+            f"{plus_minus(gain, with_sign=True)} rad/s more error than with the exact H and Euler in the estimate "
+            "alone."
         ),
         holds=_positive(method) and _positive(exact),
         conditions=(
-            f"By explicit Euler at 200 Hz, of which the paper says nothing: then {told} of the distance is the "
+            f"By explicit Euler at 200 Hz, of which the paper says nothing: then {share_text} of the distance is the "
             "method's, and the rest is there without any error of method. "
             + (
                 "Nearly all of it comes from the step of the estimate, and none to speak of from the equations of H, "
@@ -91,5 +86,5 @@ def cause(errors: Errors) -> Claim:
 
 
 def _positive(interval: Interval | None) -> bool:
-    """Whether it lies above zero."""
+    """Return true if the interval lies above zero."""
     return interval is not None and interval.low > 0.0

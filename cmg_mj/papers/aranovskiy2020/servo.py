@@ -8,7 +8,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
+from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery, run_on_rigs
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.plant.plant import Plant, load_plant
@@ -45,7 +45,7 @@ def in_velocity_mode(plant: Plant, deadband: float, lag_s: float = LAG_S) -> Non
         lag_s: I/kv [s].
     """
     model = plant.model
-    for module in plant.modules:
+    for module in plant.axis.modules:
         i = module.servo
         dof = int(model.jnt_dofadr[module.gimbal])
         kv = float(model.dof_M0[dof]) / lag_s
@@ -63,7 +63,7 @@ class Servos(NamedTuple):
     """The runs, the same worlds each."""
 
     position: Result
-    """With the bench's servo."""
+    """Runs with the bench's servo."""
     velocity: Mapping[float, Result]
     """Deadband [rad/s] -> runs with the servo in velocity mode."""
     soft: Result
@@ -77,55 +77,55 @@ def run(worlds: int, seed: int, duration_s: float = DURATION_S) -> Servos:
     rigs = [load_plant(experiment.scenario.plant) for _ in cases]
     for rig, case in zip(rigs, cases, strict=True):
         in_velocity_mode(rig, *case)
-    plants = [rig for rig in rigs for _ in range(worlds)]
-    *groups, soft = experiment.run_many([*range(worlds)] * len(rigs), plants=plants).split(len(rigs))
+    *groups, soft = run_on_rigs(experiment, rigs, worlds)
     return Servos(experiment.run_many(worlds), dict(zip(DEADBANDS, groups, strict=True)), soft)
 
 
-def tracking(result: Result) -> Interval | None:
+def measure_tracking(result: Result) -> Interval | None:
     """RMS of the gimbals' rate less the command, means over `MEANS_S`, by that of the command; worlds that stood."""
     run = trajectory_of(result)
     span = round(MEANS_S / float(run["time_s"][1] - run["time_s"][0]))
     ends = np.arange(0, len(run["time_s"]), span)
-    turned = np.diff(run["x3_rad"][ends], axis=0) / MEANS_S
-    command = np.add.reduceat(run["u_rad_s"], ends[:-1])[: len(turned)] / span
+    rates = np.diff(run["x3_rad"][ends], axis=0) / MEANS_S
+    command = np.add.reduceat(run["u_rad_s"], ends[:-1])[: len(rates)] / span
     command[-1] = run["u_rad_s"][ends[-2] : ends[-1]].mean(axis=0)
-    off = np.sqrt(np.mean((turned - command) ** 2, axis=0) / np.mean(command**2, axis=0))
-    return known_interval(np.where(result.stood, off, np.nan))
+    relative_errors = np.sqrt(np.mean((rates - command) ** 2, axis=0) / np.mean(command**2, axis=0))
+    return known_interval(np.where(result.stood, relative_errors, np.nan))
 
 
-def servo_claim(found: Servos) -> Claim:
-    """Whether the commanded velocity can be taken for the gimbal's."""
-    smooth = found.velocity[0.0]
+def servo_claim(servos: Servos) -> Claim:
+    """Judge whether the commanded velocity can be taken for the gimbal's."""
+    smooth = servos.velocity[0.0]
     velocity, tilt = (
-        {d: ratio_interval(result.values(key), smooth.values(key)) for d, result in found.velocity.items()}
+        {d: ratio_interval(result.values(key), smooth.values(key)) for d, result in servos.velocity.items()}
         for key in ("velocity_rms_error_rad_s", "tilt_rms_deg")
     )
-    fell = {d: float(result.fell.mean()) for d, result in found.velocity.items()}
-    unnoticed = [
-        d for d in fell if fell[d] == 0.0 and max(abs(velocity[d].mean - 1.0), abs(tilt[d].mean - 1.0)) < WITHIN
+    falls = {d: float(result.fell.mean()) for d, result in servos.velocity.items()}
+    harmless = [
+        d for d in falls if falls[d] == 0.0 and max(abs(velocity[d].mean - 1.0), abs(tilt[d].mean - 1.0)) < WITHIN
     ]
-    tracked = {d: tracking(result) for d, result in found.velocity.items()}
-    standing = [d for d in fell if fell[d] == 0.0]
-    listed = ", ".join(f"{d:g}: {velocity[d].mean:.2f} and {tilt[d].mean:.2f}" for d in standing if d > 0.0)
-    falling = [f"{d:g}" for d in fell if fell[d] > 0.0]
-    near = tracked[RESOLUTION]
-    bench = ratio_interval(*(r.values("velocity_rms_error_rad_s") for r in (found.position, smooth)))
+    errors = {d: measure_tracking(result) for d, result in servos.velocity.items()}
+    safe_deadbands = [d for d in falls if falls[d] == 0.0]
+    ratios_text = ", ".join(f"{d:g}: {velocity[d].mean:.2f} and {tilt[d].mean:.2f}" for d in safe_deadbands if d > 0.0)
+    falling = [f"{d:g}" for d in falls if falls[d] > 0.0]
+    fine_error = errors[RESOLUTION]
+    bench = ratio_interval(*(r.values("velocity_rms_error_rad_s") for r in (servos.position, smooth)))
     return Claim(
         place="After (2), the servos",
-        says="The gimbals' servos ensure velocity tracking, so that omega_c can be taken for an input.",
-        found=(
+        statement="The gimbals' servos ensure velocity tracking, so that omega_c can be taken for an input.",
+        result=(
             f"Servos in velocity mode with a lag of {1e3 * LAG_S:g} ms and a deadband, (11) in the loop, "
             f"{len(smooth.outcomes)} seeds, the push of Figs 5 to 7. Over {MEANS_S:g} s the gimbal is off its command "
-            f"by {_share(tracked[0.0])} of it (RMS) without a deadband, by {_share(near)} with the resolution of the "
-            f"MX-106, {RESOLUTION:g} rad/s. With a lag of {1e3 * SOFT_LAG_S:g} ms, and so less torque against the "
-            f"flywheel's, it is {_share(tracking(found.soft))}. By deadband [rad/s], velocity RMS error and tilt RMS "
-            f"by those without: {listed}. The rig falls with {', '.join(falling) or 'none'}. The bench's own servo, "
-            f"which integrates its command, has {bench.mean:.2f} times the velocity error."
+            f"by {_share(errors[0.0])} of it (RMS) without a deadband, by {_share(fine_error)} with "
+            f"the resolution of the MX-106, {RESOLUTION:g} rad/s. With a lag of {1e3 * SOFT_LAG_S:g} ms, and so less "
+            f"torque against the flywheel's, it is {_share(measure_tracking(servos.soft))}. By deadband [rad/s], "
+            f"velocity RMS error and tilt RMS by those without: {ratios_text}. The rig falls with "
+            f"{', '.join(falling) or 'none'}. The bench's own servo, which integrates its command, has "
+            f"{bench.mean:.2f} times the velocity error."
         ),
-        holds=RESOLUTION in unnoticed and near is not None and near.mean < WITHIN,
+        holds=RESOLUTION in harmless and fine_error is not None and fine_error.mean < WITHIN,
         conditions=(
-            f"With a servo that stiff, up to a deadband of {max(unnoticed, default=0.0):g} rad/s, with which the "
+            f"With a servo that stiff, up to a deadband of {max(harmless, default=0.0):g} rad/s, with which the "
             f"estimate's error and the tilt stay within {WITHIN:.0%}; the paper says nothing of one."
         ),
         otherwise="Already the resolution of the servo is felt in the estimate or in the tilt.",
@@ -133,12 +133,12 @@ def servo_claim(found: Servos) -> Claim:
             "deadband_rad_s": list(DEADBANDS),
             "velocity_rms_error_by_none": list(velocity.values()),
             "tilt_rms_by_none": list(tilt.values()),
-            "tracking_error_share": list(tracked.values()),
-            "tracking_error_share_soft": tracking(found.soft),
-            "fell_fraction": list(fell.values()),
+            "tracking_error_share": list(errors.values()),
+            "tracking_error_share_soft": measure_tracking(servos.soft),
+            "fell_fraction": list(falls.values()),
             "bench_servo_velocity_rms_error_by_none": bench,
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(servos)],
     )
 
 
@@ -146,12 +146,12 @@ def _share(interval: Interval | None) -> str:
     return "-" if interval is None else f"{interval.mean:.0%}"
 
 
-def _picture(found: Servos) -> Picture:
+def _picture(servos: Servos) -> Picture:
     tilts, turns = [], []
-    shown = {POSITION: found.position} | {
-        f"deadband {d:g} rad/s": found.velocity[d] for d in (0.0, DEADBANDS[3], DEADBANDS[-1])
+    results = {POSITION: servos.position} | {
+        f"deadband {d:g} rad/s": servos.velocity[d] for d in (0.0, DEADBANDS[3], DEADBANDS[-1])
     }
-    for color, (label, result) in enumerate(shown.items()):
+    for color, (label, result) in enumerate(results.items()):
         run = trajectory_of(result).world(0)
         tilts.append(Line(run["time_s"], np.degrees(run["x1_rad"]), label, color=color, width=0.8))
         turns.append(Line(run["time_s"], np.degrees(run["x3_rad"]), color=color, width=0.8))
@@ -163,5 +163,5 @@ def _picture(found: Servos) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The servos."""
+    """Judge the servos."""
     return [servo_claim(run(WORLDS, SEED))]

@@ -2,54 +2,46 @@
 
 from __future__ import annotations
 
-from cmg_mj.papers.aranovskiy2020.joint import Together, is_best, joint_claim, nearest_joint
+from cmg_mj.papers.aranovskiy2020.joint import JointExperiment, is_best, joint_claim, nearest_joint
 from cmg_mj.papers.aranovskiy2020.retuned import (
     CASES,
     DEFAULT_NOISE,
     SEED,
     WORLDS,
     Studies,
-    Tuned,
+    Tuning,
     all_studies,
-    worth_it,
+    beats_zero,
 )
-from cmg_mj.papers.aranovskiy2020.tuning_procedure import LOOP_SHARE, loops_of, procedure_claim
+from cmg_mj.papers.aranovskiy2020.tuning_procedure import LOOP_SHARE, procedure_claim, run_trials
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.words import with_ends
 from cmg_mj.studies.tuning import NoiseLevelResult
 
 
-def table_2_claim(case: Tuned, studies: Studies, together: Together) -> Claim:
-    """Table 2's line of one observer, judged in the experiment that all three lines come nearest to.
-
-    Args:
-        case: What was tuned.
-        studies: Of all three, under every push.
-        together: That experiment.
-
-    Returns:
-        The claim.
-    """
-    level = together.levels[case.observer]
-    good = worth_it(level)
+def table_2_claim(case: Tuning, studies: Studies, experiment: JointExperiment) -> Claim:
+    """Judge Table 2's line of one observer in the experiment that all three lines come nearest to."""
+    level = experiment.levels[case.observer]
+    is_tunable = beats_zero(level)
     return Claim(
         place=f"Table 2, {case.equation}",
-        says=f"{case.printed}, tuned to fit the gyro best.",
-        found=(
+        statement=f"{case.table_line}, tuned to fit the gyro best.",
+        result=(
             f"Fitted on {len(level.rms)} seeds, scored on as many others, from the push to a second after it. At "
-            f"{together.words}, where the three lines come nearest to being the best together, the best is "
+            f"{experiment.words}, where the three lines come nearest to being the best together, the best is "
             f"{_sizes(level)}. Table 2's error is {level.given_rms.mean():.4f} rad/s, that of the tuned "
-            f"{level.rms.mean():.4f}, the ratio {_ratio(level)}. That of an estimate of zero is {level.zero_rms:.4f}. "
-            f"{_elsewhere(case, studies)}"
+            f"{level.rms.mean():.4f}, the ratio {with_ends(level.ratio)}. That of an estimate of zero is "
+            f"{level.zero_rms:.4f}. {_describe_all_pushes(case, studies)}"
         ),
-        holds=is_best(level) and good,
+        holds=is_best(level) and is_tunable,
         conditions=(
-            f"At {together.words}, the same for all three lines (the bench's own noise is {DEFAULT_NOISE:g}). The "
-            f"paper gives neither its push nor its noise. {_scenario(case, studies)}"
+            f"At {experiment.words}, the same for all three lines (the bench's own noise is {DEFAULT_NOISE:g}). The "
+            f"paper gives neither its push nor its noise. {_describe_first_push(case, studies)}"
         ),
         otherwise=(
             f"In the experiment in which all three could have been tuned they have {level.ratio.mean:.2f} times the "
-            f"error of the tuned. {_alone(case, studies)}"
-            if good
+            f"error of the tuned. {_describe_single_line(case, studies)}"
+            if is_tunable
             else "In the experiment nearest to one for all three an estimate of zero is closer to the gyro."
         ),
         figures={
@@ -67,7 +59,7 @@ def table_2_claim(case: Tuned, studies: Studies, together: Together) -> Claim:
     )
 
 
-def _elsewhere(case: Tuned, studies: Studies) -> str:
+def _describe_all_pushes(case: Tuning, studies: Studies) -> str:
     """Table 2's error by that of the tuned, under every push."""
     sentences = []
     for push, by_name in studies.items():
@@ -80,26 +72,26 @@ def _elsewhere(case: Tuned, studies: Studies) -> str:
     return " ".join(sentences)
 
 
-def _scenario(case: Tuned, studies: Studies) -> str:
-    """What they lose under the push of Figs 5 to 7, at the noise at which they lose least there."""
+def _describe_first_push(case: Tuning, studies: Studies) -> str:
+    """Describe the loss under the push of Figs 5 to 7, at the noise at which it is least there."""
     push = next(iter(studies))
     level = least_lost(case, studies)
-    closer = "" if worth_it(level) else ", where an estimate of zero is closer than either"
+    zero_note = "" if beats_zero(level) else ", where an estimate of zero is closer than either"
     return (
         f"Under {push} they lose least at {level.noise_ug_rthz:g} ug/rtHz: {level.ratio.mean:.2f} times the error of "
-        f"the tuned{closer}."
+        f"the tuned{zero_note}."
     )
 
 
-def _alone(case: Tuned, studies: Studies) -> str:
+def _describe_single_line(case: Tuning, studies: Studies) -> str:
     level = least_lost(case, studies)
-    return _scenario(case, studies) + (
+    return _describe_first_push(case, studies) + (
         " What is the best for this line alone is not the best for the other two." if is_best(level) else ""
     )
 
 
-def least_lost(case: Tuned, studies: Studies) -> NoiseLevelResult:
-    """The level at which Table 2's line loses least under the first push, that of Figs 5 to 7."""
+def least_lost(case: Tuning, studies: Studies) -> NoiseLevelResult:
+    """Return the level at which Table 2's line loses least under the first push, that of Figs 5 to 7."""
     return min(next(iter(studies.values()))[case.observer].levels, key=lambda level: level.ratio.mean)
 
 
@@ -107,17 +99,13 @@ def _sizes(level: NoiseLevelResult) -> str:
     return ", ".join(f"{name} = {size:.4g}" for name, size in level.sizes.items())
 
 
-def _ratio(level: NoiseLevelResult) -> str:
-    return f"{level.ratio.mean:.3f} ({level.ratio.low:.3f} to {level.ratio.high:.3f})"
-
-
 def claims(on_share: OnShare) -> list[Claim]:
-    """Section V's procedure, whether Table 2 is one experiment's, and a line of it an observer."""
+    """Judge section V's procedure, whether Table 2 is one experiment's, and a line of it an observer."""
     studies = all_studies(SEED, WORLDS, lambda share: on_share((1.0 - LOOP_SHARE) * share))
-    together = nearest_joint(studies)
-    loops = loops_of(studies, together, lambda share: on_share(1.0 - LOOP_SHARE * (1.0 - share)))
+    experiment = nearest_joint(studies)
+    loops = run_trials(studies, experiment, lambda share: on_share(1.0 - LOOP_SHARE * (1.0 - share)))
     return [
         procedure_claim(studies, loops),
         joint_claim(studies),
-        *(table_2_claim(case, studies, together) for case in CASES),
+        *(table_2_claim(case, studies, experiment) for case in CASES),
     ]

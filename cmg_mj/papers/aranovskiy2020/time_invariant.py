@@ -9,7 +9,7 @@ from typing import NamedTuple
 from cmg_mj.papers.aranovskiy2020.paper import printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.words import listed_and
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.summary_keys import format_figure
 from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
@@ -23,33 +23,33 @@ JUDGED_DEG = 0.5
 
 
 class Gain(NamedTuple):
-    """Of e = x1 - y1: x1' has -l1 e, x2' has -l2 e, so that the error's poles without gravity are s^2 + l1 s + l2."""
+    """Gain on e = x1 - y1: x1' has -l1 e, x2' has -l2 e, so the error's poles without gravity are s^2 + l1 s + l2."""
 
     l1: float
     l2: float
 
     @property
     def speed(self) -> float:
-        """Of the error's poles, their distance from 0 [rad/s]."""
+        """Distance of the error's poles from 0 [rad/s]."""
         return math.sqrt(self.l2)
 
 
-def damped(speed: float) -> Gain:
-    """The gain whose poles lie 45 degrees off the real axis, as those of the frozen Riccati gain do [rad/s]."""
+def damped_gain(speed: float) -> Gain:
+    """Return the gain whose poles lie 45 degrees off the real axis, as those of the frozen Riccati gain do [rad/s]."""
     return Gain(math.sqrt(2.0) * speed, speed**2)
 
 
 PREDECESSOR, FROZEN = "predecessor's", "frozen"
 GAINS: dict[str, Gain] = {
-    "slow": damped(10.0),
+    "slow": damped_gain(10.0),
     PREDECESSOR: Gain(20.0, 150.0),
-    "medium": damped(20.0),
-    "fast": damped(30.0),
+    "medium": damped_gain(20.0),
+    "fast": damped_gain(30.0),
     FROZEN: Gain(*settled_gains()),
 }
-"""From slow to fast. The predecessor's is of its Table II, the frozen one is where the Riccati equation settles."""
+"""Gains, the slow first. The predecessor's is of its Table II; the Riccati equation settles at the frozen one."""
 PRINTED = (PREDECESSOR, FROZEN)
-"""Those that the authors could have run: what the verdict goes by."""
+"""The gains that the authors could have run: the verdict goes by them."""
 
 LINEAR, MEASURED = "gravity at the estimate", "gravity at y1"
 MODELS = (LINEAR, MEASURED)
@@ -62,7 +62,7 @@ Cell = tuple[str, str]
 
 
 class Fate(NamedTuple):
-    """What became of the worlds at one bias."""
+    """The end of the worlds at one bias."""
 
     fell: float
     """Share that fell."""
@@ -70,7 +70,7 @@ class Fate(NamedTuple):
     """Mean velocity RMS error of those that stood [rad/s]; None if none did."""
 
 
-def fates_of(
+def find_fates(
     observers: Sequence[tuple[str, Sequence[str]]],
     biases_deg: Sequence[float],
     worlds: int,
@@ -82,8 +82,8 @@ def fates_of(
     Args:
         observers: Names and settings.
         biases_deg: The biases e [deg].
-        worlds: How many a bias, the same ones at each and for every observer.
-        seed: Of the noise.
+        worlds: Worlds a bias, the same ones at each and for every observer.
+        seed: Seed of the noise.
         duration_s: Simulated time [s].
 
     Returns:
@@ -91,9 +91,9 @@ def fates_of(
     """
     biases = {"equilibrium_bias_deg": [e for e in biases_deg for _ in range(worlds)]}
     numbers = [*range(worlds)] * len(biases_deg)
-    prepared = [push_recovery(observer, seed, settings, duration_s) for observer, settings in observers]
+    experiments = [push_recovery(observer, seed, settings, duration_s) for observer, settings in observers]
     results = run_side_by_side(
-        [BatchJob(each.with_varied(biases), numbers) for each in prepared], keep_trajectory=False
+        [BatchJob(experiment.with_varied(biases), numbers) for experiment in experiments], keep_trajectory=False
     )
     return [
         {
@@ -104,8 +104,8 @@ def fates_of(
     ]
 
 
-def observer_of(cell: Cell) -> tuple[str, list[str]]:
-    """The observer with that gain and model, and its settings.
+def choose_observer(cell: Cell) -> tuple[str, list[str]]:
+    """Return the observer with that gain and model, and its settings.
 
     With alpha = 1, (11) is the first two states of (10) with a constant gain.
     """
@@ -116,7 +116,7 @@ def observer_of(cell: Cell) -> tuple[str, list[str]]:
 
 
 def rate_bias(cell: Cell) -> float:
-    """Of the rate estimated at rest, per radian of e, in closed form [1/s]."""
+    """Return the bias of the rate estimated at rest, per radian of e, in closed form [1/s]."""
     (l1, l2), model = GAINS[cell[0]], printed_model()
     lever = model.gravity_torque / model.J1
     return l1 * lever / (l2 - lever if cell[1] == LINEAR else l2)
@@ -129,11 +129,11 @@ class Factorial(NamedTuple):
     whole: Mapping[float, Fate]
 
     def falls_at(self, cell: Cell) -> list[float]:
-        """The biases at which every world of a cell falls [deg]."""
+        """Return the biases at which every world of a cell falls [deg]."""
         return [e for e, fate in self.cells[cell].items() if fate.fell == 1.0]
 
     def stands_everywhere(self, cell: Cell) -> bool:
-        """Whether no world of a cell falls at any bias."""
+        """Return true if no world of a cell falls at any bias."""
         return all(fate.fell == 0.0 for fate in self.cells[cell].values())
 
     @property
@@ -144,36 +144,30 @@ class Factorial(NamedTuple):
         return [c for c in self.cells if c[0] in PRINTED and self.cells[c][JUDGED_DEG].fell == 1.0]
 
 
-def remark(found: Factorial) -> Claim:
-    """The remark, over gain, model and bias.
-
-    Args:
-        found: The fates.
-
-    Returns:
-        The claim.
-    """
-    standing = [gain for gain in GAINS if all(found.stands_everywhere((gain, model)) for model in MODELS)]
+def remark(experiment: Factorial) -> Claim:
+    """Judge the remark, over gain, model and bias."""
+    safe_gains = [gain for gain in GAINS if all(experiment.stands_everywhere((gain, model)) for model in MODELS)]
     return Claim(
         place="Section V, the time-invariant observer",
-        says="A linear time-invariant observer, which is a particular case of (10), could not stabilise the rig.",
-        found=(
-            f"{len(GAINS)} constant gains by 2 models by {len(found.whole)} biases, {WORLDS} seeds each, the push of "
-            f"Figs 5 to 7, the law on measured angles. {' '.join(_of_model(found, model) for model in MODELS)} "
-            f"{_stands(standing)} Velocity RMS error of the frozen gain with gravity at y1 at {JUDGED_DEG:g} deg "
-            f"{_error(found.cells[FROZEN, MEASURED][JUDGED_DEG])} rad/s, of (10) itself "
-            f"{_error(found.whole[JUDGED_DEG])}. At rest e biases the estimated rate by "
+        statement="A linear time-invariant observer, which is a particular case of (10), could not stabilise the rig.",
+        result=(
+            f"{len(GAINS)} constant gains by 2 models by {len(experiment.whole)} biases, {WORLDS} seeds each, the "
+            "push of Figs 5 to 7, the law on measured angles. "
+            f"{' '.join(_describe_model(experiment, model) for model in MODELS)} {_describe_safe_gains(safe_gains)} "
+            f"Velocity RMS error of the frozen gain with gravity at y1 at {JUDGED_DEG:g} deg "
+            f"{_error(experiment.cells[FROZEN, MEASURED][JUDGED_DEG])} rad/s, of (10) itself "
+            f"{_error(experiment.whole[JUDGED_DEG])}. At rest e biases the estimated rate by "
             f"{rate_bias((PREDECESSOR, LINEAR)):.1f} e/s with the predecessor's gain on the linear model, by "
             f"{rate_bias((FROZEN, MEASURED)):.1f} e/s with the frozen one and gravity at y1."
         ),
-        holds=bool(found.failing),
-        conditions=_conditions(found, standing),
+        holds=bool(experiment.failing),
+        conditions=_conditions(experiment, safe_gains),
         otherwise=(
             f"At e = {JUDGED_DEG:g} deg neither the predecessor's gain nor the frozen one of (10) falls in every "
             "world, with either model, where (10) stands."
         ),
         figures={
-            "bias_deg": list(found.whole),
+            "bias_deg": list(experiment.whole),
             **{
                 f"{gain}, {model}": {
                     "l1_1_s": GAINS[gain].l1,
@@ -182,43 +176,43 @@ def remark(found: Factorial) -> Claim:
                     "fell_fraction": [fate.fell for fate in fates.values()],
                     "velocity_rms_error_rad_s": [fate.error for fate in fates.values()],
                 }
-                for (gain, model), fates in found.cells.items()
+                for (gain, model), fates in experiment.cells.items()
             },
-            "fell_fraction (10)": [fate.fell for fate in found.whole.values()],
-            "velocity_rms_error (10)_rad_s": [fate.error for fate in found.whole.values()],
+            "fell_fraction (10)": [fate.fell for fate in experiment.whole.values()],
+            "velocity_rms_error (10)_rad_s": [fate.error for fate in experiment.whole.values()],
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(experiment)],
     )
 
 
-def _of_model(found: Factorial, model: str) -> str:
-    """From which bias on each gain falls in every world."""
+def _describe_model(experiment: Factorial, model: str) -> str:
+    """Name the bias from which each gain falls in every world."""
     parts = []
     for gain, (_, l2) in GAINS.items():
-        falls = found.falls_at((gain, model))
+        falls = experiment.falls_at((gain, model))
         fate = f"from {min(falls):g} deg" if falls else "at none"
         parts.append(f"{gain} ({math.sqrt(l2):.0f} rad/s) {fate}")
     return f"With {model} it falls in every world: {', '.join(parts)}."
 
 
-def _stands(gains: Sequence[str]) -> str:
+def _describe_safe_gains(gains: Sequence[str]) -> str:
     if not gains:
         return "No gain stands at every bias with both models."
-    return f"At every bias and with both models it stands with the gains {listed_and(gains)}."
+    return f"At every bias and with both models it stands with the gains {join_with_and(gains)}."
 
 
-def _conditions(found: Factorial, standing: Sequence[str]) -> str:
-    """What falls, and that it is not the constancy of the gain."""
-    cells = [f"the {gain} gain and {model}" for gain, model in found.failing]
-    sentences = [f"At e = {JUDGED_DEG:g} deg, with {listed_and(cells)}." if cells else "Nowhere."]
-    if FROZEN in standing:
+def _conditions(experiment: Factorial, safe_gains: Sequence[str]) -> str:
+    """Name the cells that fall, and say that the constancy of the gain is not the cause."""
+    cells = [f"the {gain} gain and {model}" for gain, model in experiment.failing]
+    sentences = [f"At e = {JUDGED_DEG:g} deg, with {join_with_and(cells)}." if cells else "Nowhere."]
+    if FROZEN in safe_gains:
         sentences.append(
             "It is not that the gain is constant: frozen at the value at which the Riccati equation settles, it "
             "stands with either model at every bias tried."
         )
-    slow = [model for model in MODELS if found.falls_at((PREDECESSOR, model))]
-    if len(slow) == 2:
-        first = {model: min(found.falls_at((PREDECESSOR, model))) for model in MODELS}
+    sensitive_models = [model for model in MODELS if experiment.falls_at((PREDECESSOR, model))]
+    if len(sensitive_models) == 2:
+        first = {model: min(experiment.falls_at((PREDECESSOR, model))) for model in MODELS}
         sentences.append(
             f"It is that the gain is small, and then the model: the predecessor's falls from {first[LINEAR]:g} deg "
             f"with {LINEAR}, from {first[MEASURED]:g} deg with {MEASURED}."
@@ -230,17 +224,17 @@ def _error(fate: Fate) -> str:
     return format_figure("velocity_rms_error_rad_s", fate.error)
 
 
-def _picture(found: Factorial) -> Picture:
+def _picture(experiment: Factorial) -> Picture:
     shares, errors = [], []
     for model in MODELS:
         falls, velocities = [], []
         for color, gain in enumerate(GAINS):
-            fates = found.cells[gain, model]
-            known = {e: fate.error for e, fate in fates.items() if fate.error is not None}
+            fates = experiment.cells[gain, model]
+            known_errors = {e: fate.error for e, fate in fates.items() if fate.error is not None}
             falls.append(Line(list(fates), [100.0 * fate.fell for fate in fates.values()], gain, "o-", color))
-            velocities.append(Line(list(known), list(known.values()), style="o-", color=color))
-        stood = {e: fate.error for e, fate in found.whole.items() if fate.error is not None}
-        velocities.append(Line(list(stood), list(stood.values()), WHOLE, "k--"))
+            velocities.append(Line(list(known_errors), list(known_errors.values()), style="o-", color=color))
+        whole_errors = {e: fate.error for e, fate in experiment.whole.items() if fate.error is not None}
+        velocities.append(Line(list(whole_errors), list(whole_errors.values()), WHOLE, "k--"))
         shares.append(Panel("share of falls [%]", falls, y_range=(-5.0, 105.0)))
         label = "velocity\nRMS error [rad/s]"
         errors.append(Panel(label, velocities, "of those that stood", "equilibrium bias e [deg]", y_range=(0.0, 0.2)))
@@ -255,11 +249,11 @@ def _picture(found: Factorial) -> Picture:
 def factorial(worlds: int, seed: int, duration_s: float = DURATION_S) -> Factorial:
     """Run every cell, and (10)."""
     cells = [(gain, model) for gain in GAINS for model in MODELS]
-    observers = [*(observer_of(cell) for cell in cells), ("ltv", [])]
-    *found, whole = fates_of(observers, BIASES_DEG, worlds, seed, duration_s)
-    return Factorial(dict(zip(cells, found, strict=True)), whole)
+    observers = [*(choose_observer(cell) for cell in cells), ("ltv", [])]
+    *fates, whole = find_fates(observers, BIASES_DEG, worlds, seed, duration_s)
+    return Factorial(dict(zip(cells, fates, strict=True)), whole)
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The remark."""
+    """Judge the remark."""
     return [remark(factorial(WORLDS, SEED))]

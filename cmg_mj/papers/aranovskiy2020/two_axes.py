@@ -21,16 +21,16 @@ from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 AXES = ("pitch", "roll")
 """The tilt axes y and x of the body; the cubes' gimbals lie across them."""
 HEIGHT_M = 0.134
-"""Of the cubes' centres above the joint, l/sqrt(2) as on the rig [m]."""
+"""Height of the cubes' centres above the joint, l/sqrt(2) as on the rig [m]."""
 MASS_KG = 4.0 * TABLE_1["m"]
 SPEED = TABLE_1["omega_d"]
 DURATION_S, PUSH_S = 3.0, 0.1
 PUSHES_N_M = (1.0, 2.0, 3.0)
 """On either axis, of a body of four cubes [N m]; the rig of two has 1."""
 SMALL = 0.05
-"""What the other axis changes by less than this of the largest tilt leaves the two separate."""
+"""Two axes are separate if either changes the other by less than this share of the largest tilt."""
 WEIGHTS = (426.0, 1.7, 0.01, 0.08)
-"""Of the law of either axis: a diagonal Q that gives Table 2's gains on the rig, to the digits printed."""
+"""Weights of the law of either axis: a diagonal Q that gives Table 2's gains on the rig, to the digits printed."""
 
 
 @cache
@@ -56,17 +56,17 @@ def _cube() -> Path:
 
 
 class Addresses(NamedTuple):
-    """Where an axis' things are."""
+    """Places of an axis in MuJoCo's arrays."""
 
     tilt: int
     gimbals: list[int]
     servos: list[int]
     signs: list[float]
-    """By which a command is multiplied, so that both cubes of the pair push the same way."""
+    """Factors of a command, so that both cubes of the pair push the same way."""
 
 
 def addresses(model: mujoco.MjModel, axis: int) -> Addresses:
-    """Of pitch, driven by the first two cubes, or of roll, by the others."""
+    """Find those of pitch, driven by the first two cubes, or of roll, by the others."""
     cubes = (2 * axis, 2 * axis + 1)
     tilt = int(model.joint(AXES[axis]).qposadr[0])
     gimbals = [int(model.joint(f"c{i}/gimbal").qposadr[0]) for i in cubes]
@@ -87,7 +87,7 @@ def _mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
 
 
 def at_rest(model: mujoco.MjModel) -> mujoco.MjData:
-    """Upright, spin axes upright, the wheels of a pair turning against each other."""
+    """Return the body upright, spin axes upright, the wheels of a pair turning against each other."""
     data = mujoco.MjData(model)
     for i in range(4):
         gimbal = int(model.joint(f"c{i}/gimbal").qposadr[0])
@@ -111,8 +111,8 @@ def reduced(model: mujoco.MjModel, axis: int) -> ReducedModel:
     return ReducedModel(J1, 0.0, TABLE_1["J_d"], SPEED, abs(float(data.qfrc_bias[tilt])) / 2.0, 2)
 
 
-class Ran(NamedTuple):
-    """What the body did."""
+class Motion(NamedTuple):
+    """The motion of the body."""
 
     tilts: np.ndarray
     """Pitch and roll tick by tick, (n_ticks, 2) [rad]."""
@@ -120,12 +120,12 @@ class Ran(NamedTuple):
     """The torque about the vertical that held it from turning, (n_ticks - 1,) [N m]."""
 
 
-def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Ran:
-    """The motion under a push on each axis at 0.2 s, each axis with a law of its own that knows its own state alone.
+def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Motion:
+    """Simulate a push on each axis at 0.2 s, each axis with a law of its own that knows its own state alone.
 
     Args:
         pushes_n_m: On pitch and roll [N m].
-        duration_s: How long [s].
+        duration_s: Simulated time [s].
 
     Returns:
         What the body did.
@@ -139,23 +139,23 @@ def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Ran:
     torso = int(model.body("torso").id)
     for tick in range(round(duration_s / DT)):
         pushing = 0.2 <= tick * DT < 0.2 + PUSH_S - 1e-9
-        for axis, (at, law) in enumerate(zip(axes, laws, strict=True)):
-            pairs = zip(at.signs, at.gimbals, strict=True)
+        for axis, (places, law) in enumerate(zip(axes, laws, strict=True)):
+            pairs = zip(places.signs, places.gimbals, strict=True)
             x3 = sum(sign * float(data.qpos[gimbal] - math.pi / 2.0) for sign, gimbal in pairs) / 2.0
-            state = float(data.qpos[at.tilt]), float(data.qvel[at.tilt]), x3, integrators[axis]
+            state = float(data.qpos[places.tilt]), float(data.qvel[places.tilt]), x3, integrators[axis]
             u, integrators[axis] = law(*state)
-            for sign, servo in zip(at.signs, at.servos, strict=True):
+            for sign, servo in zip(places.signs, places.servos, strict=True):
                 data.ctrl[servo] = sign * u
-            data.qfrc_applied[at.tilt] = pushes_n_m[axis] if pushing else 0.0
-        tilts.append([float(data.qpos[at.tilt]) for at in axes])
+            data.qfrc_applied[places.tilt] = pushes_n_m[axis] if pushing else 0.0
+        tilts.append([float(data.qpos[places.tilt]) for places in axes])
         mujoco.mj_subtreeVel(model, data)
         momenta.append(float(_about_the_joint(data, torso)))
         mujoco.mj_step(model, data, steps)
-    return Ran(np.array(tilts), np.diff(momenta) / DT)
+    return Motion(np.array(tilts), np.diff(momenta) / DT)
 
 
 def _about_the_joint(data: mujoco.MjData, body: int) -> float:
-    """Vertical part of the momentum of all that hangs on a body, about the world's origin [N m s]."""
+    """Return the vertical part of the momentum of all that hangs on a body, about the world's origin [N m s]."""
     arm, moving = data.subtree_com[body], data.subtree_linvel[body] * MASS_KG
     return data.subtree_angmom[body][2] + arm[0] * moving[1] - arm[1] * moving[0]
 
@@ -163,9 +163,9 @@ def _about_the_joint(data: mujoco.MjData, body: int) -> float:
 class Coupling(NamedTuple):
     """One push on both axes at once beside the same on either alone."""
 
-    both: np.ndarray
+    joint_tilts: np.ndarray
     """Tilts, (n_ticks, 2) [rad]."""
-    alone: np.ndarray
+    single_tilts: np.ndarray
     """Each axis' tilt while the other is not pushed, (n_ticks, 2) [rad]."""
     vertical_n_m: float
     """Largest torque about the vertical, with both pushed."""
@@ -173,61 +173,61 @@ class Coupling(NamedTuple):
     @property
     def largest_deg(self) -> float:
         """Largest tilt of an axis alone."""
-        return float(np.degrees(np.abs(self.alone).max()))
+        return float(np.degrees(np.abs(self.single_tilts).max()))
 
     @property
     def share(self) -> float:
         """Largest change by the other axis, by the largest tilt."""
-        return float(np.abs(self.both - self.alone).max() / np.abs(self.alone).max())
+        return float(np.abs(self.joint_tilts - self.single_tilts).max() / np.abs(self.single_tilts).max())
 
 
 def coupling(push_n_m: float) -> Coupling:
     """Push both, then either."""
-    both = run((push_n_m, push_n_m))
+    motion = run((push_n_m, push_n_m))
     pitch, roll = run((push_n_m, 0.0)).tilts, run((0.0, push_n_m)).tilts
-    return Coupling(both.tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), float(np.abs(both.vertical).max()))
+    return Coupling(motion.tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), float(np.abs(motion.vertical).max()))
 
 
-def axes_claim(found: dict[float, Coupling]) -> Claim:
-    """Each axis alone."""
-    small = [push for push, c in found.items() if c.share < SMALL]
-    first = next(iter(found))
-    listed = ", ".join(f"{push:g} N m: {c.largest_deg:.1f} deg, {c.share:.2%}" for push, c in found.items())
+def axes_claim(couplings: dict[float, Coupling]) -> Claim:
+    """Judge each axis alone."""
+    separate_pushes = [push for push, c in couplings.items() if c.share < SMALL]
+    first = next(iter(couplings))
+    tilts_text = ", ".join(f"{push:g} N m: {c.largest_deg:.1f} deg, {c.share:.2%}" for push, c in couplings.items())
     return Claim(
         place="Section I, one axis at a time",
-        says="With two scissored pairs at right angles each tilt axis of the robot can be stabilised by itself.",
-        found=(
+        statement="With two scissored pairs at right angles each tilt axis of the robot can be stabilised by itself.",
+        result=(
             "Four cubes on a body that tilts about two axes, each with a law of its own that knows only its own state. "
             "A push on both axes at once beside the same push on either alone: largest tilt, and how much of it the "
-            f"other axis changes. {listed}. The torque about the vertical is "
-            f"{', '.join(f'{c.vertical_n_m:.2f}' for c in found.values())} N m at most."
+            f"other axis changes. {tilts_text}. The torque about the vertical is "
+            f"{', '.join(f'{c.vertical_n_m:.2f}' for c in couplings.values())} N m at most."
         ),
-        holds=first in small,
+        holds=first in separate_pushes,
         conditions=(
-            f"Up to pushes of {max(small, default=0.0):g} N m for {PUSH_S:g} s, under which the other axis changes "
-            f"less than {SMALL:.0%} of the tilt, on a body that does not turn about the vertical. What a pair "
+            f"Up to pushes of {max(separate_pushes, default=0.0):g} N m for {PUSH_S:g} s, under which the other axis "
+            f"changes less than {SMALL:.0%} of the tilt, on a body that does not turn about the vertical. What a pair "
             "holds along its own axis makes a torque about the vertical as soon as the other axis moves; the ground "
             "must bear it."
         ),
         otherwise="The axes are felt in each other.",
         figures={
-            "push_n_m": list(found),
-            "largest_tilt_deg": [c.largest_deg for c in found.values()],
-            "vertical_torque_n_m": [c.vertical_n_m for c in found.values()],
-            "changed_by_the_other_axis_share": [c.share for c in found.values()],
+            "push_n_m": list(couplings),
+            "largest_tilt_deg": [c.largest_deg for c in couplings.values()],
+            "vertical_torque_n_m": [c.vertical_n_m for c in couplings.values()],
+            "changed_by_the_other_axis_share": [c.share for c in couplings.values()],
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(couplings)],
     )
 
 
-def _picture(found: dict[float, Coupling]) -> Picture:
+def _picture(couplings: dict[float, Coupling]) -> Picture:
     panels = []
-    push = max(found)
+    push = max(couplings)
     for axis, name in enumerate(AXES):
-        time = np.arange(len(found[push].both)) * DT
+        time = np.arange(len(couplings[push].joint_tilts)) * DT
         lines = [
-            Line(time, np.degrees(found[push].alone[:, axis]), "pushed alone", color=0),
-            Line(time, np.degrees(found[push].both[:, axis]), "both pushed", "--", color=1),
+            Line(time, np.degrees(couplings[push].single_tilts[:, axis]), "pushed alone", color=0),
+            Line(time, np.degrees(couplings[push].joint_tilts[:, axis]), "both pushed", "--", color=1),
         ]
         panels.append(Panel(f"{name} [deg]", lines, shaded=[(0.2, 0.2 + PUSH_S)]))
     return Picture(
@@ -238,9 +238,9 @@ def _picture(found: dict[float, Coupling]) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The two axes."""
-    found = {}
+    """Judge the two axes."""
+    couplings = {}
     for i, push in enumerate(PUSHES_N_M):
-        found[push] = coupling(push)
+        couplings[push] = coupling(push)
         on_share((i + 1) / len(PUSHES_N_M))
-    return [axes_claim(found)]
+    return [axes_claim(couplings)]

@@ -18,15 +18,9 @@ from cmg_mj.studies.benchmark import time_of_update
 
 
 def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, float]:
-    """Median time of an update [us], the observers taking turns.
+    """Measure the median time of an update [us], the observers taking turns.
 
-    Args:
-        worlds: So many at once, on arrays; None for one, on floats, and then the plain forms of (10) too.
-        turns: How many.
-        updates: Updates in a row.
-
-    Returns:
-        Time by observer.
+    With worlds, arrays of so many; without (None) floats, and then the plain forms of (10) too.
     """
     cases: dict[str, Any] = {name: make_observer(name, DT, printed_model()) for name in OBSERVERS}
     if worlds is None:
@@ -40,19 +34,19 @@ def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, floa
 
 def cost() -> Claim:
     """Instructions of an update of (10) beside those of (9) and (11) on the rig's processor; times on this one."""
-    one = update_times(None, turns=3, updates=200)
+    single_times = update_times(None, turns=3, updates=200)
     worlds = 4096
-    many = update_times(worlds, turns=1, updates=4)
-    ratios = {name: one[name] / one["linear"] for name in one}
-    arithmetic = {name: many[name] / many["linear"] for name in many}
+    batch_times = update_times(worlds, turns=1, updates=4)
+    ratios = {name: single_times[name] / single_times["linear"] for name in single_times}
+    arithmetic = {name: batch_times[name] / batch_times["linear"] for name in batch_times}
     board, counted_here = instructions()
     dearest = max(board[name] for name in ("ltv", *PLAIN))
     share = dearest / CLOCK_MHZ / (1e6 * DT)
     return Claim(
         place="Remark 1, cost",
-        says="The observer (10) is computationally heavy in embedded systems: its gain takes differential equations "
-        "solved online.",
-        found=(
+        statement="The observer (10) is computationally heavy in embedded systems: its gain takes differential "
+        "equations solved online.",
+        result=(
             "On the class of the rig's processor, a Cortex-M7, an update takes "
             f"{board['linear']:.0f} instructions by (9), {board['homogeneous']:.0f} by (11) and {board['ltv']:.0f} by "
             "(10), with the exact step on the 2x2 block that is left of H. Written out with 3x3 matrices (10) takes "
@@ -71,7 +65,7 @@ def cost() -> Claim:
             "instructions": board,
             "instructions_counted_here": counted_here,
             "share_of_period": share,
-            "update_us": one,
+            "update_us": single_times,
             "update_by_linear": ratios,
             "update_by_linear_4096_worlds": arithmetic,
         },
@@ -79,5 +73,5 @@ def cost() -> Claim:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The cost."""
+    """Judge the cost."""
     return [cost()]

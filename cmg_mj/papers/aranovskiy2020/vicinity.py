@@ -8,50 +8,37 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.observers import Measurement, make_observer
+from cmg_mj.observers import make_observer
+from cmg_mj.papers.aranovskiy2020.finite_time import rates_at_rest
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT
+from cmg_mj.papers.aranovskiy2020.rig import DT, replay_at_rest
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import rms
-from cmg_mj.replay import replay
-from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED = 77_000
 ALPHAS = (0.55, 0.7, 0.85, 1.0)
 SETTLING = ALPHAS[1:]
-"""Those without much chatter."""
+"""The exponents without much chatter."""
 BIASES_DEG = (0.125, 0.25, 0.5, 1.0, 2.0)
 NOISES_RAD = (0.0005, 0.001, 0.002, 0.004, 0.008)
 TICKS = 2000
 VANISHED = 1e-3
-"""Of the first error of the rate: what is left counts as none."""
+"""Share of the rate's first error that counts as none."""
 SEEN_RAD_S = 0.01
 """Biases of the rate above this one are compared with the closed form by their ratio, those below by the difference."""
 
 
-def left_of_an_error(alpha: float, dt: float = DT, first_rad_s: float = -1.0, span_s: float = 3.0) -> float:
-    """What is left of a wrong rate without bias, noise or motion, by its first size: largest of the last 0.5 s."""
-    observer = make_observer("homogeneous", dt, printed_model(), alpha=alpha)
-    still = Measurement(0.0, 0.0)
-    state = observer.init(still)._replace(x1=0.05, x2=first_rad_s)
-    errors = []
-    for _ in range(round(span_s / dt)):
-        state, estimate = observer.step(state, still, 0.0)
-        errors.append(abs(estimate.x2 / first_rad_s))
-    return float(max(errors[-round(0.5 / dt) :]))
+def remaining_error(alpha: float, dt: float = DT, first_rad_s: float = -1.0, span_s: float = 3.0) -> float:
+    """Return what is left of a wrong rate without bias, noise or motion, by its first size: the last 0.5 s' largest."""
+    rates = rates_at_rest(alpha, dt, span_s, x1=0.05, x2=first_rad_s)
+    return float(rates[-round(0.5 / dt) :].max() / abs(first_rad_s))
 
 
 def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
-    """RMS of the rate estimated at rest, whose true value is zero, (n_worlds,) [rad/s].
-
-    Args:
-        alpha: The exponent.
-        y1: What is measured, (n_ticks, n_worlds) [rad].
-    """
-    columns = {"y1_rad": y1, "y2_rad": np.zeros_like(y1), "u_rad_s": np.zeros_like(y1)}
+    """Return the RMS of the rate estimated at rest, (n_worlds,) [rad/s], from y1, (n_ticks, n_worlds) [rad]."""
     observer = make_observer("homogeneous", DT, printed_model(), alpha=alpha)
-    return rms(replay(observer, Trajectory(columns)).x2[len(y1) // 2 :])
+    return rms(replay_at_rest(observer, y1).x2[len(y1) // 2 :])
 
 
 def bias_bound(alpha: float, e_rad: float) -> float:
@@ -62,12 +49,12 @@ def bias_bound(alpha: float, e_rad: float) -> float:
 
 
 def hurwitz(b: float, c: float) -> bool:
-    """Whether s^2 + b s + c is."""
+    """Return true if s^2 + b s + c is Hurwitz."""
     return bool(np.roots([1.0, b, c]).real.max() < 0.0)
 
 
 class Vicinity(NamedTuple):
-    """How far from the true rate the estimate ends, at rest."""
+    """Distances from the true rate at which the estimate ends, at rest."""
 
     by_bias: dict[float, np.ndarray]
     """alpha -> error without noise, (n_biases,) [rad/s]."""
@@ -88,7 +75,7 @@ class Vicinity(NamedTuple):
 
     @property
     def exponents(self) -> dict[float, float]:
-        """With which power of the noise the error rises, by alpha."""
+        """Powers of the noise with which the error rises, by alpha."""
         sizes = np.log(NOISES_RAD)
         return {alpha: float(np.polyfit(sizes, np.log(error), 1)[0]) for alpha, error in self.by_noise.items()}
 
@@ -109,57 +96,57 @@ def vicinity(rng: np.random.Generator) -> Vicinity:
 
 
 def vicinity_claim(seed: int = SEED) -> Claim:
-    """Convergence to a vicinity of the origin, and how large it is."""
+    """Judge convergence to a vicinity of the origin, and how large it is."""
     rng = np.random.default_rng(seed)
-    left, often = ({alpha: left_of_an_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
+    errors, fine_errors = ({alpha: remaining_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
     # Sampled, (11) chatters with an amplitude that falls as dt^(alpha/(1 - alpha)), by homogeneity.
-    converges = all(left[a] < VANISHED or often[a] < left[a] / 10.0 for a in ALPHAS)
-    found = vicinity(rng)
-    off, apart, slopes = found.relative_difference, found.difference, found.exponents
+    converges = all(errors[a] < VANISHED or fine_errors[a] < errors[a] / 10.0 for a in ALPHAS)
+    measures = vicinity(rng)
+    relative_difference, difference, slopes = measures.relative_difference, measures.difference, measures.exponents
     gains = rng.normal(0.0, 100.0, (500, 2))
-    same = all(hurwitz(k1, k2) == hurwitz(k2, k1) for k1, k2 in gains)
+    is_equivalent = all(hurwitz(k1, k2) == hurwitz(k2, k1) for k1, k2 in gains)
     return Claim(
         place="After (11), the vicinity",
-        says="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
-        found=(
+        statement="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
+        result=(
             "k1, k2 of Table 2, at rest. Without bias and noise a first error of 1 rad/s has fallen after 2.5 s, by "
-            f"alpha, to {_listed(left, '.0e')} rad/s at 200 Hz. At 2000 Hz it is {_listed(often, '.0e')}: near 1/2 "
-            "what is left is chatter between samples. With a bias e the rate rests off by "
-            "k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), for e from "
-            f"{BIASES_DEG[0]:g} to {BIASES_DEG[-1]:g} deg: to {off:.0e} of it where that is above {SEEN_RAD_S:g} "
-            f"rad/s, else to {apart:.0e} rad/s. At 0.5 deg it is "
-            f"{_listed({a: values[2] for a, values in found.by_bias.items()}, '.4f')} rad/s. With noise in y1 and e = "
-            "0 its RMS rises with the noise to the power "
-            f"{_listed(slopes, '.2f')}: the vicinity shrinks to the origin "
+            f"alpha, to {_list_by_alpha(errors, '.0e')} rad/s at 200 Hz. At 2000 Hz it is "
+            f"{_list_by_alpha(fine_errors, '.0e')}: near 1/2 what is left is chatter between samples. With a "
+            "bias e the rate rests off by k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), for e from "
+            f"{BIASES_DEG[0]:g} to {BIASES_DEG[-1]:g} deg: to {relative_difference:.0e} of it where that is above "
+            f"{SEEN_RAD_S:g} rad/s, else to {difference:.0e} rad/s. At 0.5 deg it is "
+            f"{_list_by_alpha({a: values[2] for a, values in measures.by_bias.items()}, '.4f')} rad/s. With noise in "
+            "y1 and e = 0 its RMS rises with the noise to the power "
+            f"{_list_by_alpha(slopes, '.2f')}: the vicinity shrinks to the origin "
             f"with either. Of {len(gains)} random pairs of gains, of any sign, the two polynomials are Hurwitz "
-            f"together in {'all' if same else 'some'}."
+            f"together in {'all' if is_equivalent else 'some'}."
         ),
-        holds=converges and off < 0.01 and apart < 0.1 * SEEN_RAD_S and min(slopes.values()) > 0.5,
+        holds=converges and relative_difference < 0.01 and difference < 0.1 * SEEN_RAD_S and min(slopes.values()) > 0.5,
         conditions=(
             "With s^2 + k1 s + k2 Hurwitz; the printed s^2 + k2 s + k1 has k1 and k2 exchanged"
             + (
                 ", without consequence: either is Hurwitz just when both gains are positive."
-                if same
+                if is_equivalent
                 else ", and the two are not Hurwitz together."
             )
         ),
         otherwise="The error does not converge, or not to the vicinity foreseen.",
         figures={
-            "error_left_share": _by_name(left),
+            "error_left_share": _by_name(errors),
             "bias_deg": list(BIASES_DEG),
-            "rate_error_by_bias_rad_s": _by_name(found.by_bias),
-            "error_left_share_2000_hz": _by_name(often),
-            "closed_form_relative_difference": off,
-            "closed_form_difference_where_small_rad_s": apart,
+            "rate_error_by_bias_rad_s": _by_name(measures.by_bias),
+            "error_left_share_2000_hz": _by_name(fine_errors),
+            "closed_form_relative_difference": relative_difference,
+            "closed_form_difference_where_small_rad_s": difference,
             "noise_rad": list(NOISES_RAD),
-            "rate_error_by_noise_rad_s": _by_name(found.by_noise),
+            "rate_error_by_noise_rad_s": _by_name(measures.by_noise),
             "exponent_of_noise": _by_name(slopes),
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(measures)],
     )
 
 
-def _listed(by_alpha: Mapping[float, float], form: str) -> str:
+def _list_by_alpha(by_alpha: Mapping[float, float], form: str) -> str:
     return ", ".join(f"{alpha:g}: {value:{form}}" for alpha, value in by_alpha.items())
 
 
@@ -167,12 +154,12 @@ def _by_name(by_alpha: Mapping[float, Any]) -> dict[str, Any]:
     return {str(alpha): np.asarray(value).tolist() for alpha, value in by_alpha.items()}
 
 
-def _picture(found: Vicinity) -> Picture:
+def _picture(measures: Vicinity) -> Picture:
     biased, noisy = [], []
     for i, alpha in enumerate(SETTLING):
-        biased.append(Line(BIASES_DEG, found.by_bias[alpha], f"alpha = {alpha:g}", "o", color=i + 1))
-        biased.append(Line(BIASES_DEG, found.bound[alpha], color=i + 1, width=0.8))
-        noisy.append(Line(np.degrees(NOISES_RAD), found.by_noise[alpha], f"alpha = {alpha:g}", "o-", color=i + 1))
+        biased.append(Line(BIASES_DEG, measures.by_bias[alpha], f"alpha = {alpha:g}", "o", color=i + 1))
+        biased.append(Line(BIASES_DEG, measures.bound[alpha], color=i + 1, width=0.8))
+        noisy.append(Line(np.degrees(NOISES_RAD), measures.by_noise[alpha], f"alpha = {alpha:g}", "o-", color=i + 1))
     e, sigma = "equilibrium bias e [deg]", "standard deviation of y1's noise [deg]"
     return Picture(
         "aranovskiy2020-vicinity",
@@ -186,5 +173,5 @@ def _picture(found: Vicinity) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The vicinity."""
+    """Judge the vicinity."""
     return [vicinity_claim()]

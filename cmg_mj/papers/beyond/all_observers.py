@@ -25,35 +25,30 @@ Cell = tuple[float, float]
 """Noise density [ug/rtHz] and equilibrium bias [deg]."""
 
 SHOWN: Cell = (400.0, 0.5)
-"""Whose lags and noise gains are drawn."""
+"""The cell whose lags and noise gains are drawn."""
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """All observers, and where the papers' order holds."""
+    """Judge all observers, and where the papers' order holds."""
     return [order_claim(league(WORLDS, SEED, on_share))]
 
 
 def order_claim(rows: Sequence[Row]) -> Claim:
-    """The claim.
-
-    Args:
-        rows: What `league` found.
-
-    Returns:
-        It holds if the paper's order is that of some cell.
-    """
+    """Judge the papers' order by the rows of `league`: it holds if it is that of some cell."""
     cells = by_cell(rows)
     ordered = [cell for cell, of_cell in cells.items() if in_order(of_cell)]
-    where = ", ".join(f"{noise:g} ug/rtHz and {bias:g} deg" for noise, bias in ordered)
-    best = [of_cell[0]["observer"] for of_cell in cells.values()]
-    winners = ", ".join(f"`{kind}` {best.count(kind)}" for kind in dict.fromkeys(best))
+    cells_text = ", ".join(f"{noise:g} ug/rtHz and {bias:g} deg" for noise, bias in ordered)
+    best_kinds = [of_cell[0]["observer"] for of_cell in cells.values()]
+    winners = ", ".join(f"`{kind}` {best_kinds.count(kind)}" for kind in dict.fromkeys(best_kinds))
     return Claim(
         place="All observers, three noises, three biases",
-        says="aranovskiy2020 section V: homogeneous before ltv before linear; here over a grid, with every observer",
-        found=(
+        statement="aranovskiy2020 section V: homogeneous before ltv before linear; here over a grid, with every "
+        "observer",
+        result=(
             f"{rows[0]['worlds']} seeds a cell. The smallest velocity error: {winners} of {len(cells)} cells. The "
-            f"paper's order holds at {where or 'none of them'}. The floor is the error of the filter that knows the "
-            "model, e, the push, the gimbals' motion and the noise exactly: none of the observers knows e or the push."
+            f"paper's order holds at {cells_text or 'none of them'}. The floor is the error of the filter that knows "
+            "the model, e, the push, the gimbals' motion and the noise exactly: none of the observers knows e or the "
+            "push."
         ),
         table=league_table(rows),
         holds=bool(ordered),
@@ -65,7 +60,7 @@ def order_claim(rows: Sequence[Row]) -> Claim:
 
 
 def by_cell(rows: Sequence[Row]) -> dict[Cell, list[Row]]:
-    """The rows of each noise and bias, the smallest velocity error first."""
+    """Return the rows of each noise and bias, the smallest velocity error first."""
     cells: dict[Cell, list[Row]] = {}
     for row in rows:
         cells.setdefault((row["noise_ug_rthz"], row["bias_deg"]), []).append(row)
@@ -73,22 +68,22 @@ def by_cell(rows: Sequence[Row]) -> dict[Cell, list[Row]]:
 
 
 def in_order(of_cell: Sequence[Row]) -> bool:
-    """Whether the paper's three observers come in its order."""
+    """Return true if the paper's three observers come in its order."""
     errors = {row["observer"]: row[ERROR] for row in of_cell}
     values = [errors[kind] for kind in ORDER]
-    return None not in values and all(better < worse for better, worse in pairwise(values))
+    return None not in values and all(error < next_error for error, next_error in pairwise(values))
 
 
 def league_table(rows: Sequence[Row]) -> str:
-    """The table, one block a noise and bias, the smallest velocity error first."""
-    error, *others = (heading(key) for key in MEANS)
+    """Return the table, one block a noise and bias, the smallest velocity error first."""
+    error, *other_headings = (heading(key) for key in MEANS)
     headings = (
         "observer",
         error,
         "over the floor",
         "push lag [ms]",
         "noise gain [1/s]",
-        *others,
+        *other_headings,
         "falls [%]",
         "update [us]",
     )
@@ -100,23 +95,23 @@ def league_table(rows: Sequence[Row]) -> str:
 
 
 def _line(row: Row) -> list[str]:
-    error, *others = (_mean(row, key) for key in MEANS)
+    error, *other_means = (_mean(row, key) for key in MEANS)
     ratio, lag = row["ratio_to_floor"], row["push_lag_s"]
-    fell, low, high = (100.0 * row[f"fell_fraction{end}"] for end in ("", "_low", "_high"))
+    falls, low, high = (100.0 * row[f"fell_fraction{end}"] for end in ("", "_low", "_high"))
     return [
         f"`{row['observer']}`",
         error,
         "-" if ratio is None else f"{ratio:.1f}",
         "-" if lag is None else f"{1e3 * lag:.1f}",
         f"{row['noise_gain_per_s']:.1f}",
-        *others,
-        f"{fell:.0f} ({low:.0f} to {high:.0f})",
+        *other_means,
+        f"{falls:.0f} ({low:.0f} to {high:.0f})",
         f"{row['update_us']:.1f}",
     ]
 
 
 def _mean(row: Row, key: str) -> str:
-    """A mean and half its interval, with the digits that the key has in every table."""
+    """Return a mean and half its interval, with the digits that the key has in every table."""
     if row[key] is None:
         return "-"
     half = Interval(row[key], row[f"{key}_low"], row[f"{key}_high"]).half
@@ -124,12 +119,12 @@ def _mean(row: Row, key: str) -> str:
 
 
 def _trade_off(rows: Sequence[Row]) -> Picture:
-    """Lag against noise gain, a mark an observer."""
+    """Draw lag against noise gain, a mark an observer."""
     of_cell = [row for row in rows if (row["noise_ug_rthz"], row["bias_deg"]) == SHOWN]
-    shown = [row for row in of_cell if row["push_lag_s"] is not None]
+    visible_rows = [row for row in of_cell if row["push_lag_s"] is not None]
     marks = [
         Line([1e3 * row["push_lag_s"]], [row["noise_gain_per_s"]], row["observer"], "o", row["observer"])
-        for row in shown
+        for row in visible_rows
     ]
     panel = Panel("noise gain [1/s]", marks, x_label="lag in a sudden push [ms]", y_scale="log")
     return Picture("beyond-trade-off", f"Lag and noise gain of every observer ({SHOWN[0]:g} ug/rtHz)", [panel])

@@ -1,4 +1,4 @@
-"""What an observer does to a signal: its lag, its noise gain, and what an update costs."""
+"""An observer's answer to a signal: its lag, its noise gain, and the cost of an update."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def record_motion(noise_ug: float, worlds: int, seed: int) -> Motion:
 
     Args:
         noise_ug: Noise density of the accelerometers [ug/rtHz].
-        worlds: How many.
-        seed: Of their noise.
+        worlds: Number of worlds.
+        seed: Seed of their noise.
 
     Returns:
         The motion; the noiseless measurement is the true tilt, and the true rate's slope.
@@ -49,8 +49,8 @@ def record_motion(noise_ug: float, worlds: int, seed: int) -> Motion:
     noisy = experiment.run_many(worlds).trajectory
     assert noisy is not None
     slope = np.gradient(noisy["x2_rad_s"], experiment.law.dt, axis=0)
-    true = {"y1_rad": noisy["x1_rad"], "acceleration_rad_s2": slope}
-    return Motion(experiment, noisy, Trajectory({**noisy.columns, **true}))
+    truth = {"y1_rad": noisy["x1_rad"], "acceleration_rad_s2": slope}
+    return Motion(experiment, noisy, Trajectory({**noisy.columns, **truth}))
 
 
 class Character(NamedTuple):
@@ -64,27 +64,19 @@ class Character(NamedTuple):
 
 
 def character(kind: str, motion: Motion) -> Character:
-    """Replay an observer on the same motion with and without noise.
-
-    Args:
-        kind: The observer.
-        motion: What `record_motion` recorded.
-
-    Returns:
-        Its lag and noise gain.
-    """
+    """Replay an observer on the same motion with and without noise for its lag and noise gain."""
     experiment = motion.experiment
     observer = make_observer(kind, *experiment.design.constructor_arguments)
     clean = replay(observer, motion.clean).x2
-    added = replay(observer, motion.noisy).x2 - clean
-    settled = motion.noisy["time_s"] > 1.0
+    noise_response = replay(observer, motion.noisy).x2 - clean
+    late = motion.noisy["time_s"] > 1.0
     noise = motion.noisy["y1_rad"] - motion.clean["y1_rad"]
-    gain = np.sqrt(np.mean(added[settled] ** 2) / np.mean(noise[settled] ** 2))
+    gain = np.sqrt(np.mean(noise_response[late] ** 2) / np.mean(noise[late] ** 2))
     return Character(push_lag(observer, experiment.plant.reduced, experiment.law.dt), float(gain))
 
 
 def push_lag(observer: Observer, model: ReducedModel, dt: float) -> float | None:
-    """How long an observer takes to see a sudden push, without noise and with the gimbals still.
+    """Measure how late an observer sees a sudden push, without noise and with the gimbals still.
 
     From rest at the upright the rig is pushed with 1 N m for 0.1 s and left to itself: in linear terms its rate is
     a sinh. The lag is the time between the true rate and the estimate passing half of the rate at the push's end. In
@@ -103,30 +95,30 @@ def push_lag(observer: Observer, model: ReducedModel, dt: float) -> float | None
     acceleration = PUSH_N_M / (model.gimbals * model.J1)
     t = np.arange(-0.2, 0.5, dt)
 
-    def pushed(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def torque_response(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tilt and rate under a torque that began at t = 0."""
         t = np.maximum(t, 0.0)
         return acceleration / pole**2 * (np.cosh(pole * t) - 1.0), acceleration / pole * np.sinh(pole * t)
 
-    tilt, rate = (now - later for now, later in zip(pushed(t), pushed(t - PUSH_S), strict=True))
+    tilt, rate = (now - later for now, later in zip(torque_response(t), torque_response(t - PUSH_S), strict=True))
     push = 0.5 * (np.sign(np.round(t / dt, 6)) - np.sign(np.round((t - PUSH_S) / dt, 6)))  # at its edges half of it
-    measured = np.stack([tilt, pole**2 * tilt + acceleration * push], axis=1).tolist()
-    state = observer.init(Measurement(measured[0][0], 0.0, measured[0][1]))
+    measurements = np.stack([tilt, pole**2 * tilt + acceleration * push], axis=1).tolist()
+    state = observer.init(Measurement(measurements[0][0], 0.0, measurements[0][1]))
     estimate = [0.0]
-    for y1, slope in measured[1:]:
-        state, estimated = observer.step(state, Measurement(y1, 0.0, slope), 0.0)
-        estimate.append(estimated[1])
+    for y1, slope in measurements[1:]:
+        state, output = observer.step(state, Measurement(y1, 0.0, slope), 0.0)
+        estimate.append(output[1])
     half = 0.5 * acceleration / pole * math.sinh(pole * PUSH_S)
-    true, seen = _first_passing(t, rate, half), _first_passing(t, np.array(estimate), half)
-    return None if true is None or seen is None else seen - true
+    true_time, estimate_time = _first_passing(t, rate, half), _first_passing(t, np.array(estimate), half)
+    return None if true_time is None or estimate_time is None else estimate_time - true_time
 
 
 def _first_passing(time_s: np.ndarray, values: np.ndarray, level: float) -> float | None:
     """When a signal first passes a level on its way from zero [s]; None if it never does."""
-    beyond = np.flatnonzero(values / level >= 1.0)
-    if not len(beyond):
+    passing = np.flatnonzero(values / level >= 1.0)
+    if not len(passing):
         return None
-    k = int(beyond[0])
+    k = int(passing[0])
     if k == 0:
         return float(time_s[0])
     share = (level - values[k - 1]) / (values[k] - values[k - 1])
@@ -134,17 +126,9 @@ def _first_passing(time_s: np.ndarray, values: np.ndarray, level: float) -> floa
 
 
 def update_us(kind: str, motion: Motion) -> float:
-    """Microseconds of one update on floats, along half a second of the motion.
-
-    Args:
-        kind: The observer.
-        motion: What it is given.
-
-    Returns:
-        The time [us].
-    """
+    """Measure the microseconds of one update on floats, along half a second of the motion."""
     experiment = motion.experiment
     observer = make_observer(kind, *experiment.design.constructor_arguments)
-    short = motion.noisy.between(2.0, 2.5)
+    excerpt = motion.noisy.between(2.0, 2.5)
     names = "y1_rad", "y2_rad", "acceleration_rad_s2", "u_rad_s"
-    return time_of_update(observer, *(short[name][:, 0].tolist() for name in names))
+    return time_of_update(observer, *(excerpt[name][:, 0].tolist() for name in names))

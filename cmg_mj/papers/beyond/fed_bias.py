@@ -19,66 +19,59 @@ KINDS = (ALONE, "adaptive", TOLD)
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """What feeding the estimated bias into (11) brings."""
+    """Judge the feeding of the estimated bias into (11)."""
     return [fed_bias_claim(fed_bias(WORLDS, SEED, on_share))]
 
 
 def fed_bias(
     worlds: int, seed: int, on_share: OnShare, biases_deg: Sequence[float] = BIASES_DEG, settings: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
-    """(11) alone, `adaptive` alone, and (11) told the bias by `adaptive`, at several biases.
+    """Run (11) alone, `adaptive` alone, and (11) told the bias by `adaptive`, at several biases.
 
     Args:
-        worlds: How many a bias, the same ones each time.
-        seed: Of the sensors' noise.
+        worlds: Worlds a bias, the same ones each time.
+        seed: Seed of the sensors' noise.
         on_share: Called with the share done.
         biases_deg: The equilibrium biases e [deg].
-        settings: What else is changed in `push_recovery`.
+        settings: Settings `section.field=value` that differ in `push_recovery`.
 
     Returns:
         A row a bias: each observer's velocity RMS error and share of falls, and what (11) gains by being told.
     """
-    found = {}
+    by_kind = {}
     for i, kind in enumerate(KINDS):
-        found[kind] = on_rigs(push_recovery(kind, seed, settings), worlds, "equilibrium_bias_deg", biases_deg)
+        by_kind[kind] = on_rigs(push_recovery(kind, seed, settings), worlds, "equilibrium_bias_deg", biases_deg)
         on_share((i + 1) / len(KINDS))
     rows = []
     for i, bias in enumerate(biases_deg):
         row: dict[str, Any] = {"bias_deg": bias, "worlds": worlds, "seed": seed}
-        values = {kind: results[i].values(ERROR) for kind, results in found.items()}
+        values = {kind: results[i].values(ERROR) for kind, results in by_kind.items()}
         for kind in KINDS:
             row[f"{kind}_rad_s"] = known_interval(values[kind])
-            row[f"{kind}_fell_fraction"] = 1.0 - float(found[kind][i].stood.mean())
+            row[f"{kind}_fell_fraction"] = 1.0 - float(by_kind[kind][i].stood.mean())
         rows.append(row | {"gain_rad_s": gain(values[ALONE], values[TOLD])})
     return rows
 
 
 def fed_bias_claim(rows: Sequence[dict[str, Any]]) -> Claim:
-    """The claim.
-
-    Args:
-        rows: What `fed_bias` found.
-
-    Returns:
-        It holds if being told the bias helps at some bias: a smaller error beyond chance, or fewer falls.
-    """
-    helped = [
+    """Judge the rows of `fed_bias`: it helps if at some bias the error is smaller beyond chance, or falls are fewer."""
+    helped_biases = [
         row["bias_deg"]
         for row in rows
         if (row["gain_rad_s"] is not None and row["gain_rad_s"].low > 0.0)
         or row[f"{TOLD}_fell_fraction"] < row[f"{ALONE}_fell_fraction"]
     ]
-    where = f"It helps at e = {', '.join(f'{e:g}' for e in helped)} deg of those tried."
+    helpful_biases = f"It helps at e = {', '.join(f'{e:g}' for e in helped_biases)} deg of those tried."
     headings = ("e [deg]", *(f"`{kind}` [1e-3 rad/s]" for kind in KINDS))
     cells = [(f"{row['bias_deg']:g}", *(_cell(row, kind) for kind in KINDS)) for row in rows]
     return Claim(
         place="homogeneous with the bias fed in from adaptive",
-        ours=True,
-        says="the rate error of (11) that e causes goes when e is estimated beside it",
-        found="Velocity RMS error in `push_recovery`, 95 % intervals:",
+        is_ours=True,
+        statement="the rate error of (11) that e causes goes when e is estimated beside it",
+        result="Velocity RMS error in `push_recovery`, 95 % intervals:",
         table=markdown.table(headings, cells),
-        holds=bool(helped),
-        conditions="" if len(helped) == len(rows) else where,
+        holds=bool(helped_biases),
+        conditions="" if len(helped_biases) == len(rows) else helpful_biases,
         otherwise="It helps at none of the biases tried.",
         figures={"rows": rows},
         pictures=[_picture(rows)],
@@ -86,16 +79,16 @@ def fed_bias_claim(rows: Sequence[dict[str, Any]]) -> Claim:
 
 
 def _cell(row: dict[str, Any], kind: str) -> str:
-    error, fell = row[f"{kind}_rad_s"], row[f"{kind}_fell_fraction"]
-    shown = plus_minus(None if error is None else Interval(*(1e3 * value for value in error)), 1)
-    return shown + (f" [{fell:.0%} fell]" if fell else "")
+    error, fall_share = row[f"{kind}_rad_s"], row[f"{kind}_fell_fraction"]
+    error_text = plus_minus(None if error is None else Interval(*(1e3 * value for value in error)), 1)
+    return error_text + (f" [{fall_share:.0%} fell]" if fall_share else "")
 
 
 def _picture(rows: Sequence[dict[str, Any]]) -> Picture:
     lines = []
     for kind in KINDS:
-        known = [(row["bias_deg"], row[f"{kind}_rad_s"]) for row in rows if row[f"{kind}_rad_s"] is not None]
-        biases, errors = [bias for bias, _ in known], [error for _, error in known]
+        points = [(row["bias_deg"], row[f"{kind}_rad_s"]) for row in rows if row[f"{kind}_rad_s"] is not None]
+        biases, errors = [bias for bias, _ in points], [error for _, error in points]
         means, halves = [error.mean for error in errors], [error.half for error in errors]
         lines.append(Line(biases, means, kind, "o-", kind, spread=halves))
     panel = Panel("velocity RMS error [rad/s]", lines, x_label="equilibrium bias e [deg]")

@@ -11,7 +11,7 @@ from cmg_mj.observers.reduced_model import ReducedModel
 
 
 def kalman_filter(model: ReducedModel, dt: float, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The stationary Kalman filter of the linearised rig with every torque on it known, and its error.
+    """Return the stationary Kalman filter of the linearised rig with every torque on it known, and its error.
 
     Knowing the gimbals' motion, the push and e exactly, the error obeys x' = [[0, 1], [M/J1, 0]] x without any process
     noise: only the measurement's noise is left. The rig being unstable, the error does not die out even so. In
@@ -27,11 +27,11 @@ def kalman_filter(model: ReducedModel, dt: float, sigma: float) -> tuple[np.ndar
     """
     Phi = expm(np.array([[0.0, 1.0], [model.gravity_torque / model.J1, 0.0]]) * dt)
     C, R = np.array([[1.0, 0.0]]), np.array([[sigma**2]])
-    predicted = solve_discrete_are(Phi.T, C.T, np.zeros((2, 2)), R)
-    gain = predicted @ C.T / (C @ predicted @ C.T + R)
-    return Phi, gain[:, 0], predicted - gain @ C @ predicted
+    prior = solve_discrete_are(Phi.T, C.T, np.zeros((2, 2)), R)
+    gain = prior @ C.T / (C @ prior @ C.T + R)
+    return Phi, gain[:, 0], prior - gain @ C @ prior
 
 
 def velocity_floor(model: ReducedModel, dt: float, sigma: float) -> float:
-    """RMS velocity error of that filter [rad/s]; no unbiased estimate from the same samples is better."""
+    """Return the RMS velocity error of that filter [rad/s]; no unbiased estimate from the same samples is better."""
     return math.sqrt(kalman_filter(model, dt, sigma)[2][1, 1])

@@ -16,61 +16,54 @@ WITH = {False: "without", True: "with"}
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """What a friction model in the observer brings."""
+    """Judge a friction model in the observer."""
     return [friction_claim(friction(WORLDS, SEED, on_share))]
 
 
 def friction(worlds: int, seed: int, on_share: OnShare, settings: Sequence[str] = ()) -> dict[str, Any]:
-    """Dry friction in the plant and in the observer, each with and without the other.
+    """Run dry friction in the plant and in the observer, each with and without the other.
 
     Args:
-        worlds: How many, the same ones each time.
-        seed: Of the sensors' noise.
+        worlds: Number of worlds, the same ones each time.
+        seed: Seed of the sensors' noise.
         on_share: Called with the share done.
-        settings: What else is changed in `push_recovery`.
+        settings: Settings `section.field=value` that differ in `push_recovery`.
 
     Returns:
         Mean errors by plant and observer; the gain of the observer's friction model on both plants, and how much of
         the gain on the rig that rubs is not had on the one that does not.
     """
-    found = {}
-    for knows in (False, True):
-        observer = f"observer.friction_n_m={FRICTION_N_M if knows else 0.0}"
+    results = {}
+    for model in (False, True):
+        observer = f"observer.friction_n_m={FRICTION_N_M if model else 0.0}"
         experiment = push_recovery("homogeneous", seed, [observer, *settings])
         rigs = on_rigs(experiment, worlds, "tilt_friction_n_m", (0.0, FRICTION_N_M))
-        found[False, knows], found[True, knows] = rigs
-        on_share(0.5 + 0.5 * knows)
+        results[False, model], results[True, model] = rigs
+        on_share(0.5 + 0.5 * model)
     means = {
-        f"{WITH[rubs]}_friction_in_the_plant_{WITH[knows]}_in_the_observer_rad_s": found[rubs, knows].mean(ERROR)
-        for rubs in (False, True)
-        for knows in (False, True)
+        f"{WITH[rig]}_friction_in_the_plant_{WITH[model]}_in_the_observer_rad_s": results[rig, model].mean(ERROR)
+        for rig in (False, True)
+        for model in (False, True)
     }
-    values = {key: result.values(ERROR) for key, result in found.items()}
-    gains = {f"gain_{WITH[rubs]}_friction_rad_s": gain(values[rubs, False], values[rubs, True]) for rubs in WITH}
+    values = {key: result.values(ERROR) for key, result in results.items()}
+    gains = {f"gain_{WITH[rig]}_friction_rad_s": gain(values[rig, False], values[rig, True]) for rig in WITH}
     due = (values[True, False] - values[True, True]) - (values[False, False] - values[False, True])
     return means | gains | {"gain_due_to_friction_rad_s": known_interval(due), "worlds": worlds, "seed": seed}
 
 
 def friction_claim(figures: dict[str, Any]) -> Claim:
-    """The claim.
-
-    Args:
-        figures: What `friction` found.
-
-    Returns:
-        It holds if knowing the friction brings something beyond the damping.
-    """
-    smooth, rubbing, due = (figures[f"gain_{which}_friction_rad_s"] for which in (*WITH.values(), "due_to"))
-    errors = (figures[f"with_friction_in_the_plant_{knows}_in_the_observer_rad_s"] for knows in WITH.values())
-    before, after = (format_figure(ERROR, error) for error in errors)
+    """Judge the figures of `friction`: knowing the friction helps if it brings more than damping."""
+    smooth, rough, due = (figures[f"gain_{condition}_friction_rad_s"] for condition in (*WITH.values(), "due_to"))
+    errors = (figures[f"with_friction_in_the_plant_{condition}_in_the_observer_rad_s"] for condition in WITH.values())
+    error_without, error_with = (format_figure(ERROR, error) for error in errors)
     return Claim(
         place="Future work of both papers: friction in the observer",
-        says="a friction model in the velocity estimator would reduce its modelling errors",
-        found=(
+        statement="a friction model in the velocity estimator would reduce its modelling errors",
+        result=(
             f"On a rig with {FRICTION_N_M:g} N m of dry friction on the tilt axis the same friction in (11) takes "
-            f"{_milli(rubbing)} off the velocity RMS error ({before} to {after} rad/s). But on a rig without it, it "
-            f"takes {_milli(smooth)} off as well: it also damps the estimate of a rate whose true value is small. What "
-            f"is due to knowing the friction is the difference, {_milli(due)}."
+            f"{_milli(rough)} off the velocity RMS error ({error_without} to {error_with} rad/s). But on "
+            f"a rig without it, it takes {_milli(smooth)} off as well: it also damps the estimate of a "
+            f"rate whose true value is small. What is due to knowing the friction is the difference, {_milli(due)}."
         ),
         holds=due is not None and due.low > 0.0,
         conditions=(

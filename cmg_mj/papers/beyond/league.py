@@ -19,7 +19,7 @@ from cmg_mj.results.result import Result
 NOISES_UG = (200.0, 400.0, 800.0)
 BIASES_DEG = (0.0, 0.5, 1.0)
 MEANS = (ERROR, "settle_time_s", "tilt_rms_deg", "command_rms_rad_s")
-"""What is shown of a run's summary."""
+"""The keys of a run's summary that are shown."""
 
 
 def league(
@@ -36,13 +36,13 @@ def league(
     World i has the same noise for all observers and biases of one noise level.
 
     Args:
-        worlds: How many a cell.
-        seed: Of the sensors' noise.
+        worlds: Worlds a cell.
+        seed: Seed of the sensors' noise.
         on_share: Called with the share done.
         kinds: The observers.
         noises_ug: Noise densities of the accelerometers [ug/rtHz].
         biases_deg: Equilibrium biases e [deg].
-        settings: What else is changed in `push_recovery`.
+        settings: Settings `section.field=value` that differ in `push_recovery`.
 
     Returns:
         A row an observer, noise and bias. Means are over the worlds that stood to the end; intervals are of 95 %.
@@ -52,10 +52,10 @@ def league(
         motion = record_motion(noise_ug, min(worlds, 20), seed + 1)
         noise = f"sensors.accelerometer.noise_density_ug_rthz={noise_ug}"
         for j, kind in enumerate(kinds):
-            seen = character(kind, motion)
+            traits = character(kind, motion)
             open_loop = {
-                "push_lag_s": seen.lag_s,
-                "noise_gain_per_s": seen.noise_gain_per_s,
+                "push_lag_s": traits.lag_s,
+                "noise_gain_per_s": traits.noise_gain_per_s,
                 "update_us": update_us(kind, motion),
             }
             experiment = push_recovery(kind, seed, [noise, *settings])
@@ -70,13 +70,13 @@ def league(
 
 
 def _cell(result: Result, floor: float) -> dict[str, Any]:
-    """What an observer does at one noise and bias."""
-    worlds, stood = len(result.stood), int(result.stood.sum())
-    share = binomtest(worlds - stood, worlds).proportion_ci(0.95)
+    """Summarise an observer at one noise and bias."""
+    worlds, n_stood = len(result.stood), int(result.stood.sum())
+    share = binomtest(worlds - n_stood, worlds).proportion_ci(0.95)
     cell: dict[str, Any] = {
         "worlds": worlds,
-        "stood": stood,
-        "fell_fraction": (worlds - stood) / worlds,
+        "stood": n_stood,
+        "fell_fraction": (worlds - n_stood) / worlds,
         "fell_fraction_low": float(share.low),
         "fell_fraction_high": float(share.high),
     }

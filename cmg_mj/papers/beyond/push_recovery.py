@@ -12,40 +12,31 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 
 ERROR = "velocity_rms_error_rad_s"
-"""What is compared."""
+"""The measure that is compared."""
 
 
 def push_recovery(kind: str, seed: int, settings: Sequence[str] = ()) -> Experiment:
-    """The scenario with an observer.
-
-    Args:
-        kind: The observer.
-        seed: Of the sensors' noise.
-        settings: What else is changed in the scenario.
-
-    Returns:
-        The experiment.
-    """
+    """Prepare the scenario with an observer, and with other settings."""
     return prepare(load_scenario("push_recovery", [f"seed={seed}", *settings], kind))
 
 
 def on_rigs(experiment: Experiment, worlds: int, field: str, values: Sequence[float]) -> list[Result]:
-    """The same worlds on rigs that differ in one setting, all in one batch.
+    """Run the same worlds on rigs that differ in one setting, all in one batch.
 
     Args:
         experiment: The experiment; its own value of the setting does not count.
-        worlds: How many a rig; world i has the same noise on all.
+        worlds: Worlds a rig; world i has the same noise on all.
         field: The setting, a field of [plant].
         values: Its value on each rig.
 
     Returns:
         A result a rig.
     """
-    each = [value for value in values for _ in range(worlds)]
+    values_by_world = [value for value in values for _ in range(worlds)]
     numbers = [*range(worlds)] * len(values)
-    return experiment.run_many(numbers, vary={field: each}, keep_trajectory=False).split(len(values))
+    return experiment.run_many(numbers, vary={field: values_by_world}, keep_trajectory=False).split(len(values))
 
 
-def gain(before: np.ndarray, after: np.ndarray) -> Interval | None:
-    """By how much an error shrank, world by world, in those that stood both times; None if fewer than two did."""
-    return known_interval(before - after)
+def gain(errors_before: np.ndarray, errors_after: np.ndarray) -> Interval | None:
+    """Return how much an error shrank, world by world, in those that stood both times; None if fewer than two did."""
+    return known_interval(errors_before - errors_after)

@@ -1,4 +1,4 @@
-"""What is printed otherwise than it can be meant, and what the paper leaves open of its simulation."""
+"""The misprints, and the settings of the simulation that the paper leaves open."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ import numpy as np
 
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.dao2023 import paper
-from cmg_mj.papers.dao2023.pendulum_robot import follow, motion, one, proposed, starts
+from cmg_mj.papers.dao2023.pendulum_robot import follow, make_proposed, make_single, motion, starts
 
 DT, DURATION_S = 0.005, 80.0
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The sampling and the misprints."""
-    return [sampled(lambda share: on_share(0.6 * share)), printed()]
+    """Judge the sampling and the misprints."""
+    return [sampling_claim(lambda share: on_share(0.6 * share)), misprint_claim()]
 
 
-def sampled(on_share: OnShare) -> Claim:
-    """A sampled observer at Sigma = 1000; what an explicit step does is told beside it, and does not count."""
+def sampling_claim(on_share: OnShare) -> Claim:
+    """Judge a sampled observer at Sigma = 1000; an explicit step is shown beside it, and does not count."""
     t = DT * np.arange(round(DURATION_S / DT) + 1)
     x = motion(starts(1, 4), t)
-    rms = follow(proposed(DT, (1000.0,)), t, x, on_share).tail_rms()[0]
+    rms = follow(make_proposed(DT, (1000.0,)), t, x, on_share).tail_rms()[0]
     escape = explicit_escape(1000.0, DT, 10.0)
     explicit = f"has left every bound after {escape:.1f} s" if math.isfinite(escape) else "stays bounded for 10 s"
     return Claim(
         place="Section 3.2, simulation",
-        says="The observer is simulated at Sigma = 1000 (the paper does not say how).",
-        found=f"Sampled at 200 Hz, our implicit step stays stable: state RMS error {rms.max():.1e} at worst over "
+        statement="The observer is simulated at Sigma = 1000 (the paper does not say how).",
+        result=f"Sampled at 200 Hz, our implicit step stays stable: state RMS error {rms.max():.1e} at worst over "
         f"64-80 s in {len(rms)} motions. A classical Runge-Kutta step of (7) to (9) at that rate {explicit}.",
         holds=bool(rms.max() < 0.1),
         figures={
@@ -39,24 +39,24 @@ def sampled(on_share: OnShare) -> Claim:
 
 
 def explicit_escape(sigma: float, dt: float, duration: float, seed: int = 0) -> float:
-    """When a classical Runge-Kutta step of (7) to (9) at a sample rate has left every bound: infinite if never [s].
+    """Find when a Runge-Kutta step of (7) to (9) at a sample rate has left every bound: infinite if never [s].
 
     Args:
         sigma: The weight Sigma.
         dt: Sample period [s].
-        duration: How long to try [s].
-        seed: Of the initial values.
+        duration: Time to try [s].
+        seed: Seed of the initial values.
 
     Returns:
         The time at which an estimate passes 1e9.
     """
-    observer = one(dt, sigma)
+    observer = make_single(dt, sigma)
     t = dt * np.arange(round(duration / dt) + 1)
     q = motion(starts(seed, 1), t)[:, 0, 0]
 
     def slope(time: float, s: np.ndarray, y: float) -> np.ndarray:
-        here = paper.system(y, paper.torque(time))
-        parts = observer.slope(time, s[:2], s[2:6], s[6:].reshape(2, 4), here, np.zeros(1), np.array([y]))
+        system = paper.system(y, paper.torque(time))
+        parts = observer.slope(time, s[:2], s[2:6], s[6:].reshape(2, 4), system, np.zeros(1), np.array([y]))
         return np.concatenate([part.ravel() for part in parts])
 
     s = np.zeros(14)
@@ -71,15 +71,15 @@ def explicit_escape(sigma: float, dt: float, duration: float, seed: int = 0) -> 
     return math.inf
 
 
-def printed() -> Claim:
-    """L as a row, and (10) against (14)."""
+def misprint_claim() -> Claim:
+    """Judge L as a row, and (10) against (14)."""
     row, column = (L.shape[1] == paper.system(0.0, 0.0).C2.shape[0] for L in (paper.L_PRINTED, paper.L))
-    polynomial, amplitude = np.poly(paper.error_matrix()), amplitude_found_if_10_holds()
+    polynomial, amplitude = np.poly(paper.error_matrix()), amplitude_under_10()
     by_10, by_14 = abs(amplitude / paper.THETA[1] - 1.0).max(), abs(amplitude - 1.0).max()
     return Claim(
         place="L, (7), (10), (14) as printed",
-        says="L = -[1 1] makes A + L C2 Hurwitz, and (14) is (10) rearranged.",
-        found=f"A row L {'fits' if row else 'does not fit'} C2, which has one row; the column gives A + L C2 the "
+        statement="L = -[1 1] makes A + L C2 Hurwitz, and (14) is (10) rearranged.",
+        result=f"A row L {'fits' if row else 'does not fit'} C2, which has one row; the column gives A + L C2 the "
         f"polynomial s^2 + {polynomial[1]:.0f} s + {polynomial[2]:.0f}. If the arm moves by (10), the observer finds a "
         f"disturbance of amplitude {amplitude.mean():.3f}: theta2 d, not d.",
         holds=column and bool(np.all(polynomial > 0.0)) and bool(min(by_10, by_14) < 0.025),
@@ -93,7 +93,7 @@ def printed() -> Claim:
 
 
 def _corrections(*, row: bool, rearranged: bool) -> list[str]:
-    """What must be read otherwise than printed."""
+    """List the corrections to the printed equations."""
     sentences = [
         "(7) needs B2 u and the hats of its estimates; the example has B2 = 0, so that it does not show there."
     ]
@@ -104,10 +104,10 @@ def _corrections(*, row: bool, rearranged: bool) -> list[str]:
     return sentences
 
 
-def amplitude_found_if_10_holds() -> np.ndarray:
-    """Amplitude of the disturbance that the observer finds of an arm that moves by (10), one a motion [rad/s^2]."""
+def amplitude_under_10() -> np.ndarray:
+    """Estimate the amplitude of the disturbance on an arm that moves by (10), one a motion [rad/s^2]."""
     t = DT * np.arange(round(DURATION_S / DT) + 1)
     x = motion(starts(3, 3), t, coefficient=paper.THETA[1])
     late = t >= 0.8 * DURATION_S
-    error = follow(proposed(DT, (1000.0,)), t, x).exogenous[late, 0, :, 2]
+    error = follow(make_proposed(DT, (1000.0,)), t, x).exogenous[late, 0, :, 2]
     return np.sqrt(2.0 * np.mean((error + paper.disturbance(t[late])[:, None]) ** 2, axis=0))

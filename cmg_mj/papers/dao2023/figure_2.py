@@ -8,36 +8,36 @@ from scipy.linalg import expm
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.pendulum_robot import Errors, settle_times
-from cmg_mj.papers.dao2023.study import SETTLED, UNSTATED, Study, known_times, words_of_time
+from cmg_mj.papers.dao2023.study import SETTLED, UNSTATED, Study, finite_times, words_of_time
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 QUICK = 10.0
 """Quick: at most this many times as slow as an observer that knows the parameters."""
 
 
-def claims(found: Study) -> list[Claim]:
-    """(a), (b), and how fast (b) is."""
-    return [conventional(found), proposed(found), quickly(found)]
+def claims(study: Study) -> list[Claim]:
+    """Judge (a), (b), and how fast (b) is."""
+    return [conventional(study), proposed(study), speed_claim(study)]
 
 
-def conventional(found: Study) -> Claim:
-    """(a)."""
-    rms = found.conventional.tail_rms()[0]
+def conventional(study: Study) -> Claim:
+    """Judge (a)."""
+    rms = study.conventional.tail_rms()[0]
     return Claim(
         place="Fig. 2(a)",
-        says="With the conventional observer, which knows of no disturbance, the error of the state goes on "
+        statement="With the conventional observer, which knows of no disturbance, the error of the state goes on "
         "oscillating.",
-        found=f"RMS of the state error over 160-200 s at Sigma = 10: {rms.min():.3f} to {rms.max():.3f} in {len(rms)} "
+        result=f"RMS of the state error over 160-200 s at Sigma = 10: {rms.min():.3f} to {rms.max():.3f} in {len(rms)} "
         "motions; it does not decay.",
         holds=rms.min() > 0.2,
         conditions=UNSTATED,
         otherwise=UNSTATED,
         figures={"conventional_state_rms_160_200_s": rms.tolist()},
-        pictures=[_picture(found)],
+        pictures=[_picture(study)],
     )
 
 
-def _picture(found: Study) -> Picture:
+def _picture(study: Study) -> Picture:
     def panel(title: str, errors: Errors, every: int) -> Panel:
         lines = [
             Line(errors.t[::every], errors.state[::every, 0, 0, i], label, color=i, width=0.8)
@@ -49,56 +49,56 @@ def _picture(found: Study) -> Picture:
         "dao2023-fig-2",
         "dao2023, Fig. 2: state error at Sigma = 10, one of ten motions (the first seconds leave the axes)",
         (
-            panel("(a) conventional adaptive observer", found.conventional, 10),
-            panel("(b) adaptive disturbance observer", found.proposed, 20),
+            panel("(a) conventional adaptive observer", study.conventional, 10),
+            panel("(b) adaptive disturbance observer", study.proposed, 20),
         ),
     )
 
 
-def proposed(found: Study) -> Claim:
-    """(b)."""
-    rms, plain = found.proposed.tail_rms()[0], found.conventional.tail_rms()[0]
+def proposed(study: Study) -> Claim:
+    """Judge (b)."""
+    rms, plain = study.proposed.tail_rms()[0], study.conventional.tail_rms()[0]
     return Claim(
         place="Fig. 2(b)",
-        says="With the proposed observer the error of the state tends to zero.",
-        found=f"RMS over 160-200 s at Sigma = 10: {rms.min():.3f} to {rms.max():.3f}, {np.min(plain / rms):.1f} to "
+        statement="With the proposed observer the error of the state tends to zero.",
+        result=f"RMS over 160-200 s at Sigma = 10: {rms.min():.3f} to {rms.max():.3f}, {np.min(plain / rms):.1f} to "
         f"{np.max(plain / rms):.0f} times smaller than the conventional observer's.",
         holds=rms.max() < 0.1 and bool((rms < plain).all()),
         conditions=UNSTATED,
         otherwise=UNSTATED,
-        figures={"proposed_state_rms_160_200_s": rms.tolist(), "largest_angle_rad": found.largest_angle},
+        figures={"proposed_state_rms_160_200_s": rms.tolist(), "largest_angle_rad": study.largest_angle},
     )
 
 
-def quickly(found: Study) -> Claim:
-    """(b), how fast."""
-    settled, known = state_settle_times(found.proposed)
-    middle, yardstick = float(np.median(settled)), float(np.median(known))
+def speed_claim(study: Study) -> Claim:
+    """Judge (b), how fast."""
+    learning_times, ideal_times = state_settle_times(study.proposed)
+    middle, yardstick = float(np.median(learning_times)), float(np.median(ideal_times))
     meaning = (
         f"{UNSTATED} Quickly is taken to mean: the median time until the error, as a vector, stays below {SETTLED} is "
         f"at most {QUICK:g} times that of an observer with the same L that knows the parameters and the disturbance."
     )
     return Claim(
         place="Fig. 2(b), how fast",
-        says="With the proposed observer the error of the state tends to zero soon.",
-        found=f"At Sigma = 10 the state's error stays below {SETTLED} from {words_of_time(middle)} on (median of "
-        f"{len(settled)} motions); with all of xm known, L takes {yardstick:.1f} s. It is {middle / yardstick:.0f} "
-        "times as slow: what takes long is to learn the parameters.",
+        statement="With the proposed observer the error of the state tends to zero soon.",
+        result=f"At Sigma = 10 the state's error stays below {SETTLED} from {words_of_time(middle)} on (median of "
+        f"{len(learning_times)} motions); with all of xm known, L takes {yardstick:.1f} s. It is "
+        f"{middle / yardstick:.0f} times as slow: what takes long is to learn the parameters.",
         holds=middle <= QUICK * yardstick,
         conditions=meaning,
         otherwise=meaning,
         figures={
-            "state_settles_below_0_1_s": known_times(settled),
-            "state_settles_below_0_1_if_all_is_known_s": known.tolist(),
+            "state_settles_below_0_1_s": finite_times(learning_times),
+            "state_settles_below_0_1_if_all_is_known_s": ideal_times.tolist(),
         },
     )
 
 
 def state_settle_times(errors: Errors) -> tuple[np.ndarray, np.ndarray]:
-    """When the state's error, as a vector, stays below `SETTLED`, with the first of the weights.
+    """Find when the state's error, as a vector, stays below `SETTLED`, with the first of the weights.
 
     Args:
-        errors: What the observers made of the motions.
+        errors: Errors of the observers along the motions.
 
     Returns:
         The times (n,) [s], infinite if they do not settle; and the same of an observer from the same start with the
@@ -108,5 +108,5 @@ def state_settle_times(errors: Errors) -> tuple[np.ndarray, np.ndarray]:
     onward, z = expm(t[1] * paper.error_matrix()), [errors.state[0, 0].T]
     for _ in t[1:]:
         z.append(onward @ z[-1])
-    known = settle_times(np.linalg.norm(z, axis=1), t, SETTLED)
-    return settle_times(np.linalg.norm(errors.state[:, 0], axis=-1), errors.t, SETTLED), known
+    ideal_times = settle_times(np.linalg.norm(z, axis=1), t, SETTLED)
+    return settle_times(np.linalg.norm(errors.state[:, 0], axis=-1), errors.t, SETTLED), ideal_times

@@ -14,7 +14,7 @@ from cmg_mj.papers.dao2023.study import (
     UNSTATED,
     Study,
     exogenous_settle_times,
-    known_times,
+    finite_times,
     words_of_time,
 )
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
@@ -27,17 +27,17 @@ TESTED = (
 )
 
 
-def claims(found: Study) -> list[Claim]:
-    """(a) to (c), what (b) comes to, and the conclusion."""
-    return [settling_order(found), parameters(found), larger_gains(found)]
+def claims(study: Study) -> list[Claim]:
+    """Judge (a) to (c), what (b) comes to, and the conclusion."""
+    return [settling_order(study), parameters(study), larger_gains(study)]
 
 
-def settling_order(found: Study) -> Claim:
-    """(a), (b), (c)."""
-    times = exogenous_settle_times(found.proposed)[:3]
+def settling_order(study: Study) -> Claim:
+    """Judge (a), (b), (c)."""
+    times = exogenous_settle_times(study.proposed)[:3]
     ten, thousand, tenth = times
-    ordered = (thousand < ten) & (ten <= tenth) & np.isfinite(thousand)
-    early = exogenous_settle_times(found.proposed, 1.0)[:3]
+    in_order = (thousand < ten) & (ten <= tenth) & np.isfinite(thousand)
+    early = exogenous_settle_times(study.proposed, 1.0)[:3]
     faster_early = int(np.sum(early[1] < early[0]))
     n = len(ten)
     medians = [float(np.median(row)) for row in times]
@@ -49,24 +49,24 @@ def settling_order(found: Study) -> Claim:
     )
     return Claim(
         place="Fig. 3(a), (b), (c)",
-        says="Against Sigma = 10, parameters and disturbance are found sooner with 1000 and later with 0.1.",
-        found=f"In {int(ordered.sum())} of {n} motions the settling order is 1000 < 10 <= 0.1. Medians: "
+        statement="Against Sigma = 10, parameters and disturbance are found sooner with 1000 and later with 0.1.",
+        result=f"In {int(in_order.sum())} of {n} motions the settling order is 1000 < 10 <= 0.1. Medians: "
         f"{words_of_time(medians[1])} at 1000, {words_of_time(medians[0])} at 10, {words_of_time(medians[2])} at 0.1.",
-        holds=ordered.sum() >= 0.9 * n,
+        holds=in_order.sum() >= 0.9 * n,
         conditions=meaning,
         otherwise=meaning,
         figures={
-            f"settles_below_0_1_sigma_{sigma:g}_s": known_times(row)
+            f"settles_below_0_1_sigma_{sigma:g}_s": finite_times(row)
             for sigma, row in zip(paper.SIGMAS, times, strict=True)
         }
-        | {"motions_ordered": int(ordered.sum()), "motions_faster_into_band_1_at_1000": faster_early, "motions": n},
-        pictures=[_picture(found)],
+        | {"motions_ordered": int(in_order.sum()), "motions_faster_into_band_1_at_1000": faster_early, "motions": n},
+        pictures=[_picture(study)],
     )
 
 
-def _picture(found: Study) -> Picture:
+def _picture(study: Study) -> Picture:
     labels = ("$\\theta_1$ [1/s$^2$]", "$\\theta_2$ [1/(kg m$^2$)]", "$d$ [rad/s$^2$]")
-    t, errors = found.proposed.t[::20], found.proposed.exogenous[::20, :, 0]
+    t, errors = study.proposed.t[::20], study.proposed.exogenous[::20, :, 0]
     panels = tuple(
         Panel(
             "estimate less truth",
@@ -80,19 +80,19 @@ def _picture(found: Study) -> Picture:
     return Picture("dao2023-fig-3", title, panels)
 
 
-def parameters(found: Study) -> Claim:
-    """(b), where it ends."""
-    errors = np.abs(found.proposed.exogenous[-1, 1, :, :2])
-    rms = found.proposed.tail_rms()[1]
-    sampled = f"{UNSTATED} At 400 Hz; at 200 Hz the straight line between samples leaves up to 3e-3 in theta1."
+def parameters(study: Study) -> Claim:
+    """Judge (b), where it ends."""
+    errors = np.abs(study.proposed.exogenous[-1, 1, :, :2])
+    rms = study.proposed.tail_rms()[1]
+    sampling_remark = f"{UNSTATED} At 400 Hz; at 200 Hz the straight line between samples leaves up to 3e-3 in theta1."
     return Claim(
         place="Fig. 3(b), parameters",
-        says="At Sigma = 1000 theta1 and theta2 are found.",
-        found=f"After 200 s the largest errors of {len(errors)} motions are {errors[:, 0].max():.1e} of theta1 = 9.81 "
+        statement="At Sigma = 1000 theta1 and theta2 are found.",
+        result=f"After 200 s the largest errors of {len(errors)} motions are {errors[:, 0].max():.1e} of theta1 = 9.81 "
         f"and {errors[:, 1].max():.1e} of theta2 = 2; the state's RMS error is at most {rms.max():.1e}.",
         holds=errors.max() < 1e-3,
-        conditions=sampled,
-        otherwise=sampled,
+        conditions=sampling_remark,
+        otherwise=sampling_remark,
         figures={
             "theta1_error_1_s2": errors[:, 0].tolist(),
             "theta2_error_1_kg_m2": errors[:, 1].tolist(),
@@ -101,25 +101,25 @@ def parameters(found: Study) -> Claim:
     )
 
 
-def larger_gains(found: Study) -> Claim:
-    """The conclusion."""
-    medians = dict(zip(SIGMAS, np.median(exogenous_settle_times(found.proposed), axis=-1).tolist(), strict=True))
-    rises = medians[1000.0] < medians[10.0] <= medians[0.1]
-    goes_on = medians[10_000.0] < medians[1000.0]
-    size = np.linalg.norm(found.proposed.exogenous / np.array([*paper.THETA, 1.0]), axis=-1)  # d has the amplitude 1
+def larger_gains(study: Study) -> Claim:
+    """Judge the conclusion."""
+    medians = dict(zip(SIGMAS, np.median(exogenous_settle_times(study.proposed), axis=-1).tolist(), strict=True))
+    in_order = medians[1000.0] < medians[10.0] <= medians[0.1]
+    order_goes_on = medians[10_000.0] < medians[1000.0]
+    size = np.linalg.norm(study.proposed.exogenous / np.array([*paper.THETA, 1.0]), axis=-1)  # d has the amplitude 1
     order = np.argsort(SIGMAS)
     lines = [
-        Line(found.proposed.t[::80], np.median(size[::80, i], axis=-1), f"Sigma = {SIGMAS[i]:g}", color=int(c))
+        Line(study.proposed.t[::80], np.median(size[::80, i], axis=-1), f"Sigma = {SIGMAS[i]:g}", color=int(c))
         for c, i in enumerate(order)
     ]
     return Claim(
         place="Section 3.2, conclusion",
-        says="L_m grows in proportion to Sigma, and the more of it, the sooner every estimate settles.",
-        found="For one T, (9) is linear in Sigma. Median settling times: "
+        statement="L_m grows in proportion to Sigma, and the more of it, the sooner every estimate settles.",
+        result="For one T, (9) is linear in Sigma. Median settling times: "
         + ", ".join(f"{words_of_time(medians[SIGMAS[i]])} at {SIGMAS[i]:g}" for i in order)
         + ".",
-        holds=rises,
-        conditions=UNSTATED if goes_on else f"{UNSTATED} {TESTED}",
+        holds=in_order,
+        conditions=UNSTATED if order_goes_on else f"{UNSTATED} {TESTED}",
         otherwise=f"{UNSTATED} The settling times are not in order at the three weights tested either.",
         figures={
             f"median_settle_sigma_{sigma:g}_s": value if math.isfinite(value) else None

@@ -8,6 +8,6 @@ from cmg_mj.papers.dao2023.study import study
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Fig. 2, then Fig. 3."""
-    found = study(on_share=on_share)
-    return [*figure_2.claims(found), *figure_3.claims(found)]
+    """Judge Fig. 2, then Fig. 3."""
+    results = study(on_share=on_share)
+    return [*figure_2.claims(results), *figure_3.claims(results)]

@@ -19,7 +19,7 @@ from scipy.linalg import expm
 
 from cmg_mj.errors import InputError
 from cmg_mj.observers.reduced_model import is_hurwitz
-from cmg_mj.papers.dao2023.matrices import real, real_matrix, require_positive_definite, require_shape, solve, times
+from cmg_mj.papers.dao2023.matrices import require_positive_definite, require_shape, solve, times, to_matrix, to_real
 from cmg_mj.papers.require import require_positive
 
 
@@ -29,10 +29,10 @@ class System:
 
     Attributes:
         A: State matrix, (..., n, n).
-        B0: Where r acts, (..., n, r).
-        B2: Where u acts, (..., n, m).
-        C2: What of x is measured, (..., p, n).
-        D20: What of r is measured, (..., p, r).
+        B0: Input matrix of r, (..., n, r).
+        B2: Input matrix of u, (..., n, m).
+        C2: Output matrix of x, (..., p, n).
+        D20: Output matrix of r, (..., p, r).
     """
 
     A: np.ndarray
@@ -43,7 +43,7 @@ class System:
 
     def __post_init__(self) -> None:
         for name in ("A", "B0", "B2", "C2", "D20"):
-            object.__setattr__(self, name, real(name, getattr(self, name)))
+            object.__setattr__(self, name, to_real(name, getattr(self, name)))
 
 
 class State(NamedTuple):
@@ -101,7 +101,7 @@ class FriedlandTacker:
     def __post_init__(self) -> None:
         object.__setattr__(self, "dt", require_positive("dt", self.dt))
         for name in ("Am", "Cm", "L", "Gamma", "Sigma"):
-            object.__setattr__(self, name, real_matrix(name, getattr(self, name)))
+            object.__setattr__(self, name, to_matrix(name, getattr(self, name)))
         nm, p = self.Am.shape[-1], self.L.shape[-1]
         require_shape("Am", self.Am, (nm, nm), "square")
         if self.Am.ndim > 2 or self.Cm.ndim > 2:
@@ -114,7 +114,7 @@ class FriedlandTacker:
 
     @classmethod
     def conventional(cls, dt: float, L: np.ndarray, Gamma: np.ndarray, Sigma: np.ndarray) -> FriedlandTacker:
-        """The adaptive observer of Zhang (2002) and Liu, Zhang, Su (2011): r constant, Am = 0, Cm = I.
+        """Make the adaptive observer of Zhang (2002) and Liu, Zhang, Su (2011): r constant, Am = 0, Cm = I.
 
         Args:
             dt: Sample period [s].
@@ -125,7 +125,7 @@ class FriedlandTacker:
         Returns:
             The observer; its T is the papers' Upsilon.
         """
-        r = real_matrix("Gamma", Gamma).shape[-1]
+        r = to_matrix("Gamma", Gamma).shape[-1]
         return cls(dt, np.zeros((r, r)), np.eye(r), L, Gamma, Sigma)
 
     @property
@@ -146,7 +146,7 @@ class FriedlandTacker:
 
     @cached_property
     def _identities(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the dimensions n and p."""
+        """Identity matrices of the dimensions n and p."""
         return np.eye(self.L.shape[-2]), np.eye(self.L.shape[-1])
 
     def init(
@@ -156,7 +156,7 @@ class FriedlandTacker:
         xm: np.ndarray | None = None,
         T: np.ndarray | None = None,
     ) -> State:
-        """The state at the first sample.
+        """Return the state at the first sample.
 
         Args:
             y: The first measurement, (..., p).
@@ -171,10 +171,10 @@ class FriedlandTacker:
             ValueError: A vector or matrix does not fit.
         """
         n, p, _, nm = self.sizes.values()
-        y = real("y", y)
-        x = np.zeros(n) if x is None else real("x", x)
-        xm = np.zeros(nm) if xm is None else real("xm", xm)
-        T = np.zeros((n, nm)) if T is None else real("T", T)
+        y = to_real("y", y)
+        x = np.zeros(n) if x is None else to_real("x", x)
+        xm = np.zeros(nm) if xm is None else to_real("xm", xm)
+        T = np.zeros((n, nm)) if T is None else to_real("T", T)
         require_shape("y", y, (p,), "(p,), p the columns of L")
         require_shape("x", x, (n,), "(n,), n the rows of L")
         require_shape("xm", xm, (nm,), "(nm,), as Am")
@@ -209,10 +209,10 @@ class FriedlandTacker:
         Raises:
             ValueError: A matrix or vector does not fit.
         """
-        u, y = real("u", u), real("y", y)
-        L = self.L if L is None else real("L", L)
-        C2 = system.C2 if C2 is None else real("C2", C2)
-        D20 = system.D20 if D20 is None else real("D20", D20)
+        u, y = to_real("u", u), to_real("y", y)
+        L = self.L if L is None else to_real("L", L)
+        C2 = system.C2 if C2 is None else to_real("C2", C2)
+        D20 = system.D20 if D20 is None else to_real("D20", D20)
         self._check(system, u, y, L, C2, D20)
         h = self.dt
         F, F_back, Cm_middle = self._turn
@@ -221,8 +221,8 @@ class FriedlandTacker:
 
         half = h / 2.0 * (system.A + L @ system.C2)
         W = (system.B0 + L @ system.D20) @ Cm_middle
-        known = times(system.B2, u) - times(L, (y_before + y) / 2.0)
-        right_x = x + times(half, x) + h * (times(W, xm) + known)
+        input_terms = times(system.B2, u) - times(L, (y_before + y) / 2.0)
+        right_x = x + times(half, x) + h * (times(W, xm) + input_terms)
         right_T = T + half @ T + h * W
         x = solve(I_n - half, right_x)
         T = np.linalg.solve(I_n - half, right_T) @ F_back
@@ -252,14 +252,14 @@ class FriedlandTacker:
         require_shape("A", system.A, (n, n), "(n, n), n the rows of L")
         require_shape("C2", system.C2, (p, n), "(p, n), the shape of L transposed")
         poles = np.linalg.eigvals(system.A + self.L @ system.C2)
-        worst = poles.ravel()[np.argmax(poles.real)]
+        rightmost = poles.ravel()[np.argmax(poles.real)]
         if not is_hurwitz(poles):
-            raise InputError(f"L: A + L C2 must be Hurwitz; it has the eigenvalue {worst:.3g}")
+            raise InputError(f"L: A + L C2 must be Hurwitz; it has the eigenvalue {rightmost:.3g}")
 
     def slope(
         self, t: float, x: np.ndarray, xm: np.ndarray, T: np.ndarray, system: System, u: np.ndarray, y: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The observer in continuous time, (7) to (9) as they are printed, with B2 u and the hats put back.
+        """Evaluate the observer in continuous time, (7) to (9) as they are printed, with B2 u and the hats put back.
 
         Args:
             t: Time [s].
@@ -282,9 +282,9 @@ class FriedlandTacker:
         augmented_B = np.vstack([B2, np.zeros((nm, B2.shape[1]))])
         augmented_C = np.hstack([C2, D20 @ Cm])
         augmented_L = np.vstack([L + T @ Lm, Lm])
-        both = np.concatenate([x, xm])
-        both = augmented_A @ both + augmented_B @ u + augmented_L @ (augmented_C @ both - y)  # (7)
-        return both[:n], both[n:], (A + L @ C2) @ T - T @ Am + (B0 + L @ D20) @ Cm  # (8)
+        estimates = np.concatenate([x, xm])
+        estimates = augmented_A @ estimates + augmented_B @ u + augmented_L @ (augmented_C @ estimates - y)  # (7)
+        return estimates[:n], estimates[n:], (A + L @ C2) @ T - T @ Am + (B0 + L @ D20) @ Cm  # (8)
 
     def _check(
         self,

@@ -1,4 +1,4 @@
-"""What (7) to (9) imply, checked along the robot: the separated errors, and the conventional observer's Upsilon."""
+"""The consequences of (7) to (9) along the robot: the separated errors, and the conventional observer's Upsilon."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from scipy.linalg import expm
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker
-from cmg_mj.papers.dao2023.pendulum_robot import motion, one, starts
+from cmg_mj.papers.dao2023.pendulum_robot import make_single, motion, starts
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The separated errors and Upsilon."""
+    """Judge the separated errors and Upsilon."""
     return [separated_errors(on_share), upsilon()]
 
 
 def separated_errors(on_share: OnShare) -> Claim:
-    """The error of the state parts from that of the exosystem."""
+    """Judge whether the error of the state parts from that of the exosystem."""
     errors, sizes = {}, []
     for i, (sigma, duration) in enumerate(((0.1, 6.0), (10.0, 6.0), (1000.0, 1.5))):
         errors[f"continuous_sigma_{sigma:g}"], size = continuous_deviation(sigma, duration)
         sizes.append(size)
         on_share(0.2 * (i + 1))
     errors["200_hz_sigma_1000"], size = sampled_deviation(1000.0, 0.005, 40.0)
-    worst = max(errors.values())
+    largest = max(errors.values())
     return Claim(
         place="Equations (7) to (9)",
-        says="With T from (8), the error of the state parts from that of the exosystem.",
-        found="z = (x^ - x) - T (xm^ - xm) obeys z' = (A + L C2) z whatever Gamma and Sigma, along a motion that is "
-        f"chaotic, to {worst:.0e} at worst. It does so in continuous time for 6 s (1.5 s at Sigma = 1000) and, sampled "
-        "at 200 Hz, for 40 s.",
-        holds=worst < 1e-8,
+        statement="With T from (8), the error of the state parts from that of the exosystem.",
+        result="z = (x^ - x) - T (xm^ - xm) obeys z' = (A + L C2) z whatever Gamma and Sigma, along a motion that is "
+        f"chaotic, to {largest:.0e} at worst. It does so in continuous time for 6 s (1.5 s at Sigma = 1000) and, "
+        "sampled at 200 Hz, for 40 s.",
+        holds=largest < 1e-8,
         figures={"identity_error": errors, "largest_z": max(*sizes, size)},
     )
 
@@ -43,24 +43,24 @@ def separated_errors(on_share: OnShare) -> Claim:
 def continuous_run(
     sigma: float, start: np.ndarray, state: np.ndarray, t: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The arm and (7) to (9) in continuous time, integrated as one.
+    """Integrate the arm and (7) to (9) in continuous time, as one.
 
     Args:
         sigma: The weight Sigma.
         start: q and its rate, (2,).
         state: The observer's x and xm, (6,); T starts at zero.
         t: Times, (n_times,) [s].
-        tolerance: Of the integrator, relative and absolute.
+        tolerance: Tolerance of the integrator, relative and absolute.
 
     Returns:
         The arm's x (n_times, 2), the observer's x (n_times, 2), xm (n_times, 4) and T (n_times, 2, 4).
     """
-    observer = one(1.0, sigma)
+    observer = make_single(1.0, sigma)
     no_input = np.zeros(1)
 
     def slope(time: float, s: np.ndarray) -> np.ndarray:
-        here = paper.system(s[0], paper.torque(time))
-        parts = observer.slope(time, s[2:4], s[4:8], s[8:].reshape(2, 4), here, no_input, s[:1])
+        system = paper.system(s[0], paper.torque(time))
+        parts = observer.slope(time, s[2:4], s[4:8], s[8:].reshape(2, 4), system, no_input, s[:1])
         return np.concatenate([[s[1], paper.acceleration(s[0], time)], *(part.ravel() for part in parts)])
 
     begin = np.concatenate([start, state, np.zeros(8)])
@@ -69,108 +69,108 @@ def continuous_run(
 
 
 def continuous_deviation(sigma: float, duration: float, seed: int = 0, tolerance: float = 1e-11) -> tuple[float, float]:
-    """How far z = (x^ - x) - T (xm^ - xm) is from exp((A + L C2) t) z(0), in continuous time along the chaotic arm.
+    """Measure the deviation of z = (x^ - x) - T (xm^ - xm) from exp((A + L C2) t) z(0), along the chaotic arm.
 
     Args:
         sigma: The weight Sigma.
-        duration: How long [s].
-        seed: Of the initial values.
-        tolerance: Of the integrator.
+        duration: Simulated time [s].
+        seed: Seed of the initial values.
+        tolerance: Tolerance of the integrator.
 
     Returns:
         The largest deviation, and the largest |z| for comparison.
     """
     rng = np.random.default_rng(seed)
     t = np.linspace(0.0, duration, 21)
-    x, guessed, xm, T = continuous_run(sigma, starts(seed, 1)[0], rng.normal(0.0, 1.0, 6), t, tolerance)
-    z = guessed - x - np.einsum("kij,kj->ki", T, xm - paper.exosystem_state(t))
-    expected = np.array([expm(paper.error_matrix() * time) @ z[0] for time in t])
-    return float(np.abs(z - expected).max()), float(np.abs(z).max())
+    x, x_hat, xm, T = continuous_run(sigma, starts(seed, 1)[0], rng.normal(0.0, 1.0, 6), t, tolerance)
+    z = x_hat - x - np.einsum("kij,kj->ki", T, xm - paper.exosystem_state(t))
+    exact_z = np.array([expm(paper.error_matrix() * time) @ z[0] for time in t])
+    return float(np.abs(z - exact_z).max()), float(np.abs(z).max())
 
 
 def sampled_deviation(sigma: float, dt: float, duration: float, seed: int = 0) -> tuple[float, float]:
-    """The same in discrete time: z+ = (I - h/2 M)^-1 (I + h/2 M) z for the arm by the implicit midpoint rule.
+    """Measure the deviation in discrete time: z+ = (I - h/2 M)^-1 (I + h/2 M) z for the arm by the midpoint rule.
 
     Args:
         sigma: The weight Sigma.
         dt: Sample period [s].
-        duration: How long [s].
-        seed: Of the initial values.
+        duration: Simulated time [s].
+        seed: Seed of the initial values.
 
     Returns:
         The largest deviation, and the largest |z| for comparison.
     """
     rng = np.random.default_rng(seed)
-    observer = one(dt, sigma)
+    observer = make_single(dt, sigma)
     q, rate = starts(seed, 1)[0].tolist()
     state = observer.init(np.array([q]), x=rng.normal(0.0, 1.0, 2), xm=rng.normal(0.0, 1.0, 4))
     F, half = expm(paper.A_M * dt), dt / 2.0 * paper.error_matrix()
     onward = np.linalg.solve(np.eye(2) - half, np.eye(2) + half)
     xm = paper.exosystem_state(0.0)
     z = state.x - [q, rate] - state.T @ (state.xm - xm)
-    worst, size = 0.0, float(np.abs(z).max())
+    largest, size = 0.0, float(np.abs(z).max())
     for k in range(round(duration / dt)):
         u = float(paper.torque((k + 0.5) * dt))
-        pushed = paper.THETA[1] * u + float((paper.C_M @ (xm + F @ xm))[2]) / 2.0
-        q_next, rate_next = _midpoint_step(q, rate, pushed, dt)
+        input_acceleration = paper.THETA[1] * u + float((paper.C_M @ (xm + F @ xm))[2]) / 2.0
+        q_next, rate_next = _midpoint_step(q, rate, input_acceleration, dt)
         state = observer.step(state, paper.system((q + q_next) / 2.0, u), np.zeros(1), np.array([q_next]))
         q, rate, xm = q_next, rate_next, F @ xm
         z = onward @ z
-        worst = max(worst, float(np.abs(state.x - [q, rate] - state.T @ (state.xm - xm) - z).max()))
-    return worst, size
+        largest = max(largest, float(np.abs(state.x - [q, rate] - state.T @ (state.xm - xm) - z).max()))
+    return largest, size
 
 
-def _midpoint_step(q: float, rate: float, pushed: float, dt: float) -> tuple[float, float]:
-    """The arm after one step of the implicit midpoint rule, its input's share of the acceleration held."""
+def _midpoint_step(q: float, rate: float, input_acceleration: float, dt: float) -> tuple[float, float]:
+    """Take one step of the implicit midpoint rule, the input's share of the arm's acceleration held."""
     q_next, rate_next = q, rate
     for _ in range(12):  # a contraction by dt^2 theta1/4 each time
-        rate_next = rate + dt * (pushed - paper.THETA[0] * math.sin((q + q_next) / 2.0))
+        rate_next = rate + dt * (input_acceleration - paper.THETA[0] * math.sin((q + q_next) / 2.0))
         q_next = q + dt * (rate + rate_next) / 2.0
     return q_next, rate_next
 
 
 def upsilon() -> Claim:
-    """The relation between Upsilon and T."""
+    """Judge the relation between Upsilon and T."""
     matrix_gap, estimate_gap = upsilon_gaps(10.0, 0.005, 15.0)
-    corrected = (
+    correction = (
         "Upsilon's equation must have (B0 + L D20) Cm exp(Am t), not (B0 + L D20), unless Am = 0. So read, the "
         "proposed observer is the conventional one of the constant xm(0): its estimate of x is the same."
     )
     return Claim(
         place="Section 2.2, last equation",
-        says="The conventional observer's Upsilon is T exp(Am t).",
-        found=f"To {matrix_gap:.0e} over 15 s at 200 Hz; the estimates of x of both observers agree to "
+        statement="The conventional observer's Upsilon is T exp(Am t).",
+        result=f"To {matrix_gap:.0e} over 15 s at 200 Hz; the estimates of x of both observers agree to "
         f"{estimate_gap:.0e}.",
         holds=matrix_gap < 1e-9 and estimate_gap < 1e-9,
-        conditions=corrected,
-        otherwise=corrected,
+        conditions=correction,
+        otherwise=correction,
         figures={"upsilon_gap": matrix_gap, "state_gap": estimate_gap},
     )
 
 
 def upsilon_gaps(sigma: float, dt: float, duration: float, seed: int = 0) -> tuple[float, float]:
-    """The proposed observer beside the conventional one of the constant xm(0), whose regressor is B0 Cm exp(Am t).
+    """Run the observer beside the conventional one of the constant xm(0), whose regressor is B0 Cm exp(Am t).
 
     Args:
         sigma: The weight Sigma.
         dt: Sample period [s].
-        duration: How long [s].
-        seed: Of the initial values.
+        duration: Simulated time [s].
+        seed: Seed of the initial values.
 
     Returns:
         The largest |Upsilon - T exp(Am t)| and the largest difference of the estimates of x.
     """
     t = dt * np.arange(round(duration / dt) + 1)
     y = motion(starts(seed, 1), t)[:, 0, :1]
-    ours = one(dt, sigma)
-    plain = FriedlandTacker.conventional(dt, paper.L, paper.GAMMA, ours.Sigma)
-    a, b = ours.init(y[0]), plain.init(y[0])
+    proposed = make_single(dt, sigma)
+    plain = FriedlandTacker.conventional(dt, paper.L, paper.GAMMA, proposed.Sigma)
+    a, b = proposed.init(y[0]), plain.init(y[0])
     mean = paper.C_M @ (expm(paper.A_M * dt) + np.eye(4)) / 2.0
-    worst = [0.0, 0.0]
+    largest = [0.0, 0.0]
     for k in range(1, len(t)):
-        here = paper.system((y[k - 1, 0] + y[k, 0]) / 2.0, paper.torque(t[k] - dt / 2.0))
-        turned = replace(here, B0=here.B0 @ mean @ expm(paper.A_M * t[k - 1]), D20=np.zeros((1, 4)))
-        a, b = ours.step(a, here, np.zeros(1), y[k]), plain.step(b, turned, np.zeros(1), y[k])
+        system = paper.system((y[k - 1, 0] + y[k, 0]) / 2.0, paper.torque(t[k] - dt / 2.0))
+        turned_system = replace(system, B0=system.B0 @ mean @ expm(paper.A_M * t[k - 1]), D20=np.zeros((1, 4)))
+        a, b = proposed.step(a, system, np.zeros(1), y[k]), plain.step(b, turned_system, np.zeros(1), y[k])
         gaps = np.abs(b.T - a.T @ expm(paper.A_M * t[k])).max(), np.abs(a.x - b.x).max()
-        worst = [max(old, float(new)) for old, new in zip(worst, gaps, strict=True)]
-    return worst[0], worst[1]
+        largest = [max(old, float(new)) for old, new in zip(largest, gaps, strict=True)]
+    return largest[0], largest[1]

@@ -18,8 +18,8 @@ def require_shape(name: str, value: np.ndarray, shape: tuple[int, ...], words: s
         raise InputError(f"{name}: must have the shape {shape}, {words}; it has {value.shape}")
 
 
-def real(name: str, value: Any) -> np.ndarray:
-    """As an array of floats; refuse what is not real numbers."""
+def to_real(name: str, value: Any) -> np.ndarray:
+    """Return an array of floats; refuse what is not real numbers."""
     try:
         array = np.asarray(value)
     except ValueError as error:  # rows of different lengths
@@ -29,12 +29,12 @@ def real(name: str, value: Any) -> np.ndarray:
     return array.astype(float, copy=False)
 
 
-def real_matrix(name: str, value: Any) -> np.ndarray:
-    """The same with at least two dimensions, and finite."""
-    matrix = real(name, value)
+def to_matrix(name: str, value: Any) -> np.ndarray:
+    """Return an array of floats with at least two dimensions; refuse what is not finite."""
+    matrix = to_real(name, value)
     if matrix.ndim < 2 or not np.isfinite(matrix).all():
-        what = f"not of shape {matrix.shape}" if matrix.ndim else f"not a scalar; for one number write [[{matrix:g}]]"
-        raise InputError(f"{name}: must be a matrix of finite numbers, {what}")
+        fault = f"not of shape {matrix.shape}" if matrix.ndim else f"not a scalar; for one number write [[{matrix:g}]]"
+        raise InputError(f"{name}: must be a matrix of finite numbers, {fault}")
     return matrix
 
 
@@ -49,7 +49,7 @@ def require_positive_definite(name: str, matrix: np.ndarray) -> None:
 
 
 def times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Matrix times vector, (..., a, b) and (..., b) -> (..., a)."""
+    """Multiply matrix and vector, (..., a, b) and (..., b) -> (..., a)."""
     return (matrix @ vector[..., None])[..., 0]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim, OnShare, obtain
 from cmg_mj.papers.dao2023 import adaptive_rig as rig
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.results.intervals import mean_interval
@@ -17,77 +17,72 @@ WITHIN_DEG = 0.15
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """The bias, the velocity, torques."""
-    found = [bias()]
-    on_share(0.25)
-    found.append(velocity())
-    on_share(0.8)
-    found.append(torques())
-    return found
+    """Judge the bias, the velocity, torques."""
+    return obtain([bias, velocity, torques], on_share)
 
 
 def share_within(errors: np.ndarray, bound: float) -> float:
-    """The share of worlds whose error is at most a bound."""
+    """Return the share of worlds whose error is at most a bound."""
     return float(np.mean(errors <= bound))
 
 
 def bias(seed: int = 50_000, worlds: int = 20) -> Claim:
-    """What it finds of the equilibrium bias."""
+    """Judge the estimate of the equilibrium bias."""
     biases = rig.signed_biases(seed, worlds)
     result = rig.learnt_bias(seed, biases, keep_trajectory=True)
     rms = rig.errors(result, "bias_rms_error_deg")
     offset_mg = (5.0, -3.0)
-    off = rig.learnt_bias(seed + 1, biases[:6], offset_mg)
-    found, expected = (off.values(key) - biases[:6] for key in ("bias_estimate_deg", "bias_deg"))
+    offset_run = rig.learnt_bias(seed + 1, biases[:6], offset_mg)
+    excess, expected_excess = (offset_run.values(key) - biases[:6] for key in ("bias_estimate_deg", "bias_deg"))
     share = share_within(rms, WITHIN_DEG)
-    setup = (
+    remark = (
         f"Six bodies, datasheet sensors (400 ug/rtHz), 200 Hz, no push, {worlds} worlds with |e| "
         "from 0.3 to 1.5 degrees; gains from docs/studies/tune_adaptive.py. The servo's lag, which the observer does "
         "not know, does not prevent it."
     )
     return Claim(
         place="On the rig: equilibrium bias",
-        says=f"`adaptive` finds the equilibrium bias together with the state, to {WITHIN_DEG} degrees RMS over seconds "
-        "5 to 10.",
-        found=f"RMS error of the bias over seconds 5 to 10: {rms.mean():.3f} deg on average, {rms.max():.3f} at worst; "
-        f"at most {WITHIN_DEG} in {100.0 * share:.0f} % of {worlds} worlds. With the accelerometers "
+        statement=f"`adaptive` finds the equilibrium bias together with the state, to {WITHIN_DEG} degrees RMS over "
+        "seconds 5 to 10.",
+        result=f"RMS error of the bias over seconds 5 to 10: {rms.mean():.3f} deg on average, {rms.max():.3f} at "
+        f"worst; at most {WITHIN_DEG} in {100.0 * share:.0f} % of {worlds} worlds. With the accelerometers "
         f"{offset_mg[0]:g} and {offset_mg[1]:g} mg off, it finds e less the tilt that they make: "
-        f"{found.mean():+.3f} deg beside e, where {expected.mean():+.3f} is expected.",
-        holds=share >= 0.95 and share_within(rig.errors(off, "bias_rms_error_deg"), WITHIN_DEG) == 1.0,
-        conditions=setup,
-        otherwise=setup,
+        f"{excess.mean():+.3f} deg beside e, where {expected_excess.mean():+.3f} is expected.",
+        holds=share >= 0.95 and share_within(rig.errors(offset_run, "bias_rms_error_deg"), WITHIN_DEG) == 1.0,
+        conditions=remark,
+        otherwise=remark,
         figures={
             "bias_deg": biases,
             "bias_rms_error_deg": rms.tolist(),
             "accelerometer_bias_mg": list(offset_mg),
-            "found_less_e_deg": found.tolist(),
-            "expected_less_e_deg": expected.tolist(),
+            "found_less_e_deg": excess.tolist(),
+            "expected_less_e_deg": expected_excess.tolist(),
         },
         pictures=[_picture_of_bias(trajectory_of(result).between(0.0, 5.0), biases)],
-        ours=True,
+        is_ours=True,
     )
 
 
-def _picture_of_bias(recorded: Trajectory, biases: list[float]) -> Picture:
-    found = np.degrees(recorded["estimate/adaptive/bias_rad"])
-    lines = [Line(recorded["time_s"], found[:, i], f"e = {biases[i]:.2f} deg", width=0.8) for i in range(6)]
+def _picture_of_bias(trajectory: Trajectory, biases: list[float]) -> Picture:
+    estimates = np.degrees(trajectory["estimate/adaptive/bias_rad"])
+    lines = [Line(trajectory["time_s"], estimates[:, i], f"e = {biases[i]:.2f} deg", width=0.8) for i in range(6)]
     title = "dao2023, on the six-body rig: the bias that the adaptive observer finds, six worlds"
     return Picture("dao2023-rig-bias", title, (Panel("estimate of e [deg]", lines),))
 
 
 def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
-    """The velocity's error beside that of observers that take e for zero."""
+    """Judge the velocity's error beside that of observers that take e for zero."""
     biases = (0.0, 0.5, 1.0, 1.5)
     errors = rig.velocity_errors(seed, worlds, ("adaptive", *OTHERS), biases)
-    biased = [i for i, value in enumerate(biases) if value >= 0.5]
+    biased_cases = [i for i, value in enumerate(biases) if value >= 0.5]
     intervals = {name: [mean_interval(row) for row in values] for name, values in errors.items()}
     means = {name: [interval.mean for interval in row] for name, row in intervals.items()}
     halves = {name: [interval.half for interval in row] for name, row in intervals.items()}
 
     def words(name: str) -> str:
-        return ", ".join(f"{means[name][i]:.3f}" for i in biased)
+        return ", ".join(f"{means[name][i]:.3f}" for i in biased_cases)
 
-    setup = (
+    remark = (
         f"As above, {worlds} worlds a bias, the observer in the loop, no push. Without bias there "
         "is nothing to learn, and what learning costs in noise shows: there, homogeneous has "
         f"{means['homogeneous'][0]:.3f} and adaptive {means['adaptive'][0]:.3f} rad/s."
@@ -105,40 +100,40 @@ def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
     )
     return Claim(
         place="On the rig: velocity",
-        says="From e = 0.5 degrees up, the velocity error of `adaptive` is smaller than that of (9), (10), (11) of "
-        "aranovskiy2020, which take e for zero.",
-        found=f"Velocity RMS error with `adaptive` in the loop {words('adaptive')} rad/s at e = 0.5, 1.0, 1.5 deg; "
+        statement="From e = 0.5 degrees up, the velocity error of `adaptive` is smaller than that of (9), (10), (11) "
+        "of aranovskiy2020, which take e for zero.",
+        result=f"Velocity RMS error with `adaptive` in the loop {words('adaptive')} rad/s at e = 0.5, 1.0, 1.5 deg; "
         + "; ".join(f"{name} {words(name)}" for name in OTHERS)
         + ".",
-        holds=all((errors["adaptive"] < errors[name])[biased].all() for name in OTHERS),
-        conditions=setup,
-        otherwise=setup,
+        holds=all((errors["adaptive"] < errors[name])[biased_cases].all() for name in OTHERS),
+        conditions=remark,
+        otherwise=remark,
         figures={"bias_deg": list(biases)}
         | {f"{name}_velocity_rms_error_rad_s": values for name, values in means.items()}
         | {f"{name}_half_interval_rad_s": values for name, values in halves.items()},
         pictures=[picture],
-        ours=True,
+        is_ours=True,
     )
 
 
 def torques(seed: int = 52_000, worlds: int = 4) -> Claim:
-    """A gait's torque, and a constant one."""
+    """Judge a gait's torque, and a constant one."""
     gait = rig.learnt_gait(seed, rig.signed_biases(seed, worlds))
     torque = rig.learnt_torque(seed + 1, worlds)
-    setup = f"As above, {worlds} worlds; a torque of 0.3 N m at 1 Hz with e unknown; 0.1 N m, constant, with e known."
+    remark = f"As above, {worlds} worlds; a torque of 0.3 N m at 1 Hz with e unknown; 0.1 N m, constant, with e known."
     better = (gait["knowing_rad_s"] < gait["not_knowing_rad_s"]).all()
     return Claim(
         place="On the rig: disturbance torques",
-        says="`adaptive` finds a sinusoidal torque of known frequency, and the state in spite of it; a constant torque "
-        "too.",
-        found=f"Over seconds 5 to 10 the velocity RMS error is {gait['knowing_rad_s'].mean():.3f} rad/s, against "
+        statement="`adaptive` finds a sinusoidal torque of known frequency, and the state in spite of it; a constant "
+        "torque too.",
+        result=f"Over seconds 5 to 10 the velocity RMS error is {gait['knowing_rad_s'].mean():.3f} rad/s, against "
         f"{gait['not_knowing_rad_s'].mean():.3f} without the sinusoid in the exosystem; the torque is found to "
         f"{gait['disturbance_n_m'].max():.3f} N m RMS, the bias to {gait['bias_deg'].max():.3f} deg. A constant "
         f"torque is found to {torque.max():.3f} N m.",
         holds=bool(better and gait["disturbance_n_m"].max() < 0.06 and torque.max() < 0.02),
-        conditions=setup,
-        otherwise=setup,
+        conditions=remark,
+        otherwise=remark,
         figures={name: values.tolist() for name, values in gait.items()}
         | {"constant_torque_rms_error_n_m": torque.tolist()},
-        ours=True,
+        is_ours=True,
     )

@@ -23,26 +23,26 @@ L_PRINTED = -np.array([[1.0, 1.0]])
 """A row, which does not fit: with one output L has one column."""
 GAMMA = np.diag([2.0, 2.0, 1.0, 1.0])
 SIGMAS = (10.0, 1000.0, 0.1)
-"""Of Fig. 3(a), (b), (c); the first is that of Fig. 2, too."""
+"""Weights of Fig. 3(a), (b), (c); the first is that of Fig. 2, too."""
 
 
 def torque(t: np.ndarray | float) -> np.ndarray:
-    """The arm's torque u(t), section 3.2 [N m]."""
+    """Return the arm's torque u(t), section 3.2 [N m]."""
     return 5.0 * (np.sin(2.0 * np.asarray(t)) + np.cos(20.0 * np.asarray(t)))
 
 
 def disturbance(t: np.ndarray | float) -> np.ndarray:
-    """d(t) as (14) has it, an acceleration [rad/s^2]."""
+    """Return d(t) as (14) has it, an acceleration [rad/s^2]."""
     return np.sin(OMEGA * np.asarray(t))
 
 
 def acceleration(q: np.ndarray | float, t: float, coefficient: float = 1.0) -> np.ndarray:
-    """The arm's q'', (14); with theta2 for the coefficient of d it is that of (10).
+    """Return the arm's q'', (14); with theta2 for the coefficient of d it is that of (10).
 
     Args:
         q: Angle of the arm, (...,) [rad].
         t: Time [s].
-        coefficient: What d is multiplied by.
+        coefficient: Factor of d.
 
     Returns:
         The acceleration, (...,) [rad/s^2].
@@ -51,14 +51,14 @@ def acceleration(q: np.ndarray | float, t: float, coefficient: float = 1.0) -> n
 
 
 def exosystem_state(t: np.ndarray | float) -> np.ndarray:
-    """The true xm(t), (..., 4): theta1, theta2 and the two states of the sinusoid."""
+    """Return the true xm(t), (..., 4): theta1, theta2 and the two states of the sinusoid."""
     t = np.asarray(t)
     constant = np.broadcast_to(THETA, (*t.shape, 2))
     return np.concatenate([constant, np.cos(OMEGA * t)[..., None], np.sin(OMEGA * t)[..., None]], axis=-1)
 
 
 def system(q: np.ndarray | float, u: np.ndarray | float, *, with_disturbance: bool = True) -> System:
-    """The matrices of (14), (15) at a measured angle and a torque.
+    """Return the matrices of (14), (15) at a measured angle and a torque.
 
     Args:
         q: Angle of the arm, (...,) [rad].
@@ -77,6 +77,6 @@ def system(q: np.ndarray | float, u: np.ndarray | float, *, with_disturbance: bo
 
 
 def error_matrix() -> np.ndarray:
-    """A + L C2, (2, 2)."""
-    here = system(0.0, 0.0)
-    return here.A + L @ here.C2
+    """Return A + L C2, (2, 2)."""
+    matrices = system(0.0, 0.0)
+    return matrices.A + L @ matrices.C2

@@ -12,29 +12,29 @@ from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, System
 
 
-def proposed(dt: float, sigmas: Sequence[float] = (10.0,)) -> FriedlandTacker:
-    """The paper's observer; its leading dimensions are those of the weights sigma, then one for the motions."""
+def make_proposed(dt: float, sigmas: Sequence[float] = (10.0,)) -> FriedlandTacker:
+    """Make the paper's observer; its leading dimensions are the weights sigma, then one for the motions."""
     return FriedlandTacker(dt, paper.A_M, paper.C_M, paper.L, paper.GAMMA, np.reshape(sigmas, (-1, 1, 1, 1)))
 
 
-def conventional(dt: float, sigmas: Sequence[float] = (10.0,)) -> FriedlandTacker:
-    """The observer it is compared with, which knows of no disturbance; leading dimensions as above."""
+def make_conventional(dt: float, sigmas: Sequence[float] = (10.0,)) -> FriedlandTacker:
+    """Make the observer compared with it, which knows of no disturbance; leading dimensions as above."""
     return FriedlandTacker.conventional(dt, paper.L, paper.GAMMA[:2, :2], np.reshape(sigmas, (-1, 1, 1, 1)))
 
 
-def one(dt: float, sigma: float) -> FriedlandTacker:
-    """The paper's observer without leading dimensions."""
+def make_single(dt: float, sigma: float) -> FriedlandTacker:
+    """Make the paper's observer without leading dimensions."""
     return FriedlandTacker(dt, paper.A_M, paper.C_M, paper.L, paper.GAMMA, np.array([[sigma]]))
 
 
 def starts(seed: int, n: int) -> np.ndarray:
-    """Initial angles within half a turn and rates within 2 rad/s, (n, 2) [rad, rad/s]."""
+    """Return the initial angles within half a turn and rates within 2 rad/s, (n, 2) [rad, rad/s]."""
     rng = np.random.default_rng(seed)
     return np.stack([rng.uniform(-np.pi, np.pi, n), rng.uniform(-2.0, 2.0, n)], axis=-1)
 
 
 def motion(start: np.ndarray, t: np.ndarray, coefficient: float = 1.0) -> np.ndarray:
-    """The arm's own motion.
+    """Integrate the arm's own motion.
 
     It is chaotic: after some time two integrators no longer agree. Each computed motion is still, to the tolerance,
     one that the arm can make, and that is what an observer is given.
@@ -42,7 +42,7 @@ def motion(start: np.ndarray, t: np.ndarray, coefficient: float = 1.0) -> np.nda
     Args:
         start: q and its rate at t[0], (n, 2) [rad, rad/s].
         t: Times, (n_times,) [s].
-        coefficient: What d is multiplied by in q'': 1 as in (14); (10) would have theta2.
+        coefficient: Factor of d in q'': 1 as in (14); (10) would have theta2.
 
     Returns:
         q and its rate, (n_times, n, 2).
@@ -58,7 +58,7 @@ def motion(start: np.ndarray, t: np.ndarray, coefficient: float = 1.0) -> np.nda
 
 @dataclass(frozen=True)
 class Errors:
-    """What an observer made of the motions.
+    """An observer's errors along the motions.
 
     Attributes:
         t: Times, (n_times,) [s].
@@ -71,7 +71,7 @@ class Errors:
     exogenous: np.ndarray
 
     def tail_rms(self) -> np.ndarray:
-        """RMS of the state error's norm over the last fifth, (n_sigmas, n)."""
+        """Return the RMS of the state error's norm over the last fifth, (n_sigmas, n)."""
         tail = self.t >= self.t[0] + 0.8 * (self.t[-1] - self.t[0])
         return np.sqrt(np.mean(np.sum(self.state[tail] ** 2, axis=-1), axis=0))
 
@@ -100,8 +100,8 @@ def follow(
     exogenous = np.zeros((len(t), n_sigmas, x.shape[1], r))
     state_errors[0], exogenous[0] = -x[0], -truth[0, :r]
     for k in range(1, len(t)):
-        here = System(all_times.A, all_times.B0[k - 1], all_times.B2, all_times.C2, all_times.D20)
-        state = observer.step(state, here, inputs[k - 1 : k], y[k])
+        system = System(all_times.A, all_times.B0[k - 1], all_times.B2, all_times.C2, all_times.D20)
+        state = observer.step(state, system, inputs[k - 1 : k], y[k])
         state_errors[k] = state.x - x[k]
         exogenous[k] = state.xm @ observer.Cm.T - truth[k, :r]
         if k % 1000 == 0:
@@ -110,7 +110,7 @@ def follow(
 
 
 def settle_times(size: np.ndarray, t: np.ndarray, band: float) -> np.ndarray:
-    """From when on a quantity stays inside a band: infinite if it is outside at the end.
+    """Find the time from which a quantity stays inside a band: infinite if it is outside at the end.
 
     Args:
         size: Its absolute value, (n_times, ...).
@@ -120,7 +120,7 @@ def settle_times(size: np.ndarray, t: np.ndarray, band: float) -> np.ndarray:
     Returns:
         The times, (...) [s].
     """
-    outside = size > band
-    after_last = len(t) - np.argmax(outside[::-1], axis=0)  # the sample after the last one outside
-    found = np.append(t, np.inf)[after_last]
-    return np.where(outside.any(axis=0), found, t[0])
+    is_outside = size > band
+    index = len(t) - np.argmax(is_outside[::-1], axis=0)  # the sample after the last one outside
+    times = np.append(t, np.inf)[index]
+    return np.where(is_outside.any(axis=0), times, t[0])

@@ -48,9 +48,9 @@ def study(
     """Let both observers follow the arm.
 
     Args:
-        seed: Of the initial values.
-        motions: How many.
-        duration_s: How long [s].
+        seed: Seed of the initial values.
+        motions: Number of motions.
+        duration_s: Simulated time [s].
         rates_hz: Sample rates of the proposed and of the conventional observer, the former a multiple of the latter
             [Hz].
         on_share: Called with the share done.
@@ -61,22 +61,22 @@ def study(
     rate, every = rates_hz[0], round(rates_hz[0] / rates_hz[1])
     t = np.arange(round(duration_s * rate) + 1) / rate
     x = robot.motion(robot.starts(seed, motions), t)
-    proposed = robot.follow(robot.proposed(1.0 / rate, SIGMAS), t, x, lambda s: on_share(0.1 + 0.65 * s))
+    proposed = robot.follow(robot.make_proposed(1.0 / rate, SIGMAS), t, x, lambda s: on_share(0.1 + 0.65 * s))
     t_plain, x_plain = t[::every], x[::every]
-    plain = robot.follow(robot.conventional(every / rate), t_plain, x_plain, lambda s: on_share(0.75 + 0.25 * s))
+    plain = robot.follow(robot.make_conventional(every / rate), t_plain, x_plain, lambda s: on_share(0.75 + 0.25 * s))
     return Study(proposed, plain, float(np.abs(x[..., 0]).max()))
 
 
 def exogenous_settle_times(errors: robot.Errors, band: float = SETTLED) -> np.ndarray:
-    """When the errors of theta1, theta2 and d settle, (n_sigmas, n) [s]; infinite if they do not."""
+    """Find when the errors of theta1, theta2 and d settle, (n_sigmas, n) [s]; infinite if they do not."""
     return robot.settle_times(np.linalg.norm(errors.exogenous, axis=-1), errors.t, band)
 
 
 def words_of_time(time: float) -> str:
-    """A settling time in words."""
+    """Write a settling time in words."""
     return f"{time:.0f} s" if math.isfinite(time) else "not within 200 s"
 
 
-def known_times(times: np.ndarray) -> list[float | None]:
-    """Settling times as JSON can hold them."""
+def finite_times(times: np.ndarray) -> list[float | None]:
+    """Return settling times as JSON can hold them."""
     return [float(time) if math.isfinite(time) else None for time in times]

@@ -21,42 +21,33 @@ RELEASE_S, WINDOW_S = 24.0, 6.0
 
 
 class Cycle(NamedTuple):
-    """What the loop does by itself, let go without noise."""
+    """The loop's motion by itself, let go without noise."""
 
     sustained: bool
-    """Whether it oscillates without end."""
+    """True if it oscillates without end."""
     amplitude_deg: float
     """Half of the tilt's range over the last window [deg]."""
     frequency_hz: float
-    """Where the tilt rate's spectrum has its peak there [Hz]."""
+    """Frequency at which the tilt rate's spectrum has its peak there [Hz]."""
 
     @property
     def words(self) -> str:
-        """What it does."""
+        """The cycle in words."""
         if not self.sustained:
             return "comes to rest"
         return f"goes on oscillating by {self.amplitude_deg:.2f} deg to either side at {self.frequency_hz:.1f} Hz"
 
 
-def released(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Experiment:
-    """The rig let go with a gap.
-
-    Args:
-        observer: In the loop.
-        arcmin: The gap [arcmin].
-        **parameters: The observer's, where they are not Table II's.
-
-    Returns:
-        The experiment.
-    """
-    changed = [f"observer.{name}={value}" for name, value in parameters.items()]
+def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Experiment:
+    """Prepare the rig let go with a gap, with an observer whose parameters may differ from Table II's."""
+    observer_settings = [f"observer.{name}={value}" for name, value in parameters.items()]
     gap = f"plant.gimbal_backlash_arcmin={arcmin}"
-    return experiment([*RELEASE, f"duration_s={RELEASE_S}", gap, *changed], observer)
+    return experiment([*RELEASE, f"duration_s={RELEASE_S}", gap, *observer_settings], observer)
 
 
-def cycles_of(releases: Sequence[Experiment]) -> list[Cycle]:
-    """The cycles that rigs let go end in, one world each."""
-    return [_cycle(trajectory_of(result)) for result in run_side_by_side([run_of(each, 1) for each in releases])]
+def find_cycles(releases: Sequence[Experiment]) -> list[Cycle]:
+    """Find the cycles that rigs let go end in, one world each."""
+    return [_cycle(trajectory_of(result)) for result in run_side_by_side([run_of(release, 1) for release in releases])]
 
 
 def _cycle(trajectory: Trajectory) -> Cycle:

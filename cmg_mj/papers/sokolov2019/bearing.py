@@ -15,7 +15,7 @@ import numpy as np
 from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.linear_check import poles_as_pairs
-from cmg_mj.papers.recorded import pushed, rms, trajectory_of
+from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.papers.sokolov2019.vertical_torque import Locked, locked_run, vertical_torque
 from cmg_mj.papers.words import plus_minus
@@ -35,7 +35,7 @@ CASES = {
     "let go 1 deg off, no push": ("plant.initial_tilt_deg=1.0", "push=[]"),
     "let go upright, no push": (UPRIGHT, "push=[]"),
 }
-"""What happens to the rig on a free bearing."""
+"""The cases of the rig on a free bearing."""
 
 
 class Stiffness(NamedTuple):
@@ -48,7 +48,7 @@ class Stiffness(NamedTuple):
     gravity: float
     """m g l [N m/rad], the wrong way."""
     poles: np.ndarray
-    """Of the law with the true rate on the linearised rig [1/s]."""
+    """Poles of the law with the true rate on the linearised rig [1/s]."""
 
 
 def stiffness() -> Stiffness:
@@ -95,8 +95,8 @@ def study(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Study:
     for world in range(worlds):
         locked.append(locked_run(prepared, world))
         on_share(0.6 * (world + 1) / worlds)
-    both = ["plant.model=scissored_pair.xml", "plant.lock_thrust_bearing=true"]
-    pair = locked_run(experiment([*settings, *both], feedback="truth"))
+    pair_settings = ["plant.model=scissored_pair.xml", "plant.lock_thrust_bearing=true"]
+    pair = locked_run(experiment([*settings, *pair_settings], feedback="truth"))
     free = {
         case: experiment([f"seed={seed}", *FREE, *changes], feedback="truth").run_many(worlds)
         for case, changes in CASES.items()
@@ -104,33 +104,33 @@ def study(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Study:
     return Study(locked, pair, free)
 
 
-def claim(found: Study) -> Claim:
-    """The thrust bearing, which the model of one tilt angle leaves out."""
-    worlds, error, k = len(found.locked), found.closed_form_error, stiffness()
-    peak = mean_interval([float(np.abs(run.within(1.0, 1.6)).max()) for run in found.locked])
-    rest = mean_interval([float(rms(run.within(0.5, 1.0))) for run in found.locked])
-    of_mean, pair = float(np.abs(found.mean_torque).max()), float(np.abs(found.pair.torque).max())
-    falls = {case: float(result.fell.mean()) for case, result in found.free.items()}
+def claim(runs: Study) -> Claim:
+    """Judge the thrust bearing, which the model of one tilt angle leaves out."""
+    worlds, error, k = len(runs.locked), runs.closed_form_error, stiffness()
+    peak = mean_interval([float(np.abs(run.torque_between(1.0, 1.6)).max()) for run in runs.locked])
+    noise_torque = mean_interval([float(rms(run.torque_between(0.5, 1.0))) for run in runs.locked])
+    peak_of_mean, pair = float(np.abs(runs.mean_torque).max()), float(np.abs(runs.pair.torque).max())
+    falls = {case: float(result.fell.mean()) for case, result in runs.free.items()}
     ends = {
         case: mean_interval([trajectory_of(result).world(i)["time_s"][-1] for i in range(worlds)])
-        for case, result in found.free.items()
+        for case, result in runs.free.items()
     }
-    told = "; ".join(
+    falls_text = "; ".join(
         f"{case} {share:.0%} fall" + (f", at {ends[case].mean:.2f} s" if share == 1.0 else "")
         for case, share in falls.items()
     )
     return Claim(
         place="Fig. 2, the bearing",
-        says="The pendulum has one degree of freedom, its tilt: there is no yaw in (1).",
-        found=(
+        statement="The pendulum has one degree of freedom, its tilt: there is no yaw in (1).",
+        result=(
             "One gimbal leaves a torque about the vertical, dH/dt with H = J_d w_d cos x3 cos q_b and smaller terms; "
             f"MuJoCo's inverse dynamics confirm it to {error:.0e} N m. A locked bearing carries up to "
-            f"{plus_minus(peak, 3)} N m at a push ({worlds} seeds; {of_mean:.3f} in their mean). Noise makes "
-            f"{plus_minus(rest, 3)} N m RMS of it before; a scissored pair's bearing carries {pair:.0e} N m. A free "
-            f"bearing, with the exact rate in the law: {told}. There the yaw takes up the tilt: (J_d w_d)^2/(2 I_z) is "
-            f"{k.gyroscopic:.2f} N m/rad against gravity's {k.gravity:.2f}. So little is left to bring the gimbal back "
-            f"with, and of the wrong sign: the linearised law has a pole at {np.real(k.poles).max():+.3f} 1/s, and a "
-            "start off the upright makes the gimbal run away."
+            f"{plus_minus(peak, 3)} N m at a push ({worlds} seeds; {peak_of_mean:.3f} in their mean). Noise makes "
+            f"{plus_minus(noise_torque, 3)} N m RMS of it before; a scissored pair's bearing carries {pair:.0e} N m. A "
+            f"free bearing, with the exact rate in the law: {falls_text}. There the yaw takes up the tilt: (J_d "
+            f"w_d)^2/(2 I_z) is {k.gyroscopic:.2f} N m/rad against gravity's {k.gravity:.2f}. So little is left to "
+            "bring the gimbal back with, and of the wrong sign: the linearised law has a pole at "
+            f"{np.real(k.poles).max():+.3f} 1/s, and a start off the upright makes the gimbal run away."
         ),
         holds=error < 1e-9 and pair < 1e-6 * peak.mean,
         conditions=(
@@ -142,8 +142,8 @@ def claim(found: Study) -> Claim:
         otherwise="What the bearing carries is not what the closed form says.",
         figures={
             "peak_torque_at_push_n_m": list(peak),
-            "peak_of_the_mean_torque_n_m": of_mean,
-            "rms_torque_before_push_n_m": list(rest),
+            "peak_of_the_mean_torque_n_m": peak_of_mean,
+            "rms_torque_before_push_n_m": list(noise_torque),
             "closed_form_error_n_m": error,
             "peak_torque_of_the_pair_n_m": pair,
             "yaw_inertia_kg_m2": k.yaw_inertia,
@@ -153,20 +153,20 @@ def claim(found: Study) -> Claim:
             "free": {case: {"fell_fraction": falls[case], "end_time_s": list(ends[case])} for case in CASES},
             "worlds": worlds,
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(runs)],
     )
 
 
-def _picture(found: Study) -> Picture:
-    one = found.locked[0]
-    free = trajectory_of(found.free["a push of the upright rig"]).world(0)
+def _picture(runs: Study) -> Picture:
+    example = runs.locked[0]
+    free = trajectory_of(runs.free["a push of the upright rig"]).world(0)
     plant = experiment([BALANCED]).plant
-    t, s, push = one.time_s, free["time_s"], pushed(free)
-    x1, x3 = one.motion.q[:, 0] - plant.tilt_zero, one.motion.q[:, 1] - plant.modules[0].gimbal_zero
+    t, s, push = example.time_s, free["time_s"], push_intervals(free)
+    x1, x3 = example.motion.q[:, 0] - plant.tilt_zero, example.motion.q[:, 1] - plant.axis.modules[0].gimbal_zero
     torques = [
-        Line(t, one.torque, "on the bearing", color=1, width=0.5),
-        Line(t, found.mean_torque, f"mean of {len(found.locked)} seeds", color=3, width=1.2),
-        Line(found.pair.time_s, found.pair.torque, "scissored pair", color=2),
+        Line(t, example.torque, "on the bearing", color=1, width=0.5),
+        Line(t, runs.mean_torque, f"mean of {len(runs.locked)} seeds", color=3, width=1.2),
+        Line(runs.pair.time_s, runs.pair.torque, "scissored pair", color=2),
     ]
     panels = [
         Panel("tilt [deg]", [Line(t, np.degrees(x1), color=0)], "locked bearing", shaded=push),
@@ -181,5 +181,5 @@ def _picture(found: Study) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Fig. 2."""
+    """Judge Fig. 2."""
     return [claim(study(on_share))]

@@ -11,12 +11,12 @@ from cmg_mj.papers.sokolov2019.loops import loops
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Figs 4 to 6 need the lags and the cycles: what oscillates by itself is told there, without noise."""
+    """Judge the loops; Figs 4 to 6 need the lags and the cycles, which show what oscillates without noise."""
     lags = lag.lags(lambda share: on_share(0.2 * share))
     ends = cycles()
-    found = loops(lambda share: on_share(0.3 + 0.7 * share))
+    results = loops(lambda share: on_share(0.3 + 0.7 * share))
     four, five, six = on_common_scales(
-        [figure_4(found, lags, ends), figure_5(found, lags, ends), figure_6(found, ends)]
+        [figure_4(results, lags, ends), figure_5(results, lags, ends), figure_6(results, ends)]
     )
     return [
         four,
@@ -24,7 +24,7 @@ def claims(on_share: OnShare) -> list[Claim]:
         cause_of_figure_5(ends),
         six,
         figure_6_at_rest(lags, ends),
-        comparison.best(found),
-        comparison.model_based(found),
+        comparison.best_claim(results),
+        comparison.model_based(results),
         lag.claim(lags),
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.sokolov2019.loops import Loops, better, numbers, shown, smaller
+from cmg_mj.papers.sokolov2019.loops import Loops, format_interval, is_better, is_smaller, numbers
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.results import markdown
 from cmg_mj.results.intervals import known_interval
@@ -15,38 +15,38 @@ KEYS = {"velocity_rms_error_rad_s": "velocity RMS error [rad/s]", "tilt_rms_deg"
 
 
 def _cell(result: Result, key: str) -> str:
-    fell = f" ({result.fell.mean():.0%} fell)" if result.fell.any() else ""
-    return shown(known_interval(result.values(key))) + fell
+    falls_note = f" ({result.fell.mean():.0%} fell)" if result.fell.any() else ""
+    return format_interval(known_interval(result.values(key))) + falls_note
 
 
-def _table(found: Loops) -> str:
+def _table(loops: Loops) -> str:
     rows = [
-        (where, words, *(_cell(by_name[name], key) for name in OBSERVERS))
+        (setting, words, *(_cell(by_name[name], key) for name in OBSERVERS))
         for key, words in KEYS.items()
-        for where, by_name in found.everywhere.items()
+        for setting, by_name in loops.all_settings.items()
     ]
     return markdown.table(("where", "what", *OBSERVERS.values()), rows, text_columns=2)
 
 
-def best(found: Loops) -> Claim:
-    """Section V: (10) against the other two."""
+def best_claim(loops: Loops) -> Claim:
+    """Judge section V: (10) against the other two."""
     wins = {
-        where: all(better(by_name["homogeneous"], by_name[name]) for name in ("linear", "luenberger"))
-        for where, by_name in found.everywhere.items()
+        setting: all(is_better(by_name["homogeneous"], by_name[name]) for name in ("linear", "luenberger"))
+        for setting, by_name in loops.all_settings.items()
     }
     tilt_of_8 = [
-        where
-        for where, by_name in found.everywhere.items()
-        if smaller(by_name["linear"], by_name["homogeneous"], "tilt_rms_deg")
+        setting
+        for setting, by_name in loops.all_settings.items()
+        if is_smaller(by_name["linear"], by_name["homogeneous"], "tilt_rms_deg")
     ]
     return Claim(
         place="Section V, the comparison",
-        says="The nonlinear differentiator (10) offers the best behaviour of the three.",
-        found=(
-            f"{found.worlds} seeds, world by world, 95 % intervals. (10) has the smallest error of the rate, or stands "
+        statement="The nonlinear differentiator (10) offers the best behaviour of the three.",
+        result=(
+            f"{loops.worlds} seeds, world by world, 95 % intervals. (10) has the smallest error of the rate, or stands "
             f"where another falls, in {sum(wins.values())} of {len(wins)} settings."
         ),
-        table=_table(found),
+        table=_table(loops),
         holds=all(wins.values()),
         conditions=(
             "It is the best by the error of the estimated rate; by the tilt's RMS (8) is the better one at "
@@ -56,28 +56,29 @@ def best(found: Loops) -> Claim:
         ),
         otherwise="Its velocity error is not the smallest everywhere.",
         figures={
-            where: {name: numbers(by_name[name]) for name in OBSERVERS} | {"10_is_best": wins[where]}
-            for where, by_name in found.everywhere.items()
+            setting: {name: numbers(by_name[name]) for name in OBSERVERS} | {"10_is_best": wins[setting]}
+            for setting, by_name in loops.all_settings.items()
         },
     )
 
 
-def ranked(by_name: Mapping[str, Result]) -> bool:
-    """Whether (9) is better than (8), (10) better than (9), and neither of the two with a model falls."""
-    with_model = better(by_name["luenberger"], by_name["linear"])
-    nonlinear = better(by_name["homogeneous"], by_name["luenberger"])
+def is_ranked(by_name: Mapping[str, Result]) -> bool:
+    """Return true if (9) is better than (8), (10) better than (9), and neither of the two with a model falls."""
+    with_model = is_better(by_name["luenberger"], by_name["linear"])
+    nonlinear = is_better(by_name["homogeneous"], by_name["luenberger"])
     return with_model and nonlinear and not any(by_name[name].fell.any() for name in ("luenberger", "homogeneous"))
 
 
-def model_based(found: Loops) -> Claim:
-    """Section VI: with a model better than without, and the nonlinear one better than the linear one."""
-    holds_at = [where for where, by_name in found.everywhere.items() if ranked(by_name)]
-    not_at = [where for where in found.everywhere if where not in holds_at]
+def model_based(loops: Loops) -> Claim:
+    """Judge section VI: with a model better than without, and the nonlinear one better than the linear one."""
+    holds_at = [setting for setting, by_name in loops.all_settings.items() if is_ranked(by_name)]
+    not_at = [setting for setting in loops.all_settings if setting not in holds_at]
     return Claim(
         place="Section VI",
-        says="The designs with a model outperform the one without; of them the nonlinear one has the smaller error.",
-        found=(
-            f"By velocity RMS error, {found.worlds} seeds, world by world beyond chance, (10) is better than (9) and "
+        statement="The designs with a model outperform the one without; of them the nonlinear one has the smaller "
+        "error.",
+        result=(
+            f"By velocity RMS error, {loops.worlds} seeds, world by world beyond chance, (10) is better than (9) and "
             f"(9) than (8), with no fall, at {'; '.join(holds_at) or 'none'}."
         ),
         holds=bool(holds_at),

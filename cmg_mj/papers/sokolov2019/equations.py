@@ -14,107 +14,101 @@ from cmg_mj.papers.linear_check import (
     controllability_margin,
     equilibrium,
     finite_difference_error,
+    model_difference,
     poles_as_pairs,
     poles_in_words,
 )
 from cmg_mj.papers.sokolov2019 import paper
-from cmg_mj.papers.sokolov2019.rig import experiment, servo_of
+from cmg_mj.papers.sokolov2019.rig import experiment, read_servo
 from cmg_mj.plant.plant import Plant
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Sections II and III."""
+    """Judge sections II and III."""
     return [table_i(), equations_of_motion(), law_equilibria()]
 
 
 def table_i() -> Claim:
-    """The constants of the compiled rig beside those of Table I."""
-    ours, printed = experiment().plant.reduced, paper.printed_model()
-    names = ("J1", "J2", "J_d", "omega_d", "gravity_torque")
-    off = max(abs(getattr(ours, name) / getattr(printed, name) - 1.0) for name in names)
+    """Judge the constants of the compiled rig beside those of Table I."""
+    table = paper.printed_model()
+    error = model_difference(experiment().plant.reduced, table)
     return Claim(
         place="Table I",
-        says="Mass, pivot distance and inertias; J1 = I_d + J_b + K_c + m l^2, J2 = J_c - I_d + J_d - K_c.",
-        found=(
-            f"J1 = {printed.J1:.6f}, J2 = {printed.J2:.2e} kg m^2, J_d w_d = {printed.J_d * printed.omega_d:.4f} N m "
-            f"s, m g l = {printed.gravity_torque:.4f} N m; the compiled model has the same to {off:.0e}. Unstable pole "
-            f"{math.sqrt(printed.gravity_torque / printed.J1):.2f} 1/s."
+        statement="Mass, pivot distance and inertias; J1 = I_d + J_b + K_c + m l^2, J2 = J_c - I_d + J_d - K_c.",
+        result=(
+            f"J1 = {table.J1:.6f}, J2 = {table.J2:.2e} kg m^2, J_d w_d = "
+            f"{table.J_d * table.omega_d:.4f} N m s, m g l = {table.gravity_torque:.4f} N m; the "
+            f"compiled model has the same to {error:.0e}. Unstable pole "
+            f"{math.sqrt(table.gravity_torque / table.J1):.2f} 1/s."
         ),
-        holds=off < 1e-9,
+        holds=error < 1e-9,
         otherwise="The model file has other numbers.",
         figures={
-            "J1_kg_m2": printed.J1,
-            "J2_kg_m2": printed.J2,
-            "spin_momentum_n_m_s": printed.J_d * printed.omega_d,
-            "gravity_torque_n_m": printed.gravity_torque,
-            "largest_relative_difference": off,
+            "J1_kg_m2": table.J1,
+            "J2_kg_m2": table.J2,
+            "spin_momentum_n_m_s": table.J_d * table.omega_d,
+            "gravity_torque_n_m": table.gravity_torque,
+            "largest_relative_difference": error,
         },
     )
 
 
 def equation_residual(plant: Plant, model: ReducedModel, states: int, seed: int) -> float:
-    """Largest difference between (1) and MuJoCo's inverse dynamics at random states [N m].
-
-    Args:
-        plant: The rig on a locked bearing.
-        model: The constants to put into (1).
-        states: How many.
-        seed: Of the states.
-    """
-    I_cd = servo_of(plant).inertia
-    rng, data, worst = np.random.default_rng(seed), mujoco.MjData(plant.model), 0.0
+    """Return the largest difference between (1), with a model's constants, and MuJoCo's inverse dynamics [N m]."""
+    I_cd = read_servo(plant).inertia
+    rng, data, largest = np.random.default_rng(seed), mujoco.MjData(plant.model), 0.0
     for _ in range(states):
         q = rng.uniform(-math.pi, math.pi, 3)
         w = np.array([*rng.uniform(-5.0, 5.0, 2), rng.uniform(200.0, 400.0)])
         dw = rng.uniform(-100.0, 100.0, 3)
         data.qpos[:], data.qvel[:], data.qacc[:] = q, w, dw
         mujoco.mj_inverse(plant.model, data)
-        worst = max(worst, float(np.abs(data.qfrc_inverse - paper.torques(model, I_cd, q, w, dw)).max()))
-    return worst
+        largest = max(largest, float(np.abs(data.qfrc_inverse - paper.torques(model, I_cd, q, w, dw)).max()))
+    return largest
 
 
 def equations_of_motion(states: int = 300, seed: int = 81_000) -> Claim:
-    """(1) against the compiled bodies."""
+    """Judge (1) against the compiled bodies."""
     plant = experiment(["plant.equilibrium_bias_deg=0.0"]).plant
     model = plant.reduced
     residual = equation_residual(plant, model, states, seed)
-    turned = equation_residual(plant, replace(model, J2=-model.J2), states, seed)
+    opposite = equation_residual(plant, replace(model, J2=-model.J2), states, seed)
     return Claim(
         place="(1)",
-        says="The Euler-Lagrange equations of frame, gimbal and wheel.",
-        found=(
+        statement="The Euler-Lagrange equations of frame, gimbal and wheel.",
+        result=(
             f"At {states} random states all three are those of the compiled bodies to {residual:.0e} N m; with J2's "
-            f"sign turned they are off by {turned:.1e} N m."
+            f"sign turned they are off by {opposite:.1e} N m."
         ),
-        holds=residual < 1e-9 and turned > 1e3 * residual,
+        holds=residual < 1e-9 and opposite > 1e3 * residual,
         otherwise="The bodies obey other equations.",
-        figures={"largest_residual_n_m": residual, "largest_residual_with_J2_turned_n_m": turned, "states": states},
+        figures={"largest_residual_n_m": residual, "largest_residual_with_J2_turned_n_m": opposite, "states": states},
     )
 
 
 def law_equilibria() -> Claim:
-    """Section III: linearisation, controllability, and where (6) and (7) rest."""
+    """Judge section III: linearisation, controllability, and where (6) and (7) rest."""
     model, K_e = paper.printed_model(), np.array(paper.K_E)
     K = K_e[:3]
     error, margin = finite_difference_error(model), controllability_margin(model.A_e, model.B_e)
     rest_6, poles_6 = equilibrium(model.A, model.B, K, 1.0)
     rest_7, poles_7 = equilibrium(model.A_e, model.B_e, K_e, 1.0)
     x3, x_e = K[0] / K[2], K_e[0] / K_e[3]
-    off = max(np.abs(rest_6 - [0.0, 0.0, x3]).max() / abs(x3), np.abs(rest_7 - [0.0, 0.0, 0.0, x_e]).max() / x_e)
+    miss = max(np.abs(rest_6 - [0.0, 0.0, x3]).max() / abs(x3), np.abs(rest_7 - [0.0, 0.0, 0.0, x_e]).max() / x_e)
     slowest = float(max(np.real(poles_6).max(), np.real(poles_7).max()))
     return Claim(
         place="(5), (6), (7)",
-        says=(
+        statement=(
             "A, B linearise (3) and (A_e, B_e) is controllable; (6) leaves the gimbal at -k1/k3 e, (7) brings x to "
             "zero with x_e at -k_e1/k_e4 e."
         ),
-        found=(
+        result=(
             f"Central differences give A and B to {error:.0e}; the controllability matrix has rank 4 (least singular "
             f"value {margin:.1e} of the largest). Per radian of e, (6) rests at x3 = {rest_6[2]:+.1f} = +k1/k3 and (7) "
             f"at x = 0, x_e = {rest_7[3]:+.1f} s = +k_e1/k_e4. Poles of (6): {poles_in_words(poles_6)}; of (7): "
             f"{poles_in_words(poles_7)} 1/s."
         ),
-        holds=error < 1e-6 and margin > 1e-9 and off < 1e-9 and slowest < 0.0,
+        holds=error < 1e-6 and margin > 1e-9 and miss < 1e-9 and slowest < 0.0,
         conditions="With y1 = x1 - e the bias enters (6) and (7) as +k1 e: both offsets have a plus where a minus is "
         "printed.",
         otherwise="The linear equations rest elsewhere, or are not what (3) linearises to.",

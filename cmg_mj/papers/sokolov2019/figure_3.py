@@ -11,7 +11,7 @@ from scipy.signal import lsim, lti
 from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.recorded import pushed, rms, trajectory_of
+from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS, TABLE_II
 from cmg_mj.papers.sokolov2019.rig import estimator, experiment
 from cmg_mj.papers.words import plus_minus
@@ -27,16 +27,16 @@ AFTER_S = 0.5
 """The push's window ends so long after the push."""
 WITH_Y2 = "luenberger and y2"
 L1, L2 = (row[0] for row in TABLE_II["luenberger"]["L"][:2])
-"""What (9) makes of y1 less its estimate [1/s, 1/s^2]."""
+"""Gains of (9) on y1 less its estimate [1/s, 1/s^2]."""
 
 
 def stiffness(model: ReducedModel) -> float:
-    """150 - m g l/J1: with (s + 20) s its sum is the characteristic polynomial of (9) in x1 and x2 [1/s^2]."""
+    """Return 150 - m g l/J1: plus (s + 20) s it is the characteristic polynomial of (9) in x1 and x2 [1/s^2]."""
     return L2 - model.gravity_torque / model.J1
 
 
 def nine_with_y2(prepared: Experiment) -> Observer:
-    """(9) with all of the model's terms in y2.
+    """Make (9) with all of the model's terms in y2.
 
     (9) has x2' = M/J1 xhat1 + b u + 150 (y1 - xhat1) with M = m g l, or M/J1 y1 + b u + (150 - M/J1)(y1 - xhat1). So
     (10) with alpha = 1 and k2 = 150 - M/J1 is (9) but for J2, cos y2 and the sine.
@@ -52,7 +52,7 @@ class Tuning(NamedTuple):
     rates: Mapping[str, np.ndarray]
     """Estimated tilt rates, (n_ticks, n_worlds) [rad/s]."""
     window: np.ndarray
-    """Which ticks lie between the push's start and half a second after its end, (n_ticks,)."""
+    """True for ticks between the push's start and half a second after its end, (n_ticks,)."""
 
     @property
     def push(self) -> Push:
@@ -78,13 +78,13 @@ def tuning_experiment(worlds: int = WORLDS, seed: int = SEED) -> Tuning:
 
 
 def relative_errors(tuning: Tuning) -> dict[str, Interval]:
-    """RMS of estimate less gyro over the push's window, by the gyro's own RMS there; an estimate of zero has 1."""
+    """Return the RMS of estimate less gyro in the push's window, by the gyro's RMS there; an estimate of zero has 1."""
     gyro = tuning.trajectory["fog_rad_s"][tuning.window]
     return {name: mean_interval(rms(rates[tuning.window] - gyro) / rms(gyro)) for name, rates in tuning.rates.items()}
 
 
-def predicted_error(tuning: Tuning) -> np.ndarray:
-    """The error in the rate of (9) that the push alone makes, (n_ticks,) [rad/s].
+def predict_error(tuning: Tuning) -> np.ndarray:
+    """Return the error in the rate of (9) that the push alone makes, (n_ticks,) [rad/s].
 
     The observer does not know the push: d/J1 passes through (s + 20)/(s^2 + 20 s + 150 - M/J1), with the sign turned.
     """
@@ -95,7 +95,7 @@ def predicted_error(tuning: Tuning) -> np.ndarray:
 
 
 def y2_reaches_the_rate(prepared: Experiment, seed: int = 0) -> float:
-    """How much the rate of (9) changes if y2 is replaced by noise of 1 rad, over 200 samples [rad/s]."""
+    """Measure the change of (9)'s rate if y2 is replaced by noise of 1 rad, over 200 samples [rad/s]."""
     rng = np.random.default_rng(seed)
     y1, u = rng.normal(size=(2, 200))
     columns = {"y1_rad": y1, "u_rad_s": u}
@@ -105,29 +105,29 @@ def y2_reaches_the_rate(prepared: Experiment, seed: int = 0) -> float:
 
 
 def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
-    """Fig. 3."""
-    others = {name: relative[name] for name in OBSERVERS if name != "luenberger"}
+    """Judge Fig. 3."""
+    other_errors = {name: relative[name] for name in OBSERVERS if name != "luenberger"}
     at_end = int(np.argmin(np.abs(tuning.trajectory["time_s"] - tuning.push.end_s)))
     ends = {name: mean_interval(rates[at_end]) for name, rates in tuning.rates.items()}
     truth = mean_interval(tuning.trajectory["fog_rad_s"][at_end])
     wrong_sign = ends["luenberger"].mean * truth.mean < 0.0
     worlds = tuning.rates["luenberger"].shape[1]
-    listed = ", ".join(f"{equation} {plus_minus(relative[name], 2)}" for name, equation in OBSERVERS.items())
-    shown = ", ".join(f"{equation} {ends[name].mean:+.2f}" for name, equation in OBSERVERS.items())
-    also = " and ".join(OBSERVERS[name] for name, error in others.items() if error.low > 1.0)
+    errors_text = ", ".join(f"{equation} {plus_minus(relative[name], 2)}" for name, equation in OBSERVERS.items())
+    rates_text = ", ".join(f"{equation} {ends[name].mean:+.2f}" for name, equation in OBSERVERS.items())
+    failures = " and ".join(OBSERVERS[name] for name, error in other_errors.items() if error.low > 1.0)
     return Claim(
         place="Fig. 3",
-        says="At the push, (9) fails completely to estimate x2.",
-        found=(
+        statement="At the push, (9) fails completely to estimate x2.",
+        result=(
             f"The law fed by the gyro, {tuning.push.torque_n_m:g} N m for {tuning.push.duration_s:g} s, {worlds} seeds "
             f"with 95 % intervals. From the push to half a second after it, RMS of estimate less gyro by the gyro's "
-            f"own RMS (an estimate of zero has 1): {listed}. When the push ends the gyro shows {truth.mean:+.2f} "
-            f"rad/s, {shown}{': (9) has the wrong sign' if wrong_sign else ''}."
+            f"own RMS (an estimate of zero has 1): {errors_text}. When the push ends the gyro shows {truth.mean:+.2f} "
+            f"rad/s, {rates_text}{': (9) has the wrong sign' if wrong_sign else ''}."
         ),
-        holds=relative["luenberger"].low > max(1.0, *(error.high for error in others.values())),
+        holds=relative["luenberger"].low > max(1.0, *(error.high for error in other_errors.values())),
         conditions=(
-            f"{also} fails there too, if less: so does every estimator that takes the command's effect for motion."
-            if also
+            f"{failures} fails there too, if less: so does every estimator that takes the command's effect for motion."
+            if failures
             else ""
         ),
         otherwise="Its error is no larger than that of an estimate of zero, or than the others'.",
@@ -142,20 +142,20 @@ def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
 
 
 def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
-    """What Section V says is the reason."""
+    """Judge the reason that Section V gives."""
     reach = y2_reaches_the_rate(tuning.prepared)
-    error, with_y2, without = tuning.error_of_9, relative[WITH_Y2], relative["luenberger"]
-    before = error[tuning.trajectory["time_s"] < tuning.push.start_s][-20:].mean()
-    explained = 1.0 - np.var((error - predicted_error(tuning))[tuning.window]) / np.var(error[tuning.window])
+    error, with_y2, without_y2 = tuning.error_of_9, relative[WITH_Y2], relative["luenberger"]
+    bias_error = error[tuning.trajectory["time_s"] < tuning.push.start_s][-20:].mean()
+    explained_share = 1.0 - np.var((error - predict_error(tuning))[tuning.window]) / np.var(error[tuning.window])
     return Claim(
         place="Section V, (9) and y2",
-        says="(9) ignores y2 completely, and thus is not robust against external disturbances.",
-        found=(
+        statement="(9) ignores y2 completely, and thus is not robust against external disturbances.",
+        result=(
             f"y2 does not reach its rate: noise of 1 rad on y2 changes it by {reach:.0e} rad/s. But with every "
             f"term in y2 put back in its relative error at the push is {with_y2.mean:.2f} instead of "
-            f"{without.mean:.2f}. What (9) lacks is the push: d/J1 through (s + 20)/(s^2 + 20 s + "
-            f"{stiffness(tuning.prepared.plant.reduced):.1f}) explains {explained:.0%} of its error's variance there "
-            f"(and the bias e the {before:+.3f} rad/s before)."
+            f"{without_y2.mean:.2f}. What (9) lacks is the push: d/J1 through (s + 20)/(s^2 + 20 s + "
+            f"{stiffness(tuning.prepared.plant.reduced):.1f}) explains {explained_share:.0%} of its error's variance "
+            f"there (and the bias e the {bias_error:+.3f} rad/s before)."
         ),
         holds=reach == 0.0 and with_y2.high < 1.0,
         otherwise=(
@@ -166,24 +166,24 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
         figures={
             "effect_of_y2_rad_s": reach,
             "relative_error_with_y2": list(with_y2),
-            "relative_error_without_y2": list(without),
-            "gain_by_y2": without.mean - with_y2.mean,
-            "variance_explained_by_the_unknown_push": float(explained),
+            "relative_error_without_y2": list(without_y2),
+            "gain_by_y2": without_y2.mean - with_y2.mean,
+            "variance_explained_by_the_unknown_push": float(explained_share),
         },
     )
 
 
 def _picture(tuning: Tuning) -> Picture:
-    one = tuning.trajectory.world(0).between(0.0, 3.0)
-    t, shaded, push = one["time_s"], pushed(one), tuning.push
+    run = tuning.trajectory.world(0).between(0.0, 3.0)
+    t, shaded, push = run["time_s"], push_intervals(run), tuning.push
     panels = [
-        Panel("tilt y1 [deg]", [Line(t, np.degrees(one["y1_rad"]), "y1", color=7, width=0.8)], "(a)", shaded=shaded),
-        Panel("command u [rad/s]", [Line(t, one["u_rad_s"], "u", color=3, width=0.8)], shaded=shaded),
+        Panel("tilt y1 [deg]", [Line(t, np.degrees(run["y1_rad"]), "y1", color=7, width=0.8)], "(a)", shaded=shaded),
+        Panel("command u [rad/s]", [Line(t, run["u_rad_s"], "u", color=3, width=0.8)], shaded=shaded),
     ]
     for i, (name, equation) in enumerate(OBSERVERS.items()):
         lines = [
             Line(t, tuning.rates[name][: len(t), 0], f"{equation} {name}", color=name, width=0.8),
-            Line(t, one["fog_rad_s"], "gyro", "k-", width=1.0),
+            Line(t, run["fog_rad_s"], "gyro", "k-", width=1.0),
         ]
         panels.append(Panel("tilt rate [rad/s]", lines, "(b)" if i == 0 else "", shaded=shaded, y_range=(-1.0, 0.6)))
     title = (
@@ -194,7 +194,7 @@ def _picture(tuning: Tuning) -> Picture:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Fig. 3, and what Section V says of (9) there."""
+    """Judge Fig. 3, and what Section V says of (9) there."""
     tuning = tuning_experiment()
     on_share(0.8)
     relative = relative_errors(tuning)

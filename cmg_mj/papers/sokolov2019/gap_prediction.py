@@ -1,4 +1,4 @@
-"""Which cycle a gap makes of the linearised, sampled loop, by its describing function."""
+"""The cycle of the linearised, sampled loop behind a gap, by its describing function."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from scipy.optimize import brentq
 
 from cmg_mj.controllers.backlash import ARCMIN_A_DEGREE
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
-from cmg_mj.papers.sokolov2019.lag import linearised
+from cmg_mj.papers.sokolov2019.lag import linearise
 
 
-class Foreseen(NamedTuple):
+class PredictedCycle(NamedTuple):
     """A cycle of the linear loop with the gap."""
 
     amplitude_deg: float
-    """Of the tilt [deg]."""
+    """Amplitude of the tilt [deg]."""
     frequency_hz: float
 
 
-def share_of(c: float) -> complex:
-    """What a gap passes of a sine: the fundamental of the gimbal's angle by that of the motor's.
+def describing_function(c: float) -> complex:
+    """Return the fundamental of the gimbal's angle by that of the motor's, a sine, behind a gap.
 
     Args:
         c: gap/A - 1, with A the motor's amplitude: -1 without a gap, 1 where the motor only just crosses it.
@@ -31,24 +31,24 @@ def share_of(c: float) -> complex:
     return complex(0.5 - (math.asin(c) + c * root) / math.pi, -root * root / math.pi)
 
 
-def foreseen_cycle(observer: str, points: int = 60) -> Foreseen | None:
-    """The largest motion that neither grows nor decays, of which larger ones decay and smaller ones grow.
+def predict_cycle(observer: str, points: int = 60) -> PredictedCycle | None:
+    """Return the largest motion that neither grows nor decays, of which larger ones decay and smaller ones grow.
 
     Args:
         observer: A linear one, in the loop.
-        points: Of the grid on which it is sought.
+        points: Number of points of the grid.
 
     Returns:
         The cycle; None if there is none.
     """
-    loop, servo, dt = linearised(observer)
+    loop, servo, dt = linearise(observer)
 
     def turning(c: float) -> tuple[complex, np.ndarray]:
-        """The least damped motion that turns forward faster than 1 rad/s: its factor a period, its shape."""
-        factors, shapes = np.linalg.eig(loop(servo, share=share_of(c)))
+        """Return the least damped motion that turns forward faster than 1 rad/s: its factor a period, its shape."""
+        factors, shapes = np.linalg.eig(loop(servo, share=describing_function(c)))
         forward = np.angle(factors) > dt
-        best = int(np.argmax(np.where(forward, np.abs(factors), 0.0)))
-        return complex(factors[best]), shapes[:, best]
+        index = int(np.argmax(np.where(forward, np.abs(factors), 0.0)))
+        return complex(factors[index]), shapes[:, index]
 
     def growth(c: float) -> float:
         return math.log(abs(turning(c)[0])) / dt
@@ -62,4 +62,4 @@ def foreseen_cycle(observer: str, points: int = 60) -> Foreseen | None:
     factor, shape = turning(c)
     rate = math.atan2(factor.imag, factor.real) / dt
     motor = math.radians(GAP_ARCMIN / ARCMIN_A_DEGREE) / (1.0 + c)
-    return Foreseen(math.degrees(motor * rate * float(abs(shape[0]) / abs(shape[-1]))), rate / (2.0 * math.pi))
+    return PredictedCycle(math.degrees(motor * rate * float(abs(shape[0]) / abs(shape[-1]))), rate / (2.0 * math.pi))

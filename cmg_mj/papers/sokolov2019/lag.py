@@ -20,7 +20,7 @@ from cmg_mj.papers.sokolov2019.release import (
     latency_threshold,
     sweeps,
 )
-from cmg_mj.papers.sokolov2019.rig import FINE, estimator, experiment, servo_of
+from cmg_mj.papers.sokolov2019.rig import FINE, estimator, experiment, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
 from cmg_mj.results import markdown
 from cmg_mj.simulation.experiment import Experiment
@@ -30,8 +30,8 @@ LARGEST_S = 0.12
 """Lags are searched up to here in the linearised loop [s]."""
 
 
-class Predicted(NamedTuple):
-    """Of one observer in the linearised, sampled loop; None for what does not happen in the range searched."""
+class Prediction(NamedTuple):
+    """One observer in the linearised, sampled loop; None for an event that is not in the range searched."""
 
     servo_lag_s: float | None
     """The least servo lag at which it oscillates, as stiff."""
@@ -59,20 +59,12 @@ Loop = Callable[..., np.ndarray]
 
 @cache
 def _rig() -> Experiment:
-    """With the physics step of the releases, in which latencies are counted."""
+    """Prepare the rig with the physics step of the releases, in which latencies are counted."""
     return experiment([FINE])
 
 
-def linearised(observer: str | None, **parameters: float) -> tuple[Loop, Servo, float]:
-    """The sampled loop with an observer, or with the true rate (None).
-
-    Args:
-        observer: Its name.
-        **parameters: Those that are not Table II's.
-
-    Returns:
-        The loop, the model's servo and the control period [s].
-    """
+def linearise(observer: str | None, **parameters: float) -> tuple[Loop, Servo, float]:
+    """Linearise the sampled loop with an observer, or with the true rate (None); parameters differ from Table II's."""
     prepared = _rig()
     plant, law = prepared.plant, prepared.law
     assert isinstance(law, StateFeedback)
@@ -82,30 +74,30 @@ def linearised(observer: str | None, **parameters: float) -> tuple[Loop, Servo, 
         step = plant.model.opt.timestep
         return period_map(plant.reduced, servo, o, law, timestep=step, age_steps=age_steps, share=share)
 
-    return loop, servo_of(plant), law.dt
+    return loop, read_servo(plant), law.dt
 
 
-def predicted(observer: str | None) -> Predicted:
-    """What the linearised loop does with a linear observer, or with the true rate (None)."""
-    loop, servo, dt = linearised(observer)
+def predict(observer: str | None) -> Prediction:
+    """Predict the linearised loop's behaviour with a linear observer, or with the true rate (None)."""
+    loop, servo, dt = linearise(observer)
 
-    def growth(varied: Servo, age_steps: int = 0) -> float:
-        return float(modes(loop(varied, age_steps), dt)[0].real)
+    def growth(changed_servo: Servo, age_steps: int = 0) -> float:
+        return float(modes(loop(changed_servo, age_steps), dt)[0].real)
 
     latencies = range(LARGEST_LATENCY_STEPS + 1) if observer else ()
-    return Predicted(
-        first_crossing(lambda lag: growth(servo.damped(lag)), 5e-3, LARGEST_S),
-        first_crossing(lambda lag: growth(servo.softened(lag)), 5e-3, LARGEST_S),
+    return Prediction(
+        first_crossing(lambda lag: growth(servo.damp(lag)), 5e-3, LARGEST_S),
+        first_crossing(lambda lag: growth(servo.soften(lag)), 5e-3, LARGEST_S),
         next((steps / 1000 for steps in latencies if growth(servo, steps) > 0.0), None),
         oscillation(loop(servo), dt),
     )
 
 
 def largest_tau() -> float | None:
-    """The time constant of (8) from which the loop oscillates with the model's servo [s]; its own lag is 2 tau."""
+    """Find the time constant of (8) from which the loop oscillates with the model's servo [s]; its lag is 2 tau."""
 
     def growth(tau: float) -> float:
-        loop, servo, dt = linearised("linear", tau=tau)
+        loop, servo, dt = linearise("linear", tau=tau)
         return float(modes(loop(servo), dt)[0].real)
 
     return first_crossing(growth, 0.01, 0.1)
@@ -117,59 +109,59 @@ class Lags(NamedTuple):
     sweeps: dict[str, Sweep]
     thresholds: dict[str, Threshold]
     latencies: dict[str, Threshold]
-    predictions: dict[str, Predicted]
-    """Of the linear observers and, under `truth`, of the true rate."""
+    predictions: dict[str, Prediction]
+    """Predictions for the linear observers and, under `truth`, for the true rate."""
     tau: float | None
     own_lag_s: float
-    """Of the model's servo."""
+    """Lag of the model's servo."""
 
 
 def lags(on_share: OnShare) -> Lags:
-    """Sweep, sharpen, and predict."""
-    swept = sweeps(list(OBSERVERS))
-    thresholds = lag_thresholds(swept)
+    """Sweep, sharpen and predict all lags."""
+    lag_sweeps = sweeps(list(OBSERVERS))
+    thresholds = lag_thresholds(lag_sweeps)
     latencies: dict[str, Threshold] = {}
     for i, name in enumerate(OBSERVERS):
         latencies[name] = latency_threshold(name)
         on_share((i + 1) / 4.0)
-    predictions = {name: predicted(name) for name in ("linear", "luenberger")} | {"truth": predicted(None)}
-    return Lags(swept, thresholds, latencies, predictions, largest_tau(), float(swept["linear"].lags_s[0]))
+    predictions = {name: predict(name) for name in ("linear", "luenberger")} | {"truth": predict(None)}
+    return Lags(lag_sweeps, thresholds, latencies, predictions, largest_tau(), float(lag_sweeps["linear"].lags_s[0]))
 
 
 def in_ms(seconds: float | None, otherwise: str = "none") -> str:
-    """A time in words."""
+    """Write a time in words."""
     return otherwise if seconds is None else f"{1e3 * seconds:.1f} ms"
 
 
-def claim(found: Lags) -> Claim:
-    """Section V: the differentiator's lag."""
-    own, lag, latency = found.own_lag_s, found.thresholds, found.latencies
-    linear = found.predictions["linear"]
-    begins, others = lag["linear"], min(lag[name].low for name in ("luenberger", "homogeneous"))
+def claim(results: Lags) -> Claim:
+    """Judge section V: the differentiator's lag."""
+    own_lag, lags, latencies = results.own_lag_s, results.thresholds, results.latencies
+    linear = results.predictions["linear"]
+    begin, least = lags["linear"], min(lags[name].low for name in ("luenberger", "homogeneous"))
     return Claim(
         place="Section V, the lag",
-        says="Finite differences lag, and the lag brings the loop into sustained oscillations.",
-        found=(
+        statement="Finite differences lag, and the lag brings the loop into sustained oscillations.",
+        result=(
             "Let go without noise, the rig oscillates by itself from the lags and latencies of the table on. With the "
-            f"model's servo, {in_ms(own)}, the loop of (8) has poles {linear.pole.real:.1f} +- {linear.pole.imag:.1f}j "
-            f"1/s, a damping ratio of {linear.damping:.2f} at {linear.frequency_hz:.1f} Hz. From tau = "
-            f"{in_ms(found.tau)} on it would oscillate as it is. A servo that lags because it is soft never makes it "
-            f"oscillate ({in_ms(linear.softened_lag_s, f'none up to {1e3 * LARGEST_S:.0f} ms')}): the flywheel then "
-            "turns the gimbal back, which damps the tilt."
+            f"model's servo, {in_ms(own_lag)}, the loop of (8) has poles {linear.pole.real:.1f} +- "
+            f"{linear.pole.imag:.1f}j 1/s, a damping ratio of {linear.damping:.2f} at {linear.frequency_hz:.1f} Hz. "
+            f"From tau = {in_ms(results.tau)} on it would oscillate as it is. A servo that lags because it is soft "
+            f"never makes it oscillate ({in_ms(linear.softened_lag_s, f'none up to {1e3 * LARGEST_S:.0f} ms')}): the "
+            "flywheel then turns the gimbal back, which damps the tilt."
         ),
-        table=_table(found),
-        holds=begins.high is not None and begins.high < others,
+        table=_table(results),
+        holds=begin.high is not None and begin.high < least,
         conditions=(
-            f"It does with a servo lag from {in_ms(begins.middle)} or a latency of y1 from "
-            f"{in_ms(latency['linear'].high)}; at the model's servo lag of {in_ms(own)} the oscillation decays."
-            if begins.middle is not None and begins.middle > own
+            f"It does with a servo lag from {in_ms(begin.middle)} or a latency of y1 from "
+            f"{in_ms(latencies['linear'].high)}; at the model's servo lag of {in_ms(own_lag)} the oscillation decays."
+            if begin.middle is not None and begin.middle > own_lag
             else ""
         ),
         otherwise="The loop of (8) is not the first to oscillate.",
         figures={
-            "servo_lag_of_the_model_s": own,
-            "servo_lag_threshold_s": {name: list(threshold) for name, threshold in lag.items()},
-            "latency_threshold_s": {name: list(threshold) for name, threshold in latency.items()},
+            "servo_lag_of_the_model_s": own_lag,
+            "servo_lag_threshold_s": {name: list(begin) for name, begin in lags.items()},
+            "latency_threshold_s": {name: list(begin) for name, begin in latencies.items()},
             "predicted": {
                 name: {
                     "servo_lag_s": p.servo_lag_s,
@@ -178,25 +170,29 @@ def claim(found: Lags) -> Claim:
                     "pole_1_s": [p.pole.real, p.pole.imag],
                     "damping_ratio": p.damping,
                 }
-                for name, p in found.predictions.items()
+                for name, p in results.predictions.items()
             },
-            "tau_threshold_s": found.tau,
+            "tau_threshold_s": results.tau,
         },
-        pictures=[_picture(found)],
+        pictures=[_picture(results)],
     )
 
 
-def _table(found: Lags) -> str:
+def _table(lags: Lags) -> str:
     rows = []
     for name, equation in (OBSERVERS | {"truth": "true rate in the law"}).items():
-        lag, latency, of = found.thresholds.get(name), found.latencies.get(name), found.predictions.get(name)
+        lag, latency, forecast = (
+            lags.thresholds.get(name),
+            lags.latencies.get(name),
+            lags.predictions.get(name),
+        )
         rows.append(
             (
                 equation,
                 "-" if lag is None else in_ms(lag.middle, f"none up to {1e3 * LAGS_S[-1]:.0f} ms"),
-                "-" if of is None else in_ms(of.servo_lag_s),
+                "-" if forecast is None else in_ms(forecast.servo_lag_s),
                 "-" if latency is None else in_ms(latency.high, f"none up to {LARGEST_LATENCY_STEPS} ms"),
-                "-" if of is None or name == "truth" else in_ms(of.latency_s),
+                "-" if forecast is None or name == "truth" else in_ms(forecast.latency_s),
             )
         )
     headings = ("", "servo lag, MuJoCo", "by eigenvalues", "latency of y1, MuJoCo", "by eigenvalues")
@@ -204,12 +200,12 @@ def _table(found: Lags) -> str:
 
 
 def _growth(observer: str, lags_s: np.ndarray) -> list[float]:
-    """Growth of the tilt's oscillation over the servo lag [1/s]."""
-    loop, servo, dt = linearised(observer)
-    return [oscillation(loop(servo.damped(float(lag))), dt).real for lag in lags_s]
+    """Return the growth of the tilt's oscillation over the servo lag [1/s]."""
+    loop, servo, dt = linearise(observer)
+    return [oscillation(loop(servo.damp(float(lag))), dt).real for lag in lags_s]
 
 
-def _picture(found: Lags) -> Picture:
+def _picture(results: Lags) -> Picture:
     grid = np.linspace(5e-3, 0.07, 66)
     rates = [
         Line(1e3 * grid, _growth(name, grid), f"{OBSERVERS[name]} {name}", color=name)
@@ -218,7 +214,7 @@ def _picture(found: Lags) -> Picture:
     rates.append(Line([5.0, 70.0], [0.0, 0.0], style="k:", width=0.8))
     tilts = [
         Line(1e3 * s.lags_s, s.amplitude_deg, f"{OBSERVERS[name]} {name}", "os^"[i] + "-", color=name)
-        for i, (name, s) in enumerate(found.sweeps.items())
+        for i, (name, s) in enumerate(results.sweeps.items())
     ]
     panels = [
         Panel("growth of the tilt's\noscillation [1/s]", rates, "linearised and sampled", x_label="servo lag [ms]"),

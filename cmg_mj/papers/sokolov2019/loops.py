@@ -34,7 +34,7 @@ class Loops(NamedTuple):
     by_bias: dict[float, dict[str, Result]]
     """Without backlash: e [deg] -> observer -> runs."""
     gap: dict[str, Result]
-    """With the datasheet's, at the bias of the pictures."""
+    """Runs with the datasheet's backlash, at the bias of the pictures."""
     quiet: dict[str, Result]
     """Without backlash or noise, one world at the bias of the pictures: what the push leaves behind."""
     gyro: Result
@@ -42,10 +42,10 @@ class Loops(NamedTuple):
     worlds: int
 
     @property
-    def everywhere(self) -> dict[str, Mapping[str, Result]]:
+    def all_settings(self) -> dict[str, Mapping[str, Result]]:
         """All but the gyro's: where, in words -> observer -> runs."""
-        by: dict[str, Mapping[str, Result]] = {f"e = {e:g} deg": by_name for e, by_name in self.by_bias.items()}
-        return by | {BEHIND_A_GAP: self.gap}
+        by_setting: dict[str, Mapping[str, Result]] = {f"e = {e:g} deg": by_name for e, by_name in self.by_bias.items()}
+        return by_setting | {BEHIND_A_GAP: self.gap}
 
 
 def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s: float = DURATION_S) -> Loops:
@@ -56,12 +56,12 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
     quiet: dict[str, Result] = {}
     cases = len(BIASES_DEG) + 1
     gaps = np.repeat([*[0.0] * len(BIASES_DEG), GAP_ARCMIN], worlds)
-    varied = {"equilibrium_bias_deg": np.repeat([*BIASES_DEG, SHOWN_DEG], worlds), "gimbal_backlash_arcmin": gaps}
-    runs = [BatchJob(experiment(settings, name).with_varied(varied), [*range(worlds)] * cases) for name in OBSERVERS]
+    values = {"equilibrium_bias_deg": np.repeat([*BIASES_DEG, SHOWN_DEG], worlds), "gimbal_backlash_arcmin": gaps}
+    runs = [BatchJob(experiment(settings, name).with_varied(values), [*range(worlds)] * cases) for name in OBSERVERS]
     for name, result in zip(OBSERVERS, run_side_by_side(runs), strict=True):
-        *own, gap[name] = result.split(cases)
-        for e, found in zip(BIASES_DEG, own, strict=True):
-            by_bias[e][name] = found
+        *no_gap, gap[name] = result.split(cases)
+        for e, bias_result in zip(BIASES_DEG, no_gap, strict=True):
+            by_bias[e][name] = bias_result
     on_share(0.8)
     for name in OBSERVERS:
         quiet[name] = experiment([*settings, *NO_NOISE], name).run()
@@ -71,42 +71,42 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED, duration_s:
 # --- what is read off the runs ------------------------------------------------------------------------------
 
 
-def _late(result: Result, name: str) -> np.ndarray:
-    """A signal over the last `LATE_S` of the worlds that stood, (n_ticks, n_stood)."""
+def _late_signal(result: Result, name: str) -> np.ndarray:
+    """Return a signal over the last `LATE_S` of the worlds that stood, (n_ticks, n_stood)."""
     t = trajectory_of(result)["time_s"]
     return trajectory_of(result)[name].reshape(len(t), -1)[t >= t[-1] - LATE_S][:, result.stood]
 
 
 def main_frequency(result: Result) -> float:
-    """Where the tilt rate's spectrum has its late peak, averaged over the worlds that stood [Hz]."""
-    x2, t = _late(result, "x2_rad_s"), trajectory_of(result)["time_s"]
+    """Find the late peak of the tilt rate's spectrum, averaged over the worlds that stood [Hz]."""
+    x2, t = _late_signal(result, "x2_rad_s"), trajectory_of(result)["time_s"]
     padded = 8 * len(x2)
     spectrum = (np.abs(np.fft.rfft(x2 - x2.mean(axis=0), padded, axis=0)) ** 2).mean(axis=1)
     return float(np.fft.rfftfreq(padded, t[1] - t[0])[spectrum.argmax()])
 
 
 def deviations(result: Result) -> np.ndarray:
-    """Standard deviation of the tilt over the last `LATE_S`, one a world that stood [deg]."""
-    return np.degrees(_late(result, "x1_rad")).std(axis=0)
+    """Return the standard deviation of the tilt over the last `LATE_S`, one a world that stood [deg]."""
+    return np.degrees(_late_signal(result, "x1_rad")).std(axis=0)
 
 
 def deviation(result: Result) -> Interval | None:
-    """Its mean over these worlds [deg]."""
+    """Return the mean of `deviations` [deg]."""
     return known_interval(deviations(result))
 
 
 def tail(result: Result) -> float:
-    """The same of a single run without noise: what the push has left behind [deg]."""
+    """Return the late deviation of a single run without noise: what the push has left behind [deg]."""
     return float(deviations(result).max())
 
 
-def shown(interval: Interval | None) -> str:
-    """With three digits after the point, as these claims write them."""
+def format_interval(interval: Interval | None) -> str:
+    """Write an interval with three digits after the point."""
     return plus_minus(interval, 3)
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    """What a claim's figures say of it."""
+    """Return a result's numbers for a claim's figures."""
     intervals = {key: known_interval(result.values(key)) for key in ("velocity_rms_error_rad_s", "tilt_rms_deg")}
     intervals["late_tilt_deviation_deg"] = deviation(result)
     return {
@@ -115,15 +115,15 @@ def numbers(result: Result) -> dict[str, Any]:
     }
 
 
-def smaller(a: Result, b: Result, key: str = "velocity_rms_error_rad_s") -> bool | None:
-    """Whether a's numbers are smaller than b's beyond chance, world by world; None if fewer than two stood in both."""
+def is_smaller(a: Result, b: Result, key: str = "velocity_rms_error_rad_s") -> bool | None:
+    """Return true if a's numbers are smaller beyond chance, world by world; None if fewer than two stood in both."""
     difference = known_interval(b.values(key) - a.values(key))
     return None if difference is None else difference.low > 0.0
 
 
-def better(a: Result, b: Result) -> bool:
-    """Whether a has the smaller velocity error beyond chance and falls no more often, or stands where b always fell."""
-    beyond_chance = smaller(a, b)
+def is_better(a: Result, b: Result) -> bool:
+    """Return true if a's velocity error is smaller beyond chance and a falls no more often, or stands where b fell."""
+    beyond_chance = is_smaller(a, b)
     if beyond_chance is None:
         return bool(a.stood.all() and b.fell.all())
     return beyond_chance and a.fell.mean() <= b.fell.mean()

@@ -19,7 +19,7 @@ REST_S = 35.0
 
 
 class Rest(NamedTuple):
-    """Where a run without noise comes to rest."""
+    """The rest of a run without noise."""
 
     x: np.ndarray
     """Largest |x1| [rad], |x2| [rad/s], |x3| [rad] over the last second, (3,)."""
@@ -29,7 +29,7 @@ class Rest(NamedTuple):
     """The integrator [rad s]."""
 
 
-def rest_of(observer: str, e_deg: float, angles: str) -> Rest:
+def find_rest(observer: str, e_deg: float, angles: str) -> Rest:
     """Release the rig with a bias and wait; the law on `estimated` or `measured` angles."""
     settings = [*NO_NOISE, f"plant.equilibrium_bias_deg={e_deg}", "plant.initial_tilt_deg=0.1", "push=[]"]
     result = experiment([*settings, f"duration_s={REST_S}", f"controller.angle_source={angles}"], observer).run()
@@ -41,29 +41,30 @@ def rest_of(observer: str, e_deg: float, angles: str) -> Rest:
 
 
 def biased_luenberger(e_deg: float = 0.25) -> Claim:
-    """Section IV-B: the integrator compensates the offset even if (9) is biased."""
+    """Judge section IV-B: the integrator compensates the offset even if (9) is biased."""
     model, e = paper.printed_model(), math.radians(e_deg)
     poles = np.linalg.eigvals(paper.error_matrix(model))
     x_hat = paper.rest_of_9(model, e)
-    rests = {angles: rest_of("luenberger", e_deg, angles) for angles in ("estimated", "measured")}
+    rests = {angles: find_rest("luenberger", e_deg, angles) for angles in ("estimated", "measured")}
     k1, k2, _, k4 = paper.K_E
     x_e = {"estimated": -(k1 * x_hat[0] + k2 * x_hat[1]) / k4, "measured": (k1 * e - k2 * x_hat[1]) / k4}
-    still = max(float(rest.x.max()) for rest in rests.values())
-    off = max(abs(rest.x2_estimate / x_hat[1] - 1.0) for rest in rests.values())
-    off_x_e = max(abs(rest.x_e / x_e[angles] - 1.0) for angles, rest in rests.items())
+    largest_rest = max(float(rest.x.max()) for rest in rests.values())
+    error = max(abs(rest.x2_estimate / x_hat[1] - 1.0) for rest in rests.values())
+    x_e_error = max(abs(rest.x_e / x_e[angles] - 1.0) for angles, rest in rests.items())
     return Claim(
         place="Section IV-B",
-        says="A - L C is Hurwitz; with a bias e the estimate of (9) is off, but the integrator still brings x to zero.",
-        found=(
+        statement="A - L C is Hurwitz; with a bias e the estimate of (9) is off, but the integrator still brings x to "
+        "zero.",
+        result=(
             f"Poles of A - L C: {poles_in_words(poles)} 1/s. At e = {e_deg} deg and without noise, |x| ends below "
-            f"{still:.1e} after {REST_S:.0f} s, the law on estimated angles or on measured ones, while the estimated "
-            f"rate rests at {rests['estimated'].x2_estimate:.4f} rad/s (closed form {x_hat[1]:.4f})."
+            f"{largest_rest:.1e} after {REST_S:.0f} s, the law on estimated angles or on measured ones, while the "
+            f"estimated rate rests at {rests['estimated'].x2_estimate:.4f} rad/s (closed form {x_hat[1]:.4f})."
         ),
-        holds=still < 2e-3 and off < 0.02 and off_x_e < 0.02 and float(np.real(poles).max()) < 0.0,
+        holds=largest_rest < 2e-3 and error < 0.02 and x_e_error < 0.02 and float(np.real(poles).max()) < 0.0,
         conditions="With y1 = x1 - e the bias enters y as -C_e e and the error as +L C_e e; the other sign is printed.",
         otherwise="It does not come to rest as the linear equations say.",
         figures={
-            "largest_rest_state": still,
+            "largest_rest_state": largest_rest,
             "rate_estimate_rad_s": rests["estimated"].x2_estimate,
             "rate_estimate_closed_form_rad_s": float(x_hat[1]),
             "integrator_rad_s": {angles: rest.x_e for angles, rest in rests.items()},
@@ -74,29 +75,29 @@ def biased_luenberger(e_deg: float = 0.25) -> Claim:
 
 
 def homogeneous_vicinity(biases_deg: Sequence[float] = (0.0, 0.25, 0.5)) -> Claim:
-    """Section IV-C: the error of (10) ends in a vicinity of the origin, whose size e decides."""
+    """Judge section IV-C: the error of (10) ends in a vicinity of the origin, whose size e decides."""
     model = paper.printed_model()
-    found = {e: rest_of("homogeneous", e, "measured").x2_estimate for e in biases_deg}
-    expected = {e: paper.rest_of_10(model, math.radians(e)) for e in biases_deg}
-    off = max(abs(found[e] - expected[e]) / max(abs(expected[e]), 5e-3) for e in biases_deg)
-    listed = ", ".join(f"{found[e]:.4f} at e = {e:g} deg (closed form {expected[e]:.4f})" for e in biases_deg)
+    rates = {e: find_rest("homogeneous", e, "measured").x2_estimate for e in biases_deg}
+    forms = {e: paper.rest_of_10(model, math.radians(e)) for e in biases_deg}
+    error = max(abs(rates[e] - forms[e]) / max(abs(forms[e]), 5e-3) for e in biases_deg)
+    text = ", ".join(f"{rates[e]:.4f} at e = {e:g} deg (closed form {forms[e]:.4f})" for e in biases_deg)
     return Claim(
         place="Section IV-C",
-        says=(
+        statement=(
             "With alpha in (1/2, 1] the error of (10) converges to a vicinity of the origin: sin(y1) replaces sin(x1)."
         ),
-        found=f"Without noise the estimated rate comes to rest at [rad/s] {listed}, the true one being zero.",
-        holds=off < 0.1,
+        result=f"Without noise the estimated rate comes to rest at [rad/s] {text}, the true one being zero.",
+        holds=error < 0.1,
         otherwise="The vicinity is not of the size that the equations give.",
         figures={
-            "rate_estimate_rad_s": {f"{e:g}_deg": found[e] for e in biases_deg},
-            "rate_estimate_closed_form_rad_s": {f"{e:g}_deg": expected[e] for e in biases_deg},
+            "rate_estimate_rad_s": {f"{e:g}_deg": rates[e] for e in biases_deg},
+            "rate_estimate_closed_form_rad_s": {f"{e:g}_deg": forms[e] for e in biases_deg},
         },
     )
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Section IV but for Proposition 1."""
+    """Judge section IV but for Proposition 1."""
     first = biased_luenberger()
     on_share(0.4)
     return [first, homogeneous_vicinity()]

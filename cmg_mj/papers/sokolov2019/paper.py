@@ -1,4 +1,4 @@
-"""What sokolov2019 prints: Tables I and II, its equations, and the rests that follow from (9) and (10)."""
+"""sokolov2019 as printed: Tables I and II, its equations, and the rests that follow from (9) and (10)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.elementwise import signed_power
 from cmg_mj.observers.reduced_model import ReducedModel
 
 TABLE_I = {
@@ -37,7 +38,7 @@ OBSERVERS = {"linear": "(8)", "luenberger": "(9)", "homogeneous": "(10)"}
 
 
 def printed_model() -> ReducedModel:
-    """J1 and J2 below (1), J_d w_d and m g l, from Table I's numbers alone."""
+    """Return J1 and J2 below (1), J_d w_d and m g l, from Table I's numbers alone."""
     t = TABLE_I
     return ReducedModel(
         J1=t["I_d"] + t["J_b"] + t["K_c"] + t["m"] * t["l"] ** 2,
@@ -49,7 +50,7 @@ def printed_model() -> ReducedModel:
 
 
 def torques(model: ReducedModel, I_cd: float, q: np.ndarray, w: np.ndarray, dw: np.ndarray) -> np.ndarray:
-    """(1) at e = 0: the torques on frame, gimbal and wheel, (3,) [N m].
+    """Evaluate (1) at e = 0: the torques on frame, gimbal and wheel, (3,) [N m].
 
     Args:
         model: J1, J2, J_d and m g l.
@@ -75,18 +76,17 @@ def torques(model: ReducedModel, I_cd: float, q: np.ndarray, w: np.ndarray, dw: 
 
 
 def error_matrix(model: ReducedModel) -> np.ndarray:
-    """A - L C of (9), (3, 3)."""
+    """Return A - L C of (9), (3, 3)."""
     return model.A - np.array(TABLE_II["luenberger"]["L"]) @ model.C
 
 
 def rest_of_9(model: ReducedModel, e: float) -> np.ndarray:
-    """What (9) estimates at x = 0, u = 0, y1 = -e: the solution of (A - L C) xhat + L y = 0, (3,)."""
+    """Solve (A - L C) xhat + L y = 0 for the estimate of (9) at x = 0, u = 0, y1 = -e, (3,)."""
     return np.linalg.solve(error_matrix(model), -np.array(TABLE_II["luenberger"]["L"]) @ [-e, 0.0])
 
 
 def rest_of_10(model: ReducedModel, e: float) -> float:
-    """The rate that (10) estimates at x = u = 0, y1 = -e: k1 [e_b]^alpha, k2 [e_b]^(2 alpha - 1) = f2(y) [rad/s]."""
+    """Return the rate of (10) at x = u = 0, y1 = -e: k1 [e_b]^alpha, k2 [e_b]^(2 alpha - 1) = f2(y) [rad/s]."""
     k1, k2, alpha = TABLE_II["homogeneous"].values()
-    drift = float(model.terms(-e, 0.0)[0])
-    e_b = math.copysign((abs(drift) / k2) ** (1.0 / (2.0 * alpha - 1.0)), drift)
-    return k1 * math.copysign(abs(e_b) ** alpha, e_b)
+    e_b = signed_power(float(model.terms(-e, 0.0)[0]) / k2, 1.0 / (2.0 * alpha - 1.0))
+    return k1 * signed_power(e_b, alpha)

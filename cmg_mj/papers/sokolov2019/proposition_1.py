@@ -7,5 +7,5 @@ from cmg_mj.papers.claim import Claim, OnShare
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Proposition 1."""
+    """Judge Proposition 1."""
     return [plvcc.claim("sokolov2019")]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.papers.recorded import trajectory_of
-from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, experiment, rig_with, servo_of
+from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, experiment, make_rig, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
@@ -36,7 +36,7 @@ LARGEST_LATENCY_STEPS = 64
 
 
 def is_sustained(trajectory: Trajectory, window_s: float = WINDOW_S) -> np.ndarray:
-    """Which worlds of a release oscillate without end, grow or fall, (n_worlds,).
+    """Find the worlds of a release that oscillate without end, grow or fall, (n_worlds,).
 
     Sustained: the tilt rate's peak over the last window is at least 98 % of that over the window before, and above 1e-3
     rad/s. A fall counts too.
@@ -51,16 +51,16 @@ def is_sustained(trajectory: Trajectory, window_s: float = WINDOW_S) -> np.ndarr
 def releases(servos: Mapping[str, Sequence[Servo]], settings: Sequence[str] = ()) -> dict[str, Trajectory]:
     """Let the rig go without noise, with each observer in the loop: one world a servo of its own."""
     runs = []
-    for observer, own in servos.items():
-        prepared = experiment([*RELEASE, FINE, *settings], observer)
-        rigs = [replace(prepared, plant=rig_with(prepared.scenario.plant, servo)) for servo in own]
+    for observer, observer_servos in servos.items():
+        base = experiment([*RELEASE, FINE, *settings], observer)
+        rigs = [replace(base, plant=make_rig(base.scenario.plant, servo)) for servo in observer_servos]
         runs.append(BatchJob(rigs, range(len(rigs))))
     results = run_side_by_side(runs)
     return {observer: trajectory_of(result) for observer, result in zip(servos, results, strict=True)}
 
 
 def release(observer: str, servos: Sequence[Servo], settings: Sequence[str] = ()) -> Trajectory:
-    """The same for one observer."""
+    """Let the rig go with one observer."""
     return releases({observer: servos}, settings)[observer]
 
 
@@ -70,30 +70,30 @@ class Sweep(NamedTuple):
     lags_s: np.ndarray
     """(n_lags,)."""
     sustained: np.ndarray
-    """Whether the loop oscillates by itself, (n_lags,)."""
+    """True where the loop oscillates by itself, (n_lags,)."""
     amplitude_deg: np.ndarray
     """Largest tilt over the last two seconds, (n_lags,); NaN where the rig fell."""
 
-    def sustained_at(self, lag_s: float) -> bool:
-        """Whether it does so at the lag nearest to this one."""
+    def is_sustained_at(self, lag_s: float) -> bool:
+        """Return true if the loop oscillates by itself at the lag nearest to this one."""
         return bool(self.sustained[np.argmin(np.abs(self.lags_s - lag_s))])
 
 
 def sweeps(observers: Sequence[str]) -> dict[str, Sweep]:
     """Release the rig with the model's servo and with slower ones, as stiff."""
-    servo = servo_of(experiment().plant)
+    servo = read_servo(experiment().plant)
     lags = np.array([servo.lag_s, *LAGS_S])
-    servos = [servo.damped(lag) for lag in lags]
-    found = {}
+    servos = [servo.damp(lag) for lag in lags]
+    results = {}
     for observer, trajectory in releases(dict.fromkeys(observers, servos)).items():
         t, x1 = trajectory["time_s"], trajectory["x1_rad"]
         amplitude = np.degrees(np.abs(x1[t > t[-1] - WINDOW_S]).max(axis=0))
-        found[observer] = Sweep(lags, is_sustained(trajectory), amplitude)
-    return found
+        results[observer] = Sweep(lags, is_sustained(trajectory), amplitude)
+    return results
 
 
 class Threshold(NamedTuple):
-    """Where something begins: not yet at `low`, already at `high`; `high` is None if nowhere in the range."""
+    """The begin of something: not yet at `low`, already at `high`; `high` is None if nowhere in the range."""
 
     low: float
     high: float | None
@@ -104,40 +104,40 @@ class Threshold(NamedTuple):
         return None if self.high is None else (self.low + self.high) / 2.0
 
 
-def lag_thresholds(found: Mapping[str, Sweep], parts: int = 10) -> dict[str, Threshold]:
-    """The least servo lag at which each loop oscillates by itself, as stiff, to a tenth of the sweep's spacing [s]."""
+def lag_thresholds(sweep_by_observer: Mapping[str, Sweep], parts: int = 10) -> dict[str, Threshold]:
+    """Find the least servo lag at which each loop oscillates by itself, to a tenth of the sweep's spacing [s]."""
     thresholds, grids = {}, {}
-    for observer, of in found.items():
-        first = np.flatnonzero(of.sustained)
+    for observer, sweep in sweep_by_observer.items():
+        first = np.flatnonzero(sweep.sustained)
         if not len(first):
-            thresholds[observer] = Threshold(float(of.lags_s[-1]), None)
+            thresholds[observer] = Threshold(float(sweep.lags_s[-1]), None)
         elif first[0] == 0:
-            thresholds[observer] = Threshold(0.0, float(of.lags_s[0]))
+            thresholds[observer] = Threshold(0.0, float(sweep.lags_s[0]))
         else:
-            grids[observer] = np.linspace(of.lags_s[first[0] - 1], of.lags_s[first[0]], parts + 1)
-    servo = servo_of(experiment().plant)
-    between = releases({observer: [servo.damped(lag) for lag in grid[1:]] for observer, grid in grids.items()})
+            grids[observer] = np.linspace(sweep.lags_s[first[0] - 1], sweep.lags_s[first[0]], parts + 1)
+    servo = read_servo(experiment().plant)
+    refinements = releases({observer: [servo.damp(lag) for lag in grid[1:]] for observer, grid in grids.items()})
     for observer, grid in grids.items():
-        i = int(np.argmax(is_sustained(between[observer])))  # the last of them is the sweep's own
+        i = int(np.argmax(is_sustained(refinements[observer])))  # the last of them is the sweep's own
         thresholds[observer] = Threshold(float(grid[i]), float(grid[i + 1]))
-    return {observer: thresholds[observer] for observer in found}
+    return {observer: thresholds[observer] for observer in sweep_by_observer}
 
 
 def latency_threshold(observer: str, largest_steps: int = LARGEST_LATENCY_STEPS) -> Threshold:
-    """The least latency of the accelerometers at which the loop oscillates by itself, to one physics step [s].
+    """Find the least latency of the accelerometers at which the loop oscillates, to one physics step [s].
 
     They are sampled at every physics step here, so that the latency is not rounded up to control periods.
     """
 
-    def sustained(steps: int) -> bool:
+    def oscillates(steps: int) -> bool:
         latency = f"sensors.accelerometer.latency_s={steps / 1000}"
         result = experiment([*RELEASE, FINE, "sensors.accelerometer.rate_hz=1000.0", latency], observer).run()
         return not result.stood.all() or bool(is_sustained(trajectory_of(result))[0])
 
     low, high = 0, largest_steps
-    if not sustained(high):
+    if not oscillates(high):
         return Threshold(high / 1000, None)
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (low, middle) if sustained(middle) else (middle, high)
+        low, high = (low, middle) if oscillates(middle) else (middle, high)
     return Threshold(low / 1000, high / 1000)

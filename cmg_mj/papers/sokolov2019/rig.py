@@ -30,30 +30,30 @@ RK4_LIMIT = 2.7
 
 
 def experiment(settings: Sequence[str] = (), observer: str = "homogeneous", feedback: str = "observer") -> Experiment:
-    """The scenario `single_gimbal` with Table II.
+    """Prepare the scenario `single_gimbal` with Table II.
 
     Args:
         settings: Settings `section.field=value` that differ.
-        observer: In the loop.
-        feedback: Which rate the law uses: `observer`, `fog` or `truth`.
+        observer: Observer in the loop.
+        feedback: Rate that the law uses: `observer`, `fog` or `truth`.
 
     Returns:
         The experiment, ready to run.
     """
-    printed = {"controller.gains": K_E} | {f"observer.{key}": value for key, value in TABLE_II[observer].items()}
-    fields = [f"{key}={json.dumps(value)}" for key, value in printed.items()]
+    table_settings = {"controller.gains": K_E} | {f"observer.{key}": value for key, value in TABLE_II[observer].items()}
+    fields = [f"{key}={json.dumps(value)}" for key, value in table_settings.items()]
     return prepare(load_scenario("single_gimbal", [*fields, f"controller.feedback={feedback}", *settings], observer))
 
 
-def estimator(name: str, prepared: Experiment, **changed: Any) -> Observer:
-    """An observer with Table II's parameters or others, for the rig and control period of an experiment."""
-    return make_observer(name, prepared.law.dt, prepared.plant.reduced, **TABLE_II[name] | changed)
+def estimator(name: str, prepared: Experiment, **changes: Any) -> Observer:
+    """Make an observer with Table II's parameters or others, for an experiment's rig and control period."""
+    return make_observer(name, prepared.law.dt, prepared.plant.reduced, **TABLE_II[name] | changes)
 
 
-def servo_of(plant: Plant) -> Servo:
-    """The gimbal servo that the model file describes."""
+def read_servo(plant: Plant) -> Servo:
+    """Read the gimbal servo off the model file."""
     (servo,) = plant.axis.servos
-    (module,) = plant.modules
+    (module,) = plant.axis.modules
     dof = int(plant.model.jnt_dofadr[module.gimbal])
     return Servo(
         float(plant.model.actuator_gainprm[servo, 0]),
@@ -62,14 +62,14 @@ def servo_of(plant: Plant) -> Servo:
     )
 
 
-def rig_with(settings: PlantSettings, servo: Servo) -> Plant:
-    """The rig with another servo.
+def make_rig(settings: PlantSettings, servo: Servo) -> Plant:
+    """Load the rig with another servo.
 
     Raises:
         ValueError: The servo is too stiffly damped for RK4 at this timestep: it would chatter by itself.
     """
-    of_its_own = {"servo_stiffness_n_m_rad": servo.kp, "servo_damping_n_m_s_rad": servo.kv}
-    plant = load_plant(dataclasses.replace(settings, **of_its_own))
+    servo_settings = {"servo_stiffness_n_m_rad": servo.kp, "servo_damping_n_m_s_rad": servo.kv}
+    plant = load_plant(dataclasses.replace(settings, **servo_settings))
     decay = servo.kv * plant.timestep / servo.inertia
     if decay > RK4_LIMIT:
         raise ValueError(

@@ -37,21 +37,21 @@ class Servo:
 
     @property
     def lag_s(self) -> float:
-        """How far the angle stays behind a setpoint that moves steadily [s]."""
+        """Delay of the angle behind a setpoint that moves steadily [s]."""
         return self.kv / self.kp
 
-    def damped(self, lag_s: float) -> Servo:
-        """As stiff, with another lag: more damping."""
+    def damp(self, lag_s: float) -> Servo:
+        """Return a servo as stiff, with another lag: more damping."""
         return replace(self, kv=lag_s * self.kp)
 
-    def softened(self, lag_s: float) -> Servo:
-        """Critically damped, with another lag: less stiffness."""
+    def soften(self, lag_s: float) -> Servo:
+        """Return a critically damped servo with another lag: less stiffness."""
         kp = 4.0 * self.inertia / lag_s**2
         return replace(self, kp=kp, kv=lag_s * kp)
 
 
 def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[np.ndarray, np.ndarray]:
-    """sokolov2019 (1) with the servo's torque, linearised upright: x' = A x + B u.
+    """Linearise sokolov2019 (1) with the servo's torque upright: x' = A x + B u.
 
     The state is tilt, tilt rate, gimbal angle, gimbal rate and setpoint. The flywheel's torque -J_d w_d x2 drives the
     gimbal back.
@@ -80,7 +80,7 @@ def period_map(
     age_steps: int = 0,
     share: complex = 1.0,
 ) -> np.ndarray:
-    """The matrix that takes the loop from one control tick to the next.
+    """Return the matrix that takes the loop from one control tick to the next.
 
     Args:
         model: The reduced model.
@@ -88,8 +88,8 @@ def period_map(
         observer: A linear observer; None for the true rate in the law.
         law: The law; its rate limit does not count.
         timestep: Physics step [s].
-        age_steps: How old y1 is at a tick [physics steps]: the latency of the accelerometers.
-        share: What the gimbal's setpoint makes of the commanded rate: 1, or the describing function of a gap.
+        age_steps: Age of y1 at a tick [physics steps]: the latency of the accelerometers.
+        share: Share of the commanded rate that reaches the gimbal's setpoint: 1, or the describing function of a gap.
 
     Returns:
         A square matrix. Its state is that of the rig, the tilts not yet seen, the observer's, x_e and the last u.
@@ -103,35 +103,35 @@ def period_map(
     parts = np.cumsum([5, age_steps, n_observer])
 
     def period(v: np.ndarray) -> np.ndarray:
-        rig, seen, inside, (x_e, u) = np.split(v, parts)
-        y1, y2 = (seen[-1] if age_steps else rig[0]), rig[2]
+        rig, pending_tilts, observer_state, (x_e, u) = np.split(v, parts)
+        y1, y2 = (pending_tilts[-1] if age_steps else rig[0]), rig[2]
         x2 = rig[1]
         if observer:
-            state, estimate = observer.step(state_type(*inside), Measurement(y1, y2), u)
-            inside, x2 = np.array(state), estimate.x2
+            state, estimate = observer.step(state_type(*observer_state), Measurement(y1, y2), u)
+            observer_state, x2 = np.array(state), estimate.x2
         u, x_e = law(y1, x2, y2, x_e)
         for _ in range(steps):
-            seen = np.concatenate([rig[:1], seen])[:age_steps]
+            pending_tilts = np.concatenate([rig[:1], pending_tilts])[:age_steps]
             rig = Phi @ rig + gamma * (share * u)
-        return np.concatenate([rig, seen, inside, [x_e, u]])
+        return np.concatenate([rig, pending_tilts, observer_state, [x_e, u]])
 
     return np.column_stack([period(unit) for unit in np.eye(parts[-1] + 2)])
 
 
 def modes(matrix: np.ndarray, dt: float) -> np.ndarray:
-    """The poles s = log(z)/dt of a period's map, the least damped first [1/s]."""
+    """Return the poles s = log(z)/dt of a period's map, the least damped first [1/s]."""
     z = np.linalg.eigvals(matrix)
     s = np.log(z[np.abs(z) > 1e-9].astype(complex)) / dt
     return s[np.argsort(-s.real)]
 
 
 def oscillation(matrix: np.ndarray, dt: float) -> complex:
-    """The least damped oscillating pole with a frequency above 1 rad/s [1/s]: the integrator's pair is slower."""
+    """Find the least damped oscillating pole with a frequency above 1 rad/s [1/s]: the integrator's pair is slower."""
     return complex(next(s for s in modes(matrix, dt) if s.imag > 1.0))
 
 
 def first_crossing(value: Callable[[float], float], low: float, high: float, points: int = 40) -> float | None:
-    """The smallest argument at which a function rises through zero; None if it does not."""
+    """Return the smallest argument at which a function rises through zero; None if it does not."""
     grid = np.linspace(low, high, points)
     values = [value(float(x)) for x in grid]
     for a, b, at_a, at_b in zip(grid, grid[1:], values, values[1:], strict=False):

@@ -15,21 +15,21 @@ SEED, WORLDS = 85_000, 10
 WARM_UP_S = 0.5
 """Replayed before the window: many times the time constants of the three [s]."""
 NUMBERS = {"linear": ["tau"], "luenberger": ["L[0][0]", "L[1][0]"], "homogeneous": ["k1", "k2", "alpha"]}
-"""What is tuned of each; the entry of L that corrects x3 does not reach the rate."""
+"""The numbers tuned of each observer; the entry of L that corrects x3 does not reach the rate."""
 GENTLE = ("push.0.torque_n_m=0.15", "plant.equilibrium_bias_deg=0.0")
 """A push of which the model knows more, on a rig without bias."""
 PUSHES: dict[str, tuple[Sequence[str], Sequence[float]]] = {
     "0.5 N m, e = 0.5 deg": ((), (100.0, 400.0, 1600.0)),
     "0.15 N m, e = 0": (GENTLE, (400.0,)),
 }
-"""What pushes, and at which noises [ug/sqrt(Hz)]: the same for all three, which were tuned on one recording."""
+"""Push -> settings and noises [ug/sqrt(Hz)]: the same for all three, which were tuned on one recording."""
 
-Tuned = Mapping[str, Mapping[str, Sequence[NoiseLevelResult]]]
+Levels = Mapping[str, Mapping[str, Sequence[NoiseLevelResult]]]
 """Push -> observer -> what came out, one a noise."""
 
 
 def scenario_of(name: str, settings: Sequence[str], seed: int) -> Scenario:
-    """What an estimator is tuned in."""
+    """Build the scenario in which an estimator is tuned."""
     return experiment([f"seed={seed}", "duration_s=3.0", *settings], name, feedback="fog").scenario
 
 
@@ -53,59 +53,61 @@ def levels_of(
     ).levels
 
 
-def tuned(
+def tune_all(
     on_share: OnShare, worlds: int = WORLDS, seed: int = SEED
 ) -> dict[str, dict[str, Sequence[NoiseLevelResult]]]:
     """Tune all three under both pushes."""
-    found: dict[str, dict[str, Sequence[NoiseLevelResult]]] = {push: {} for push in PUSHES}
-    wanted = [
-        each
+    results: dict[str, dict[str, Sequence[NoiseLevelResult]]] = {push: {} for push in PUSHES}
+    recordings = [
+        half
         for settings, noises in PUSHES.values()
-        for each in halves(scenario_of(next(iter(OBSERVERS)), settings, seed), worlds, noises)
+        for half in halves(scenario_of(next(iter(OBSERVERS)), settings, seed), worlds, noises)
     ]
-    recorded = recorder(wanted, warm_up_s=WARM_UP_S)
+    recorded = recorder(recordings, warm_up_s=WARM_UP_S)
     for i, (push, (settings, noises)) in enumerate(PUSHES.items()):
         for j, name in enumerate(OBSERVERS):
-            found[push][name] = levels_of(name, settings, worlds, seed, noises, recorded)
+            results[push][name] = levels_of(name, settings, worlds, seed, noises, recorded)
             on_share((3 * i + j + 1) / 6.0)
-    return found
+    return results
 
 
 def none_better(levels: Sequence[NoiseLevelResult]) -> bool:
-    """Whether at one noise none of the tuned estimators is better on the held-out seeds than the printed one."""
+    """Return true if none of the tuned estimators is better on the held-out seeds than the printed one."""
     return all(level.verdict != "better" for level in levels)
 
 
-def claim(found: Tuned) -> Claim:
-    """The printed values beside the best ones."""
-    settings = [(push, i, level.noise_ug_rthz) for push, of in found.items() for i, level in enumerate(of["linear"])]
+def claim(results: Levels) -> Claim:
+    """Judge the printed values beside the best ones."""
+    settings = [
+        (push, i, level.noise_ug_rthz) for push, studies in results.items() for i, level in enumerate(studies["linear"])
+    ]
     best = [
         f"{push} at {noise:g} ug/rtHz"
         for push, i, noise in settings
-        if none_better([levels[i] for levels in found[push].values()])
+        if none_better([levels[i] for levels in results[push].values()])
     ]
-    alone = {
-        name: [f"{noise:g} ({push})" for push, i, noise in settings if none_better([found[push][name][i]])]
+    by_name = {
+        name: [f"{noise:g} ({push})" for push, i, noise in settings if none_better([results[push][name][i]])]
         for name in OBSERVERS
     }
-    worse = [
+    losers = [
         OBSERVERS[name]
         for name in OBSERVERS
-        if all(level.rms.mean() > level.zero_rms for of in found.values() for level in of[name])
+        if all(level.rms.mean() > level.zero_rms for studies in results.values() for level in studies[name])
     ]
-    each = "; ".join(f"{OBSERVERS[name]} at {', '.join(at) or 'none'}" for name, at in alone.items())
+    text = "; ".join(f"{OBSERVERS[name]} at {', '.join(places) or 'none'}" for name, places in by_name.items())
     return Claim(
         place="Table II, tuning",
-        says="tau, L and [k1, k2, alpha] were tuned, on one recording, to fit the gyro best.",
-        found=(
+        statement="tau, L and [k1, k2, alpha] were tuned, on one recording, to fit the gyro best.",
+        result=(
             f"Fitted on {WORLDS} seeds and scored on as many others, from the push's start to a second after it. The "
-            f"printed values are not beaten, by noise in ug/rtHz: {each}."
+            f"printed values are not beaten, by noise in ug/rtHz: {text}."
         ),
-        table=_table(found),
+        table=_table(results),
         holds=bool(best),
         conditions=(
             f"For a push of {'; '.join(best)}. The paper gives neither push nor noise."
-            + (f" The best {' and '.join(worse)} are farther from the gyro than zero is." if worse else "")
+            + (f" The best {' and '.join(losers)} are farther from the gyro than zero is." if losers else "")
         ),
         otherwise=(
             "In none of these settings are all three printed lines the best: they were not found on such a recording."
@@ -120,14 +122,14 @@ def claim(found: Tuned) -> Claim:
                     "zero_estimate_error_rad_s": [level.zero_rms for level in levels],
                     "tuned_is": [level.verdict for level in levels],
                 }
-                for name, levels in of.items()
+                for name, levels in studies.items()
             }
-            for push, of in found.items()
+            for push, studies in results.items()
         },
     )
 
 
-def _table(found: Tuned) -> str:
+def _table(results: Levels) -> str:
     rows = [
         (
             push,
@@ -137,8 +139,8 @@ def _table(found: Tuned) -> str:
             f"{level.ratio.mean:.3f} +- {level.ratio.half:.3f}",
             f"{level.rms.mean() / level.zero_rms:.2f}",
         )
-        for push, of in found.items()
-        for name, levels in of.items()
+        for push, by_observer in results.items()
+        for name, levels in by_observer.items()
         for level in levels
     ]
     headings = ("push", "", "noise [ug/rtHz]", "tuned", "printed by tuned error", "tuned error by zero's")
@@ -146,5 +148,5 @@ def _table(found: Tuned) -> str:
 
 
 def claims(on_share: OnShare) -> list[Claim]:
-    """Table II."""
-    return [claim(tuned(on_share))]
+    """Judge Table II."""
+    return [claim(tune_all(on_share))]

@@ -1,4 +1,4 @@
-"""What one gimbal does about the vertical: its angular momentum, and the torque that a locked thrust bearing carries.
+"""One gimbal's momentum about the vertical, and the torque that a locked thrust bearing carries.
 
 With yaw at rest, the bodies' angular momentum about the vertical is, with q_c = pi/2 + x3,
 
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.papers.sokolov2019.rig import servo_of
+from cmg_mj.papers.sokolov2019.rig import read_servo
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.simulation.callback import control
 from cmg_mj.simulation.experiment import Experiment
@@ -30,18 +30,18 @@ class Motion(NamedTuple):
 
 
 def vertical_momentum(plant: Plant, motion: Motion) -> np.ndarray:
-    """H of the module's docstring, (...) [N m s]."""
-    r, inertia = plant.reduced, servo_of(plant).inertia
-    q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.modules[0].gimbal_zero
+    """Return H of the module's docstring, (...) [N m s]."""
+    r, inertia = plant.reduced, read_servo(plant).inertia
+    q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.axis.modules[0].gimbal_zero
     w_b, w_c, w_d = np.moveaxis(motion.v, -1, 0)
     spin = r.J_d * w_d * np.cos(x3) - 0.5 * r.J2 * np.sin(2.0 * x3) * w_b
     return np.cos(q_b) * spin - np.sin(q_b) * inertia * w_c
 
 
 def vertical_torque(plant: Plant, motion: Motion) -> np.ndarray:
-    """dH/dt, (...) [N m]."""
-    r, inertia = plant.reduced, servo_of(plant).inertia
-    q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.modules[0].gimbal_zero
+    """Return dH/dt, (...) [N m]."""
+    r, inertia = plant.reduced, read_servo(plant).inertia
+    q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.axis.modules[0].gimbal_zero
     w_b, w_c, w_d = np.moveaxis(motion.v, -1, 0)
     dw_b, dw_c, dw_d = np.moveaxis(motion.a, -1, 0)
     spin = r.J_d * w_d * np.cos(x3) - 0.5 * r.J2 * np.sin(2.0 * x3) * w_b
@@ -57,10 +57,10 @@ class Locked(NamedTuple):
     time_s: np.ndarray
     motion: Motion
     torque: np.ndarray
-    """What the bearing carries about the vertical, by MuJoCo's inverse dynamics, (n_ticks,) [N m]."""
+    """Torque of the bearing about the vertical, by MuJoCo's inverse dynamics, (n_ticks,) [N m]."""
 
-    def within(self, start_s: float, end_s: float) -> np.ndarray:
-        """The torque between two times, (n_ticks,) [N m]."""
+    def torque_between(self, start_s: float, end_s: float) -> np.ndarray:
+        """Return the torque between two times, (n_ticks,) [N m]."""
         return self.torque[(self.time_s > start_s) & (self.time_s < end_s)]
 
 
@@ -73,7 +73,7 @@ def locked_run(prepared: Experiment, world: int = 0) -> Locked:
     free = load_plant(replace(scenario.plant, lock_thrust_bearing=False))
     controller = prepared.controller(world)
     half_a_step = plant.model.opt.timestep / 2.0
-    data, there, inverse = plant.new_data(), mujoco.MjData(plant.model), mujoco.MjData(free.model)
+    data, tick_data, inverse = plant.new_data(), mujoco.MjData(plant.model), mujoco.MjData(free.model)
     times, rows, torques = [], [], []
     while data.time < scenario.duration_s - half_a_step:
         data.qfrc_applied[plant.tilt] = sum(
@@ -82,13 +82,13 @@ def locked_run(prepared: Experiment, world: int = 0) -> Locked:
             if push.start_s - half_a_step < data.time < push.end_s - half_a_step
         )
         if control(plant, controller, data):
-            mujoco.mj_copyData(there, plant.model, data)
-            mujoco.mj_forward(plant.model, there)
+            mujoco.mj_copyData(tick_data, plant.model, data)
+            mujoco.mj_forward(plant.model, tick_data)
             for name in ("qpos", "qvel", "qacc"):
-                getattr(inverse, name)[:] = [0.0, *getattr(there, name)]
+                getattr(inverse, name)[:] = [0.0, *getattr(tick_data, name)]
             mujoco.mj_inverse(free.model, inverse)
             times.append(data.time)
-            rows.append([there.qpos.copy(), there.qvel.copy(), there.qacc.copy()])
+            rows.append([tick_data.qpos.copy(), tick_data.qvel.copy(), tick_data.qacc.copy()])
             torques.append(float(inverse.qfrc_inverse[free.yaw]))
         mujoco.mj_step(plant.model, data)
     return Locked(np.array(times), Motion(*np.swapaxes(np.array(rows), 0, 1)), np.array(torques))

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from cmg_mj.plant.mounting.robot import joint_sizes
 from cmg_mj.plant.mounting.servos import rest_controls
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY
+from cmg_mj.plant.mujoco_state import posed
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, joint_sizes
 
 Poses = Mapping[str, np.ndarray]
 """Joint -> its position in qpos."""
@@ -51,10 +51,7 @@ def write_keyframe(
         speeds: Joint -> speed, for those that turn [rad/s].
         ctrl: Actuator -> control. Other position servos hold their joints in place.
     """
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_forward(model, data)
-    qvel, (act, controls) = np.zeros(model.nv), rest_controls(model, data)
+    qvel, (act, controls) = np.zeros(model.nv), rest_controls(model, posed(model, qpos))
     for joint, speed in speeds.items():
         qvel[int(model.joint(joint).dofadr[0])] = speed
     for i in range(model.nu):

@@ -31,8 +31,8 @@ from cmg_mj.plant.mounting.robot import (
     read_robot,
     set_physics_options,
 )
-from cmg_mj.plant.mounting.stance import axes_along, check_unturned, find_place, posed, stand_upright, under_and_height
-from cmg_mj.plant.mujoco_state import quiet, set_control_callback
+from cmg_mj.plant.mounting.stance import axes_along, check_unturned, find_place, stand_upright, under_and_height
+from cmg_mj.plant.mujoco_state import posed, quiet, set_control_callback
 from cmg_mj.plant.parts import EQUILIBRIUM_KEY, axes_of
 
 

@@ -13,12 +13,9 @@ from cmg_mj.errors import InputError, nearest
 from cmg_mj.plant.mjcf import compile_model, parse
 from cmg_mj.plant.mounting.held_joints import joint_held, unused_name
 
-BAD_CONNECTIONS = {
-    int(mujoco.mjtEq.mjEQ_CONNECT): "connect",
-    int(mujoco.mjtEq.mjEQ_WELD): "weld",
-}
+BAD_CONNECTIONS = {int(mujoco.mjtEq.mjEQ_CONNECT): "connect", int(mujoco.mjtEq.mjEQ_WELD): "weld"}
 UNNAMED = "MuJoCo Model"
-"""What MuJoCo calls a model that has no name."""
+"""The name that MuJoCo gives to a model without one."""
 NEEDED = {
     "mjDSBL_CONSTRAINT": "constraint",
     "mjDSBL_EQUALITY": "equality",
@@ -26,7 +23,7 @@ NEEDED = {
     "mjDSBL_ACTUATION": "actuation",
     "mjDSBL_SENSOR": "sensor",
 }
-"""What must not be switched off, and what MJCF's <flag> calls it."""
+"""Flags that must not be switched off: MuJoCo's name -> the name in MJCF's <flag>."""
 LARGEST_STEP_S = 0.005
 """Largest physics step; the gimbals' servos need it [s]."""
 ITERATIONS, TOLERANCE = 100, 1e-8
@@ -232,11 +229,6 @@ def _place(spec: mujoco.MjSpec, root: mujoco.MjsBody, pos: np.ndarray, quat: np.
     mujoco.mju_negPose(back_pos, back_quat, frame.pos, frame.quat)
     mujoco.mju_mulPose(inner_pos, inner_quat, back_pos, back_quat, pos, quat)
     root.pos, root.quat = inner_pos, inner_quat
-
-
-def joint_sizes(kind: int) -> tuple[int, int]:
-    """Return how many numbers a joint of a kind has in qpos and in qvel."""
-    return {0: (7, 6), 1: (4, 3)}.get(kind, (1, 1))
 
 
 def pose_of(model: mujoco.MjModel, keyframe: str | None, path: Path) -> np.ndarray:

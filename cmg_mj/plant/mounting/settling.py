@@ -62,8 +62,7 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
     _touch_down(model, data, joint, path)
     leaned = 0.0
     for _ in range(8):
-        target = data.xquat[int(model.jnt_bodyid[joint])].copy()
-        _rest(model, data, joint, direction, target, path)
+        _rest(model, data, joint, direction, path)
         point, direction = _support(model, data, joint, direction, path)
         body = int(model.jnt_bodyid[joint])
         arm = data.subtree_com[body] - point
@@ -113,14 +112,7 @@ def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, joint: int, path: Pa
     mujoco.mj_forward(model, data)
 
 
-def _rest(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    joint: int,
-    direction: np.ndarray,
-    target: np.ndarray,
-    path: Path,
-) -> None:
+def _rest(model: mujoco.MjModel, data: mujoco.MjData, joint: int, direction: np.ndarray, path: Path) -> None:
     """Let the robot come to rest, kept from tilting by a torque that vanishes where its mass is above the line."""
     body, dof = int(model.jnt_bodyid[joint]), int(model.jnt_dofadr[joint])
     mass = float(model.body_subtreemass[body])
@@ -132,7 +124,7 @@ def _rest(
     steps = math.ceil(LONGEST_S / model.opt.timestep)
     for step in range(steps):
         off = np.empty(3)
-        mujoco.mju_subQuat(off, target, data.xquat[body])  # in the body's axes
+        mujoco.mju_subQuat(off, start, data.xquat[body])  # in the body's axes
         turn = data.xmat[body].reshape(3, 3)
         along = turn.T @ direction
         torque = along * (stiffness * (off @ along) - damping * (data.qvel[dof + 3 : dof + 6] @ along))

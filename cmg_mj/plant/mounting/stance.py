@@ -18,6 +18,7 @@ from cmg_mj.plant.mounting.axes import hinge_or_direction
 from cmg_mj.plant.mounting.keyframes import as_qpos
 from cmg_mj.plant.mounting.request import MountRequest
 from cmg_mj.plant.mounting.settling import UP, Support, stand
+from cmg_mj.plant.mujoco_state import posed
 
 SMALLEST_HEIGHT_M = 1e-3
 """Smallest height of a robot's mass above the line [m]."""
@@ -146,14 +147,6 @@ def under_and_height(
 def axes_along(direction: np.ndarray) -> np.ndarray:
     """Return a line's axes in the world, by columns: y along the line, z upward."""
     return np.stack([np.cross(direction, UP), direction, UP], axis=1)
-
-
-def posed(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
-    """Return a model's data with given joint positions, after a forward pass."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_forward(model, data)
-    return data
 
 
 def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np.ndarray, path: Path) -> Support:

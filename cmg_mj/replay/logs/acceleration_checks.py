@@ -7,6 +7,7 @@ the outer one is gravity alone: where its size is right, large specific forces a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,13 +38,48 @@ FEWEST = 20
 """Fewest stretches for a comparison."""
 
 
+@dataclass(frozen=True)
+class TiltMotion:
+    """The tilt and the angular acceleration of a log.
+
+    Attributes:
+        tilt: y, (n,) [rad].
+        acceleration: a, (n,) [rad/s^2].
+        parts: Slices without a gap.
+        dt: Sample period [s].
+    """
+
+    tilt: np.ndarray
+    acceleration: np.ndarray
+    parts: Sequence[slice]
+    dt: float
+
+    def second_derivative_pairs(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Weight the acceleration and the tilt's second derivative over stretches.
+
+        The weights w = (1 - s^2)^4 end smoothly: with b = sum(y w'') and a = sum(a w) no noisy samples are subtracted.
+
+        Returns:
+            Weighted sums of a and of y'', (n_stretches,); None for fewer than `FEWEST` stretches.
+        """
+        half = max(FEWEST_SAMPLES // 2, round(WIDTH_S / 2.0 / self.dt))
+        s = np.arange(-half, half + 1) / (half + 1.0)
+        weights = (1.0 - s**2) ** 4
+        second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * self.dt) ** 2
+        second -= second.mean()
+        smoothed, derived = [], []
+        for part in self.parts:
+            if part.stop - part.start >= len(s):
+                smoothed.append(np.convolve(self.acceleration[part], weights, mode="valid")[::half])
+                derived.append(np.convolve(self.tilt[part], second, mode="valid")[::half])
+        a, b = (np.concatenate(rows) if rows else np.zeros(0) for rows in (smoothed, derived))
+        return (a, b) if len(a) >= FEWEST else None
+
+
 def implausible_acceleration(
     columns: Mapping[str, Column],
     signals: Mapping[str, np.ndarray],
-    tilt: np.ndarray,
-    acceleration: np.ndarray,
-    parts: Sequence[slice],
-    dt: float,
+    motion: TiltMotion,
     places: RadialTilt | None,
 ) -> list[str]:
     """Describe an acceleration that cannot be; of several mistakes with one cause, only the first.
@@ -51,10 +87,7 @@ def implausible_acceleration(
     Args:
         columns: Role -> column.
         signals: Role -> values in SI units, (n_rows,).
-        tilt: y, (n,) [rad].
-        acceleration: a, (n,) [rad/s^2].
-        parts: Slices without a gap.
-        dt: Sample period [s].
+        motion: Tilt and angular acceleration.
         places: Geometry of the accelerometers, if they measure the tilt.
 
     Returns:
@@ -62,9 +95,9 @@ def implausible_acceleration(
     """
     if places is not None:
         message = gravity_mismatch(columns, signals, places)
-        if message or interchanged(tilt, acceleration, parts, dt, places):
+        if message or interchanged(motion, places):
             return [message or SWAPPED]
-    message = second_derivative_mismatch(tilt, acceleration, parts, dt, columns)
+    message = second_derivative_mismatch(motion, columns)
     return [message] if message else []
 
 
@@ -107,26 +140,17 @@ def gravity_mismatch(
     return f"the {names} accelerometer's specific force is {sizes_text} times gravity's 9.81 m/s^2 (median): {cure}"
 
 
-def second_derivative_mismatch(
-    tilt: np.ndarray,
-    acceleration: np.ndarray,
-    parts: Sequence[slice],
-    dt: float,
-    columns: Mapping[str, Column],
-) -> str | None:
+def second_derivative_mismatch(motion: TiltMotion, columns: Mapping[str, Column]) -> str | None:
     """Describe an angular acceleration whose sign or size the tilt's second derivative clearly contradicts.
 
     Args:
-        tilt: y, (n,) [rad].
-        acceleration: a, (n,) [rad/s^2].
-        parts: Slices without a gap.
-        dt: Sample period [s].
+        motion: Tilt and angular acceleration.
         columns: Role -> column.
 
     Returns:
         The deviation and a cure; None if there is none, or none that is clear.
     """
-    compared = second_derivative_pairs(tilt, acceleration, parts, dt)
+    compared = motion.second_derivative_pairs()
     if compared is None:
         return None
     a, b = (values - values.mean() for values in compared)
@@ -158,9 +182,7 @@ def second_derivative_mismatch(
     return f"{start}: --scale acceleration={wanted:.3g}"
 
 
-def interchanged(
-    tilt: np.ndarray, acceleration: np.ndarray, parts: Sequence[slice], dt: float, places: RadialTilt
-) -> bool:
+def interchanged(motion: TiltMotion, places: RadialTilt) -> bool:
     """Return whether the data clearly show that the two accelerometers are interchanged.
 
     With a = (x_outer - x_inner) / (r_outer - r_inner) the angular acceleration and y the tilt, y'' = a. Interchanged
@@ -173,53 +195,20 @@ def interchanged(
     counts, and the result is False.
 
     Args:
-        tilt: y, (n,) [rad].
-        acceleration: a, (n,) [rad/s^2].
-        parts: Slices without a gap.
-        dt: Sample period [s].
+        motion: Tilt and angular acceleration.
         places: Geometry of the accelerometers as given.
     """
-    share = (places.r_inner + places.r_outer) / STANDARD_GRAVITY * acceleration * np.cos(tilt)
-    as_named = _agreement(tilt, acceleration, parts, dt)
-    turned = _agreement(tilt - np.arcsin(np.clip(share, -1.0, 1.0)), -acceleration, parts, dt)
+    share = (places.r_inner + places.r_outer) / STANDARD_GRAVITY * motion.acceleration * np.cos(motion.tilt)
+    tilt = motion.tilt - np.arcsin(np.clip(share, -1.0, 1.0))
+    as_named, turned = _agreement(motion), _agreement(replace(motion, tilt=tilt, acceleration=-motion.acceleration))
     return as_named is not None and turned is not None and as_named < 0.0 and turned > CLEARLY_SWAPPED
 
 
-def _agreement(tilt: np.ndarray, acceleration: np.ndarray, parts: Sequence[slice], dt: float) -> float | None:
+def _agreement(motion: TiltMotion) -> float | None:
     """Return 2 sum(a b) / sum(a^2 + b^2) of the acceleration a and the tilt's second derivative b over stretches."""
-    pairs = second_derivative_pairs(tilt, acceleration, parts, dt)
+    pairs = motion.second_derivative_pairs()
     if pairs is None:
         return None
     a, b = pairs
     size = float(np.sum(a**2 + b**2))
     return 2.0 * float(np.sum(a * b)) / size if size > 0.0 else None
-
-
-def second_derivative_pairs(
-    tilt: np.ndarray, acceleration: np.ndarray, parts: Sequence[slice], dt: float
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Weight the acceleration and the tilt's second derivative over the stretches of a log.
-
-    The weights w = (1 - s^2)^4 end smoothly: with b = sum(y w'') and a = sum(a w) no noisy samples are subtracted.
-
-    Args:
-        tilt: y, (n,) [rad].
-        acceleration: a, (n,) [rad/s^2].
-        parts: Slices without a gap.
-        dt: Sample period [s].
-
-    Returns:
-        Weighted sums of a and of y'', (n_stretches,); None for fewer than `FEWEST` stretches.
-    """
-    half = max(FEWEST_SAMPLES // 2, round(WIDTH_S / 2.0 / dt))
-    s = np.arange(-half, half + 1) / (half + 1.0)
-    weights = (1.0 - s**2) ** 4
-    second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * dt) ** 2
-    second -= second.mean()
-    smoothed, derived = [], []
-    for part in parts:
-        if part.stop - part.start >= len(s):
-            smoothed.append(np.convolve(acceleration[part], weights, mode="valid")[::half])
-            derived.append(np.convolve(tilt[part], second, mode="valid")[::half])
-    a, b = (np.concatenate(rows) if rows else np.zeros(0) for rows in (smoothed, derived))
-    return (a, b) if len(a) >= FEWEST else None

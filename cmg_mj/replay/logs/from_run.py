@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cmg_mj.errors import InputError
 from cmg_mj.replay.logs.log import REFERENCE, Log
+from cmg_mj.replay.logs.table import PARQUET, head_of
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push, push_windows
 
@@ -14,9 +15,7 @@ SAY_COLUMNS = "say which columns are what, --columns tilt=HEADING,rate=HEADING,.
 
 def log_of_trajectory(path: Path) -> Log:
     """Read a run's own recording, whose columns are known."""
-    if not path.is_file() or _begins(path) != b"PAR1":
-        if not path.exists():
-            raise InputError(f"{path}: no such file; name a CSV or Parquet file, or the folder of a run")
+    if not head_of(path).startswith(PARQUET):
         raise InputError(f"{path}: {SAY_COLUMNS}")
     try:
         trajectory = Trajectory.load(path)
@@ -47,11 +46,3 @@ def log_of_trajectory(path: Path) -> Log:
     name = path.parent.name if path.stem == "trajectory" and path.parent.name else path.stem
     everything = [slice(0, len(trajectory))]
     return Log(name, 1.0 / rate, columns, everything, has, None, push_windows(pushes), scenario=scenario)
-
-
-def _begins(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            return file.read(4)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error

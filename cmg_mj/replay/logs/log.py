@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.errors import TomlValue
 from cmg_mj.results.stored_columns import number_of_rows, select_rows
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Window
@@ -16,9 +17,6 @@ from cmg_mj.sensors.tilt import RadialTilt
 
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
-
-
-TomlValue = str | float | dict[str, str] | dict[str, float] | list[float] | list[list[float]]
 
 
 @dataclass(frozen=True)
@@ -52,19 +50,8 @@ class ReadOptions:
 
     def as_toml(self) -> dict[str, TomlValue]:
         """Return the options that are not the defaults, as TOML holds them."""
-        options: dict[str, TomlValue | None] = {
-            "columns": dict(self.columns),
-            "units": dict(self.units),
-            "scale": dict(self.scale),
-            "offset": dict(self.offset),
-            "rate_hz": self.rate_hz,
-            "max_gap_s": self.max_gap_s,
-            "delay_s": self.delay_s or None,
-            "radii_m": list(self.radii_m) if self.radii_m else None,
-            "time_range_s": list(self.time_range_s) if self.time_range_s else None,
-            "windows_s": [list(window) for window in self.windows_s],
-        }
-        return {name: value for name, value in options.items() if value not in (None, {}, [])}
+        defaults, options = vars(ReadOptions()), {**vars(self), "windows_s": tuple(self.windows_s)}
+        return {name: value for name, value in options.items() if value != defaults[name]}
 
 
 @dataclass(frozen=True)
@@ -77,7 +64,7 @@ class Log:
         columns: `time_s`, `y1_rad`, `y2_rad`, `u_rad_s`, `acceleration_rad_s2`, `reference_rad_s`, each (n,). Where
             the log lacks a signal, y2 and u are zero, the others NaN.
         parts: Slices without a gap; the observers start at the beginning of each.
-        has: Those of "gimbals" (y2 and u), "acceleration" and "reference" that the log has.
+        has: Signals of the log among "gimbals" (y2 and u), "acceleration" and "reference".
         tilt: Geometry of the two accelerometers, if they measure the tilt.
         windows: Windows that are scored separately [s].
         notes: Changes to the rows that were not requested, and likely mistakes, a line each.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmg_mj.errors import InputError
-from cmg_mj.replay.logs.acceleration_checks import implausible_acceleration
+from cmg_mj.replay.logs.acceleration_checks import TiltMotion, implausible_acceleration
 from cmg_mj.replay.logs.checks import (
     accelerometer_geometry,
     check_assumed,
@@ -64,9 +65,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     rows = _convert(path, options)
     if options.time_range_s is not None:
         rows = _cut(path, rows, options.time_range_s, options.rate_hz)
-    sampler = Sampler(str(path), options.rate_hz, options.max_gap_s, rows.notes)
+    sampler = Sampler(str(path), options.rate_hz, options.max_gap_s, rows.notes, held=("u_rad_s",))
     measured = _measured(rows)
-    dt, parts = sampler.parts(rows.time, measured, held=("u_rad_s",))
+    dt, parts = sampler.parts(rows.time, measured)
     joined = _join(parts, rows, options)
     check_motion(path, joined, rows.referred)
     has = _signals_in(measured, rows)
@@ -77,8 +78,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     slices = [slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
     notes = list(rows.notes)
     if "acceleration" in has:
-        tilt, acceleration = joined["y1_rad"], joined["acceleration_rad_s2"]
-        notes += implausible_acceleration(rows.columns, rows.signals, tilt, acceleration, slices, dt, rows.tilt)
+        motion = TiltMotion(joined["y1_rad"], joined["acceleration_rad_s2"], slices, dt)
+        notes += implausible_acceleration(rows.columns, rows.signals, motion, rows.tilt)
     units = {role: column.unit for role, column in rows.columns.items()}
     options = replace(options, units=units)
     return Log(path.stem, dt, joined, slices, has, rows.tilt, windows, tuple(notes), options, None, sampler.period)
@@ -86,19 +87,10 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
 
 def _read_run(path: Path, options: ReadOptions) -> Log:
     log = log_of_trajectory(path)
-    refused = {
-        "--units": options.units,
-        "--scale": options.scale,
-        "--offset": options.offset,
-        "--rate": options.rate_hz,
-        "--max-gap": options.max_gap_s,
-        "--delay": options.delay_s,
-        "--radii": options.radii_m,
-        "--time-range": options.time_range_s,
-    }
-    for option, value in refused.items():
-        if value not in (None, 0.0, {}):
-            raise InputError(f"{option}: {path} is a run's own recording; read it with --columns for that")
+    for field in options.as_toml():
+        if field != "windows_s":
+            option = re.sub("_(hz|s|m)$", "", field).replace("_", "-")  # max_gap_s is --max-gap
+            raise InputError(f"--{option}: {path} is a run's own recording; read it with --columns for that")
     if not options.windows_s:
         return log
     return replace(log, windows=windows_inside(path, options.windows_s, log["time_s"]))

@@ -70,6 +70,7 @@ class Sampler:
         rate_hz: Rate of rows without times; else the rate to resample to, or None for the rows' own.
         max_gap_s: Longer gaps part the log; None for `BRIDGED` periods.
         notes: Changes to the rows.
+        held: Names of signals that hold until the next row, such as a command.
         period: Period of the file's own rows, once they are read [s].
     """
 
@@ -77,17 +78,15 @@ class Sampler:
     rate_hz: float | None
     max_gap_s: float | None
     notes: list[str]
+    held: Sequence[str] = ()
     period: float | None = None
 
-    def parts(
-        self, time: np.ndarray | None, measured: Mapping[str, np.ndarray], held: Sequence[str] = ()
-    ) -> tuple[float, list[Part]]:
+    def parts(self, time: np.ndarray | None, measured: Mapping[str, np.ndarray]) -> tuple[float, list[Part]]:
         """Discard incomplete rows, and resample the others if they are uneven.
 
         Args:
             time: Stamps, (n_rows,) [s]; None for rows that are even.
             measured: Name -> values, (n_rows,); a row must have all of them.
-            held: Names of signals that hold until the next row, such as a command.
 
         Returns:
             The sample period [s], and the parts.
@@ -108,7 +107,7 @@ class Sampler:
         time, values = self._forward(time if present.all() else time[present], masked(measured, present))
         if len(time) < FEWEST:
             raise InputError(f"{self.where}: {_rows(len(time))} with all that is needed; at least {FEWEST}")
-        return self._on_a_grid(time, values, held)
+        return self._on_a_grid(time, values)
 
     def _forward(self, time: np.ndarray, values: StoredColumns) -> tuple[np.ndarray, StoredColumns]:
         """Return the rows with growing times."""
@@ -137,7 +136,7 @@ class Sampler:
             time, values = time[mask], masked(values, mask)
         return time, values
 
-    def _on_a_grid(self, time: np.ndarray, values: StoredColumns, held: Sequence[str]) -> tuple[float, list[Part]]:
+    def _on_a_grid(self, time: np.ndarray, values: StoredColumns) -> tuple[float, list[Part]]:
         steps = np.diff(time)
         usual = float(np.median(steps))
         period = float(steps[steps <= GAP_PERIODS * usual].mean())
@@ -155,7 +154,7 @@ class Sampler:
         even = all(is_even(time[s], period, resolution) for s in stretches)
         dt = period if self.rate_hz is None else 1.0 / self.rate_hz
         resampled = not even or abs(dt - period) > 1e-6 * dt
-        self._say_how(time, steps[steps <= GAP_PERIODS * period], period, dt, even, resampled, resolution)
+        self._say_how(steps[steps <= GAP_PERIODS * period], period, dt, even, resampled, resolution)
         bridged = (steps > GAP_PERIODS * period) & (steps <= max(GAP_PERIODS * period, longest + period))
         if bridged.any():
             self.notes.append(_gaps("bridged by straight lines", time, steps, bridged, period))
@@ -167,7 +166,7 @@ class Sampler:
         if total > MOST_ROWS:
             raise InputError(f"{self.where}: {total:,.0f} samples at {1.0 / dt:g} Hz; at most {MOST_ROWS:,}")
         parts = [
-            self._part(time[s], values.rows(s), period, dt, resampled, held)
+            self._part(time[s], values.rows(s), period, dt, resampled)
             for s in stretches
             if (time[s][-1] - time[s][0]) / dt >= FEWEST - 1.5
         ]
@@ -181,15 +180,9 @@ class Sampler:
         return dt, parts
 
     def _say_how(
-        self,
-        time: np.ndarray,
-        steps: np.ndarray,
-        period: float,
-        dt: float,
-        even: bool,
-        resampled: bool,
-        resolution: float,
+        self, steps: np.ndarray, period: float, dt: float, even: bool, resampled: bool, resolution: float
     ) -> None:
+        """Note how uneven rows are, and whether they are resampled."""
         span = f"{steps.min() * 1e3:.4g} to {steps.max() * 1e3:.4g} ms"
         if resampled and even:
             self.notes.append(f"{1.0 / period:.6g} Hz resampled to {1.0 / dt:.6g} Hz by cubic splines")
@@ -205,15 +198,7 @@ class Sampler:
                 f"{1.0 / period:.6g} Hz, and taken as such"
             )
 
-    def _part(
-        self,
-        time: np.ndarray,
-        values: StoredColumns,
-        period: float,
-        dt: float,
-        resampled: bool,
-        held: Sequence[str],
-    ) -> Part:
+    def _part(self, time: np.ndarray, values: StoredColumns, period: float, dt: float, resampled: bool) -> Part:
         if not resampled and len(time) == round((time[-1] - time[0]) / dt) + 1:
             grid = time[0] + dt * np.arange(len(time))
             return Part(grid, values, time, grid)
@@ -224,12 +209,12 @@ class Sampler:
             time, places = time[mask], places[mask]
             values = masked(values, mask)
             stamps, grid = places * dt, dt * np.arange(places[-1] + 1)
-            filled = {name: shelved(bridge(grid, stamps, column, name in held)) for name, column in values.items()}
+            filled = {name: shelved(bridge(grid, stamps, column, name in self.held)) for name, column in values.items()}
             return Part(time[0] + grid, StoredColumns(filled, 0, len(grid)), time, time[0] + stamps)
         grid = dt * np.arange(int((time[-1] - time[0]) / dt + 1e-6) + 1)
         stamps = time - time[0]
         sampled = {
-            name: shelved(resample(grid, stamps, column, GAP_PERIODS * period, name in held))
+            name: shelved(resample(grid, stamps, column, GAP_PERIODS * period, name in self.held))
             for name, column in values.items()
         }
         return Part(time[0] + grid, StoredColumns(sampled, 0, len(grid)), time, time)

@@ -25,24 +25,10 @@ MOST_ROWS = 5_000_000
 DELIMITERS = (",", ";", "\t", "|")
 HEAD = 1 << 16
 """Size of the part of a CSV that is searched for its heading, which must end in it [bytes]."""
-MISSING = [
-    "",
-    "nan",
-    "NaN",
-    "NAN",
-    "-nan",
-    "NA",
-    "N/A",
-    "#N/A",
-    "null",
-    "NULL",
-    "None",
-    "none",
-    "inf",
-    "-inf",
-    "Inf",
-    "-Inf",
-]
+PARQUET = b"PAR1"
+"""First bytes of a Parquet file."""
+NOT_FINITE = ["nan", "NaN", "NAN", "-nan", "inf", "-inf", "Inf", "-Inf"]
+MISSING = ["", "NA", "N/A", "#N/A", "null", "NULL", "None", "none", *NOT_FINITE]
 """Cells that hold no number."""
 COMMENTS = ("#", "%", "//")
 
@@ -62,32 +48,38 @@ def read_table(path: Path, headings: Sequence[str], time: str | None) -> tuple[S
     Raises:
         InputError: The file cannot be read, lacks a column, or has text among the numbers.
     """
-    try:
-        regular, there = path.is_file(), path.exists()
-        head = b""
-        if regular:
-            with path.open("rb") as file:
-                head = file.read(HEAD)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:  # such as a name with a zero byte
-        raise InputError(f"{str(path)!r}: cannot be read: {error}") from error
-    if not regular:
-        what = "no file" if there else "no such file"
-        raise InputError(f"{path}: {what}; name a CSV or Parquet file, or the folder of a run")
+    head = head_of(path)
     if not head.strip():
         raise InputError(f"{path}: empty")
     notes: list[str] = []
     dated: list[str] = []
     columns = (
         _of_parquet(path, headings, time, dated)
-        if head[:4] == b"PAR1"
+        if head.startswith(PARQUET)
         else _of_csv(path, head, headings, time, notes, dated)
     )
     columns = stored(columns)
     if not columns.n_rows:
         raise InputError(f"{path}: has a heading and no row")
     return columns, notes, bool(dated)
+
+
+def head_of(path: Path) -> bytes:
+    """Read the first bytes of a file.
+
+    Raises:
+        InputError: There is no such file, or it cannot be read.
+    """
+    try:
+        if path.is_file():
+            with path.open("rb") as file:
+                return file.read(HEAD)
+        what = "no file" if path.exists() else "no such file"
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:  # such as a name with a zero byte
+        raise InputError(f"{str(path)!r}: cannot be read: {error}") from error
+    raise InputError(f"{path}: {what}; name a CSV or Parquet file, or the folder of a run")
 
 
 def _of_parquet(path: Path, headings: Sequence[str], time: str | None, dated: list[str]) -> Mapping[str, np.ndarray]:

@@ -36,47 +36,29 @@ UNITS: dict[Quantity, dict[str, float]] = {
 }
 """Quantity -> unit -> its size in rad, rad/s, rad/s^2, m/s^2 or s. The first of each is that."""
 
-_SAME = {
-    "radian": "rad",
-    "radians": "rad",
-    "°": "deg",
-    "degree": "deg",
-    "degrees": "deg",
-    "rads": "rad_s",
-    "rps": "rad_s",
-    "radps": "rad_s",
-    "rad_sec": "rad_s",
-    "degs": "deg_s",
-    "degps": "deg_s",
-    "deg_sec": "deg_s",
-    "°_s": "deg_s",
-    "°_s2": "deg_s2",
-    "rad_ss": "rad_s2",
-    "ms2": "m_s2",
-    "mps2": "m_s2",
-    "m_ss": "m_s2",
-    "mps": "m_s",
-    "sec": "s",
-    "secs": "s",
-    "second": "s",
-    "seconds": "s",
-    "msec": "ms",
-    "millis": "ms",
-    "usec": "us",
-    "µs": "us",
-    "μs": "us",
-    "micros": "us",
-    "nsec": "ns",
-    "nanos": "ns",
+_SPELLINGS = {
+    "rad": "radian radians",
+    "deg": "° degree degrees",
+    "rad_s": "rads rps radps rad_sec",
+    "deg_s": "degs degps deg_sec °_s",
+    "rad_s2": "rad_ss",
+    "deg_s2": "°_s2",
+    "m_s": "mps",
+    "m_s2": "ms2 mps2 m_ss",
+    "s": "sec secs second seconds",
+    "ms": "msec millis",
+    "us": "usec µs μs micros",
+    "ns": "nsec nanos",
 }
-"""Other spellings."""
+"""Unit -> its other spellings."""
+_UNIT_OF_SPELLING = {spelling: unit for unit, others in _SPELLINGS.items() for spelling in others.split()}
 
 
 def _plain(text: str) -> str:
     """Spell `Deg/s^2`, `deg.s-2` and `deg_s2` alike."""
     text = text.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
     text = re.sub(r"[\s./*·]+", "_", text).replace("_s-1", "_s").replace("_s-2", "_s2").strip("_")
-    return _SAME.get(text, text)
+    return _UNIT_OF_SPELLING.get(text, text)
 
 
 def unit(quantity: Quantity, text: str, where: str) -> str:

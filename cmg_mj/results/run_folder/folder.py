@@ -6,7 +6,7 @@ import itertools
 import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 from cmg_mj.errors import InputError, raised
@@ -173,13 +173,10 @@ def _complaint(path: Path, error: BaseException) -> str:
 
 
 @contextmanager
-def claimed(folder: RunFolder | Path) -> Iterator[RunFolder]:
-    """A folder that may have been claimed already."""
-    if isinstance(folder, RunFolder):
-        yield folder
-    else:
-        with RunFolder(folder) as now:
-            yield now
+def claimed(folder: RunFolder | Path, names: Iterable[str] = ()) -> Iterator[RunFolder]:
+    """A folder that may have been claimed already; if not, for files of these names."""
+    with nullcontext(folder) if isinstance(folder, RunFolder) else RunFolder(folder, names) as claim:
+        yield claim
 
 
 def write_text(path: Path, text: str) -> None:

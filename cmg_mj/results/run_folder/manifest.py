@@ -1,4 +1,4 @@
-"""What cmg_mj has written into a folder: the only files there that it takes away again or writes over."""
+"""The list of files that cmg_mj has written into a folder: it deletes and overwrites no others there."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cmg_mj.errors import InputError, shown
 from cmg_mj.results.files import is_plain_file
 
 HIDDEN = ".cmg-mj"
-"""What is cmg_mj's own in a run folder: the manifest; while a run lives, also its lock and the result being written."""
+"""Folder of cmg_mj's own files in a run folder: the manifest; during a run also its lock and the unfinished result."""
 
 FILES = "files.json"
 """The manifest's file in `HIDDEN`."""

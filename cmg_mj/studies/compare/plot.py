@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.results.files import whole_file
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import KEYS
 from cmg_mj.studies.compare.comparison import ComparedObserver
 from cmg_mj.studies.compare.statistics import ComparisonRow, comparison_rows
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
-from cmg_mj.visualization.plots.run_plot import pyplot
+from cmg_mj.visualization.plots.run_plot import pyplot, save_figure
 
 COLUMNS = 3
 """Panels in a row."""
@@ -37,12 +36,11 @@ def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) ->
         compared: The observers with their runs.
         title: The scenario's title.
     """
-    plt = pyplot()
     rows = comparison_rows(compared)
     drawn = {key: panel for key in KEYS if KEYS[key].compared and (panel := _Panel(key, rows)).any}
     down = -(-len(drawn) // COLUMNS)
     size = (12.0, 1.2 + down * (0.9 + 0.22 * len(rows)))
-    figure, grid = plt.subplots(down, COLUMNS, sharey=True, figsize=size, layout="constrained", squeeze=False)
+    figure, grid = pyplot().subplots(down, COLUMNS, sharey=True, figsize=size, layout="constrained", squeeze=False)
     for axes in grid.flat[len(drawn) :]:
         axes.set_visible(False)
     for axes, panel in zip(grid.flat, drawn.values(), strict=False):
@@ -56,10 +54,7 @@ def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) ->
     heading += "Lines: mean and its 95 % interval; arrows: beyond the axis."
     if not all(row.entry.result.stood.all() for row in rows):
         heading += " Crosses: worlds that did not stand to the end, until then."
-    figure.suptitle(heading, x=0.01, ha="left", parse_math=False)
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=100, format="png")
-    plt.close(figure)
+    save_figure(path, figure, heading, dpi=100)
 
 
 def _label(row: ComparisonRow, name: str) -> str:

@@ -91,7 +91,7 @@ def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:
     """Compute what `cmg-mj compare --json` prints.
 
     Args:
-        compared: What was run.
+        compared: The observers with their runs.
 
     Returns:
         For each row its means; `intervals`: key -> ends of the mean's 95 % interval; `minus_best`: key -> the

@@ -28,7 +28,7 @@ PUSH_S = 0.1
 BEFORE_S = 1.0
 """The loop runs for so long before the push comes [s]."""
 AFTER_TIME_CONSTANTS = 10.0
-"""Of the rig's unstable pole: until then it has recovered or fallen."""
+"""Time constants of the rig's unstable pole after which the rig has recovered or fallen."""
 
 
 class PushMargin(NamedTuple):

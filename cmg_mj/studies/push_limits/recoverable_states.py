@@ -1,4 +1,4 @@
-"""The ceiling for every controller: from which states gimbals of a limited rate and travel can still recover a rig."""
+"""The states from which any controller, with gimbals of a limited rate and travel, can recover a rig."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class RecoverableLimit(NamedTuple):
     """The largest tilt from which a rig at rest recovers, (H/J) S [rad]."""
     impulse: float
     """The largest impulse about the line that an upright rig recovers from if it comes all at once, J lambda times the
-    tilt [N m s]. Of a push that is held gimbals take off a part while it lasts: see `push_impulse`."""
+    tilt [N m s]. Gimbals take off a part of a held push while it lasts: see `push_impulse`."""
     pole: float
     """lambda [1/s]."""
 
     def push_impulse(self, duration_s: float) -> float:
-        """The largest impulse about the line that an upright rig recovers from if a constant torque brings it.
+        """Compute the largest impulse about the line that an upright rig recovers from, brought by a constant torque.
 
         With x = lambda D, a torque tau for D adds tau/(J lambda^2) (1 - e^-x) to what is to be recovered from, so that
         tau D = blow x/(1 - e^-x).
@@ -52,7 +52,7 @@ class RecoverableLimit(NamedTuple):
 
 
 def ceiling(model: ReducedModel, rate_limit: float, travel: float = TRAVEL) -> RecoverableLimit:
-    """The ceiling for a rig.
+    """Compute the limits for any controller on a rig.
 
     Args:
         model: Its reduced model.

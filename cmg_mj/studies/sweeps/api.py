@@ -6,16 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.studies.sweeps.axes import Variation, parse_axis
 from cmg_mj.studies.sweeps.cells import Trials, cells_in_blocks
 from cmg_mj.studies.sweeps.checks import listed_names
 from cmg_mj.studies.sweeps.chunk import compute
-from cmg_mj.studies.sweeps.order import order_counts, order_rows, order_table
+from cmg_mj.studies.sweeps.order import order_counts, order_table
 from cmg_mj.studies.sweeps.sobol import index_rows, index_table
-from cmg_mj.studies.sweeps.study import SamplingDesign, SweepStudy, check_values
+from cmg_mj.studies.sweeps.study import SweepStudy, check_values, sampling
 from cmg_mj.studies.sweeps.trials import table_of
 
 if TYPE_CHECKING:
@@ -71,12 +70,9 @@ def sweep(
     Raises:
         InputError: A field or its values are not written so or do not fit the design, or an observer cannot run.
     """
-    if sample is not None and sobol is not None:
-        raise InputError("sample and sobol: one of them")
-    design: SamplingDesign = "sample" if sample is not None else "sobol" if sobol is not None else "grid"
+    design, n = sampling(sample, sobol) or ("grid", 0)
     base = load_scenario(scenario) if isinstance(scenario, str) else scenario
     axes = tuple(parse_axis(field, values, f"vary: {field!r}") for field, values in vary.items())
-    n = next((points for points in (sample, sobol) if points is not None), 0)
     names = (base.observer.kind,) if observers is None else listed_names(observers, "observers")
     study = SweepStudy(base, axes, names, worlds, design, n, listed_names(order, "order"))
     import pyarrow as pa
@@ -88,7 +84,7 @@ def sweep(
         study,
         table,
         pa.concat_tables(cells_in_blocks(trials)),
-        order_table(study, order_rows(study, order_counts(trials))) if study.order else None,
+        order_table(study, order_counts(trials)) if study.order else None,
         index_table(index_rows(trials)) if design == "sobol" else None,
     )
 

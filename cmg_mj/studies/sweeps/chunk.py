@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING
 
 from cmg_mj.errors import InputError, raised
@@ -21,7 +20,7 @@ REFUSED = "refused"
 """Outcome of a trial whose values do not fit each other: it never begins."""
 
 BatchId = tuple[BatchKey, PlantStructure]
-"""What worlds of one batch have in common."""
+"""Properties that the worlds of one batch have in common."""
 
 
 def compute(
@@ -60,40 +59,43 @@ def compute(
         if number not in experiments:
             try:
                 experiments[number] = base.with_settings(points[number])
-                batch_of[number] = _batch_of(experiments[number])
+                batch_of[number] = experiments[number].batch_key, plant_structure(experiments[number].plant)
             except InputError as error:
                 refused[number] = str(error)
                 continue
         batches.setdefault(batch_of[number], []).append(trial)
     for trials in batches.values():
         done, share = len(results) / len(chunk.trials), len(trials) / len(chunk.trials) / study.scenario.duration_s
-        tick = partial(_chunk_progress, on_progress, done, share) if on_progress else None
+        tick = part_of_progress(on_progress, done, share)
         rows = _run([experiments[number] for number, _ in trials], trials, tick, threads)
         results |= zip(trials, rows, strict=True)
     for trial in chunk.trials:
         if trial[0] in refused:
             results[trial] = _unfinished(REFUSED, refused[trial[0]])
-    return [
-        {"point": number, **_as_columns(points[number]), **_identity(study, chunk, world), **results[number, world]}
-        for number, world in chunk.trials
-    ]
+    return _with_identity(study, chunk, points, results)
 
 
 def rows_of_failed_chunk(study: SweepStudy, chunk: Chunk, reason: str) -> list[Summary]:
     """Make the rows of a chunk that could not be computed: the reason in each."""
+    return _with_identity(study, chunk, study.points, dict.fromkeys(chunk.trials, _unfinished("stopped", reason)))
+
+
+def _with_identity(
+    study: SweepStudy, chunk: Chunk, points: Points | Mapping[int, Point], results: Mapping[tuple[int, int], Summary]
+) -> list[Summary]:
+    """Put the point, the observer, the world and the seed before each trial's result."""
+    of_all = {"observer": chunk.observer, "seed": study.scenario.seed}
     return [
-        {
-            "point": number,
-            **_as_columns(study.points[number]),
-            **_identity(study, chunk, world),
-            **_unfinished("stopped", reason),
-        }
+        {"point": number, **_as_columns(points[number]), **of_all, "world": world, **results[number, world]}
         for number, world in chunk.trials
     ]
 
 
-def _chunk_progress(on_progress: Callable[[float], None], done: float, share: float, time: float) -> None:
-    on_progress(done + share * time)
+def part_of_progress(
+    on_progress: Callable[[float], None] | None, start: float, size: float
+) -> Callable[[float], None] | None:
+    """Make the report of a part of a progress, which begins at the start and adds the size; None without a progress."""
+    return on_progress and (lambda share: on_progress(start + size * share))
 
 
 def _run(
@@ -150,15 +152,6 @@ def _monotonic_progress(tick: Callable[[float], None]) -> Callable[[float], None
         tick(latest)
 
     return report
-
-
-def _batch_of(experiment: Experiment) -> BatchId:
-    """Make a key: worlds with the same one can run in one batch."""
-    return experiment.batch_key, plant_structure(experiment.plant)
-
-
-def _identity(study: SweepStudy, chunk: Chunk, world: int) -> Summary:
-    return {"observer": chunk.observer, "world": world, "seed": study.scenario.seed}
 
 
 def _unfinished(outcome: str, reason: str) -> Summary:

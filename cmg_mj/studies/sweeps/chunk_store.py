@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 
 import pyarrow as pa
@@ -20,7 +20,7 @@ from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.results.files import is_plain_file, write_bytes, write_parquet
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.axes import FieldValue
-from cmg_mj.studies.sweeps.chunk import compute
+from cmg_mj.studies.sweeps.chunk import compute, part_of_progress
 from cmg_mj.studies.sweeps.file import SECTIONS
 from cmg_mj.studies.sweeps.fingerprint import (
     ChunkFingerprint,
@@ -214,16 +214,12 @@ def run(store: Store, on_progress: Callable[[float], None] | None = None) -> Non
     done = study.trials - sum(chunks.size(number) for number in left)
     for number in left:
         size = chunks.size(number)
-        tick = None if on_progress is None else partial(_store_progress, on_progress, done, size)
+        tick = part_of_progress(on_progress, done, size)
         store.keep(number, table_of(study, compute(study, chunks[number], tick)))
         release_free_memory()
         done += size
         if on_progress:
             on_progress(done)
-
-
-def _store_progress(on_progress: Callable[[float], None], done: int, size: int, share: float) -> None:
-    on_progress(done + share * size)
 
 
 def merged(store: Store, path: Path) -> None:

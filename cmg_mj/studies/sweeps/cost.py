@@ -8,11 +8,10 @@ from contextlib import contextmanager
 from typing import ParamSpec, TypedDict, TypeVar
 
 from mujoco.batch import Batch
-from rich import box
 from rich.table import Table
 
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.scenario.schema import Scenario
+from cmg_mj.studies.benchmark import figures_table
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.chunk import compute
 from cmg_mj.studies.sweeps.study import SweepStudy
@@ -45,7 +44,7 @@ class ChunkCost(TypedDict):
 
 
 class SweepCost(TypedDict):
-    """The cost of a sweep, as `bench --sweep --json` prints it."""
+    """The cost of a sweep, as `cmg-mj bench sweep --json` prints it."""
 
     scenario: str
     duration_s: float
@@ -68,10 +67,10 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
     Raises:
         InputError: An observer does not exist.
     """
-    cases = [(name, observer) for observer in observers for name in ("worlds", "rigs")]
+    cases = [(observer, many_plants) for observer in observers for many_plants in (False, True)]
     figures: list[ChunkCost] = []
-    for i, (name, observer) in enumerate(cases):
-        study = _one_plant(observer, worlds) if name == "worlds" else _many_plants(observer, worlds)
+    for i, (observer, many_plants) in enumerate(cases):
+        study = _study(observer, worlds, many_plants=many_plants)
         chunk = study.chunks[0]
         with _clocked() as clock:
             start = time.process_time()
@@ -93,15 +92,10 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
 
 def table(cost: SweepCost) -> Table:
     """Make the table that `cmg-mj bench sweep` prints."""
-    rows = Table(
-        title=f"{cost['scenario']}, {cost['duration_s']:g} s, on one thread: processor time of all by that "
-        "in MuJoCo's batch",
-        box=box.SIMPLE_HEAD,
-        title_justify="left",
+    rows = figures_table(
+        f"{cost['scenario']}, {cost['duration_s']:g} s, on one thread: processor time of all by that in MuJoCo's batch",
+        ("rigs", "trials", "stood", "all [s]", "batch [s]", "ratio", "trials\na second"),
     )
-    rows.add_column("observer", vertical="bottom")
-    for heading in ("rigs", "trials", "stood", "all [s]", "batch [s]", "ratio", "trials\na second"):
-        rows.add_column(heading, justify="right", vertical="bottom")
     for row in cost["figures"]:
         counts = (str(row[key]) for key in ("rigs", "trials", "stood"))
         rate = row["trials"] / row["cpu_s"]
@@ -110,19 +104,13 @@ def table(cost: SweepCost) -> Table:
     return rows
 
 
-def _scenario() -> Scenario:
-    return load_scenario(SCENARIO, [f"duration_s={DURATION_S}"])
-
-
-def _one_plant(observer: str, worlds: int) -> SweepStudy:
-    scenario = _scenario()
-    return SweepStudy(scenario, (parse_axis("plant.equilibrium_bias_deg", "0.5", "rig"),), (observer,), worlds)
-
-
-def _many_plants(observer: str, worlds: int) -> SweepStudy:
+def _study(observer: str, worlds: int, *, many_plants: bool) -> SweepStudy:
+    """Make a sweep of so many trials: many worlds of one plant, or few of each of many plants."""
+    scenario = load_scenario(SCENARIO, [f"duration_s={DURATION_S}"])
+    if not many_plants:
+        return SweepStudy(scenario, (parse_axis("plant.equilibrium_bias_deg", "0.5", "rig"),), (observer,), worlds)
     axes = tuple(parse_axis(field, values, field) for field, values in PLANTS.items())
-    plants = max(1, worlds // WORLDS_A_PLANT)
-    return SweepStudy(_scenario(), axes, (observer,), WORLDS_A_PLANT, "sample", plants)
+    return SweepStudy(scenario, axes, (observer,), WORLDS_A_PLANT, "sample", max(1, worlds // WORLDS_A_PLANT))
 
 
 @contextmanager

@@ -101,13 +101,14 @@ def _count(errors: np.ndarray) -> OrderCount:
     return OrderCount(int(holds.sum()), int((holds | broken).sum()))
 
 
-def order_table(study: SweepStudy, rows: Sequence[Summary]) -> pa.Table:
-    """Make the rows of `order_rows` into a table."""
+def order_table(study: SweepStudy, counts: Mapping[str, Sequence[OrderCount]]) -> pa.Table:
+    """Make a table of `order_rows`."""
     import pyarrow as pa
 
-    counts = [("order", "string"), ("held", "int64"), ("worlds", "int64")]
+    numbers = [("order", "string"), ("held", "int64"), ("worlds", "int64")]
     ends = [(name, "float64") for name in ("share", "low", "high")]
-    return as_table(rows, pa.schema([("figure", "string"), *point_columns(study), *counts, *ends]))
+    schema = pa.schema([("figure", "string"), *point_columns(study), *numbers, *ends])
+    return as_table(order_rows(study, counts), schema)
 
 
 def order_rows(study: SweepStudy, counts: Mapping[str, Sequence[OrderCount]]) -> list[Summary]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from typing import TypedDict
 
 from cmg_mj.simulation.batch import can_vary_in_batch
 from cmg_mj.studies.sweeps.chunk import compute
@@ -22,20 +21,12 @@ By the peaks (VmHWM) of four sweeps on Linux: of 0.05 s, 2 points x 50 worlds, 1
 """
 
 
-class Cost(TypedDict):
-    """The cost of a sweep, as `--plan --json` prints it."""
+def estimate_cost(study: SweepStudy) -> dict[str, float]:
+    """Estimate minutes on this machine and memory, as far as a piece of every observer can say.
 
-    points: int
-    observers: int
-    worlds: int
-    trials: int
-    chunks: int
-    minutes: float
-    memory_mb: float
-
-
-def estimate_cost(study: SweepStudy) -> Cost:
-    """Estimate minutes on this machine and memory, as far as a piece of every observer can say."""
+    Returns:
+        The figures that `--dry-run --json` prints.
+    """
     thinned = _thinned(study)
     seconds = sum(_seconds_a_trial(thinned, observer) for observer in study.observers)
     trials_an_observer = study.n_points * study.worlds

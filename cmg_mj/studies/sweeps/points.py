@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterator, Sequence
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
@@ -40,15 +40,7 @@ class Points:
     def __iter__(self) -> Iterator[Point]:
         return (self[number] for number in range(self._length))
 
-    @overload
-    def __getitem__(self, number: int) -> Point: ...
-
-    @overload
-    def __getitem__(self, number: slice) -> list[Point]: ...
-
-    def __getitem__(self, number: int | slice) -> Point | list[Point]:
-        if isinstance(number, slice):
-            return [self[index] for index in range(self._length)[number]]
+    def __getitem__(self, number: int) -> Point:
         if not 0 <= number < self._length:
             raise IndexError(number)
         if self._columns is not None:

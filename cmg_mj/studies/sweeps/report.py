@@ -9,12 +9,10 @@ from cmg_mj.errors import InputError
 from cmg_mj.results.files import write_parquet
 from cmg_mj.results.run_folder import RunFolder, Writers, write_text
 from cmg_mj.studies.sweeps import report_sections as sections
-from cmg_mj.studies.sweeps.axes import is_number
 from cmg_mj.studies.sweeps.cells import Trials, cells_in_blocks, cells_schema
 from cmg_mj.studies.sweeps.chunk_store import GOES_ON, TRIALS, Store, merged
-from cmg_mj.studies.sweeps.curves import CURVES, curves
-from cmg_mj.studies.sweeps.maps import MAPS, maps
-from cmg_mj.studies.sweeps.order import OrderCount, order_counts, order_rows, order_table
+from cmg_mj.studies.sweeps.order import OrderCount, order_counts, order_table
+from cmg_mj.studies.sweeps.pictures import CURVES, MAPS, pictures_of
 from cmg_mj.studies.sweeps.report_sections import CELLS, INDICES, ORDER
 from cmg_mj.studies.sweeps.sobol import IndexRow, index_rows, index_table
 from cmg_mj.studies.sweeps.study import counted
@@ -55,21 +53,6 @@ def tables_of(trials: Trials) -> SweepTables:
     )
 
 
-def pictures_of(trials: Trials) -> list[Picture]:
-    """Draw curves over one varied numeric field, a map a figure over two in a grid; else nothing."""
-    study = trials.study
-    axes = [axis for axis in study.axes if axis.is_range or len(axis.values) > 1]
-    if not all(is_number(value) for axis in axes for value in axis.values):
-        return []
-    if len(axes) == 1 and study.design != "sobol":
-        pictures = [curves(trials, axes[0].field)]
-    elif len(axes) == 2 and study.design == "grid":
-        pictures = maps(trials, axes[0].field, axes[1].field)
-    else:
-        return []
-    return [picture for picture in pictures if picture.panels]
-
-
 def save(folder: RunFolder, store: Store, tables: SweepTables) -> Path:
     """Write the tables, the pictures and the report of a finished sweep.
 
@@ -84,9 +67,7 @@ def save(folder: RunFolder, store: Store, tables: SweepTables) -> Path:
         **{f"{picture.name}.png": lambda path, picture=picture: draw(path, picture) for picture in pictures},
     }
     if study.order:
-        files[ORDER] = lambda path: write_parquet(
-            path, order_table(study, order_rows(study, tables.order)), durable=True
-        )
+        files[ORDER] = lambda path: write_parquet(path, order_table(study, tables.order), durable=True)
     if study.design == "sobol":
         files[INDICES] = lambda path: write_parquet(path, index_table(tables.indices), durable=True)
     files[REPORT] = lambda path: write_text(path, report(tables, pictures))

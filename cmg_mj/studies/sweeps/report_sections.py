@@ -20,7 +20,7 @@ from cmg_mj.studies.sweeps.order import (
     order_of_points,
     pairs_of,
 )
-from cmg_mj.studies.sweeps.plot_scales import ERRORS, fall_counts
+from cmg_mj.studies.sweeps.pictures import ERRORS, fall_counts
 from cmg_mj.studies.sweeps.sobol import FEWEST, LOG_RATIO, LOST, IndexRow
 from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.visualization.plots.figure_spec import Picture
@@ -235,7 +235,7 @@ def indices(study: SweepStudy, rows: Sequence[IndexRow]) -> list[str]:
     """Show the first-order and total indices of the figures that matter most."""
     about = ABOUT_INDICES
     if study.n < FEWEST:
-        about += f" Of fewer than {FEWEST} rows the intervals are too narrow, and nothing is called decisive."
+        about += f" With fewer than {FEWEST} rows the intervals are too narrow, and nothing is called decisive."
     parts = ["## What the errors depend on: Sobol indices", about]
     titles = {key: heading(key) for key in ERRORS} | {LOST: "share of worlds that fell or stopped"}
     titles |= {f"{LOG_RATIO}{key}": f"logarithm of the ratio: {heading(key)}" for key in ORDER_FIGURES}

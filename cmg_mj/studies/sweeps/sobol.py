@@ -45,10 +45,10 @@ class Indices(NamedTuple):
     """Shares of a variance, with the ends of their 95 % intervals; each (n_fields,).
 
     Attributes:
-        first: What a field explains by itself.
+        first: Share that a field explains by itself.
         first_low: Its interval's lower end.
         first_high: Its interval's upper end.
-        total: What it explains with all that it acts together with.
+        total: Share that a field explains together with all that it acts with.
         total_low: Its interval's lower end.
         total_high: Its interval's upper end.
     """

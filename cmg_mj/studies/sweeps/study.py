@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.scenario.schema import ObserverSettings, Scenario, parse_scenario
@@ -28,6 +29,15 @@ CHUNK = 1024
 """Trials of a chunk: so many fill a batch, and take minutes at most."""
 MOST_ALONE = 200
 """Values of a field that is varied alone that are tried before the sweep, at 5 ms each; the last one is, too."""
+
+
+def sampling(sample: int | None, sobol: int | None) -> tuple[SamplingDesign, int] | None:
+    """Return the design of `--sample` or `--sobol` and its number of points; None without either."""
+    if sample is not None and sobol is not None:
+        raise InputError("--sample and --sobol: one of them")
+    if sobol is not None:
+        return "sobol", sobol
+    return None if sample is None else ("sample", sample)
 
 
 @dataclass(frozen=True)

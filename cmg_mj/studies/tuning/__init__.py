@@ -4,11 +4,12 @@ The loop is closed on the gyro, its recording is replayed through the observer, 
 fitted on one set of worlds and scored on another.
 """
 
+from cmg_mj.studies.tuning.fit import NoiseLevelResult
 from cmg_mj.studies.tuning.on_logs import LogStudy, tune_on_logs
 from cmg_mj.studies.tuning.on_simulations import Recorded, halves, record, recorder
 from cmg_mj.studies.tuning.save import figures_of, files_of_study, save_study, tuning_table
 from cmg_mj.studies.tuning.save_on_logs import figures_of_logs, logs_table, save_log_study
-from cmg_mj.studies.tuning.study import BestNoise, NoiseLevelResult, TuningResult, best_noise, tune, tuned_scenario
+from cmg_mj.studies.tuning.study import BestNoise, TuningResult, best_noise, tune, tuned_scenario
 
 __all__ = [
     "BestNoise",

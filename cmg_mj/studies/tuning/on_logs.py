@@ -22,6 +22,7 @@ from cmg_mj.replay.observer_inputs import ObserverInputs, observer_inputs
 from cmg_mj.replay.parameter_options import ParameterValue
 from cmg_mj.replay.reference import alignment_of, remarks_on
 from cmg_mj.sensors.tilt import TiltNoise
+from cmg_mj.studies.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, level_of
 from cmg_mj.studies.tuning.parameters import (
     MakeObserver,
     ParameterValues,
@@ -32,7 +33,6 @@ from cmg_mj.studies.tuning.parameters import (
     plain,
 )
 from cmg_mj.studies.tuning.search import evaluations
-from cmg_mj.studies.tuning.study import NoiseLevelResult, OnShare, ParameterFit, level_of
 
 BLOCKS = 10
 """Stretches of each log's part that are scored one by one, for an interval."""
@@ -182,9 +182,9 @@ def tune_on_logs(
         observer_inputs(log, model=model, noises=noises, parameters={kind: start_parameters or {}}) for log in logs
     ]
     start_parameters = _common_parameters(kind, logs, inputs)
-    fit, held_out = (
-        LogSegments([log.cut(_share(log, split, first=first)) for log in logs], settle_s) for first in (True, False)
-    )
+    ends = [round(split * len(log)) for log in logs]
+    fit = LogSegments([log.cut(slice(0, end)) for log, end in zip(logs, ends, strict=True)], settle_s)
+    held_out = LogSegments([log.cut(slice(end, None)) for log, end in zip(logs, ends, strict=True)], settle_s)
     for part, log_inputs in zip((*fit.logs, *held_out.logs), (*inputs, *inputs), strict=True):
         # An observer that cannot take part is refused, with the reason.
         replay_log(part, [kind], **log_inputs._asdict(), settle_s=settle_s)
@@ -236,8 +236,3 @@ def _common_parameters(kind: str, logs: Sequence[Log], inputs: Sequence[Observer
                 "--set observer.NAME=VALUE"
             )
     return parameters
-
-
-def _share(log: Log, split: float, *, first: bool) -> slice:
-    middle = round(split * len(log))
-    return slice(0, middle) if first else slice(middle, len(log))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from cmg_mj.controllers.laws import law_class
+from cmg_mj.controllers.laws import LAW_CLASSES
 from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Observer
@@ -102,12 +101,11 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     """
     sensors = scenario.sensors
     if noise_ug_rthz is not None:
-        accelerometer = dataclasses.replace(sensors.accelerometer, noise_density_ug_rthz=noise_ug_rthz)
-        sensors = dataclasses.replace(sensors, accelerometer=accelerometer)
+        sensors = sensors.with_noise_density(noise_ug_rthz)
     period = scenario.plant.timestep_s or common_period(scenario)
     duration = math.ceil(window_of(scenario)[1] / period - 1e-9) * period
     feedback = scenario.controller.feedback
-    if feedback == "observer" and needs(law_class(scenario.controller.kind)):
+    if feedback == "observer" and needs(LAW_CLASSES.find(scenario.controller.kind)):
         feedback = "fog"
     loop = {"feedback": feedback, "bias_trim_s": 0.0}
     return scenario.model_copy(

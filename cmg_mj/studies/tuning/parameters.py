@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.observers import BENCH_PARAMETERS, Observer, observer_class
+from cmg_mj.observers import OBSERVER_CLASSES, Observer
 from cmg_mj.replay.parameter_options import ParameterValue
 
 SPAN = 1000.0
@@ -57,8 +57,8 @@ def parameters_of(kind: str, observer: Observer, arguments: ParameterValues) -> 
     Returns:
         Name -> value, without those that cannot be read off the observer.
     """
-    signature = inspect.signature(observer_class(kind)).parameters.values()
-    defaults = {p.name: p.default for p in signature if p.name not in BENCH_PARAMETERS}
+    signature = OBSERVER_CLASSES.takes(kind).values()
+    defaults = {p.name: p.default for p in signature if p.name not in OBSERVER_CLASSES.bench_parameters}
     values = {name: getattr(observer, name, default) for name, default in {**defaults, **arguments}.items()}
     return {name: _as_tuples(value) for name, value in values.items() if value is not inspect.Parameter.empty}
 
@@ -103,30 +103,24 @@ def numbers_of(kind: str, values: ParameterValues, make: MakeObserver, chosen: S
     Raises:
         InputError: A chosen name does not exist, or there is nothing to tune.
     """
-    integers = {
-        p.name
-        for p in inspect.signature(observer_class(kind)).parameters.values()
-        if p.annotation in (int, bool, "int", "bool")
-    }
+    integers = {p.name for p in OBSERVER_CLASSES.takes(kind).values() if p.annotation in (int, bool, "int", "bool")}
     candidates = [
-        (name, place, number)
+        TunedScalar(name, place, number, 0.0, math.inf)
         for name, value in values.items()
         if name not in integers
         for place, number in _leaves(value, ())
     ]
     if not candidates:
         raise InputError(f"observer {kind} has no number to tune")
-    names = {name + "".join(f"[{i}]" for i in place): name for name, place, _ in candidates}
+    allowed = {name for number in candidates for name in (number.parameter, number.name)}
     for name in chosen:
-        if name not in names and name not in names.values():
-            allowed = list(dict.fromkeys([*names.values(), *names]))
+        if name not in allowed:
             raise InputError(f"--parameters {name}: {kind} has no such number to tune; {nearest(name, allowed)}")
-    selected = [
-        (name, place, number)
-        for (name, place, number), label in zip(candidates, names, strict=True)
-        if not chosen or name in chosen or label in chosen
+    return [
+        _bounded(number, values, make)
+        for number in candidates
+        if not chosen or number.parameter in chosen or number.name in chosen
     ]
-    return [_bounded(name, place, number, values, make) for name, place, number in selected]
 
 
 def _leaves(value: ParameterValue, place: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...], float]]:
@@ -137,16 +131,13 @@ def _leaves(value: ParameterValue, place: tuple[int, ...]) -> Iterator[tuple[tup
         yield place, float(value)
 
 
-def _bounded(
-    name: str, place: tuple[int, ...], start: float, values: ParameterValues, make: MakeObserver
-) -> TunedScalar:
+def _bounded(number: TunedScalar, values: ParameterValues, make: MakeObserver) -> TunedScalar:
     """Find by bisection the range of a number that the observer accepts while the others stay."""
-    unbounded = TunedScalar(name, place, start, 0.0, math.inf)
-    size = abs(start)
+    size = abs(number.start)
 
     def accepted(candidate: float) -> bool:
         try:
-            make(**replaced(values, [unbounded], [candidate]))
+            make(**replaced(values, [number], [candidate]))
         except InputError:
             return False
         return True
@@ -160,7 +151,7 @@ def _bounded(
             inside, outside = (middle, outside) if accepted(middle) else (inside, middle)
         return inside
 
-    return TunedScalar(name, place, start, farthest(size / SPAN), farthest(size * SPAN))
+    return replace(number, low=farthest(size / SPAN), high=farthest(size * SPAN))
 
 
 def narrowed(

@@ -15,9 +15,10 @@ from cmg_mj.results.metrics import finite_or_none
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.simulation.experiment import prepare
+from cmg_mj.studies.tuning.fit import NoiseLevelResult
 from cmg_mj.studies.tuning.on_simulations import windows_of
 from cmg_mj.studies.tuning.parameters import plain
-from cmg_mj.studies.tuning.study import NoiseLevelResult, TuningResult, best_noise, tuned_scenario
+from cmg_mj.studies.tuning.study import TuningResult, best_noise, tuned_scenario
 
 
 def figures_of(study: TuningResult) -> dict[str, SummaryValue]:
@@ -137,7 +138,7 @@ def _best(study: TuningResult) -> str:
         return f"The given parameters are best at a noise {best.where} these, if at any."
     if len(study.numbers) == 1:
         return f"The given parameters are best at about {best.noise_ug_rthz:.0f} ug/rtHz."
-    return f"Of these noises the given parameters lose least at {best.noise_ug_rthz:g} ug/rtHz."
+    return f"Among these noises the given parameters lose least at {best.noise_ug_rthz:g} ug/rtHz."
 
 
 def files_of_study(noises_ug_rthz: Sequence[float]) -> list[str]:

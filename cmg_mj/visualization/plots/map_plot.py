@@ -63,11 +63,7 @@ def edges(centres: np.ndarray, *, log: bool) -> np.ndarray:
 def _contours(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray) -> None:
     if not len(spec.levels):
         return
-    values = (
-        _extend_to_edges(spec.x, x),
-        _extend_to_edges(spec.y, y),
-        np.ma.masked_invalid(np.pad(spec.values, 1, "edge")),
-    )
+    values = _to_edges(spec, x, y, spec.values)
     axes.contour(*values, spec.levels, colors=CASING, linewidths=2.2)
     lines = axes.contour(*values, spec.levels, colors="0.1", linewidths=0.8)
     for text in axes.clabel(lines, fmt="%g", fontsize="small"):
@@ -76,19 +72,19 @@ def _contours(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray) -> None:
 
 def _boundaries(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Sequence[str]) -> None:
     """Draw the boundaries; their dashes alternate, so that two or three lines on each other are all seen."""
-    across, up = _extend_to_edges(spec.x, x), _extend_to_edges(spec.y, y)
-    shares = [np.ma.masked_invalid(np.pad(share, 1, "edge")) for share in spec.boundaries.values()]
+    shares = [_to_edges(spec, x, y, share) for share in spec.boundaries.values()]
     for share in shares:
-        axes.contour(across, up, share, [0.5], colors=CASING, linewidths=BOUNDARY + 2.0)
+        axes.contour(*share, [0.5], colors=CASING, linewidths=BOUNDARY + 2.0)
     n = min(len(shares), 3)
     for i, (share, color) in enumerate(zip(shares, palette, strict=True)):
         style = (i % n * DASH, (DASH, DASH * (n - 1))) if n > 1 else "-"
-        axes.contour(across, up, share, [0.5], colors=color, linewidths=BOUNDARY, linestyles=[style])
+        axes.contour(*share, [0.5], colors=color, linewidths=BOUNDARY, linestyles=[style])
 
 
-def _extend_to_edges(centres: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Add the outer edges to the centres of cells: a line goes on through the outermost cell, which has one value."""
-    return np.concatenate([ends[:1], centres, ends[-1:]])
+def _to_edges(spec: Map, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Extend values at the cells' centres to the map's edges: a line goes on through the outermost cell."""
+    across, up = (np.concatenate([ends[:1], centres, ends[-1:]]) for centres, ends in ((spec.x, x), (spec.y, y)))
+    return across, up, np.ma.masked_invalid(np.pad(values, 1, "edge"))
 
 
 def _in_legend(

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
 
+from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.visualization.plots.colours import BASELINE_COLOURS
 
-SummaryValue: TypeAlias = "float | str | Sequence[SummaryValue] | Mapping[str, SummaryValue] | None"
 Summary = Mapping[str, SummaryValue]
 """The numbers of a run by the names that `--json` prints."""
 

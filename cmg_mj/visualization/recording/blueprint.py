@@ -90,8 +90,8 @@ def _dashboard(branch: Branch, names: Sequence[str]) -> rrb.Container:
 
 def _all_observers(branch: Branch) -> rrb.Container:
     """Lay out the estimates of every observer of a run, with all observers in the legend."""
-    rates = _plot_views(ESTIMATE_PLOTS, branch, listed=True)
-    bias = _plot_views([BIAS_PLOT], branch, listed=True) if _has_bias(branch) else []
+    rates = _plot_views(ESTIMATE_PLOTS, branch, full_legend=True)
+    bias = _plot_views([BIAS_PLOT], branch, full_legend=True) if _has_bias(branch) else []
     return _columns(
         ALL, [3, 2], rrb.Vertical(*rates), rrb.Vertical(*bias, page_tabs(_page_names([branch]), "Observers"))
     )
@@ -100,22 +100,22 @@ def _all_observers(branch: Branch) -> rrb.Container:
 def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]:
     """Lay out the best runs over each other; then, if there are more, all runs."""
     few = [branch.run.name for branch in branches if branch.entry.is_best]
-    module = plant.modules[0].of_axis
-    shown = [branch for branch in branches if branch.entry.is_best]
+    module = plant.axis.modules[0].of_axis
+    best = [branch for branch in branches if branch.entry.is_best]
     tilt = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_TILT_PLOTS]
     actuators = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_ACTUATOR_PLOTS]
-    mechanisms = rrb.Tabs(*(mechanism_view(branch, branch.label) for branch in shown), active_tab=0)
+    mechanisms = rrb.Tabs(*(mechanism_view(branch, branch.label) for branch in best), active_tab=0)
     names = _page_names(branches)
     board = _columns(
         "Comparison" if branches[0].run.axis is None else "All axes",
         [9, 8, 6],
         rrb.Vertical(mechanisms, page_tabs(names, "Summary"), row_shares=[1, 1]),
-        _below_lanes(shown, COMPARED_TILT_PLOTS, tilt),
+        _below_lanes(best, COMPARED_TILT_PLOTS, tilt),
         _stack(COMPARED_ACTUATOR_PLOTS, actuators),
     )
-    if len(shown) == len(branches):
+    if len(best) == len(branches):
         return [board]
-    any_run = Choice(few, listed=True)
+    any_run = Choice(few, full_legend=True)
     lanes = _lanes_height(branches)
     all_runs = _columns(
         ALL,
@@ -127,12 +127,12 @@ def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]
     return [board, all_runs]
 
 
-def _plot_views(plots: Sequence[Plot], branch: Branch, *, listed: bool = False) -> list[rrb.View]:
+def _plot_views(plots: Sequence[Plot], branch: Branch, *, full_legend: bool = False) -> list[rrb.View]:
     """Lay out plots; in each, switch the best observers on that have a line in the plot."""
     views = []
     for plot in plots:
         observers = {row.observer for path, row in branch.series.items() if path.startswith(plot.entities)}
-        views.append(plot_view(plot, branch, Choice(best_observers(branch.run, observers), listed)))
+        views.append(plot_view(plot, branch, Choice(best_observers(branch.run, observers), full_legend)))
     return views
 
 

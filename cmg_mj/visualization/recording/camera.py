@@ -57,26 +57,26 @@ def enclosing_ball(plant: Plant, qpos: np.ndarray) -> Ball:
     """
     model = plant.drawn_model
     data = mujoco.MjData(model)
-    drawn = [i for i in range(model.ngeom) if is_drawn(model.geom_group[i], geom_rgba(model, i))]
-    drawn = [i for i in drawn if model.geom_type[i] != int(mujoco.mjtGeom.mjGEOM_PLANE)]
-    moving = [i for i in drawn if model.geom_bodyid[i]]
-    fixed = [i for i in drawn if not model.geom_bodyid[i]]
+    geoms = [i for i in range(model.ngeom) if is_drawn(model.geom_group[i], geom_rgba(model, i))]
+    geoms = [i for i in geoms if model.geom_type[i] != int(mujoco.mjtGeom.mjGEOM_PLANE)]
+    moving_geoms = [i for i in geoms if model.geom_bodyid[i]]
+    fixed_geoms = [i for i in geoms if not model.geom_bodyid[i]]
 
     def corners_at(angles: np.ndarray) -> list[np.ndarray]:
         data.qpos[:] = angles
         mujoco.mj_kinematics(model, data)
-        return [_corners(model, data, i) for i in moving]
+        return [_corners(model, data, i) for i in moving_geoms]
 
     first = corners_at(plant.new_data().qpos)
     if not first:
         mujoco.mj_comPos(model, data)
         return Ball(data.subtree_com[0].copy(), float(model.stat.extent))
-    around_first = _around(first)
-    beside = [corners for corners in (_corners(model, data, i) for i in fixed) if _is_within(corners, around_first)]
+    first_ball = _enclose(first)
+    near_boxes = [box for box in (_corners(model, data, i) for i in fixed_geoms) if _is_within(box, first_ball)]
     poses = qpos[np.isfinite(qpos).all(axis=1)]
     poses = poses[np.unique(np.linspace(0, max(len(poses) - 1, 0), POSES).astype(int))] if len(poses) else poses
-    during = _around([*first, *beside, *(corners for angles in poses for corners in corners_at(angles))])
-    return during if during.radius < FARTHEST * around_first.radius else _around([*first, *beside])
+    ball = _enclose([*first, *near_boxes, *(corners for angles in poses for corners in corners_at(angles))])
+    return ball if ball.radius < FARTHEST * first_ball.radius else _enclose([*first, *near_boxes])
 
 
 def _corners(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
@@ -85,7 +85,7 @@ def _corners(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarra
     return data.geom_xpos[geom] + (centre + half * CORNERS) @ data.geom_xmat[geom].reshape(3, 3).T
 
 
-def _around(points: list[np.ndarray]) -> Ball:
+def _enclose(points: list[np.ndarray]) -> Ball:
     all_points = np.concatenate(points)
     centre = (all_points.min(axis=0) + all_points.max(axis=0)) / 2.0
     return Ball(centre, float(np.linalg.norm(all_points - centre, axis=1).max()))

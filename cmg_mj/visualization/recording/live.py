@@ -36,18 +36,18 @@ class ViewerStream:
         header: The header of the run.
 
     Attributes:
-        lost: The reason why the viewer has not received all of the run; empty if it has.
+        failure: The reason why the viewer has not received all of the run; empty if it has.
 
     Raises:
         InputError: The environment turns rerun off.
     """
 
     def __init__(self, url: str, header: StreamHeader) -> None:
-        self.lost = ""
+        self.failure = ""
         self._url = url
         self._header = header
         self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        self._done = 0
+        self._n_done = 0
         self._deadline = float("inf")
         self._strict = strict()
         self._thread = threading.Thread(target=self._feed, name="live view", daemon=True)
@@ -105,13 +105,13 @@ class ViewerStream:
             while (job := self._jobs.get()) is not None:
                 job()
                 if reason := self._not_taken():
-                    self.lost = reason
+                    self.failure = reason
                     return
-                self._done += 1
-            if self._done:
+                self._n_done += 1
+            if self._n_done:
                 self._rec.disconnect()  # returns when the viewer has received everything
         except Exception as error:  # the run must not care
-            self.lost = f"it could not be fed ({' '.join(str(error).split())})"
+            self.failure = f"it could not be fed ({' '.join(str(error).split())})"
 
     def _not_taken(self) -> str:
         """Wait until the viewer has taken everything sent; return the reason if it does not.
@@ -133,13 +133,13 @@ class ViewerStream:
         """Send the viewer the rest, as long as it takes any."""
         self._jobs.put(None)
         while self._thread.is_alive():
-            done = self._done
+            n_done = self._n_done
             self._deadline = time.monotonic() + PATIENCE_S
             self._thread.join(PATIENCE_S)
-            if self._thread.is_alive() and self._done == done:
+            if self._thread.is_alive() and self._n_done == n_done:
                 self._thread.join(2.0 * TAKES_S)  # its deadline has passed: it sets the reason
                 break
         if self._thread.is_alive():
-            self.lost = STUCK
+            self.failure = STUCK
         self._relay.cut()  # rerun waits for an answer at exit too
         self._thread.join(TAKES_S)

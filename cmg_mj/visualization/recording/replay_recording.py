@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 
 from cmg_mj.visualization.recording.legend import numbered_parts
 from cmg_mj.visualization.recording.signals import Lines, Series, log_styles, log_values
-from cmg_mj.visualization.recording.stream import application_name, log_page, recorded
+from cmg_mj.visualization.recording.stream import application_name, log_page, open_recording
 from cmg_mj.visualization.recording.views import Choice, Plot, page_tabs, plot_view, tabbed_blueprint
 
 TIMELINE = "time"
@@ -37,14 +37,14 @@ class LogSeries:
         name: Name of the log, unique in a recording.
         series: The series, in the folders that `PLOTS` names: angles in degrees, rates in rad/s.
         observers: Names of all observers.
-        shown: Names of the observers that are switched on at first.
+        best: Names of the observers that are switched on at first.
         stretches: Returns the series' values, stretch by stretch, where `series` has only the outlines; None otherwise.
     """
 
     name: str
     series: Sequence[Series]
     observers: Sequence[str]
-    shown: Sequence[str]
+    best: Sequence[str]
     stretches: Callable[[], Iterator[Sequence[Series]]] | None = None
 
 
@@ -68,7 +68,7 @@ def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping
     ]
     boards = [_board(branch, log, list(texts)) for branch, log in zip(branches, logs, strict=True)]
     blueprint = tabbed_blueprint(boards, TIMELINE, "paused")
-    with recorded(path, title, application_name(names, branches), blueprint) as rec:
+    with open_recording(path, title, application_name(names, branches), blueprint) as rec:
         for branch, log in zip(branches, logs, strict=True):
             log_styles(rec, branch)
             for rows in log.stretches() if log.stretches else [log.series]:
@@ -85,8 +85,8 @@ def _board(branch: Lines, log: LogSeries, titles: Sequence[str]) -> rrb.Containe
         rows = [row for path, row in branch.series.items() if path.startswith(plot.entities)]
         if rows:
             observers = {row.observer for row in rows}
-            shown = [n for n in log.shown if n in observers] or [n for n in log.observers if n in observers]
-            views[plot] = plot_view(plot, branch, Choice(shown, listed=True))
+            visible = [n for n in log.best if n in observers] or [n for n in log.observers if n in observers]
+            views[plot] = plot_view(plot, branch, Choice(visible, full_legend=True))
     left = [view for plot, view in views.items() if plot in MAIN]
     right = [view for plot, view in views.items() if plot not in MAIN]
     return rrb.Horizontal(

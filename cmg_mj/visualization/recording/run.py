@@ -84,9 +84,9 @@ class Run:
         return self.trajectory.observers[1:]
 
 
-def best_observers(run: Run, among: Collection[str] | None = None) -> list[str]:
-    """Choose the observer in the loop and the best open-loop observers; only from `among`, unless it is None."""
-    summaries = {name: summary for name, summary in run.observers.items() if among is None or name in among}
+def best_observers(run: Run, names: Collection[str] | None = None) -> list[str]:
+    """Choose the observer in the loop and the best open-loop observers; only from `names`, unless it is None."""
+    summaries = {name: summary for name, summary in run.observers.items() if names is None or name in names}
     return observers_to_draw(summaries, always=[name for name in run.trajectory.observers[:1] if name in summaries])
 
 
@@ -130,8 +130,8 @@ def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[
     for push_end in sorted({push.end_s for push in pushes}) if pushes else [0.0]:
         if any(p.start_s <= push_end < p.end_s for p in pushes):
             continue  # another push is still on
-        until = min((start for start in starts if start >= push_end), default=end)
-        steps += _recovery(run.trajectory, push_end, min(until, end), math.radians(settings.settle_band_deg))
+        next_push = min((start for start in starts if start >= push_end), default=end)
+        steps += _recovery(run.trajectory, push_end, min(next_push, end), math.radians(settings.settle_band_deg))
     steps = sorted((time, name) for time, name in steps if time < end)
     steps = [step for i, step in enumerate(steps) if i == 0 or step[1] != steps[i - 1][1]]
     if run.outcome.kind in ENDINGS:
@@ -142,15 +142,15 @@ def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[
 def _recovery(trajectory: Trajectory, start: float, end: float, band: float) -> list[tuple[float, str]]:
     """Return the steps `recovering` and `settled` between two pushes."""
     time = trajectory["time_s"]
-    inside = (time >= start - 1e-9) & (time < end - 1e-9)
-    if not inside.any():
+    window = (time >= start - 1e-9) & (time < end - 1e-9)
+    if not window.any():
         return [(start, RECOVERING)]
-    times = time[inside]
-    outside = np.flatnonzero(np.abs(trajectory["x1_rad"][inside]) > band)
-    first_settled = int(outside[-1]) + 1 if outside.size else 0
-    steps = [(start, RECOVERING)] if first_settled > 0 else []
-    if first_settled < len(times):
-        steps.append((max(start, float(times[first_settled])), SETTLED))
+    times = time[window]
+    excursions = np.flatnonzero(np.abs(trajectory["x1_rad"][window]) > band)
+    settle_index = int(excursions[-1]) + 1 if excursions.size else 0
+    steps = [(start, RECOVERING)] if settle_index > 0 else []
+    if settle_index < len(times):
+        steps.append((max(start, float(times[settle_index])), SETTLED))
     return steps
 
 

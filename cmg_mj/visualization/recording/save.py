@@ -21,7 +21,7 @@ from cmg_mj.visualization.recording.signals import (
     phase_steps,
     run_series,
 )
-from cmg_mj.visualization.recording.stream import application_name, recorded
+from cmg_mj.visualization.recording.stream import application_name, open_recording
 from cmg_mj.visualization.recording.summary import log_results, log_scenario
 
 
@@ -41,7 +41,7 @@ def write_recording(path: Path, header: RecordingHeader, runs: Sequence[Run]) ->
     branches = make_branches(header, runs)
     name = f"{header.title or 'Run'}: {', '.join(branch.label for branch in branches)}"
     application = application_name([run.name for run in runs], branches)
-    with recorded(path, name, application, default_blueprint(header.plant, branches)) as rec:
+    with open_recording(path, name, application, default_blueprint(header.plant, branches)) as rec:
         end = max(run.outcome.time_s for run in runs)
         for branch in branches:
             log_rig(rec, branch)

@@ -45,14 +45,14 @@ def log_poses(rec: rr.RecordingStream, branch: str, plant: Plant, time: np.ndarr
         qpos: Joint angles, (n, n_joints) [rad].
     """
     positions, quaternions = body_poses(plant, qpos)
-    at = time_column(time)
+    times = time_column(time)
     for body in range(1, plant.model.nbody):
         poses = rr.Transform3D.columns(translation=positions[:, body], quaternion=quaternions[:, body])
-        rec.send_columns(body_path(branch, plant, body), [at], poses)
-    for module in plant.modules:
-        translation, quaternion = _turned_back(plant, module, qpos)
+        rec.send_columns(body_path(branch, plant, body), [times], poses)
+    for module in plant.axis.modules:
+        translation, quaternion = _turn_back(plant, module, qpos)
         poses = rr.Transform3D.columns(translation=translation, quaternion=quaternion)
-        rec.send_columns(_slowed_path(branch, plant, module), [at], poses)
+        rec.send_columns(_slowed_path(branch, plant, module), [times], poses)
 
 
 def body_path(branch: str, plant: Plant, body: int) -> str:
@@ -82,16 +82,16 @@ def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return positions, np.roll(quaternions, -1, axis=-1)
 
 
-def _turned_back(plant: Plant, module: Module, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _turn_back(plant: Plant, module: Module, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute the motion, in the flywheel's frame, from its true angle to the slowed one: translation, quaternion."""
     model = plant.model
     joint = int(model.dof_jntid[module.flywheel_dof])
     axis, anchor = model.jnt_axis[joint], model.jnt_pos[joint]
     turn = (qpos[:, module.flywheel] * (1.0 / FLYWHEEL_SLOWDOWN - 1.0))[:, None]
     quaternion = np.concatenate([np.sin(turn / 2.0) * axis, np.cos(turn / 2.0)], axis=1)
-    along = axis * (axis @ anchor)
-    turned = along + np.cos(turn) * (anchor - along) + np.sin(turn) * np.cross(axis, anchor)
-    return anchor - turned, quaternion
+    axis_part = axis * (axis @ anchor)
+    rotated_anchor = axis_part + np.cos(turn) * (anchor - axis_part) + np.sin(turn) * np.cross(axis, anchor)
+    return anchor - rotated_anchor, quaternion
 
 
 def _slowed_path(branch: str, plant: Plant, module: Module) -> str:
@@ -102,7 +102,7 @@ def log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float
     """Record the plant's shapes: one static entity for each geom and site, under its body."""
     model = plant.drawn_model
     parents = {body: body_path(branch, plant, body) for body in range(model.nbody)}
-    for module in plant.modules:
+    for module in plant.axis.modules:
         parents[int(model.dof_bodyid[module.flywheel_dof])] = _slowed_path(branch, plant, module)
     for body, name, shape in drawn_shapes(model, radius):
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
@@ -127,7 +127,7 @@ def log_torques(
         largest: Result of `largest_torque` [N m].
         radius: Radius of the plant [m].
     """
-    path = f"{body_path(branch, plant, plant.frame)}/push"
+    path = f"{body_path(branch, plant, plant.axis.frame)}/push"
     tip, direction = _edge(plant)
     for time, torque in steps:
         rec.set_time(TIMELINE, duration=instant(time))
@@ -135,8 +135,8 @@ def log_torques(
             rec.log(path, rr.Clear(recursive=False))
             continue
         force = direction * (PUSH_LENGTH * radius * torque / largest)
-        looks = {"radii": [PUSH_RADIUS * radius], "colors": [PUSH_COLOR], "labels": [f"push {torque:+.3g} N m"]}
-        rec.log(path, rr.Arrows3D(vectors=[force], origins=[tip - force], **looks))
+        style = {"radii": [PUSH_RADIUS * radius], "colors": [PUSH_COLOR], "labels": [f"push {torque:+.3g} N m"]}
+        rec.log(path, rr.Arrows3D(vectors=[force], origins=[tip - force], **style))
     rec.reset_time()
 
 
@@ -148,6 +148,6 @@ def _edge(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     radial = site - axis * (axis @ site)
     distance = float(np.linalg.norm(radial))
     radial = radial / distance
-    frame_geoms = model.geom_bodyid == plant.frame
+    frame_geoms = model.geom_bodyid == plant.axis.frame
     height = max([distance, *((model.geom_pos[frame_geoms] - anchor) @ radial).tolist()])
     return anchor + radial * height, np.cross(axis, radial)

@@ -24,14 +24,14 @@ _Type = mujoco.mjtGeom
 Shape = rr.Capsules3D | rr.Cylinders3D | rr.Boxes3D | rr.Ellipsoids3D | rr.Mesh3D
 
 
-class Looks(TypedDict):
+class ShapeStyle(TypedDict):
     """Colour and orientation of a shape."""
 
     colors: list[tuple[int, ...]]
     quaternions: list[np.ndarray]
 
 
-class Solid(Looks):
+class Solid(ShapeStyle):
     """Colour and orientation of a shape with filled faces."""
 
     fill_mode: rr.components.FillMode
@@ -74,8 +74,8 @@ def _shape(
     """Convert one shape, in the body's frame."""
     rotation = _matrix(wxyz)
     color = tuple(round(255.0 * c) for c in rgba.tolist())
-    looks: Looks = {"colors": [color], "quaternions": [np.roll(wxyz, -1)]}
-    solid: Solid = {**looks, "fill_mode": rr.components.FillMode.Solid}
+    style: ShapeStyle = {"colors": [color], "quaternions": [np.roll(wxyz, -1)]}
+    solid: Solid = {**style, "fill_mode": rr.components.FillMode.Solid}
     if kind == int(_Type.mjGEOM_CAPSULE):
         # MuJoCo's capsule is centred, rerun's stands on its start.
         start = position - rotation[:, 2] * size[1]
@@ -94,7 +94,7 @@ def _shape(
         return rr.Mesh3D(vertex_positions=vertices @ rotation.T + position, triangle_indices=faces, albedo_factor=color)
     # A height field or a signed distance field: its bounding box.
     box = model.geom_aabb[geom]
-    return rr.Boxes3D(half_sizes=[box[3:]], centers=[position + rotation @ box[:3]], **looks)
+    return rr.Boxes3D(half_sizes=[box[3:]], centers=[position + rotation @ box[:3]], **style)
 
 
 def _mesh(model: mujoco.MjModel, mesh: int) -> tuple[np.ndarray, np.ndarray]:

@@ -139,12 +139,14 @@ def _series(
     yield Series("command/u", "command", time, t["u_rad_s"], CONTROLLER)
     if rate_limit is not None:
         yield _bounds("command/limit", "rate limit", time, rate_limit)
-    for i, module in enumerate(plant.modules):
+    for i, module in enumerate(plant.axis.modules):
         color = MODULES[i % len(MODULES)]
         part = rr.escape_entity_path_part(module.of_axis)
         angle = t[f"angle/{module.name}/gimbal_rad"] - module.gimbal_zero
         speed = t[f"rate/{module.name}/flywheel_rad_s"] * np.sign(module.speed)
-        width = 3.0 if i == 0 and len(plant.modules) > 1 else 1.5  # the modules' speeds agree: one must shine through
+        width = (
+            3.0 if i == 0 and len(plant.axis.modules) > 1 else 1.5
+        )  # the modules' speeds agree: one must shine through
         suffix = "" if module.speed > 0.0 else " (spins backwards)"
         yield Series(f"gimbal/{part}", module.name, time, np.degrees(angle), color)
         yield Series(f"flywheel/{part}", module.name + suffix, time, speed, color, width)

@@ -28,7 +28,7 @@ LONGEST_LIST = 120
 
 
 @contextmanager
-def recorded(path: Path, name: str, application: str, blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
+def open_recording(path: Path, name: str, application: str, blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
     """Open a recording to log to; write its file at the end.
 
     Args:
@@ -137,11 +137,11 @@ def application_name(names: Sequence[str], branches: Sequence[Lines]) -> str:
     The viewer remembers a layout by application: recordings with other branches or lines must not share its name.
     The name may have about 180 characters, few of them punctuation.
     """
-    listed = " ".join(names)
-    if len(listed) > LONGEST_LIST:
-        listed = f"{len(names)} runs"
+    run_names = " ".join(names)
+    if len(run_names) > LONGEST_LIST:
+        run_names = f"{len(names)} runs"
     lines = " ".join(f"{branch.path}/{path}" for branch in branches for path in branch.series)
-    return re.sub(r"[^\w -]", "-", f"cmg-mj {listed} {zlib.crc32(lines.encode()):08x}", flags=re.ASCII)
+    return re.sub(r"[^\w -]", "-", f"cmg-mj {run_names} {zlib.crc32(lines.encode()):08x}", flags=re.ASCII)
 
 
 def log_page(rec: rr.RecordingStream, path: str, page: str) -> None:

@@ -37,7 +37,7 @@ from cmg_mj.visualization.recording.signals import (
 from cmg_mj.visualization.recording.stream import log_page
 from cmg_mj.visualization.recording.summary import log_results, log_scenario
 
-NOW = 1e-6
+END_MARGIN_S = 1e-6
 """Time from the last tick to the assumed end of an unfinished run [s]."""
 
 
@@ -55,11 +55,11 @@ class BranchSpec:
     bias_deg: float
     axis: str | None = None
 
-    def run_until(self, trajectory: Trajectory, now: float) -> Run:
+    def run_until(self, trajectory: Trajectory, end_s: float) -> Run:
         """Make the run of the branch so far, which is taken to end now [s]."""
         bias = {"bias_deg": self.bias_deg}
         summary = {**bias, "open_loop_observers": dict.fromkeys(trajectory.observers[1:], bias)}
-        return Run(self.name, trajectory, summary, Outcome("done", now), self.axis)
+        return Run(self.name, trajectory, summary, Outcome("done", end_s), self.axis)
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class StreamedRun:
     @property
     def branches(self) -> list[Branch]:
         """The branches before the first tick."""
-        return [streamed.branch for streamed in self._branches]
+        return [stream.branch for stream in self._branches]
 
     def blueprint(self) -> rrb.Blueprint:
         """Lay out the recording before the best observers and the ranges of the axes are known."""
@@ -104,8 +104,8 @@ class StreamedRun:
 
     def begin(self, rec: rr.RecordingStream) -> None:
         """Record shapes, styles, the scenario and a page for the meantime."""
-        for streamed in self._branches:
-            streamed.begin(rec)
+        for stream in self._branches:
+            stream.begin(rec)
         log_scenario(rec, self.header.experiment.scenario_toml)
         title = self.header.experiment.title or "Run"
         log_page(rec, "summary", f"# {title}\n\nIt goes on; its figures come when it has ended.")
@@ -114,8 +114,8 @@ class StreamedRun:
         """Record the next ticks."""
         self._ticks += len(piece)
         if len(piece):
-            for streamed in self._branches:
-                streamed.add(rec, _select_axis(piece, streamed.spec.axis))
+            for stream in self._branches:
+                stream.add(rec, _select_axis(piece, stream.spec.axis))
 
     def end(self, rec: rr.RecordingStream, runs: Sequence[Run]) -> rrb.Blueprint:
         """Record the last ticks and the results of the finished run.
@@ -128,8 +128,8 @@ class StreamedRun:
             The layout, the one of `write_recording`.
         """
         branches = make_branches(self.header.experiment, runs)
-        for streamed, branch in zip(self._branches, branches, strict=True):
-            streamed.end(rec, branch, branch.run.trajectory.from_tick(self._ticks))
+        for stream, branch in zip(self._branches, branches, strict=True):
+            stream.end(rec, branch, branch.run.trajectory.from_tick(self._ticks))
         log_results(rec, self.header.experiment, branches)
         return default_blueprint(self.header.experiment.plant, branches, live=True)
 
@@ -162,16 +162,16 @@ class _StreamedBranch:
         if not len(piece):
             return
         time = piece["time_s"]
-        now = float(time[-1]) + NOW
-        log_values(rec, self._lines(self.spec.run_until(piece, now)))
+        end = float(time[-1]) + END_MARGIN_S
+        log_values(rec, self._lines(self.spec.run_until(piece, end)))
         has_pose = (self._ticks + np.arange(len(piece))) % self._stride == 0
         if has_pose.any():
             log_poses(rec, self.path, self._plant, time[has_pose], piece.qpos()[has_pose])
         self._ticks += len(piece)
-        self._push(rec, [step for step in self._torques if step[0] < now])
+        self._push(rec, [step for step in self._torques if step[0] < end])
         columns = {name: np.concatenate([self._past[name], piece[name]]) for name in ("time_s", "x1_rad")}
         self._past = Trajectory(columns, layout=piece.layout)
-        steps = phases(self.spec.run_until(self._past, now), self._pushes, self._header.settings)
+        steps = phases(self.spec.run_until(self._past, end), self._pushes, self._header.settings)
         if steps and steps[-1][1] == SETTLED:  # the rig may still leave the band before the next push
             steps.pop()
         self._phase(rec, steps)

@@ -64,8 +64,8 @@ def summary_page(header: RecordingHeader, branches: Sequence[Branch]) -> str:
 
 def observers_page(branches: Sequence[Branch]) -> str:
     """Write the page of all observers of a run; of several runs, of those with open-loop observers."""
-    shown = [branch for branch in branches if len(branches) == 1 or branch.run.open_loop_observers]
-    return _paragraphs(*(part for branch in shown for part in _estimates(branch)))
+    selection = [branch for branch in branches if len(branches) == 1 or branch.run.open_loop_observers]
+    return _paragraphs(*(part for branch in selection for part in _estimates(branch)))
 
 
 def _estimates(branch: Branch) -> list[str]:

@@ -22,8 +22,10 @@ LOOPBACK, PORT = "127.0.0.1", 9876
 STARTS_WITHIN_S, STAYS_S = 30.0, 1.0
 """Time in which a viewer starts to listen, and time after which a listening viewer has found its screen."""
 ANSWERS_WITHIN_S = 2.0
+SCREENS = ("WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY")
+"""Environment variables of which one names the screen, on Linux."""
 
-_started: list[Viewer] = []
+_viewers: list[Viewer] = []
 """References to the viewers: a viewer outlives the run, and nobody waits for its end."""
 
 
@@ -105,7 +107,7 @@ def start_viewer(options: Sequence[str] = ()) -> Viewer:
     """Start a viewer that listens on this machine alone and outlives this process.
 
     Args:
-        options: More options of `rerun`.
+        options: More options of `rerun`, which make a viewer without a window.
 
     Returns:
         The viewer, which listens.
@@ -113,7 +115,10 @@ def start_viewer(options: Sequence[str] = ()) -> Viewer:
     Raises:
         InputError: The viewer does not start, for instance because there is no screen.
     """
-    for port in (PORT, 0, 0):
+    # A viewer listens before it looks for its screen: a busy machine may take longer over that than `STAYS_S`.
+    no_screen = not options and sys.platform == "linux" and not any(map(os.environ.get, SCREENS))
+    complaint = f"neither {' nor '.join(SCREENS)} is set"
+    for port in () if no_screen else (PORT, 0, 0):
         viewer = _start(_free_port(port), options)
         with viewer.errors:  # the viewer has an end of its own
             if _starts_listening(viewer) and _stays(viewer):
@@ -141,13 +146,13 @@ def _start(port: int, options: Sequence[str]) -> Viewer:
         start_new_session=True,  # Ctrl-C is for the run
     )
     viewer = Viewer(port, process, errors)
-    _started.append(viewer)
+    _viewers.append(viewer)
     return viewer
 
 
 def _starts_listening(viewer: Viewer) -> bool:
-    until = time.monotonic() + STARTS_WITHIN_S
-    while time.monotonic() < until and viewer.process.poll() is None:
+    deadline = time.monotonic() + STARTS_WITHIN_S
+    while time.monotonic() < deadline and viewer.process.poll() is None:
         if _is_taken(viewer.port):
             return True
         time.sleep(0.05)

@@ -45,24 +45,24 @@ class Choice:
     """The observers, or runs, that are switched on. The axes fit them.
 
     Attributes:
-        shown: Names of the observers or runs.
-        listed: Whether the legend has the others too, where a click switches them on. Otherwise the list of the view's
-            entities has them.
+        names: Names of the observers or runs.
+        full_legend: Whether the legend has the others too, where a click switches them on. Otherwise the list of the
+            view's entities has them.
     """
 
-    shown: Collection[str]
-    listed: bool = False
+    names: Collection[str]
+    full_legend: bool = False
 
     def visibility(self, name: str) -> list[Override]:
         """Return the overrides that switch the line of an observer or run on or off."""
-        on = name in self.shown
-        return [rr.SeriesLines(visible_series=[on]) if self.listed else rrb.EntityBehavior(visible=on)]
+        visible = name in self.names
+        return [rr.SeriesLines(visible_series=[visible]) if self.full_legend else rrb.EntityBehavior(visible=visible)]
 
-    def styled_line(self, name: str, color: Colour, label: str) -> list[Override]:
+    def style_line(self, name: str, color: Colour, label: str) -> list[Override]:
         """Return the overrides that style the line of a run and switch it on or off."""
-        on = [name in self.shown] if self.listed else None
-        style = rr.SeriesLines(visible_series=on, colors=[color], names=[label], widths=[1.5])
-        return [style] if self.listed else [*self.visibility(name), style]
+        visible_series = [name in self.names] if self.full_legend else None
+        style = rr.SeriesLines(visible_series=visible_series, colors=[color], names=[label], widths=[1.5])
+        return [style] if self.full_legend else [*self.visibility(name), style]
 
 
 EYE = (1.48, -1.65, 0.63)
@@ -74,7 +74,7 @@ BACKGROUND = (58, 63, 71)
 def plot_view(plot: Plot, branch: Lines, observers: Choice) -> rrb.View:
     """Lay out a plot of one run or log, with all its observers, some of them switched off."""
     rows = [row for path, row in branch.series.items() if path.startswith(plot.entities)]
-    visible = [row for row in rows if not row.observer or row.observer in observers.shown]
+    visible = [row for row in rows if not row.observer or row.observer in observers.names]
     required = [row.values for row in visible if row.whole]
     if RATE_ERROR in plot.entities:
         required.append(branch.series[RATE].values)
@@ -108,12 +108,12 @@ def overlay_view(plot: Plot, branches: Sequence[Branch], module: str, runs: Choi
     for branch in branches:
         name = branch.run.name
         row = _row(branch, plot.entities[0].format(module=part))
-        overrides[f"{branch.path}/{row.path}"] = runs.styled_line(name, branch.entry.color, branch.label)
-        stands = branch.run.outcome.kind not in ENDINGS
-        if name in runs.shown:
+        overrides[f"{branch.path}/{row.path}"] = runs.style_line(name, branch.entry.color, branch.label)
+        is_standing = branch.run.outcome.kind not in ENDINGS
+        if name in runs.names:
             visible.append(row)
-            (required if row.whole and stands else optional).append(row.values)
-            if RATE_ERROR in plot.entities and stands:
+            (required if row.whole and is_standing else optional).append(row.values)
+            if RATE_ERROR in plot.entities and is_standing:
                 required.append(branch.series[RATE].values)
     plot = replace(plot, title=plot.title.format(module=module))
     return _series_view(plot, "/", list(overrides), overrides, axis_range(required, optional), visible)

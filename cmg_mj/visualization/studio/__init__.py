@@ -11,7 +11,7 @@ Independent of Studio:
 Dependent on Studio:
 
 - `messages.py`: messages between the simulation's thread and the viewer's
-- `stepping.py`, `pace.py`: the simulation's thread
+- `stepping.py`: the simulation's thread
 - `panel.py`: the viewer's thread
 - `viewers.py`, `probe.py`: choice and trial of a viewer
 - `open.py`: all together

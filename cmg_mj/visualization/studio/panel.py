@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable
 
 import numpy as np
 from mujoco.studio import messages, plugin
@@ -85,10 +86,8 @@ class StudioPanel(plugin.ViewerPlugin):
             imgui.TextWrapped(now.note)
         if now.settings is not None:
             several = len(now.axes) > 1
-            if several:
-                axis = _new_choice("axis shown and pushed", now.axis, {name: name for name in now.axes})
-                if axis is not None:
-                    self._send(ShowAxis(axis))
+            if several and (axis := _new_choice("axis shown and pushed", now.axis, now.axes)):
+                self._send(ShowAxis(axis))
             imgui.SeparatorText("Controller, on all axes" if several else "Controller")
             self._build_choices(now, now.settings)
             imgui.SeparatorText("Disturbances")
@@ -97,16 +96,13 @@ class StudioPanel(plugin.ViewerPlugin):
             self._build_plots(now)
 
     def _build_choices(self, now: SessionState, settings: Settings) -> None:
-        observer = _new_choice("observer", settings[OBSERVER], {name: name for name in now.observers})
-        if observer is not None:
+        if observer := _new_choice("observer", settings.observer, now.observers):
             self._choose({OBSERVER: observer})
-        law = _new_choice("law", now.law, {name: name for name in now.laws})
-        if law is not None:
+        if law := _new_choice("law", now.law, now.laws):
             self._choose(now.laws[law])
         if now.gains:
             imgui.TextUnformatted("K_e = " + ", ".join(f"{gain:.3g}" for gain in now.gains))
-        feedback = _new_choice("rate fed back", settings[FEEDBACK], FEEDBACKS)
-        if feedback is not None:
+        if feedback := _new_choice("rate fed back", settings.feedback, FEEDBACKS, FEEDBACKS.values()):
             self._choose({FEEDBACK: feedback})
 
     def _build_disturbances(self, now: SessionState, settings: Settings) -> None:
@@ -118,8 +114,8 @@ class StudioPanel(plugin.ViewerPlugin):
             imgui.SameLine()
         imgui.NewLine()
         on_all = ", all axes" if len(now.axes) > 1 else ""
-        self._build_number(f"e{on_all} [deg]", BIAS, settings[BIAS], 0.1)
-        self._build_number(f"noise{on_all} [ug/rtHz]", NOISE, settings[NOISE], 100.0)
+        self._build_number(f"e{on_all} [deg]", BIAS, settings.bias_deg, 0.1)
+        self._build_number(f"noise{on_all} [ug/rtHz]", NOISE, settings.noise_ug_rthz, 100.0)
 
     def _build_number(self, label: str, field: str, value: float, step: float) -> None:
         """Draw a number, which is sent when the user has finished typing."""
@@ -155,9 +151,9 @@ class StudioPanel(plugin.ViewerPlugin):
         self.viewer.send_to_sim(message)
 
 
-def _new_choice(label: str, now: str, options: dict[str, str]) -> str | None:
-    """Draw a list; return the user's new choice, if there is one."""
+def _new_choice(label: str, now: str, options: Iterable[str], texts: Iterable[str] = ()) -> str | None:
+    """Draw a list of options, or of texts for them; return the user's new choice, if there is one."""
     names = list(options)
     index = names.index(now) if now in names else -1
-    changed, index = imgui.Combo(label, index, list(options.values()))
+    changed, index = imgui.Combo(label, index, list(texts) or names)
     return names[index] if changed and 0 <= index < len(names) else None

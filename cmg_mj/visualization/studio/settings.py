@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final, TypeAlias, TypedDict
+from typing import NamedTuple, TypeAlias
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.scenario.schema import ALL_AXES_LAW_FIELDS, COMMON_LAW_FIELDS, LOOP_FIELDS, Scenario
@@ -14,22 +14,12 @@ FieldValues = Mapping[str, FieldValue]
 Fields = dict[str, FieldValue]
 """Field, named as with `--set` -> value."""
 
-OBSERVER: Final = "observer.kind"
-FEEDBACK: Final = "controller.feedback"
-BIAS: Final = "plant.equilibrium_bias_deg"
-NOISE: Final = "sensors.accelerometer.noise_density_ug_rthz"
+OBSERVER = "observer.kind"
+FEEDBACK = "controller.feedback"
+BIAS = "plant.equilibrium_bias_deg"
+NOISE = "sensors.accelerometer.noise_density_ug_rthz"
 LAW = "controller"
 """The section of the law, without the fields that stay whatever the law."""
-Settings = TypedDict(
-    "Settings",
-    {
-        "observer.kind": str,
-        "controller.feedback": str,
-        "plant.equilibrium_bias_deg": float,
-        "sensors.accelerometer.noise_density_ug_rthz": float,
-    },
-)
-"""Values of the settings in the panel."""
 STUDIO_LAW_FIELDS = tuple(name for name in COMMON_LAW_FIELDS if name not in (*ALL_AXES_LAW_FIELDS, *LOOP_FIELDS))
 """Fields of [controller] that every law takes from the scenario."""
 
@@ -37,14 +27,19 @@ WEIGHTS = {"state_cost": [1.0, 1.0, 1.0, 1.0], "input_cost": 1.0}
 """Weights for the gains of the LQR, if the scenario has none."""
 
 
+class Settings(NamedTuple):
+    """Values of the settings in the panel."""
+
+    observer: str
+    feedback: str
+    bias_deg: float
+    noise_ug_rthz: float
+
+
 def current_settings(scenario: Scenario) -> Settings:
     """Return the values of the settings."""
-    return {
-        OBSERVER: scenario.observer.kind,
-        FEEDBACK: scenario.controller.feedback,
-        BIAS: scenario.plant.equilibrium_bias_deg,
-        NOISE: scenario.sensors.accelerometer.noise_density_ug_rthz,
-    }
+    bias_deg, sensor = scenario.plant.equilibrium_bias_deg, scenario.sensors.accelerometer
+    return Settings(scenario.observer.kind, scenario.controller.feedback, bias_deg, sensor.noise_density_ug_rthz)
 
 
 def choosable_observers(base: Experiment) -> tuple[str, ...]:

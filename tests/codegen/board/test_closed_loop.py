@@ -29,42 +29,51 @@ from tests.tiers import slow_but
 
 pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
 
+
+@pytest.fixture(autouse=True)
+def few_signals(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On which an export compares C with Python, before it goes to the board: see the tests of the export."""
+    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
+
+
 NO_COUNTS = ("sensors.accelerometer.counts_per_g=0", "sensors.encoder.counts_per_revolution=0")
 ARE_PUSHED = ("homogeneous", "kalman", "gyro_free")
 """In lockstep; the others stand there for half a second."""
-PUSHED = ("duration_s=2.5", "push.0.start_s=1.0", "push.0.torque_n_m=2.5")
+PUSH_SETTINGS = ("duration_s=2.5", "push.0.start_s=1.0", "push.0.torque_n_m=2.5")
 
 
-def sets(settings: tuple[str, ...]) -> list[str]:
+def set_options(settings: tuple[str, ...]) -> list[str]:
     return [word for setting in settings for word in ("--set", setting)]
 
 
-class Recorded:
+class Recorder:
     """A processor that does what the controller itself does, and keeps what it was given and decided."""
 
     def __init__(self, experiment: Experiment) -> None:
-        self.own = experiment.axis_controller()
-        self.shown: list[tuple[list[float], list[float]]] = []
-        self.decided: list[Decision] = []
+        self.controller = experiment.axis_controller()
+        self.readings: list[tuple[list[float], list[float]]] = []
+        self.decisions: list[Decision] = []
 
     def start(self) -> None:
-        self.own.reset()
+        self.controller.reset()
 
     def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
-        tick = self.own.decide(len(self.shown) * self.own.period, accelerations, encoders, math.nan, math.nan)
-        self.shown.append((list(accelerations), list(encoders)))
-        self.decided.append(Decision(tick.u, tick.x_e, tick.estimates[0]))
-        return self.decided[-1]
+        tick = self.controller.decide(
+            len(self.readings) * self.controller.period, accelerations, encoders, math.nan, math.nan
+        )
+        self.readings.append((list(accelerations), list(encoders)))
+        self.decisions.append(Decision(tick.u, tick.x_e, tick.estimates[0]))
+        return self.decisions[-1]
 
 
 DOUBLE = re.compile(
     r"__aeabi_\w*d\w*|__\w*df\w*|(pow|exp|log|sqrt|sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|f(abs|max|min|mod)"
     r"|floor|ceil|copysign|hypot|expm1|log1p)"
 )
-"""What computes in double precision on this processor: the compiler's helpers, and the C library's functions."""
+"""Functions that compute in double precision on this processor: the compiler's helpers, and the C library's."""
 
 
-def in_double_precision(image: Path) -> list[str]:
+def double_precision_names(image: Path) -> list[str]:
     listing = subprocess.run(["arm-none-eabi-nm", image], capture_output=True, text=True, check=True).stdout
     names = [line.split()[-1] for line in listing.splitlines()]
     assert "main" in names
@@ -73,34 +82,36 @@ def in_double_precision(image: Path) -> list[str]:
 
 def test_a_processor_that_is_the_controller_changes_nothing() -> None:
     experiment = short("adaptive")
-    ours, elsewhere = experiment.run(), experiment.run_on(Recorded(experiment))
-    assert ours.summaries == elsewhere.summaries
+    ours, on_processor = experiment.run(), experiment.run_on(Recorder(experiment))
+    assert ours.summaries == on_processor.summaries
     assert ours.trajectory is not None
-    assert elsewhere.trajectory is not None
+    assert on_processor.trajectory is not None
     for name in ours.trajectory.columns:
-        np.testing.assert_array_equal(ours.trajectory[name], elsewhere.trajectory[name], err_msg=name)
+        np.testing.assert_array_equal(ours.trajectory[name], on_processor.trajectory[name], err_msg=name)
 
 
 @pytest.mark.parametrize("observer", slow_but(OBSERVERS, "linear"))
 def test_lockstep_on_the_same_inputs(observer: str) -> None:
-    """What the board is shown is rounded to single precision, and so are its numbers; nothing is in double."""
-    experiment = prepare(load_scenario("push_recovery", PUSHED if observer in ARE_PUSHED else SHORT, observer))
-    host = Recorded(experiment)
+    """The board's inputs are rounded to single precision, and so are its numbers; nothing is in double."""
+    experiment = prepare(load_scenario("push_recovery", PUSH_SETTINGS if observer in ARE_PUSHED else SHORT, observer))
+    host = Recorder(experiment)
     experiment.run_on(host)
     with exported(experiment.axis_controller()) as files:
         image = build(files.observer, files.folder).path
-        assert in_double_precision(image) == []
+        assert double_precision_names(image) == []
         board = Board(image)
     with board:
         board.start()
-        decided = [board.update(*reading) for reading in host.shown]
+        decisions = [board.update(*reading) for reading in host.readings]
     for signal in (lambda decision: decision.estimate[1], lambda decision: decision.x_e):
-        ours, its = (np.array([signal(decision) for decision in those]) for those in (host.decided, decided))
-        assert np.sqrt(np.mean((its - ours) ** 2)) < 1e-5
+        host_signal, board_signal = (
+            np.array([signal(decision) for decision in series]) for series in (host.decisions, decisions)
+        )
+        assert np.sqrt(np.mean((board_signal - host_signal) ** 2)) < 1e-5
     if observer in ARE_PUSHED:  # and hard: the command went to its limit
-        assert max(abs(decision.u) for decision in host.decided) == experiment.law.rate_limit
-    u, its_u = (np.array([decision.u for decision in those]) for those in (host.decided, decided))
-    assert np.sqrt(np.mean((its_u - u) ** 2)) < 1e-4
+        assert max(abs(decision.u) for decision in host.decisions) == experiment.law.rate_limit
+    u, board_u = (np.array([decision.u for decision in series]) for series in (host.decisions, decisions))
+    assert np.sqrt(np.mean((board_u - u) ** 2)) < 1e-4
 
 
 def test_super_twisting_is_chaotic_by_itself() -> None:
@@ -108,16 +119,16 @@ def test_super_twisting_is_chaotic_by_itself() -> None:
     ends = []
     for name in ("super_twisting", "linear"):
         experiment = prepare(load_scenario("push_recovery", [], name))
-        recorded = experiment.run().trajectory
-        assert recorded is not None
-        columns = [recorded[key].tolist() for key in ("y1_rad", "y2_rad", "u_rad_s")]
+        trajectory = experiment.run().trajectory
+        assert trajectory is not None
+        columns = [trajectory[key].tolist() for key in ("y1_rad", "y2_rad", "u_rad_s")]
         rates = []
-        for moved in (0.0, 1e-12):
+        for offset in (0.0, 1e-12):
             observer = experiment.design.observer()
-            state = observer.init(Measurement(columns[0][0] + moved, columns[1][0]))
+            state = observer.init(Measurement(columns[0][0] + offset, columns[1][0]))
             rates.append([])
             for y1, y2, u in zip(columns[0][1:], columns[1][1:], columns[2], strict=False):
-                state, estimate = observer.step(state, Measurement(y1 + moved, y2), u)
+                state, estimate = observer.step(state, Measurement(y1 + offset, y2), u)
                 rates[-1].append(estimate[1])
         ends.append(np.abs(np.subtract(*rates)).max())
     assert ends[0] > 0.01
@@ -158,7 +169,7 @@ def test_open_loop_observers_run_on_the_host() -> None:
 
 
 def test_what_the_board_cannot_do_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^controller\.feedback = 'truth': a board has no such sensor"):
+    with pytest.raises(InputError, match=r"^controller\.feedback = 'truth': cannot be exported: C has no such option"):
         short("linear", "controller.feedback=truth").run(driver="board")
 
 
@@ -167,13 +178,15 @@ def test_what_the_board_cannot_do_is_refused() -> None:
     ["*u = (float)((double)e[0] * 0.1);", "extern double pow(double, double); *u = (float)pow((double)e[0], 0.5);"],
 )
 def test_what_is_would_be_seen(tmp_path: Path, update: str) -> None:
-    assert in_double_precision(toy(tmp_path, update=update + " return;"))
+    assert double_precision_names(toy(tmp_path, update=update + " return;"))
 
 
 @pytest.mark.slow
 def test_the_commands(tmp_path: Path) -> None:
     out = tmp_path / "on_board"
-    outcome = cmg_mj(*f"run push_recovery --driver board --observer gyro_free --json --out {out}".split(), *sets(SHORT))
+    outcome = cmg_mj(
+        *f"run push_recovery --driver board --observer gyro_free --json --out {out}".split(), *set_options(SHORT)
+    )
     assert (outcome.status, outcome.err) == (0, "")
     assert json.loads(outcome.out) == json.loads((out / "summary.json").read_text())
     assert json.loads(outcome.out)["outcome"] == "done"
@@ -183,26 +196,26 @@ def test_the_commands(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("elsewhere")
 def test_a_run_on_the_board_says_so_and_reruns_to_the_same_numbers() -> None:
-    first = cmg_mj("run", "push_recovery", "--driver", "board", *sets(SHORT))
-    host = cmg_mj("run", "push_recovery", *sets(SHORT))
+    first = cmg_mj("run", "push_recovery", "--driver", "board", *set_options(SHORT))
+    host = cmg_mj("run", "push_recovery", *set_options(SHORT))
     assert "homogeneous on the board, seed 0" in " ".join(first.out.split())
     assert "board" not in host.out
     assert len(list(Path("runs").iterdir())) == 2
-    ran, beside = sorted(Path("runs").iterdir(), key=lambda folder: "-board-0" not in folder.name)
-    file = ran / "scenario.toml"
+    board_folder, host_folder = sorted(Path("runs").iterdir(), key=lambda folder: "-board-0" not in folder.name)
+    file = board_folder / "scenario.toml"
     assert "cmg-mj run scenario.toml --driver board" in file.read_text().splitlines()[1]
-    assert "board" not in (beside / "scenario.toml").read_text()
+    assert "board" not in (host_folder / "scenario.toml").read_text()
     assert cmg_mj("run", file, "--driver", "board", "--out", "again").status == 0
     assert cmg_mj("run", file, "--out", "on_host").status == 0
-    folders = [ran, Path("again"), beside, Path("on_host")]
+    folders = [board_folder, Path("again"), host_folder, Path("on_host")]
     summaries = [(folder / "summary.json").read_text() for folder in folders]
     assert summaries[0] == summaries[1] != summaries[2] == summaries[3]
-    assert (ran / "scenario.toml").read_text() == Path("again/scenario.toml").read_text()
+    assert (board_folder / "scenario.toml").read_text() == Path("again/scenario.toml").read_text()
     assert tomllib.loads(file.read_text()) == tomllib.loads(Path("on_host/scenario.toml").read_text())
     drivers = ["board", "board", None, None]
     assert [json.loads(summary).get("driver") for summary in summaries] == drivers
     assert [Trajectory.load(folder / "trajectory.parquet").metadata.get("driver") for folder in folders] == drivers
-    cmg_mj("run", "push_recovery", "--driver", "board", *sets(SHORT))
+    cmg_mj("run", "push_recovery", "--driver", "board", *set_options(SHORT))
     assert len(list(Path("runs").iterdir())) == 2  # the same run again goes to the same folder
 
 

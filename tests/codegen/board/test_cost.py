@@ -1,4 +1,4 @@
-"""What an update costs on the emulated board."""
+"""The cost of an update on the emulated board."""
 
 from __future__ import annotations
 

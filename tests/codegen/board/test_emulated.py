@@ -14,11 +14,11 @@ import pytest
 from cmg_mj.codegen.board.qemu import Board
 from cmg_mj.errors import InputError, RunStopped
 from tests.codegen.board.toy import needs_board, toy
-from tests.command import environment
+from tests.command import HANGS_AFTER_S, environment
 
 pytestmark = needs_board
 
-SHOWN = (0.25, 9.75, -0.5, 9.5)
+ACCELERATIONS = (0.25, 9.75, -0.5, 9.5)
 
 
 def is_running(process: int) -> bool:
@@ -32,36 +32,36 @@ def is_running(process: int) -> bool:
 def test_it_answers_what_the_controller_decides(tmp_path: Path) -> None:
     with Board(toy(tmp_path)) as board:
         assert board.sizes == (4, 4, 16, 4)
-        answers = [board.update(SHOWN, (k, 0.5)) for k in range(3)]
+        answers = [board.update(ACCELERATIONS, (k, 0.5)) for k in range(3)]
         assert [answer.u for answer in answers] == [105.0, 206.0, 307.0]
         assert [answer.x_e for answer in answers] == [0.0, 0.5, 1.0]
         board.start()
-        answer = board.update(SHOWN, (0.0, 0.0))
+        answer = board.update(ACCELERATIONS, (0.0, 0.0))
     assert answer.u == 100.0
-    assert answer.estimate == SHOWN
+    assert answer.estimate == ACCELERATIONS
 
 
 def test_its_observer_is_not_the_controllers(tmp_path: Path) -> None:
     with Board(toy(tmp_path)) as board:
         board.init(0.0, 0.0, 0.0)
         assert board.step(1.0, 2.0, 3.0, 4.0)[0] == (1.0, 2.0, 3.0, 4.0)
-        assert board.update(SHOWN, (0.0, 0.0)).u == 100.0
+        assert board.update(ACCELERATIONS, (0.0, 0.0)).u == 100.0
 
 
 @pytest.mark.slow
 def test_it_counts_instructions_and_stack(tmp_path: Path) -> None:
     """Exactly, and always the same: a step with 250 more instructions takes 250 more."""
-    costs = []
+    step_costs = []
     for more in ("", '__asm volatile(".rept 250\\n\\tnop\\n\\t.endr");'):
         with Board(toy(tmp_path, step=more), counting=True) as board:
             assert board.calibration_counts() == [0, 100, 1000]
             board.init(0.0, 0.0, 0.0)
-            seen = {board.step(0.1, 0.2, 0.3, 0.4)[1] for _ in range(20)}
-            assert len(seen) == 1
-            costs.append(seen.pop())
-    assert costs[1].instructions - costs[0].instructions == 250
-    assert 0 < costs[0].instructions < 20
-    assert costs[0].stack == 0
+            counts = {board.step(0.1, 0.2, 0.3, 0.4)[1] for _ in range(20)}
+            assert len(counts) == 1
+            step_costs.append(counts.pop())
+    assert step_costs[1].instructions - step_costs[0].instructions == 250
+    assert 0 < step_costs[0].instructions < 20
+    assert step_costs[0].stack == 0
 
 
 def test_it_knows_the_deepest_stack(tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_nor_when_this_process_is_killed(tmp_path: Path) -> None:
         process = int(user.stdout.readline())
         assert is_running(process)
         user.send_signal(signal.SIGKILL)
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + HANGS_AFTER_S
     while is_running(process) and time.monotonic() < deadline:
         time.sleep(0.01)
     assert not is_running(process)
@@ -117,9 +117,9 @@ def test_nor_when_this_process_is_killed(tmp_path: Path) -> None:
 def test_what_goes_wrong_on_it_is_said(tmp_path: Path, update: str, message: str) -> None:
     image = toy(tmp_path, update=f"if (e[0] == 1) {{ {update} }}")
     with Board(image, patience_s=3.0 if "not answered" in message else 30.0) as board:
-        assert board.update(SHOWN, (0.0, 0.0)).u == 100.0
+        assert board.update(ACCELERATIONS, (0.0, 0.0)).u == 100.0
         with pytest.raises(RunStopped, match=f"^{message}$"):
-            board.update(SHOWN, (1.0, 0.0))
+            board.update(ACCELERATIONS, (1.0, 0.0))
         process = board.process_id
     assert not is_running(process)
 
@@ -128,7 +128,7 @@ def test_one_that_somebody_kills(tmp_path: Path) -> None:
     with Board(toy(tmp_path)) as board:
         os.kill(board.process_id, signal.SIGKILL)
         with pytest.raises(RunStopped, match=r"^the board is gone: qemu-system-arm was ended by signal 9$"):
-            board.update(SHOWN, (0.0, 0.0))
+            board.update(ACCELERATIONS, (0.0, 0.0))
 
 
 def test_an_image_that_is_none(tmp_path: Path) -> None:

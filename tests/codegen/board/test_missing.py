@@ -22,7 +22,7 @@ def install(folder: Path, *programs: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("there", "packages"),
+    ("programs_there", "packages"),
     [
         ((), "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"),
         ((EMULATOR,), "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
@@ -31,11 +31,11 @@ def install(folder: Path, *programs: str) -> None:
     ],
 )
 def test_it_is_said_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, there: tuple[str, ...], packages: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, programs_there: tuple[str, ...], packages: str
 ) -> None:
     programs = tmp_path / "programs"
     programs.mkdir()
-    install(programs, *there)
+    install(programs, *programs_there)
     monkeypatch.setenv("PATH", f"{programs}{os.pathsep}/bin/nowhere")
     assert missing() == packages.split()
     assert not available()
@@ -59,6 +59,7 @@ def test_a_program_that_is_none(tmp_path: Path, program: str, monkeypatch: pytes
     broken = tmp_path / program
     broken.write_bytes(b"\x7fELF")
     broken.chmod(0o755)
+    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
     monkeypatch.setattr("cmg_mj.codegen.board.tools.missing", list)
     monkeypatch.setattr("cmg_mj.codegen.board.image.COMPILER", str(broken) if program == COMPILER else COMPILER)
     monkeypatch.setattr("cmg_mj.codegen.board.qemu.EMULATOR", str(broken) if program == EMULATOR else EMULATOR)

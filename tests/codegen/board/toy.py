@@ -1,4 +1,4 @@
-"""What boards are tried with: a controller written by hand that does what a test asks of it, and a short run."""
+"""A toy for boards: a controller written by hand that does what a test asks of it, and a short run."""
 
 from __future__ import annotations
 

@@ -56,11 +56,11 @@ class Compiled:
         self.library = folder / "export.so"
         compile_c("-shared", "-fPIC", self.source, "-o", self.library, "-lm")
         compile_c(self.source, self.example, "-o", folder / "example", "-lm")
-        self.said = subprocess.run([folder / "example"], capture_output=True, text=True, check=False).stdout
+        self.output = subprocess.run([folder / "example"], capture_output=True, text=True, check=False).stdout
         self._loaded = ctypes.CDLL(str(self.library))
 
     def run(self, samples: np.ndarray) -> np.ndarray:
-        """What `update` makes of raw samples, (n, 4 + gimbals): the estimates and u, (n, 4 + extra signals)."""
+        """Call `update` with raw samples, (n, 4 + gimbals); return the estimates and u, (n, 4 + extra signals)."""
         controller = ctypes.create_string_buffer(8192)
         samples = np.ascontiguousarray(samples, self.type)
         results = np.full((len(samples), self.width + 1), np.nan, self.type)
@@ -81,7 +81,7 @@ class Compiled:
         getattr(self._loaded, f"{self.name}_{function}")(*pointers)
 
 
-class Recorded:
+class Recording:
     """A closed loop of push_recovery over 15 s, or until it fell.
 
     Attributes:
@@ -96,19 +96,19 @@ class Recorded:
         samples, results, rates = [], [], []
         decide = controller.decide
 
-        def recorded(step: int, forces: Any, encoders: Any, fog: float, rate: float) -> Any:
+        def decide_and_record(step: int, forces: Any, encoders: Any, fog: float, rate: float) -> Any:
             tick = decide(step, forces, encoders, fog, rate)
             samples.append([*forces, *encoders])
             results.append([*tick.estimates[0], tick.u])
             rates.append(rate)
             return tick
 
-        controller.decide = recorded  # type: ignore[method-assign]
+        controller.decide = decide_and_record  # type: ignore[method-assign]
         scenario = experiment.scenario
         simulate(experiment.plant, controller, scenario.duration_s, observers=[kind], pushes=scenario.push)
         self.samples, self.results, self.rate = np.array(samples), np.array(results), np.array(rates)
 
 
 @cache
-def recorded(kind: str, *settings: str) -> Recorded:
-    return Recorded(kind, *settings)
+def record(kind: str, *settings: str) -> Recording:
+    return Recording(kind, *settings)

@@ -25,7 +25,13 @@ FILES = ["linear.c", "linear.h", "linear_example.c", "linear_test_vector.h"]
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
-def written(folder: str) -> list[str]:
+@pytest.fixture(autouse=True)
+def few_signals(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On which an export compares C with Python; the other tests of the export have all."""
+    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 100)
+
+
+def files(folder: str) -> list[str]:
     return sorted(path.name for path in Path(folder).iterdir() if path.name != ".cmg-mj")
 
 
@@ -35,7 +41,7 @@ def test_what_the_readme_of_an_export_says() -> None:
     assert outcome.status == 0
     assert "linear, double precision" in outcome.out
     assert outcome.out.count("0 (bit for bit)") == 5
-    assert written("board") == FILES
+    assert files("board") == FILES
     compile_c("board/linear.c", "board/linear_example.c", "-lm", "-o", "example")
     subprocess.run(["./example"], check=True, capture_output=True)
 
@@ -45,7 +51,7 @@ def test_json_and_the_folder_it_takes_by_itself() -> None:
     outcome = cmg_mj("export", "linear", "--precision", "single", "--json", "--set", "observer.tau=0.03")
     figures = json.loads(outcome.out)
     assert (figures["observer"], figures["precision"], figures["trace_off_by"]) == ("linear", "single", 0.0)
-    assert sorted(figures["files"]) == written("runs/export-linear-single") == FILES
+    assert sorted(figures["files"]) == files("runs/export-linear-single") == FILES
     assert "tau = 0.03  Time constant [s]" in Path("runs/export-linear-single/linear.h").read_text()
 
 
@@ -67,7 +73,7 @@ def test_a_users_own_observer(tmp_path: Path) -> None:
         "    def step(self, state, y, u): return y.y1, (y.y1, (y.y1 - state)/self.dt, y.y2)\n"
     )
     assert cmg_mj("export", "exported_by_a_user:HTTPObserver2D", "--out", "board").status == 0
-    assert "http_observer2_d.h" in written("board")
+    assert "http_observer2_d.h" in files("board")
 
 
 @needs_compiler
@@ -87,7 +93,7 @@ def test_a_class_with_any_name(cls: str, arguments: list[str], name: str) -> Non
         encoding="utf-8",
     )
     assert cmg_mj("export", f"called_{name}:{cls}", *arguments, "--out", "board").status == 0
-    assert f"{name}.h" in written("board")
+    assert f"{name}.h" in files("board")
     code = Path(f"board/{name}.h").read_text() + Path(f"board/{name}.c").read_text()
     assert f"void {name}_update(" in code
     assert all(f" {member};" in code for member in ("abs_", "omega", "value", "this_", "NAN_"))
@@ -109,7 +115,7 @@ def test_files_of_the_users_stay_and_an_earlier_export_is_replaced() -> None:
     cmg_mj("export", "linear", "--out", "board")
     Path("board/notes.txt").write_text("mine")
     assert cmg_mj("export", "finite_difference", "--out", "board").status == 0
-    assert written("board") == sorted([name.replace("linear", "finite_difference") for name in FILES] + ["notes.txt"])
+    assert files("board") == sorted([name.replace("linear", "finite_difference") for name in FILES] + ["notes.txt"])
     Path("board/linear.h").write_text("mine")
     assert "linear.h there is not as cmg-mj wrote it" in cmg_mj("export", "linear", "--out", "board").complaint
     assert Path("board/linear.h").read_text() == "mine"
@@ -192,7 +198,7 @@ def test_without_a_compiler_that_is_said(monkeypatch: pytest.MonkeyPatch) -> Non
     assert outcome.status == 0
     assert "no C compiler was found" in outcome.err
     assert "C, off from Python" not in outcome.out
-    assert written("board") == FILES
+    assert files("board") == FILES
 
 
 @needs_compiler
@@ -210,10 +216,10 @@ def test_c_that_is_not_what_python_runs_is_not_left(monkeypatch: pytest.MonkeyPa
 def test_without_casadi_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     genuine = importlib.util.find_spec
 
-    def lost(name: str, *others: Any) -> Any:
-        return None if name == "casadi" else genuine(name, *others)
+    def find_all_but_casadi(name: str, *arguments: Any) -> Any:
+        return None if name == "casadi" else genuine(name, *arguments)
 
-    monkeypatch.setattr("cmg_mj.codegen.export.save.find_spec", lost)
+    monkeypatch.setattr("cmg_mj.codegen.export.save.find_spec", find_all_but_casadi)
     with pytest.raises(InputError, match=r'casadi is not installed: python -m pip install "cmg_mj\[export\]"'):
         check_installed()
     assert 'pip install "cmg_mj[export]"' in cmg_mj("export", "linear", "--out", "board").complaint

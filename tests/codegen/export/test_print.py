@@ -30,13 +30,13 @@ def test_a_double_is_read_back_as_it_was(value: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "read"),
+    ("value", "expected"),
     [(0.1, np.float32(0.1)), (-35.0, -35.0), (0.0, 0.0), (1e10, 1e10), (1.0 / 3.0, np.float32(1.0 / 3.0))],
 )
-def test_a_float_is_the_nearest_one(value: float, read: float) -> None:
+def test_a_float_is_the_nearest_one(value: float, expected: float) -> None:
     text = literal(value, "single")
     assert text.endswith("f")
-    assert np.float32(text[:-1]) == read
+    assert np.float32(text[:-1]) == expected
 
 
 def test_what_is_nearly_zero_or_very_large_stays_so() -> None:
@@ -68,18 +68,25 @@ def test_every_operation_does_what_numpy_does(precision: Any, tmp_path: Path) ->
             (a < b) + (b < a) * 2.0,
         ]
         function = casadi.Function("f", [a.sx, b.sx], [x.sx for x in results])
-    run = compiled(function, precision, tmp_path)
+    run = compile_function(function, precision, tmp_path)
     rng, kind = np.random.default_rng(1), np.float64 if precision == "double" else np.float32
     pairs = [*rng.uniform(-1.5, 1.5, (50, 2)), (0.0, 0.0), (0.7, 0.7), (1.0, 0.0), (0.0, -1.0), (1.0, 1.0)]
     with np.errstate(all="ignore"):
         for pair in pairs:
             a, b = map(kind, pair)
             logical = {np.bitwise_and: np.logical_and, np.bitwise_or: np.logical_or, np.invert: np.logical_not}
-            wanted = [logical.get(f, f)(a, b) for f in binary] + [logical.get(f, f)(a) for f in unary]
-            wanted += [np.where(a < b, a, 2 * b), np.clip(a, kind(-0.5), kind(0.5))]
-            wanted += [a - (b - (a - b)), a / (b / (a * b)), a, a + kind(1.5), (a + b) * (a - b), (a < b) + 2 * (b < a)]
+            expected = [logical.get(f, f)(a, b) for f in binary] + [logical.get(f, f)(a) for f in unary]
+            expected += [np.where(a < b, a, 2 * b), np.clip(a, kind(-0.5), kind(0.5))]
+            expected += [
+                a - (b - (a - b)),
+                a / (b / (a * b)),
+                a,
+                a + kind(1.5),
+                (a + b) * (a - b),
+                (a < b) + 2 * (b < a),
+            ]
             np.testing.assert_allclose(
-                run(a, b), np.array(wanted, dtype=float), rtol=1e-15 if kind is np.float64 else 5e-7
+                run(a, b), np.array(expected, dtype=float), rtol=1e-15 if kind is np.float64 else 5e-7
             )
 
 
@@ -88,9 +95,9 @@ def test_what_is_nan_does_not_become_a_limit(tmp_path: Path) -> None:
     """As fmax would have it: a board would go on with the largest rate."""
     with _as_written():
         a, b = symbols()
-        clipped = np.clip(a, -4.7, 4.7), np.maximum(0.0, a), np.minimum(a, 1.0)
-        function = casadi.Function("f", [a.sx, b.sx], [x.sx for x in clipped])
-    assert np.isnan(compiled(function, "double", tmp_path)(math.nan, 0.0)).all()
+        results = np.clip(a, -4.7, 4.7), np.maximum(0.0, a), np.minimum(a, 1.0)
+        function = casadi.Function("f", [a.sx, b.sx], [x.sx for x in results])
+    assert np.isnan(compile_function(function, "double", tmp_path)(math.nan, 0.0)).all()
 
 
 @needs_compiler
@@ -110,7 +117,7 @@ def symbols() -> list[Any]:
     return [Symbol(casadi.SX.sym(name)) for name in "ab"]
 
 
-def compiled(function: casadi.Function, precision: Any, folder: Path) -> Any:
+def compile_function(function: casadi.Function, precision: Any, folder: Path) -> Any:
     """A function of a and b as C, called with two numbers."""
     n, real = function.n_out(), "double" if precision == "double" else "float"
     lines = body(function, ["a", "b"], [f"x[{i}]" for i in range(n)], real, precision)

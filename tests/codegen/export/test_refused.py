@@ -1,19 +1,23 @@
-"""What cannot be exported is refused in one line, with its place; what is wrong is found by comparing."""
+"""Classes that cannot be exported are refused in one line, with the place; a comparison finds wrong results."""
 
 from __future__ import annotations
 
 import inspect
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
-from cmg_mj.codegen.export import export
+from cmg_mj.codegen.export import export, pipeline
+from cmg_mj.controllers.controller import Controller
+from cmg_mj.controllers.laws import Law
 from cmg_mj.errors import InputError
 from tests.codegen.export import own
 from tests.codegen.export.compiled import controller
 
 VALUE, NUMBER = "a branch on a value", "a plain number is asked for"
-TWICE, COMPARED = "not twice the same", "traced, it is not what Python runs: on random signals x2_rad_s is off by"
+TWICE, DIFFERENCE = "not twice the same", "traced, it is not what Python runs: on random signals x2_rad_s is off by"
 
 
 @pytest.mark.parametrize(
@@ -35,7 +39,7 @@ TWICE, COMPARED = "not twice the same", "traced, it is not what Python runs: on 
 def test_what_has_no_place_in_a_formula_is_named_with_its_place(name: str, words: str, tmp_path: Path) -> None:
     lines, first = inspect.getsourcelines(getattr(own, name))
     (line,) = [i for i, text in enumerate(lines, first) if text.rstrip().endswith("# here")]
-    complaint = refused(name, tmp_path)
+    complaint = refusal(name, tmp_path)
     assert words in complaint
     assert f"own.py, line {line}: {lines[line - first].strip()})" in complaint
 
@@ -43,8 +47,8 @@ def test_what_has_no_place_in_a_formula_is_named_with_its_place(name: str, words
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("LooksAtTypes", COMPARED),
-        ("Counts", COMPARED),
+        ("LooksAtTypes", DIFFERENCE),
+        ("Counts", DIFFERENCE),
         ("DrawsLots", TWICE),
         ("Remembers", "remembers something outside of its state"),
         ("Grows", "made otherwise than the one of init"),
@@ -56,14 +60,14 @@ def test_what_has_no_place_in_a_formula_is_named_with_its_place(name: str, words
     ],
 )
 def test_what_would_not_be_the_same_in_c_is_refused(name: str, words: str, tmp_path: Path) -> None:
-    assert words in refused(name, tmp_path)
+    assert words in refusal(name, tmp_path)
 
 
-def refused(name: str, folder: Path) -> str:
+def refusal(name: str, folder: Path) -> str:
     """The complaint; and nothing is left."""
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError) as info:
         export(controller(f"tests.codegen.export.own:{name}"), folder / "export")
-    complaint = str(caught.value)
+    complaint = str(info.value)
     assert "\n" not in complaint
     assert complaint.startswith(f"tests.codegen.export.own:{name} cannot be exported: ")
     assert not (folder / "export").exists()
@@ -74,3 +78,49 @@ def refused(name: str, folder: Path) -> str:
 def test_a_board_has_the_observer_alone(feedback: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"controller\.feedback"):
         export(controller("linear", f"controller.feedback={feedback}"), tmp_path)
+
+
+class Dithering(Controller):
+    """A controller with an option that the exporter has never heard of."""
+
+    def __init__(self, *parts: Any, dither_rad_s: float = 0.0, **options: Any) -> None:
+        self.dither_rad_s = dither_rad_s
+        super().__init__(*parts, **options)
+
+
+def dithering(**options: Any) -> Controller:
+    plain = controller("linear")
+    return Dithering(plain.observer, plain.law, plain.sensors, plain.plant, **options)
+
+
+def test_an_option_that_c_does_not_have_is_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"^controller\.dither_rad_s = 0\.5: cannot .* set controller\.dither_rad_s=0\.0$"
+    ):
+        export(dithering(dither_rad_s=0.5), tmp_path / "export")
+    assert not (tmp_path / "export").exists()
+    export(dithering(seed=3, axis=1, open_loop_observers={"kalman": plain_kalman()}), tmp_path / "export")
+
+
+def plain_kalman() -> Any:
+    return controller("kalman").observer
+
+
+@dataclass(frozen=True)
+class WithADeadBand:
+    """The fields of a law that has one more than C knows."""
+
+    dt: float
+    gains: tuple[float, float, float, float] = (35.0, 4.0, -1.0, 0.3)
+    rate_limit: float = 4.7
+    dead_band: float = 0.0
+
+
+def test_a_field_of_the_law_that_c_does_not_have_is_refused_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pipeline, "StateFeedback", WithADeadBand)
+    exported = controller("linear")
+    exported.law = cast("Law", WithADeadBand(exported.law.dt, dead_band=0.05))
+    with pytest.raises(InputError, match=r"^controller\.dead_band = 0\.05: cannot be exported"):
+        export(exported, tmp_path)

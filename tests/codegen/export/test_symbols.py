@@ -29,18 +29,18 @@ def symbol(name: str = "x") -> Any:
     return Symbol(casadi.SX.sym(name))
 
 
-TRACED = [function for function in FUNCTIONS if function.id not in ("round", "digitise")]
+TRACEABLE = [function for function in FUNCTIONS if function.id not in ("round", "digitise")]
 """All but those that only sensors need."""
 
 
-@pytest.mark.parametrize("function", TRACED)
+@pytest.mark.parametrize("function", TRACEABLE)
 def test_a_symbol_equals_floats_bit_by_bit(function: Callable) -> None:
     """But for the sign of a zero, as with arrays."""
     x = symbol()
     with _as_written():
-        traced = casadi.Function("f", [x.sx], [function(x).sx])
+        graph = casadi.Function("f", [x.sx], [function(x).sx])
     values = [*SPECIAL, *np.random.default_rng(3).normal(0.0, 1.0, 200).tolist()]
-    assert [float(traced(value)) for value in values] == [function(value) for value in values]  # type: ignore[arg-type]
+    assert [float(graph(value)) for value in values] == [function(value) for value in values]  # type: ignore[arg-type]
 
 
 def test_numpys_numbers_and_arrays_on_the_left() -> None:
@@ -55,7 +55,8 @@ def test_numpys_numbers_and_arrays_on_the_left() -> None:
 
 
 @pytest.mark.parametrize("name", ["Elaborate", "Branches"])
-def test_casadi_is_left_as_it_was(name: str) -> None:
+def test_casadi_is_left_as_it_was(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
     for before in (True, False):
         casadi.GlobalOptions.setSimplificationOnTheFly(before)
         try:
@@ -70,9 +71,9 @@ def test_a_state_is_taken_apart_and_put_together() -> None:
     state = own.Elaborate(0.005, None).init(Measurement(0.1, 0.2, 0.3))
     result = list(numbers(state))
     assert [leaf.value for leaf in result] == [0, False, 0.1, 0.0, 0.0, 0.1, 0.2, 0.3, 0.0]
-    again = rebuild(state, iter(range(9)))
-    assert form(again) == form(state)
-    assert (again.last.acceleration, again.parts["π"].other, again.label) == (7, [3, 4], "a constant")
+    rerun = rebuild(state, iter(range(9)))
+    assert form(rerun) == form(state)
+    assert (rerun.last.acceleration, rerun.parts["π"].other, rerun.label) == (7, [3, 4], "a constant")
     assert form(state._replace(label="another")) != form(state)
 
 
@@ -83,7 +84,7 @@ def test_names_in_c() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "in_c"),
+    ("name", "c_name"),
     [
         ("WithBias", "with_bias"),
         ("HTTPObserver2D", "http_observer2_d"),
@@ -104,8 +105,8 @@ def test_names_in_c() -> None:
         ("Class", "class_observer"),
     ],
 )
-def test_a_class_is_called_by_its_name(name: str, in_c: str) -> None:
-    assert name_of(type(name, (own.Plain,), {})(0.005, None)) == in_c
+def test_a_class_is_called_by_its_name(name: str, c_name: str) -> None:
+    assert name_of(type(name, (own.Plain,), {})(0.005, None)) == c_name
 
 
 @pytest.mark.parametrize("name", ["观测器", "Наблюдатель", "_", "X位置", "A" * 41, "_1"])
@@ -123,9 +124,9 @@ def test_a_name_asked_for_is_one_of_c(name: str) -> None:
 
 
 def test_a_symbol_has_no_value() -> None:
-    for ask in (bool, float, int, complex, round, math.sin, math.floor):
+    for conversion in (bool, float, int, complex, round, math.sin, math.floor):
         with pytest.raises(InputError):
-            ask(symbol())
+            conversion(symbol())
     with pytest.raises(TypeError):
         hash(symbol())
     assert repr(symbol("tilt")) == "Symbol(tilt)"

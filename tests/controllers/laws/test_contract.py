@@ -1,4 +1,4 @@
-"""What every law must be: a value with pure, elementwise init and step, the same in one world and in many."""
+"""The contract of every law: a value with pure, elementwise init and step, the same in one world and in many."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, load_scenario, prepare, sweep
-from cmg_mj.controllers.laws import LAWS, FeedbackState, Law, law_class, make_law
+from cmg_mj.controllers.laws import LAW_CLASSES, LAWS, FeedbackState, Law, make_law
 from cmg_mj.controllers.laws.protocol import feedback_state, needs
-from cmg_mj.controllers.laws.registry import BENCH_PARAMETERS
 from cmg_mj.observers import Measurement
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.studies.tuning.on_simulations import tuning_scenario
@@ -33,11 +32,11 @@ def samples(n: int, shape: tuple[int, ...] = (), seed: int = 0) -> list[tuple[Me
     tilt, rate, gimbal = 0.03 * rng.normal(size=(n, *shape)), rng.normal(size=(n, *shape)), rng.normal(size=(n, *shape))
     return [
         (Measurement(*parts[::2]), feedback_state(*parts))
-        for parts in zip(*map(_listed, (tilt, rate, gimbal)), strict=True)
+        for parts in zip(*map(_to_list, (tilt, rate, gimbal)), strict=True)
     ]
 
 
-def _listed(signal: np.ndarray) -> list:
+def _to_list(signal: np.ndarray) -> list:
     return signal.tolist() if signal.ndim == 1 else list(signal)
 
 
@@ -51,7 +50,7 @@ def commands(control_law: Law, arguments: list[tuple[Measurement, FeedbackState]
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_every_parameter_is_documented(kind: str) -> None:
-    cls = law_class(kind)
+    cls = LAW_CLASSES.find(kind)
     for name in inspect.signature(cls).parameters:
         assert f"{name}: " in (cls.__doc__ or "")
 
@@ -85,12 +84,12 @@ def test_many_worlds_are_single_ones(kind: str, rate_limit: float) -> None:
     """Bit for bit, the limit reached or not."""
     control_law, worlds = law(kind, rate_limit), 7
     many = samples(60, (worlds,))
-    together = commands(control_law, many)
-    assert np.abs(together).max() == rate_limit
-    assert np.abs(together).min() < rate_limit
+    batch_commands = commands(control_law, many)
+    assert np.abs(batch_commands).max() == rate_limit
+    assert np.abs(batch_commands).min() < rate_limit
     for i in range(worlds):
         one = [(Measurement(*(float(p[i]) for p in y)), FeedbackState(*(float(p[i]) for p in x))) for y, x in many]
-        np.testing.assert_array_equal(commands(control_law, one), together[:, i])
+        np.testing.assert_array_equal(commands(control_law, one), batch_commands[:, i])
 
 
 @pytest.mark.parametrize("kind", EVERY)
@@ -111,8 +110,8 @@ def test_drivers_and_batch_are_one(kind: str) -> None:
     assert np.isfinite(native.trajectory["x_e_rad_times_s"]).all()
     for name, column in native.trajectory.columns.items():
         np.testing.assert_array_equal(callback.trajectory[name], column, name)
-        of_batch = batch.trajectory[name]
-        np.testing.assert_array_equal(of_batch if of_batch.ndim == 1 else of_batch[:, 0], column, name)
+        batch_column = batch.trajectory[name]
+        np.testing.assert_array_equal(batch_column if batch_column.ndim == 1 else batch_column[:, 0], column, name)
 
 
 @pytest.mark.parametrize("kind", EVERY)
@@ -134,11 +133,11 @@ def test_worlds_of_other_limits_share_a_batch(kind: str) -> None:
 
 def test_what_the_bench_gives_is_no_parameter() -> None:
     for kind in EVERY:
-        arguments: dict[str, Any] = dict.fromkeys(BENCH_PARAMETERS)
-        assert {"dt", "rate_limit"} <= arguments.keys() & inspect.signature(law_class(kind)).parameters.keys()
+        arguments: dict[str, Any] = dict.fromkeys(LAW_CLASSES.bench_parameters)
+        assert {"dt", "rate_limit"} <= arguments.keys() & inspect.signature(LAW_CLASSES.find(kind)).parameters.keys()
 
 
-def test_a_law_that_is_told_the_noise_keeps_worlds_of_other_noise_apart() -> None:
+def test_a_law_that_uses_the_noise_keeps_worlds_of_other_noise_apart() -> None:
     experiment = prepare(load_scenario("push_recovery", [*SHORT, "controller.kind=lqg"]))
     with pytest.raises(InputError, match="the noise that the law is told differs"):
         experiment.run_many(2, vary={"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]})
@@ -148,8 +147,8 @@ def test_a_law_that_is_told_the_noise_keeps_worlds_of_other_noise_apart() -> Non
 def test_a_sweep_over_the_law() -> None:
     """Each law in batches of its own, each row as if run alone; where one raises, its own trials alone are lost."""
     scenario = load_scenario("push_recovery", SHORT)
-    varied = {"controller.kind": [*EVERY, f"{__name__}:RaisesLate"], "plant.equilibrium_bias_deg": [0.0, 1.0]}
-    rows = sweep(scenario, varied, observers=["linear", "kalman"], worlds=2).trials.to_pylist()
+    axes = {"controller.kind": [*EVERY, f"{__name__}:RaisesLate"], "plant.equilibrium_bias_deg": [0.0, 1.0]}
+    rows = sweep(scenario, axes, observers=["linear", "kalman"], worlds=2).trials.to_pylist()
     assert len(rows) == 3 * 2 * 2 * 2
     for row in rows:
         kind, bias = row["controller.kind"], row["plant.equilibrium_bias_deg"]
@@ -189,8 +188,8 @@ def test_a_run_says_which_law_and_reruns(elsewhere: None) -> None:
     assert outcome.status == 0
     name = "runs/push_recovery-homogeneous-0-kind=lqg-torque_walk=0.1"
     assert name in outcome.err
-    again = cmg_mj("run", f"{name}/scenario.toml", "--out", "again")
-    assert again.status == 0
+    rerun = cmg_mj("run", f"{name}/scenario.toml", "--out", "again")
+    assert rerun.status == 0
     one, other = Trajectory.load(Path(name, "trajectory.parquet")), Trajectory.load(Path("again/trajectory.parquet"))
     for column in one.columns:
         np.testing.assert_array_equal(one[column], other[column])

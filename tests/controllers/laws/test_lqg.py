@@ -44,7 +44,7 @@ def rig() -> tuple[np.ndarray, np.ndarray]:
     return A, B
 
 
-def held(A: np.ndarray, B: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+def discretise(A: np.ndarray, B: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
     """x(t) = F x(0) + G u."""
     F = expm(A * t)
     return F, quad_vec(lambda s: expm(A * s) @ B, 0.0, t, epsabs=1e-15, epsrel=1e-13)[0]
@@ -58,12 +58,12 @@ def regulator(dt: float, state_cost: Any, input_cost: float) -> tuple[np.ndarray
     W = np.diag([*state_cost, input_cost])
 
     def slope(t: float) -> np.ndarray:
-        F, G = held(A, B, t)
-        along = np.vstack([np.hstack([F, G]), [0.0, 0.0, 0.0, 0.0, 1.0]])
-        return along.T @ W @ along
+        F, G = discretise(A, B, t)
+        transition = np.vstack([np.hstack([F, G]), [0.0, 0.0, 0.0, 0.0, 1.0]])
+        return transition.T @ W @ transition
 
     V = quad_vec(slope, 0.0, dt, epsabs=1e-14, epsrel=1e-12)[0]
-    (F, G), Q, N, R = held(A, B, dt), V[:4, :4], V[:4, 4:], V[4:, 4:]
+    (F, G), Q, N, R = discretise(A, B, dt), V[:4, :4], V[:4, 4:], V[4:, 4:]
     S = solve_discrete_are(F, G, Q, R, s=N)
     return np.linalg.solve(G.T @ S @ G + R, G.T @ S @ F + N.T), F, G
 
@@ -71,8 +71,10 @@ def regulator(dt: float, state_cost: Any, input_cost: float) -> tuple[np.ndarray
 def estimator(dt: float, walk: float, white: float, gimbal: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """P before a sample (4, 4), the gain M (4, 2), Q (4, 4): the noise's integral by quadrature."""
     A, B = rig()
-    into = np.array([[0.0, 0.0, 0.0], [0.0, A[1, 3] * white, B[1, 0] * gimbal], [0.0, 0.0, gimbal], [walk, 0.0, 0.0]])
-    spread = into @ into.T
+    noise_input = np.array(
+        [[0.0, 0.0, 0.0], [0.0, A[1, 3] * white, B[1, 0] * gimbal], [0.0, 0.0, gimbal], [walk, 0.0, 0.0]]
+    )
+    spread = noise_input @ noise_input.T
 
     def slope(t: float) -> np.ndarray:
         return expm(A * t) @ spread @ expm(A * t).T
@@ -83,7 +85,7 @@ def estimator(dt: float, walk: float, white: float, gimbal: float) -> tuple[np.n
     return P, P @ C.T @ np.linalg.inv(C @ P @ C.T + R), Q
 
 
-def told(control_law: Lqg) -> tuple[float, float, float]:
+def noises(control_law: Lqg) -> tuple[float, float, float]:
     return control_law.torque_walk, control_law.torque_white, control_law.gimbal_white
 
 
@@ -102,7 +104,7 @@ def test_fast_control_has_table_2s_gains_to_their_printed_digits() -> None:
 @EVERY
 def test_the_filter_is_that_of_the_riccati_equation(dt: float, parameters: dict[str, Any]) -> None:
     control_law = law(dt, **parameters)
-    P, M, Q = estimator(dt, *told(control_law))
+    P, M, Q = estimator(dt, *noises(control_law))
     np.testing.assert_allclose(control_law.process_noise, Q, rtol=1e-9, atol=1e-24)
     np.testing.assert_allclose(control_law.expected_covariance, P, rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(control_law.innovation_gain, M, rtol=1e-6, atol=1e-9)
@@ -110,7 +112,7 @@ def test_the_filter_is_that_of_the_riccati_equation(dt: float, parameters: dict[
 
 def joint(control_law: Lqg) -> np.ndarray:
     """One period of the linear rig and the law, (9, 9): made by running the law itself on unit vectors."""
-    F, G = held(*rig(), control_law.dt)
+    F, G = discretise(*rig(), control_law.dt)
     columns = []
     for unit in np.eye(9).tolist():
         x, state = np.array(unit[:4]), type(control_law.init(Measurement(0.0, 0.0)))(*unit[4:])
@@ -124,21 +126,25 @@ def test_the_closed_loops_poles_are_the_regulators_and_the_filters(dt: float, pa
     """The separation principle, and a 1 for the torque, which nothing in the loop can change."""
     control_law = law(dt, **parameters)
     K, F, G = regulator(dt, control_law.state_cost, control_law.input_cost)
-    _, M, _ = estimator(dt, *told(control_law))
-    moved = expm(rig()[0] * dt)
-    apart = [*np.linalg.eigvals(F - G @ K), *np.linalg.eigvals(moved - moved @ M @ np.eye(4)[[0, 2]]), 1.0]
-    together = np.linalg.eigvals(joint(control_law))
-    np.testing.assert_allclose(np.poly(together), np.poly(apart), rtol=1e-6, atol=1e-9)
-    assert np.sort(np.abs(together))[-2] < 1.0 - 1e-4
+    _, M, _ = estimator(dt, *noises(control_law))
+    transition = expm(rig()[0] * dt)
+    separate_poles = [
+        *np.linalg.eigvals(F - G @ K),
+        *np.linalg.eigvals(transition - transition @ M @ np.eye(4)[[0, 2]]),
+        1.0,
+    ]
+    joint_poles = np.linalg.eigvals(joint(control_law))
+    np.testing.assert_allclose(np.poly(joint_poles), np.poly(separate_poles), rtol=1e-6, atol=1e-9)
+    assert np.sort(np.abs(joint_poles))[-2] < 1.0 - 1e-4
 
 
 @cache
 def errors(worlds: int = 3000, seconds: float = 16.0) -> tuple[Lqg, np.ndarray]:
-    """Of what the law expects at a sample, on the linear rig with all its noises, (n_times * worlds, 4)."""
+    """Return the errors of the state that the law expects at a sample, on the linear rig with all its noises."""
     control_law = law()
     rng = np.random.default_rng(5)
-    _, _, Q = estimator(control_law.dt, *told(control_law))
-    F, G = held(*rig(), control_law.dt)
+    _, _, Q = estimator(control_law.dt, *noises(control_law))
+    F, G = discretise(*rig(), control_law.dt)
     root = np.linalg.cholesky(Q + 1e-24 * np.eye(4))
     x = np.zeros((4, worlds))
     state, u, result = control_law.init(Measurement(x[0], x[2])), np.zeros(worlds), []
@@ -155,7 +161,7 @@ def errors(worlds: int = 3000, seconds: float = 16.0) -> tuple[Lqg, np.ndarray]:
 def test_the_error_is_what_the_filter_says() -> None:
     """Its covariance over seeds, entry by entry, in units of the standard deviations."""
     control_law, result = errors()
-    P, _, _ = estimator(control_law.dt, *told(control_law))
+    P, _, _ = estimator(control_law.dt, *noises(control_law))
     sigma = np.sqrt(np.diag(P))
     np.testing.assert_allclose(
         result.T @ result / len(result) / np.outer(sigma, sigma), P / np.outer(sigma, sigma), atol=0.04
@@ -165,10 +171,10 @@ def test_the_error_is_what_the_filter_says() -> None:
 
 def test_its_noises_are_those_of_the_observer_kalman() -> None:
     """As docs/assumptions.md has them."""
-    assert told(law()) == (0.03, 0.082, 0.017)
+    assert noises(law()) == (0.03, 0.082, 0.017)
 
 
-def test_it_rests_where_gravity_bears_the_torque() -> None:
+def test_it_rests_where_gravity_balances_the_torque() -> None:
     """A torque on the rig, which both gimbals' shares of gravity hold: nothing to be done."""
     control_law, torque = law(), 0.1
     x1 = -torque / (2.0 * paper.gravity_torque)
@@ -186,11 +192,11 @@ def test_at_the_limit_it_expects_what_was_commanded_and_does_not_wind_up(tilt: f
         control_law.init(Measurement(tilt, gimbal)), Measurement(tilt, gimbal), feedback_state(0.0, 0.0, 0.0), 0.0
     )
     assert u == -math.copysign(0.5, tilt)
-    F, G = held(*rig(), control_law.dt)
+    F, G = discretise(*rig(), control_law.dt)
     np.testing.assert_allclose(state[:4], F @ [tilt, 0.0, gimbal, 0.0] + G[:, 0] * u, rtol=1e-9)
     # The integrator's next step would add k4 x3 to the demand, whose sign is that of u.
-    winds = control_law.gains[3] * gimbal * u > 0.0
-    assert state.x_e == (0.0 if winds else pytest.approx(-control_law.dt * (gimbal + 0.5 * control_law.dt * u)))
+    is_winding_up = control_law.gains[3] * gimbal * u > 0.0
+    assert state.x_e == (0.0 if is_winding_up else pytest.approx(-control_law.dt * (gimbal + 0.5 * control_law.dt * u)))
 
 
 def test_a_sensor_without_noise_is_taken() -> None:
@@ -212,15 +218,15 @@ def test_the_gimbals_come_back_whatever_the_bias(e: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("without", ["torque", "integrator"])
-def test_either_integral_action_alone_falls_at_a_large_bias(without: str) -> None:
+@pytest.mark.parametrize("missing_part", ["torque", "integrator"])
+def test_either_integral_action_alone_falls_at_a_large_bias(missing_part: str) -> None:
     """Why it is there twice."""
     settings = ["controller.kind=lqg", "plant.equilibrium_bias_deg=2.0"]
     experiment = prepare(load_scenario("push_recovery", settings))
     assert experiment.run_many(4).stood.all()
     control_law = experiment.law
     assert isinstance(control_law, Lqg)
-    if without == "integrator":
+    if missing_part == "integrator":
         A, B = rig()
         K = solve_without_integrator(A[:3, :3], B[:3], control_law)
         control_law.__dict__["gains"] = (*K, 0.0)
@@ -231,7 +237,7 @@ def test_either_integral_action_alone_falls_at_a_large_bias(without: str) -> Non
 
 
 def solve_without_integrator(A: np.ndarray, B: np.ndarray, control_law: Lqg) -> list[float]:
-    F, G = held(A, B, control_law.dt)
+    F, G = discretise(A, B, control_law.dt)
     Q, R = control_law.dt * np.diag(control_law.state_cost[:3]), np.array([[control_law.dt * control_law.input_cost]])
     S = solve_discrete_are(F, G, Q, R)
     return np.ravel(np.linalg.solve(G.T @ S @ G + R, G.T @ S @ F)).tolist()

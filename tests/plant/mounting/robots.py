@@ -17,7 +17,7 @@ def gymnasium_asset(name: str) -> Path:
     return Path(package.origin).parent / "envs" / "mujoco" / "assets" / name
 
 
-def _spaced(point: tuple[float, ...]) -> str:
+def _spread(point: tuple[float, ...]) -> str:
     return " ".join(f"{part:g}" for part in point)
 
 
@@ -37,7 +37,7 @@ class Robot(NamedTuple):
             elif name == "release":
                 words += [f"--release {joint}" for joint in value]
             else:
-                words.append(f"--{name} " + (f"{value}" if not isinstance(value, tuple) else f"'{_spaced(value)}'"))
+                words.append(f"--{name} " + (f"{value}" if not isinstance(value, tuple) else f"'{_spread(value)}'"))
         return " ".join(words)
 
 

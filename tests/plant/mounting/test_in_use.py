@@ -16,11 +16,11 @@ from cmg_mj.studies.push_limits.mount_files import write_scenario
 from cmg_mj.studies.sweeps.api import sweep
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import ROBOTS
-from tests.simulation.test_gymnasium_env import acting
+from tests.simulation.test_gymnasium_env import act
 from tests.visualization.studio.session import Session, as_rows
 from tests.visualization.studio.test_session import same
 
-PUSHED = ["duration_s=2.0", "plant.initial_tilt_deg=0.2", "push=[{start_s=0.5,torque_n_m=1.0}]"]
+PUSH_SETTINGS = ["duration_s=1.0", "plant.initial_tilt_deg=0.2", "push=[{start_s=0.25,torque_n_m=1.0}]"]
 
 PUSH = 7
 """Column of a session's rows."""
@@ -37,14 +37,14 @@ def scenario(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     return str(model.with_suffix(".toml"))
 
 
-def opened(scenario: str) -> Experiment:
-    return prepare(load_scenario(scenario, PUSHED))
+def open_experiment(scenario: str) -> Experiment:
+    return prepare(load_scenario(scenario, PUSH_SETTINGS))
 
 
 def test_the_callback_and_a_batch_give_the_runners_trajectory(scenario: str) -> None:
-    experiment = opened(scenario)
+    experiment = open_experiment(scenario)
     native, callback = (experiment.run(driver) for driver in ("native", "callback"))
-    many = experiment.run_many(3)
+    many = experiment.run_many(2)
     assert native.trajectory is not None
     assert callback.trajectory is not None
     assert many.trajectory is not None
@@ -55,45 +55,47 @@ def test_the_callback_and_a_batch_give_the_runners_trajectory(scenario: str) -> 
 
 
 def test_studio_gives_it_too(scenario: str) -> None:
-    studio = Session(lambda _: opened(scenario))
+    studio = Session(lambda _: open_experiment(scenario))
     try:
-        studio.run(2.0)
+        studio.run(1.0)
         assert (studio.live.stopped, studio.live.note) == ("", "")
         rows = studio.rows
     finally:
         studio.handle.close()
-    trajectory = opened(scenario).run().trajectory
+    trajectory = open_experiment(scenario).run().trajectory
     assert trajectory is not None
-    assert len(rows) == 400
+    assert len(rows) == 200
     rows[:, PUSH] = rows[:, PUSH].round(12)  # put together again from a free joint's three torques
     same(rows, as_rows(trajectory))
 
 
 def test_the_environment_gives_it_too(scenario: str) -> None:
-    env = ScissoredPairEnv(scenario, PUSHED, in_rad_s=True)
-    ticks, infos, _ = acting(env, 0)
-    trajectory = opened(scenario).run().trajectory
+    env = ScissoredPairEnv(scenario, PUSH_SETTINGS, in_rad_s=True)
+    ticks, infos, _ = act(env, 0)
+    trajectory = open_experiment(scenario).run().trajectory
     assert trajectory is not None
-    assert len(ticks) == 400
+    assert len(ticks) == 200
     for name in ("x1_rad", "x2_rad_s", "x3_rad"):
         np.testing.assert_array_equal([info[name] for info in infos[:-1]], trajectory[name])
 
 
 def test_a_sweep(scenario: str) -> None:
-    result = sweep(load_scenario(scenario, PUSHED), {"push.0.torque_n_m": [1.0, 200.0]}, ["homogeneous"], worlds=2)
-    stood = {row["push.0.torque_n_m"]: row["stood"] for row in result.trials.to_pylist()}
-    assert stood == {1.0: True, 200.0: False}
+    result = sweep(
+        load_scenario(scenario, PUSH_SETTINGS), {"push.0.torque_n_m": [1.0, 200.0]}, ["homogeneous"], worlds=2
+    )
+    standing_at = {row["push.0.torque_n_m"]: row["stood"] for row in result.trials.to_pylist()}
+    assert standing_at == {1.0: True, 200.0: False}
 
 
 @pytest.mark.slow
 def test_commands(scenario: str, tmp_path: Path) -> None:
     """A run with its recording, a check, a comparison."""
-    settings = [part for value in PUSHED for part in ("--set", value)]
-    done = cmg_mj("run", scenario, *settings, "--out", str(tmp_path / "run"))
-    assert done.status == 0, done.err
+    settings = [part for value in PUSH_SETTINGS for part in ("--set", value)]
+    outcome = cmg_mj("run", scenario, *settings, "--out", str(tmp_path / "run"))
+    assert outcome.status == 0, outcome.err
     assert (tmp_path / "run" / "recording.rrd").stat().st_size > 10_000
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["outcome"] == "done"
     assert cmg_mj("check", scenario).status == 0
     observers = ("--observers", "homogeneous,linear", "--worlds", "2")
-    done = cmg_mj("compare", scenario, *settings, *observers, "--out", str(tmp_path / "compared"))
-    assert done.status == 0, done.err
+    outcome = cmg_mj("compare", scenario, *settings, *observers, "--out", str(tmp_path / "compared"))
+    assert outcome.status == 0, outcome.err

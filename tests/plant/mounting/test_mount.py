@@ -1,4 +1,4 @@
-"""What mount makes: the file is the spec, joints are held, and the line on the floor is a hinge as far as it tilts."""
+"""The result of mount: the file is the spec, joints are held, and the line on the floor tilts like a hinge."""
 
 from __future__ import annotations
 
@@ -62,15 +62,15 @@ def everything(model: mujoco.MjModel) -> dict[str, np.ndarray]:
 def test_the_file_is_the_spec(name: str) -> None:
     """MuJoCo writes six digits."""
     result = mount(ROBOTS[name].path, **ROBOTS[name].options)
-    of_file, of_spec = mujoco.MjModel.from_xml_path(str(result.save("rig.xml"))), result.spec.compile()
-    saved, spec = everything(of_file), everything(of_spec)
+    file_model, spec_model = mujoco.MjModel.from_xml_path(str(result.save("rig.xml"))), result.spec.compile()
+    file_arrays, spec_arrays = everything(file_model), everything(spec_model)
     for field in ("body_mass", "body_inertia", "body_pos", "jnt_axis", "eq_solimp", "site_pos"):
-        np.testing.assert_allclose(saved[field], spec[field], rtol=1e-4, atol=1e-5, err_msg=field)
+        np.testing.assert_allclose(file_arrays[field], spec_arrays[field], rtol=1e-4, atol=1e-5, err_msg=field)
     for field in ("qpos", "qvel", "act", "ctrl"):
-        actual, expected = (getattr(model.key("equilibrium"), field) for model in (of_file, of_spec))
+        actual, expected = (getattr(model.key("equilibrium"), field) for model in (file_model, spec_model))
         np.testing.assert_allclose(actual, expected, rtol=1e-4, atol=1e-5, err_msg=field)
-    np.testing.assert_allclose(saved["eq_data"][:, :5], spec["eq_data"][:, :5], atol=1e-5)
-    assert {k: v.shape for k, v in saved.items()} == {k: v.shape for k, v in spec.items()}
+    np.testing.assert_allclose(file_arrays["eq_data"][:, :5], spec_arrays["eq_data"][:, :5], atol=1e-5)
+    assert {k: v.shape for k, v in file_arrays.items()} == {k: v.shape for k, v in spec_arrays.items()}
 
 
 def test_a_spec_is_taken_and_not_changed() -> None:
@@ -84,17 +84,17 @@ def test_a_spec_is_taken_and_not_changed() -> None:
 @pytest.mark.slow
 def test_every_joint_is_held_where_it_stands() -> None:
     """A ball, too, and in any pose of its reference: a run with pushes moves them by less than 0.1 deg."""
-    instance = mount(mujoco.MjSpec.from_string(BALL), "pole")
-    assert instance.held == ("shoulder", "gripper")
-    model = instance.save("rig.xml")
-    can = prospects(write_scenario(model, model, "homogeneous"))
-    assert not can.hints
-    result = write_scenario(model, model, "homogeneous", can).run()
+    mounting = mount(mujoco.MjSpec.from_string(BALL), "pole")
+    assert mounting.held == ("shoulder", "gripper")
+    model = mounting.save("rig.xml")
+    outlook = prospects(write_scenario(model, model, "homogeneous"))
+    assert not outlook.hints
+    result = write_scenario(model, model, "homogeneous", outlook).run()
     assert result.stood.all()
     trajectory = result.trajectory
     assert trajectory is not None
-    turned = np.stack([trajectory[f"orientation/shoulder/{part}"] for part in "xyz"])
-    assert np.degrees(2.0 * np.abs(turned)).max() < 0.1
+    quaternions = np.stack([trajectory[f"orientation/shoulder/{part}"] for part in "xyz"])
+    assert np.degrees(2.0 * np.abs(quaternions)).max() < 0.1
     assert np.abs(trajectory["position/gripper_m"]).max() < 1e-3
 
 
@@ -133,10 +133,10 @@ def test_the_line_on_the_floor_is_a_hinge_in_its_place() -> None:
     frame.add_joint(name="roll", type=mujoco.mjtJoint.mjJNT_HINGE, pos=free.point, axis=free.direction)
     spec.key("equilibrium").qpos, spec.key("equilibrium").qvel = [0.0, *qpos[7:]], [0.0, *qvel[6:]]
     hinged = spec.compile()
-    fixed = find_axis(hinged, hinged.key("equilibrium").id, "", axes_of(hinged)[""])
+    hinge_axis = find_axis(hinged, hinged.key("equilibrium").id, "", axes_of(hinged)[""])
     for name in ("J1", "J2", "J_d", "omega_d", "gravity_torque"):
-        expected = getattr(fixed.reduced, name)
-        assert getattr(free.reduced, name) == pytest.approx(expected, rel=1e-5, abs=1e-6 * fixed.reduced.J1), name
+        expected = getattr(hinge_axis.reduced, name)
+        assert getattr(free.reduced, name) == pytest.approx(expected, rel=1e-5, abs=1e-6 * hinge_axis.reduced.J1), name
 
 
 def test_meshes_are_found_from_another_folder(tmp_path: Path) -> None:
@@ -160,21 +160,23 @@ def test_meshes_are_found_from_another_folder(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_second_axis(tmp_path: Path) -> None:
     """A universal joint, mounted twice: the hinge that was held is let go, the first pair is kept, both stand."""
-    once = mount(
+    first = mount(
         mujoco.MjSpec.from_string(UNIVERSAL.format(0)), "trunk", axis="roll", name="roll", position=(0.0, 0.0, 0.15)
     )
-    assert once.held == ("pitch",)
-    twice = mount(once.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.35))
-    assert twice.held == ()
-    assert [equality.name for equality in twice.spec.equalities] == []
-    model = twice.save("rig.xml")
-    can = prospects(write_scenario(model, model, "homogeneous", axis="pitch"), "pitch")
-    experiment = write_scenario(model, model, "homogeneous", can, "pitch")
+    assert first.held == ("pitch",)
+    second = mount(first.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.35))
+    assert second.held == ()
+    assert [equality.name for equality in second.spec.equalities] == []
+    model = second.save("rig.xml")
+    outlook = prospects(write_scenario(model, model, "homogeneous", axis="pitch"), "pitch")
+    experiment = write_scenario(model, model, "homogeneous", outlook, "pitch")
     assert experiment.plant.axis_names == ["roll", "pitch"]
-    assert can.reduced == experiment.plant.single_axis("pitch").reduced != experiment.plant.single_axis("roll").reduced
+    assert (
+        outlook.reduced == experiment.plant.single_axis("pitch").reduced != experiment.plant.single_axis("roll").reduced
+    )
     assert prepare(experiment.scenario).run_many(3, keep_trajectory=False).stood.all()
     with pytest.raises(InputError, match="no room: the modules overlap 'roll/cube1', which is there already"):
-        mount(once.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.15))
+        mount(first.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.15))
     off = mount(
         mujoco.MjSpec.from_string(UNIVERSAL.format(0.01)), "trunk", axis="roll", name="roll", position=(0, 0, 0.15)
     )
@@ -190,10 +192,10 @@ def test_keyframes_of_its_own_are_kept() -> None:
     result = mount(mujoco.MjSpec.from_string(text), "pole", keyframe="home")
     model = result.spec.compile()
     assert [model.key(i).name for i in range(model.nkey)] == ["equilibrium", "home", "up"]
-    home, stands = model.key("home"), model.key("equilibrium")
+    home, equilibrium = model.key("home"), model.key("equilibrium")
     assert home.qpos[0] == pytest.approx(0.1)
-    assert home.qpos[5] == stands.qpos[5] == pytest.approx(0.05)
-    assert stands.ctrl.tolist() == home.ctrl.tolist()
+    assert home.qpos[5] == equilibrium.qpos[5] == pytest.approx(0.05)
+    assert equilibrium.ctrl.tolist() == home.ctrl.tolist()
     assert model.equality("gripper_held").data[0] == pytest.approx(0.05)
 
 

@@ -1,4 +1,4 @@
-"""What mount refuses, in one line that says what, where and what would do."""
+"""The refusals of mount, in one line that says what, where and what would do."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ def pole(**changes: str) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(POLE.format(**(fields | changes)))
 
 
-def torso(*replaced: tuple[str, str]) -> mujoco.MjSpec:
+def torso(*replacements: tuple[str, str]) -> mujoco.MjSpec:
     text = TORSO.read_text(encoding="utf-8")
-    for old, new in replaced:
+    for old, new in replacements:
         assert old in text
         text = text.replace(old, new)
     return mujoco.MjSpec.from_string(text)
@@ -55,7 +55,7 @@ FOOT = '<joint name="front_hip"', '<geom type="box" size="0.2 0.2 0.02" pos="0 0
 LYING = 'keyframe><key name="lying" qpos="0 0 0.2 0.7071 0.7071 0 0 0 0"/></keyframe></mujoco'
 NO_FLOOR = '<geom name="floor" type="plane" size="4 4 0.1" rgba="0.8 0.82 0.85 1"/>', ""
 
-REFUSED: dict[str, tuple[mujoco.MjSpec, dict[str, Any], str]] = {
+REFUSALS: dict[str, tuple[mujoco.MjSpec, dict[str, Any], str]] = {
     "an unknown body": (pole(), {"body": "pol"}, "--body pol: robot has no such body; did you mean 'pole'. its bodies"),
     "the world": (pole(), {"body": "world"}, "--body world: .*no such body"),
     "an unknown hinge": (pole(), {"axis": "ankel"}, "--axis ankel: .*did you mean 'ankle'"),
@@ -121,29 +121,29 @@ REFUSED: dict[str, tuple[mujoco.MjSpec, dict[str, Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("case", REFUSED)
+@pytest.mark.parametrize("case", REFUSALS)
 def test_refused_in_one_line(case: str) -> None:
-    spec, options, message = REFUSED[case]
+    spec, options, message = REFUSALS[case]
     arguments: dict[str, Any] = {"body": "pole", "axis": "y"} | options
-    with pytest.raises(InputError, match=message) as refused:
+    with pytest.raises(InputError, match=message) as info:
         mount(spec, **arguments)
-    assert "\n" not in str(refused.value)
+    assert "\n" not in str(info.value)
 
 
 def test_an_axis_that_is_there_already() -> None:
-    once = mount(pole(), "pole").spec
+    spec = mount(pole(), "pole").spec
     with pytest.raises(InputError, match="has an axis already: give the new one a name, such as --name pitch"):
-        mount(once, "pole")
-    named = mount(pole(), "pole", name="pitch").spec
+        mount(spec, "pole")
+    named_spec = mount(pole(), "pole", name="pitch").spec
     with pytest.raises(InputError, match="has an element 'pitch/tilt' already"):
-        mount(named, "pole", name="pitch")
+        mount(named_spec, "pole", name="pitch")
 
 
 def test_a_file_that_is_no_robot() -> None:
     Path("broken.xml").write_text("<mujoco><worldbody><body", encoding="utf-8")
     Path("empty.xml").write_text("", encoding="utf-8")
-    for name, what in (("none.xml", "no such file"), ("broken.xml", "syntax error"), ("empty.xml", "not a model")):
-        assert what in cmg_mj("mount", name, "--body", "torso").complaint
+    for name, complaint in (("none.xml", "no such file"), ("broken.xml", "syntax error"), ("empty.xml", "not a model")):
+        assert complaint in cmg_mj("mount", name, "--body", "torso").complaint
     assert not Path("balanced.xml").exists()
 
 

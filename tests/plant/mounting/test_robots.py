@@ -24,7 +24,7 @@ WORLDS = 10
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
-def resting(
+def robot_at_rest(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Experiment, RecoverableLimit, str]:
     """A robot with its pair, what its reduced model says, its name."""
@@ -35,14 +35,14 @@ def resting(
 
 
 @pytest.fixture(scope="module")
-def mounted(resting: tuple[Experiment, RecoverableLimit, str]) -> tuple[Experiment, Prospects, str]:
+def mounting(robot_at_rest: tuple[Experiment, RecoverableLimit, str]) -> tuple[Experiment, Prospects, str]:
     """The same with all that `mount` says of it."""
-    experiment, _, name = resting
-    can = prospects(experiment)
-    return write_scenario(experiment.plant.path, ROBOTS[name].path, "homogeneous", can), can, name
+    experiment, _, name = robot_at_rest
+    outlook = prospects(experiment)
+    return write_scenario(experiment.plant.path, ROBOTS[name].path, "homogeneous", outlook), outlook, name
 
 
-def pushed(
+def surviving_worlds(
     experiment: Experiment, torque: float, duration_s: float, tilt_deg: float = 0.0, at_s: float = 2.0
 ) -> np.ndarray:
     """Which of ten worlds stand to the end."""
@@ -51,60 +51,62 @@ def pushed(
     plant = scenario.plant.__class__(
         model=str(experiment.plant.path), equilibrium_bias_deg=0.0, initial_tilt_deg=tilt_deg
     )
-    changed = scenario.model_copy(update={"push": push, "duration_s": duration_s, "plant": plant})
-    return prepare(changed).run_many(WORLDS, keep_trajectory=False).stood
+    variation = scenario.model_copy(update={"push": push, "duration_s": duration_s, "plant": plant})
+    return prepare(variation).run_many(WORLDS, keep_trajectory=False).stood
 
 
 @pytest.mark.slow
-def test_it_stands_thirty_seconds(mounted: tuple[Experiment, Prospects, str]) -> None:
+def test_it_stands_thirty_seconds(mounting: tuple[Experiment, Prospects, str]) -> None:
     """Ten seeds, default sensors, `homogeneous`, from the smaller of a degree and a quarter of the ceiling."""
-    experiment, can, _ = mounted
-    tilt = min(1.0, 0.25 * math.degrees(can.limit.tilt))
-    assert pushed(experiment, 0.0, 30.0, tilt).all()
+    experiment, outlook, _ = mounting
+    tilt = min(1.0, 0.25 * math.degrees(outlook.limit.tilt))
+    assert surviving_worlds(experiment, 0.0, 30.0, tilt).all()
 
 
 @pytest.mark.slow
-def test_it_stands_thirty_seconds_with_a_push(mounted: tuple[Experiment, Prospects, str]) -> None:
+def test_it_stands_thirty_seconds_with_a_push(mounting: tuple[Experiment, Prospects, str]) -> None:
     """The same with 0.6 E, once the gimbals have come back from the start: E is borne by gimbals that are upright."""
-    experiment, can, _ = mounted
-    tilt = min(1.0, 0.25 * math.degrees(can.limit.tilt))
-    assert pushed(experiment, 0.6 * can.push_margin.median_impulse / PUSH_S, 30.0, tilt, PUSHED_AT_S).all()
+    experiment, outlook, _ = mounting
+    tilt = min(1.0, 0.25 * math.degrees(outlook.limit.tilt))
+    assert surviving_worlds(
+        experiment, 0.6 * outlook.push_margin.median_impulse / PUSH_S, 30.0, tilt, PUSHED_AT_S
+    ).all()
 
 
 @pytest.mark.slow
-def test_it_bears_what_the_reduced_model_says(mounted: tuple[Experiment, Prospects, str]) -> None:
+def test_it_recovers_from_what_the_reduced_model_says(mounting: tuple[Experiment, Prospects, str]) -> None:
     """E is within 35 % of the simulation's: most stand 0.65 E and fall with E/0.65; all fall with 1.8 E."""
-    experiment, can, _ = mounted
-    assert not can.hints
-    torque = can.push_margin.median_impulse / PUSH_S
-    assert 0.0 < can.push_margin.median_impulse < can.limit_push_impulse
-    assert pushed(experiment, 0.65 * torque, 8.0).sum() > WORLDS / 2
-    assert pushed(experiment, torque / 0.65, 8.0).sum() < WORLDS / 2
-    assert not pushed(experiment, 1.8 * torque, 8.0).any()
+    experiment, outlook, _ = mounting
+    assert not outlook.hints
+    torque = outlook.push_margin.median_impulse / PUSH_S
+    assert 0.0 < outlook.push_margin.median_impulse < outlook.limit_push_impulse
+    assert surviving_worlds(experiment, 0.65 * torque, 8.0).sum() > WORLDS / 2
+    assert surviving_worlds(experiment, torque / 0.65, 8.0).sum() < WORLDS / 2
+    assert not surviving_worlds(experiment, 1.8 * torque, 8.0).any()
 
 
-def test_it_starts_to_fall_as_its_reduced_model_does(resting: tuple[Experiment, RecoverableLimit, str]) -> None:
+def test_it_starts_to_fall_as_its_reduced_model_does(robot_at_rest: tuple[Experiment, RecoverableLimit, str]) -> None:
     """Nothing controlled, the simulated robot leans as cosh(lambda t): inertia, gravity and the line are right.
 
     Without the damping that a file gives its joints, which the reduced model does not have: its 1 N m s/rad makes the
     pole of Gymnasium's inverted_pendulum 6 % smaller; no other's changes by more than 0.1 %.
     """
-    experiment, limit, _ = resting
+    experiment, limit, _ = robot_at_rest
     plant = experiment.plant
     undamped = copy.copy(plant.model)
     undamped.dof_damping[:] = 0.0
     assert simulated_pole(undamped, plant.key, plant.axis.line) == pytest.approx(limit.pole, rel=0.03)
 
 
-def test_plain_mujoco_loads_it_and_it_rests(resting: tuple[Experiment, RecoverableLimit, str]) -> None:
+def test_plain_mujoco_loads_it_and_it_rests(robot_at_rest: tuple[Experiment, RecoverableLimit, str]) -> None:
     """At the keyframe nothing accelerates but for what the flywheels' motors do."""
-    experiment, limit, name = resting
+    experiment, limit, name = robot_at_rest
     model = mujoco.MjModel.from_xml_path(str(experiment.plant.path))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
     mujoco.mj_forward(model, data)
-    tilting = experiment.plant.axis.line.motion(model, data) @ data.qacc
-    assert abs(tilting) < math.radians(0.05) * limit.pole**2
+    tilt_acceleration = experiment.plant.axis.line.motion(model, data) @ data.qacc
+    assert abs(tilt_acceleration) < math.radians(0.05) * limit.pole**2
     assert isinstance(experiment.plant.axis.line, SupportLine if ROBOTS[name].on_contacts else HingeLine)
 
 

@@ -1,4 +1,4 @@
-"""What robots' files have that is seldom: each is mounted as the plain one is, or refused in one line."""
+"""Rare elements of robots' files: each is mounted as the plain one is, or refused in one line."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ TRUNK = """
 </mujoco>
 """
 NECK = '<joint name="neck" axis="0 1 0"/>'
-BENT = '<keyframe><key name="bent" qpos="0 0.3"/></keyframe>'
+BENT_KEYFRAME = '<keyframe><key name="bent" qpos="0 0.3"/></keyframe>'
 UPRIGHT = """
 <mujoco>
   <compiler angle="radian"/>
@@ -55,19 +55,19 @@ def trunk(**changes: str) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(TRUNK.format(**fields))
 
 
-def mounted(**options: Any) -> MountedRobot:
+def mount_head(**options: Any) -> MountedRobot:
     changes = {name: options.pop(name) for name in list(options) if name in TRUNK and isinstance(options[name], str)}
     return mount(trunk(**changes), **{"body": "trunk", "axis": "hip", "position": (0.0, 0.0, 0.5), **options})
 
 
 def rig(**options: Any) -> Plant:
-    return load_plant(model=str(mounted(**options).save("rig.xml")))
+    return load_plant(model=str(mount_head(**options).save("rig.xml")))
 
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Plant:
     """The head fixed to the trunk."""
-    return load_plant(model=str(mounted().save(tmp_path_factory.mktemp("plain") / "plain.xml")))
+    return load_plant(model=str(mount_head().save(tmp_path_factory.mktemp("plain") / "plain.xml")))
 
 
 def same(result: Plant, expected: Plant) -> None:
@@ -132,17 +132,17 @@ def test_a_compilers_setting_leaves_modules_as_they_are(plain: Plant, head: str)
 
 
 @pytest.mark.parametrize(
-    ("tie", "held"),
+    ("equality", "held_joints"),
     [
         ('<joint name="neck_held" joint1="neck" active="false"/>', ("neck",)),
         ('<joint name="neck_held" joint1="neck" joint2="hip" active="false"/>', ("neck",)),
         ('<joint name="mine" joint1="neck"/>', ()),
     ],
 )
-def test_a_joint_is_held_already_by_what_holds_it(plain: Plant, tie: str, held: tuple[str, ...]) -> None:
+def test_a_joint_is_held_already_by_what_holds_it(plain: Plant, equality: str, held_joints: tuple[str, ...]) -> None:
     """Not by a name; nor do names collide."""
-    result = mounted(joint=NECK, after=f"<equality>{tie}</equality>")
-    assert result.held == held
+    result = mount_head(joint=NECK, after=f"<equality>{equality}</equality>")
+    assert result.held == held_joints
     same(load_plant(model=str(result.save("rig.xml"))), plain)
 
 
@@ -158,12 +158,12 @@ def test_a_joint_is_held_already_by_what_holds_it(plain: Plant, tie: str, held: 
         ('<general name="s" joint="neck" biastype="affine" gainprm="1000" biasprm="20 -2000 -20"/>', 0.58, None),
     ],
 )
-def test_a_servo_is_told_what_holds_it_where_it_stands(
+def test_a_servo_gets_the_setpoint_that_holds_it_where_it_stands(
     servo: str, setpoint: float, state: float | None, hold: str
 ) -> None:
     """It exerts no force there; what it is told is not its joint's position, with a gear or an offset."""
-    after = f"<actuator>{servo}</actuator>{BENT}"
-    result = mounted(joint=NECK, after=after, keyframe="bent", hold=hold)
+    actuators = f"<actuator>{servo}</actuator>{BENT_KEYFRAME}"
+    result = mount_head(joint=NECK, after=actuators, keyframe="bent", hold=hold)
     assert result.held == (() if hold == "servos" else ("neck",))
     plant = load_plant(model=str(result.save("rig.xml")))
     data = mujoco.MjData(plant.model)
@@ -181,12 +181,12 @@ def test_a_servo_is_told_what_holds_it_where_it_stands(
 
 @pytest.mark.parametrize("drive", ["motor", "velocity"])
 def test_what_only_drives_a_joint_does_not_hold_it(drive: str) -> None:
-    after = f'<actuator><{drive} name="s" joint="neck"/></actuator>'
-    assert mounted(joint=NECK, after=after, hold="servos").held == ("neck",)
+    actuators = f'<actuator><{drive} name="s" joint="neck"/></actuator>'
+    assert mount_head(joint=NECK, after=actuators, hold="servos").held == ("neck",)
 
 
 def test_joints_without_a_name_get_one_that_is_free() -> None:
-    result = mounted(joint="<joint/>", more='<body><joint name="head_joint"/><geom size="0.01" mass="0.01"/></body>')
+    result = mount_head(joint="<joint/>", more='<body><joint name="head_joint"/><geom size="0.01" mass="0.01"/></body>')
     assert sorted(result.held) == ["head_joint", "head_joint_2"]
 
 
@@ -210,22 +210,22 @@ def test_joints_without_a_name_get_one_that_is_free() -> None:
     ],
 )
 def test_refused_in_one_line(changes: dict[str, str], options: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message) as refused:
-        mounted(**changes, **options)
-    assert "\n" not in str(refused.value)
+    with pytest.raises(InputError, match=message) as info:
+        mount_head(**changes, **options)
+    assert "\n" not in str(info.value)
 
 
 @pytest.mark.parametrize(
-    ("frame", "turned"),
+    ("frame", "rotation"),
     [
         ('pos="1 0 0.5" euler="0 0 0.7"', ""),
         ('pos="1 0 0.5" euler="0 0 0.7"', 'euler="0 0 0.5"'),
         ('pos="1 0 0.5" euler="0.5 0 0"', 'euler="-0.5 0 0"'),
     ],
 )
-def test_a_free_base_within_a_frame_stands_where_it_stood(frame: str, turned: str) -> None:
+def test_a_free_base_within_a_frame_stands_where_it_stood(frame: str, rotation: str) -> None:
     """Over the same place of the floor, turned the same way; the frame counts once."""
-    text = UPRIGHT.format(before=f"<frame {frame}>", turned=turned, more="", after="</frame>")
+    text = UPRIGHT.format(before=f"<frame {frame}>", turned=rotation, more="", after="</frame>")
     reference = mujoco.MjModel.from_xml_string(text)
     before = mujoco.MjData(reference)
     mujoco.mj_forward(reference, before)

@@ -18,11 +18,11 @@ from tests.plant.mounting.robots import EXAMPLES, ROBOTS
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 TORSO = EXAMPLES / "torso.xml"
-GIVEN = ("mount", str(TORSO), "--body", "torso", "--axis", "x", "--scale", "1.3")
+MOUNT = ("mount", str(TORSO), "--body", "torso", "--axis", "x", "--scale", "1.3")
 NO_XML = "must be a file that ends in .xml, such as balanced.xml"
 
 
-def there() -> list[str]:
+def files() -> list[str]:
     return sorted(str(path) for path in Path().rglob("*"))
 
 
@@ -39,8 +39,8 @@ def there() -> list[str]:
 )
 def test_the_place_is_looked_at_before_anything_is_made(out: str, message: str) -> None:
     Path("folder.xml").mkdir()
-    assert message in cmg_mj(*GIVEN, "-o", out, "--overwrite").complaint
-    assert there() == ["folder.xml"]
+    assert message in cmg_mj(*MOUNT, "-o", out, "--overwrite").complaint
+    assert files() == ["folder.xml"]
     spec = mujoco.MjSpec.from_file(str(TORSO))
     with pytest.raises(InputError):
         mount(spec, "torso", axis="x", scale=1.3).save(out)
@@ -49,8 +49,8 @@ def test_the_place_is_looked_at_before_anything_is_made(out: str, message: str) 
 @pytest.mark.parametrize("observer", ["homogenous", "nowhere:Class"])
 def test_an_observer_that_is_none_leaves_nothing(observer: str) -> None:
     Path("a.xml").write_text("mine", encoding="utf-8")
-    assert observer.partition(":")[0] in cmg_mj(*GIVEN, "-o", "a.xml", "--overwrite", "--observer", observer).complaint
-    assert (there(), Path("a.xml").read_text(encoding="utf-8")) == (["a.xml"], "mine")
+    assert observer.partition(":")[0] in cmg_mj(*MOUNT, "-o", "a.xml", "--overwrite", "--observer", observer).complaint
+    assert (files(), Path("a.xml").read_text(encoding="utf-8")) == (["a.xml"], "mine")
 
 
 def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -58,44 +58,44 @@ def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.Monke
     for name in ("a.xml", "a.toml"):
         Path(name).write_text("mine", encoding="utf-8")
 
-    def fails(*_: object, **__: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise InputError(f"{next(Path().glob('.a.*.partial.xml'))}: fails")
 
-    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files.prospects", fails)
-    assert "a.xml: fails" in cmg_mj(*GIVEN, "-o", "a.xml", "--overwrite").complaint
-    assert there() == ["a.toml", "a.xml"]
-    assert [Path(name).read_text(encoding="utf-8") for name in there()] == ["mine", "mine"]
+    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files.prospects", fail)
+    assert "a.xml: fails" in cmg_mj(*MOUNT, "-o", "a.xml", "--overwrite").complaint
+    assert files() == ["a.toml", "a.xml"]
+    assert [Path(name).read_text(encoding="utf-8") for name in files()] == ["mine", "mine"]
 
 
 def test_a_file_that_the_robot_includes_is_never_overwritten() -> None:
     Path("part.xml").write_bytes(TORSO.read_bytes())
     Path("robot.xml").write_text('<mujoco><include file="part.xml"/></mujoco>', encoding="utf-8")
-    arguments = ("mount", "robot.xml", *GIVEN[2:])
+    arguments = ("mount", "robot.xml", *MOUNT[2:])
     message = cmg_mj(*arguments, "-o", "part.xml", "--overwrite").complaint
     assert "-o part.xml: part.xml is the robot's own file, or one that it names" in message
     assert Path("part.xml").read_bytes() == TORSO.read_bytes()
-    assert there() == ["part.xml", "robot.xml"]
+    assert files() == ["part.xml", "robot.xml"]
     with pytest.raises(InputError, match=r"part\.xml is the robot's own file"):
         mount("robot.xml", "torso", axis="x", scale=1.3).save("part.xml")
 
 
 @pytest.mark.slow
 def test_what_is_written_speaks_of_itself_alone() -> None:
-    assert json.loads(cmg_mj(*GIVEN, "-o", "a.xml", "--json").out)["model"] == "a.xml"
-    assert there() == ["a.toml", "a.xml"]
+    assert json.loads(cmg_mj(*MOUNT, "-o", "a.xml", "--json").out)["model"] == "a.xml"
+    assert files() == ["a.toml", "a.xml"]
     text = Path("a.toml").read_text(encoding="utf-8")
     assert 'model = "a.xml"' in text
     assert "partial" not in text + Path("a.xml").read_text(encoding="utf-8")
 
 
 def test_what_mujoco_cannot_do_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object, **__: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise ValueError("Error: repeated name 'x'\nin frame")
 
-    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files.mount_on_request", fails)
-    message = cmg_mj(*GIVEN, "-o", "a.xml").complaint
+    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files.mount_on_request", fail)
+    message = cmg_mj(*MOUNT, "-o", "a.xml").complaint
     assert f"{TORSO}: MuJoCo cannot put a pair on it: repeated name 'x' in frame" in message
-    assert there() == []
+    assert files() == []
 
 
 def test_the_document_has_the_commands_of_its_robots() -> None:
@@ -104,7 +104,12 @@ def test_the_document_has_the_commands_of_its_robots() -> None:
     assert "\n".join(robot.command for robot in ROBOTS.values()) in text
 
 
-def test_a_command_of_the_document() -> None:
+def test_a_command_of_the_document(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In two worlds of eight pushes: how large a push they recover from is of no account here."""
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.WORLDS", 2)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.LEVELS", 8)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.BEFORE_S", 0.1)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.AFTER_TIME_CONSTANTS", 3.0)
     words = shlex.split(ROBOTS["bicycle"].command)
     assert cmg_mj("mount", str(ROBOTS["bicycle"].path), *words[3:], "-o", "a.xml").status == 0
     result = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options).save("b.xml")

@@ -19,9 +19,9 @@ from cmg_mj.inputs.bundled import folder
 
 N = 11
 SIDE = 0.095
-"""Half of a cube's edge: the cubes' centres lie as far from the two middle planes [m]."""
+"""Half of a module's edge: the modules' centres lie as far from the two middle planes [m]."""
 HEIGHT = 0.134
-"""Of the cubes' centres above the joint [m]."""
+"""Height of the modules' centres above the joint [m]."""
 MODULES = {
     "roll/cube1": ((SIDE, SIDE), -math.pi / 2.0),
     "roll/cube2": ((-SIDE, -SIDE), -math.pi / 2.0),
@@ -30,7 +30,7 @@ MODULES = {
 }
 """Where each stands in the frame, and how it is turned."""
 FRAME_HEIGHT = 0.1
-"""Of the frame's own centre [m]."""
+"""Height of the frame's own centre [m]."""
 G = 9.81
 
 
@@ -48,7 +48,7 @@ class Part(NamedTuple):
     """Coordinate and world axis (..., 3) of each joint on the way to it."""
 
 
-def _about(axis: str, angle: np.ndarray | float) -> np.ndarray:
+def _rotation(axis: str, angle: np.ndarray | float) -> np.ndarray:
     """Rotation matrices about x, y or z, (..., 3, 3); angles may be complex."""
     c, s, zero, one = np.cos(angle), np.sin(angle), 0.0 * angle, 1.0 + 0.0 * angle
     rows = {
@@ -64,34 +64,34 @@ class Chain:
 
     def __init__(self, model: str = "two_axes.xml") -> None:
         spec = mujoco.MjSpec.from_file(str(folder("models") / model))
-        self.of = {body.name: (float(body.mass), np.array(body.inertia)) for body in spec.bodies if body.name}
+        self.inertias = {body.name: (float(body.mass), np.array(body.inertia)) for body in spec.bodies if body.name}
 
     def parts(self, q: np.ndarray) -> list[Part]:
         """All bodies at coordinates q (..., 11)."""
         a, r, p = (q[..., i] for i in range(3))
-        up = np.broadcast_to([0.0, 0.0, 1.0], (*np.shape(a), 3))
-        bearing = _about("z", a)
-        cross = bearing @ _about("x", r)
-        frame = cross @ _about("y", p)
-        yaw, roll, pitch = (0, up), (1, bearing[..., :, 0]), (2, cross[..., :, 1])
+        vertical = np.broadcast_to([0.0, 0.0, 1.0], (*np.shape(a), 3))
+        bearing = _rotation("z", a)
+        cross = bearing @ _rotation("x", r)
+        frame = cross @ _rotation("y", p)
+        yaw, roll, pitch = (0, vertical), (1, bearing[..., :, 0]), (2, cross[..., :, 1])
         three = [yaw, roll, pitch]
-        nowhere = 0.0 * up
+        origin = 0.0 * vertical
         result = [
-            Part(*self.of["thrust_bearing"], bearing, nowhere, [yaw]),  # its centre is on the vertical
-            Part(*self.of["cross"], cross, nowhere, [yaw, roll]),
-            Part(*self.of["frame"], frame, FRAME_HEIGHT * frame[..., :, 2], three),
+            Part(*self.inertias["thrust_bearing"], bearing, origin, [yaw]),  # its centre is on the vertical
+            Part(*self.inertias["cross"], cross, origin, [yaw, roll]),
+            Part(*self.inertias["frame"], frame, FRAME_HEIGHT * frame[..., :, 2], three),
         ]
-        for i, (name, ((x, y), turned)) in enumerate(MODULES.items()):
+        for i, (name, ((x, y), module_angle)) in enumerate(MODULES.items()):
             place = frame @ np.array([x, y, HEIGHT])
-            half = frame @ _about("z", turned)
-            gimbal = half @ _about("x", q[..., 3 + 2 * i])
-            wheel = gimbal @ _about("y", q[..., 4 + 2 * i])
-            to_gimbal = [*three, (3 + 2 * i, half[..., :, 0])]
-            to_wheel = [*to_gimbal, (4 + 2 * i, gimbal[..., :, 1])]
+            half = frame @ _rotation("z", module_angle)
+            gimbal = half @ _rotation("x", q[..., 3 + 2 * i])
+            wheel = gimbal @ _rotation("y", q[..., 4 + 2 * i])
+            gimbal_axes = [*three, (3 + 2 * i, half[..., :, 0])]
+            wheel_axes = [*gimbal_axes, (4 + 2 * i, gimbal[..., :, 1])]
             result += [
-                Part(*self.of[f"{name}/half"], half, place, three),
-                Part(*self.of[f"{name}/gimbal"], gimbal, place, to_gimbal),
-                Part(*self.of[f"{name}/flywheel"], wheel, place, to_wheel),
+                Part(*self.inertias[f"{name}/half"], half, place, three),
+                Part(*self.inertias[f"{name}/gimbal"], gimbal, place, gimbal_axes),
+                Part(*self.inertias[f"{name}/flywheel"], wheel, place, wheel_axes),
             ]
         return result
 
@@ -126,9 +126,11 @@ class Chain:
         return -self._slopes(self.potential, q)
 
     def bias(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-        """What Lagrange's equations have besides M ddq: dM/dt dq - d(T - P)/dq, (..., 11) [N m]."""
-        along = np.imag(self.momenta(q + 1e-30j * dq, dq)) / 1e-30  # the derivative of M along the motion, exactly
-        return along - self._slopes(lambda at: self.kinetic(at, dq) - self.potential(at), q)
+        """Return the terms of Lagrange's equations besides M ddq: dM/dt dq - d(T - P)/dq, (..., 11) [N m]."""
+        derivative = np.imag(self.momenta(q + 1e-30j * dq, dq)) / 1e-30  # the derivative of M along the motion, exactly
+        return derivative - self._slopes(
+            lambda coordinates: self.kinetic(coordinates, dq) - self.potential(coordinates), q
+        )
 
     @staticmethod
     def _slopes(function: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> np.ndarray:

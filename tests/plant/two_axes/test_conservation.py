@@ -1,4 +1,4 @@
-"""What the two-axis rig's motion must conserve and the work it must account for, by the derivation of `chain.py`.
+"""Conservation laws and the balance of work of the two-axis rig's motion, by the derivation of `chain.py`.
 
 The wheels spin with 54 J each, which would hide everything else: the energy watched is the platform's, T + P without
 1/2 J_d (axial absolute angular velocity)^2 of each wheel, P counted from the hanging position.
@@ -15,6 +15,7 @@ from cmg_mj.plant.plant import Plant, load_plant
 from tests.plant.full_model import Motion, motion, passive
 from tests.plant.test_conservation import CONTROL_PERIOD_S, NEWTON_COTES, STEPS
 from tests.plant.two_axes.chain import Chain, G, N
+from tests.tiers import slow_but
 
 N_WORLDS = 6
 WHEELS = [4, 6, 8, 10]
@@ -22,7 +23,7 @@ GIMBALS = [3, 5, 7, 9]
 J_D, SPEED = 1.1e-3, 314.0
 NAMES = ("platform energy", "vertical momentum", *(f"wheel {i}'s momentum" for i in (1, 2, 3, 4)))
 CHAIN = Chain()
-HANGING = 10.9 * G * 0.1327
+LOWEST_ENERGY = 10.9 * G * 0.1327
 
 
 def initial_states(seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -43,7 +44,7 @@ def initial_states(seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def energy(run: Motion, *, gravity: bool = True) -> np.ndarray:
     """T + P, (n_worlds, n_samples) [J]."""
-    return CHAIN.kinetic(run.qpos, run.qvel) + gravity * (CHAIN.potential(run.qpos) + HANGING)
+    return CHAIN.kinetic(run.qpos, run.qvel) + gravity * (CHAIN.potential(run.qpos) + LOWEST_ENERGY)
 
 
 def drifts(run: Motion, *, gravity: bool) -> np.ndarray:
@@ -68,9 +69,10 @@ def free_motion(duration_s: float, timestep_s: float, *, gravity: bool, seed: in
     return drifts(Motion(*(samples[:, ::stride] for samples in run)), gravity=gravity)
 
 
+@pytest.mark.parametrize("duration_s", slow_but([2.5, 5.0], 2.5))
 @pytest.mark.parametrize(("gravity", "momentum_bound"), [(False, 1e-7), (True, 1e-5)])
-def test_free_motion_conserves_energy_and_momenta(gravity: bool, momentum_bound: float) -> None:
-    worst = np.abs(free_motion(5.0, 1e-3, gravity=gravity, seed=0, every_s=5e-3)).max(axis=(1, 2))
+def test_free_motion_conserves_energy_and_momenta(gravity: bool, momentum_bound: float, duration_s: float) -> None:
+    worst = np.abs(free_motion(duration_s, 1e-3, gravity=gravity, seed=0, every_s=5e-3)).max(axis=(1, 2))
     print(f"gravity {gravity}:", ", ".join(f"{name} {d:.1e}" for name, d in zip(NAMES, worst, strict=True)))
     assert worst[0] < 1e-6
     assert np.all(worst[1:] < momentum_bound)
@@ -87,10 +89,11 @@ def test_drifts_shrink_with_the_fourth_power_of_the_step(gravity: bool) -> None:
     assert np.all(orders > 3.9)
 
 
-def test_energy_changes_by_the_work_of_servos_and_motors() -> None:
+@pytest.mark.parametrize("n_periods", slow_but([200, 400], 200))
+def test_energy_changes_by_the_work_of_servos_and_motors(n_periods: int) -> None:
     """Gimbals, wheels and yaw are driven, the tilts have friction; every control period is integrated by itself."""
     plant = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0, timestep_s=5e-4, tilt_damping_n_m_s=0.05)
-    model, n_periods = plant.model, 400
+    model = plant.model
     command = _sinusoidal(plant, n_periods)
     qpos, qvel = initial_states(2)
     qvel[:, WHEELS] = np.array([1.0, -1.0, 1.0, -1.0]) * SPEED  # no motor at its limit, which would be a kink
@@ -98,20 +101,20 @@ def test_energy_changes_by_the_work_of_servos_and_motors() -> None:
     run = motion(model, qpos, qvel, n_periods * STEPS * fine, np.repeat(command, STEPS * fine, axis=1))
     run = Motion(*(samples[:, ::fine] for samples in run))
     samples = STEPS * np.arange(n_periods)[:, None] + np.arange(STEPS + 1)
-    inside = Motion(*(field[:, samples] for field in run))  # (n_worlds, n_periods, 6, ...)
-    driving = _torques(plant, inside, command[:, :, None])
-    braking = -model.dof_damping * inside.qvel
-    power = np.sum((driving + braking) * inside.qvel, axis=-1)
-    turnover = np.sum((np.abs(driving) + np.abs(braking)) * np.abs(inside.qvel), axis=-1)
+    segments = Motion(*(field[:, samples] for field in run))  # (n_worlds, n_periods, 6, ...)
+    driving = _torques(plant, segments, command[:, :, None])
+    braking = -model.dof_damping * segments.qvel
+    power = np.sum((driving + braking) * segments.qvel, axis=-1)
+    turnover = np.sum((np.abs(driving) + np.abs(braking)) * np.abs(segments.qvel), axis=-1)
     weights = CONTROL_PERIOD_S * NEWTON_COTES
     change = np.diff(energy(run)[:, ::STEPS], axis=1)
     residual = np.abs(np.cumsum(change - power @ weights, axis=1)).max(axis=1)
     relative = (residual / np.sum(turnover @ weights, axis=1)).max()
-    yaw = np.abs(driving[..., 0] * inside.qvel[..., 0]).max()
-    limited = model.actuator_forcelimited.astype(bool)
-    used = np.abs(driving)[..., model.actuator_trnid[limited, 0]] / model.actuator_forcerange[limited, 1]
+    yaw = np.abs(driving[..., 0] * segments.qvel[..., 0]).max()
+    has_limit = model.actuator_forcelimited.astype(bool)
+    torque_share = np.abs(driving)[..., model.actuator_trnid[has_limit, 0]] / model.actuator_forcerange[has_limit, 1]
     print(f"residual {relative:.1e} of the turnover; yaw's servo gave up to {yaw:.1f} W")
-    assert used.max() < 1.0  # a quadrature of full order
+    assert torque_share.max() < 1.0  # a quadrature of full order
     assert relative < 1e-6
     assert yaw > 1.0
 
@@ -135,9 +138,9 @@ def _torques(plant: Plant, run: Motion, command: np.ndarray) -> np.ndarray:
     torques = np.zeros_like(run.qvel)
     for actuator in range(model.nu):
         joint, setpoint = model.actuator_trnid[actuator, 0], model.actuator_actadr[actuator]
-        wanted = command[..., actuator] if setpoint < 0 else run.act[..., setpoint]
-        _, per_angle, per_rate = model.actuator_biasprm[actuator, :3]
-        torque = model.actuator_gainprm[actuator, 0] * wanted
-        torque = torque + per_angle * run.qpos[..., joint] + per_rate * run.qvel[..., joint]
+        setpoints = command[..., actuator] if setpoint < 0 else run.act[..., setpoint]
+        _, stiffness, damping = model.actuator_biasprm[actuator, :3]
+        torque = model.actuator_gainprm[actuator, 0] * setpoints
+        torque = torque + stiffness * run.qpos[..., joint] + damping * run.qvel[..., joint]
         torques[..., joint] = torque
     return torques

@@ -61,9 +61,9 @@ def test_it_is_locked_where_it_stands_at_the_keyframe(orientation: str, tmp_path
     upper, whole = tmp_path / "two_axes_upper.xml", tmp_path / "two_axes.xml"
     upper.write_text(upper.read_text().replace('<body name="frame">', f'<body name="frame" {orientation}>'))
     whole.write_text(whole.read_text().replace('qpos="0 0 0 1.57', 'qpos="0 0 0.3 1.57'))
-    leaning = load_plant(model=str(whole), locked_axes=["pitch"])
+    tilted_plant = load_plant(model=str(whole), locked_axes=["pitch"])
     upright = load_plant(model="two_axes.xml", locked_axes=["pitch"])
-    np.testing.assert_allclose(astuple(leaning.reduced), astuple(upright.reduced), rtol=1e-9)
+    np.testing.assert_allclose(astuple(tilted_plant.reduced), astuple(upright.reduced), rtol=1e-9)
     whole.write_text(whole.read_text().replace('qpos="0 0 0.3 1.57', 'qpos="0 0 0 1.57'))
     with pytest.raises(InputError, match=r"leans by -17\.2 deg"):
         load_plant(model=str(whole), locked_axes=["pitch"])
@@ -79,11 +79,11 @@ WRONG = [
 
 @pytest.mark.parametrize(("model", "axes", "line"), WRONG)
 def test_what_cannot_be_locked_is_said_in_one_line(model: str, axes: list[str], line: str) -> None:
-    with pytest.raises(InputError) as raised:
+    with pytest.raises(InputError) as info:
         load_plant(model=model, locked_axes=axes)
-    assert str(raised.value).endswith(line)
-    assert "\n" not in str(raised.value)
-    assert str(raised.value).startswith(f"plant.locked_axes = {axes}: ")
+    assert str(info.value).endswith(line)
+    assert "\n" not in str(info.value)
+    assert str(info.value).startswith(f"plant.locked_axes = {axes}: ")
 
 
 def test_it_is_a_list_of_names() -> None:

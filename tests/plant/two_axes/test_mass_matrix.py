@@ -31,8 +31,8 @@ def angles() -> np.ndarray:
 
 
 def test_its_coordinates_are_those_of_the_derivation(plant: Plant) -> None:
-    of_modules = [f"{module}/{joint}" for module in MODULES for joint in ("gimbal", "flywheel")]
-    assert plant.joint_names == ["yaw", "roll", "pitch", *of_modules]
+    module_joints = [f"{module}/{joint}" for module in MODULES for joint in ("gimbal", "flywheel")]
+    assert plant.joint_names == ["yaw", "roll", "pitch", *module_joints]
 
 
 def test_mass_matrix(plant: Plant, chain: Chain, angles: np.ndarray) -> None:
@@ -58,10 +58,10 @@ def test_accelerations_are_those_of_lagrange(plant: Plant, chain: Chain, angles:
 
 
 def test_a_locked_axis_leaves_the_same_rig_without_its_row(chain: Chain, angles: np.ndarray) -> None:
-    for axis, at in (("roll", 1), ("pitch", 2)):
+    for axis, row in (("roll", 1), ("pitch", 2)):
         locked = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0, locked_axes=[axis])
-        others = [i for i in range(N) if i != at]
+        others = [i for i in range(N) if i != row]
         upright = angles.copy()
-        upright[:, at] = 0.0
+        upright[:, row] = 0.0
         theirs = chain.mass_matrix(upright)[:, others][:, :, others]
         np.testing.assert_allclose(mass_matrices(locked.model, angles[:, others]), theirs, rtol=0.0, atol=1e-12)

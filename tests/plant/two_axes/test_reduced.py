@@ -22,7 +22,7 @@ def plant(request: pytest.FixtureRequest) -> Plant:
 
 
 def unstable_poles(plant: Plant) -> np.ndarray:
-    """Of the full model, linearised at its keyframe: what grows [1/s]."""
+    """Return the growing poles of the full model, linearised at its keyframe [1/s]."""
     model = copy.copy(plant.model)
     model.opt.integrator, model.opt.timestep = int(mujoco.mjtIntegrator.mjINT_EULER), 1e-4  # RK4 is refused here
     data = mujoco.MjData(model)
@@ -52,8 +52,8 @@ def test_what_grows_is_what_the_reduced_models_say(plant: Plant) -> None:
 
 def test_both_rigs_have_the_same_reduced_models() -> None:
     """The floor holds the base as the world holds the thrust bearing."""
-    fixed, free = (load_plant(model=name, equilibrium_bias_deg=0.0) for name in MODELS)
-    for one, other in zip(fixed.axes, free.axes, strict=True):
+    fixed_base, free_base = (load_plant(model=name, equilibrium_bias_deg=0.0) for name in MODELS)
+    for one, other in zip(fixed_base.axes, free_base.axes, strict=True):
         np.testing.assert_allclose(astuple(one.reduced), astuple(other.reduced), rtol=1e-9)
 
 
@@ -71,15 +71,15 @@ def test_it_is_about_the_robot_that_was_measured(plant: Plant) -> None:
 
 def test_a_base_in_the_air_gives_way() -> None:
     plant = load_plant(model="two_axes_free_base.xml", equilibrium_bias_deg=0.0)
-    lifted = copy.copy(plant.model)
-    lifted.key_qpos[plant.key, 2] += 0.01
+    model = copy.copy(plant.model)
+    model.key_qpos[plant.key, 2] += 0.01
     for axis in plant.axes:
         standing = inertia_about(plant.model, plant.key, axis.line, {}).tilt_inertia
-        assert inertia_about(lifted, plant.key, axis.line, {}).tilt_inertia < 0.3 * standing
+        assert inertia_about(model, plant.key, axis.line, {}).tilt_inertia < 0.3 * standing
 
 
 def test_a_base_on_two_feet_gives_way_about_the_line_between_them() -> None:
-    """Of four feet in a square those along x hold a roll no more, and a pitch as before."""
+    """The feet along x, of four in a square, hold a roll no more, and a pitch as before."""
     plant = load_plant(model="two_axes_free_base.xml", equilibrium_bias_deg=0.0)
     model = copy.copy(plant.model)
     for foot, y in (("foot_nn", 0.0), ("foot_pn", 0.0), ("foot_np", None), ("foot_pp", None)):

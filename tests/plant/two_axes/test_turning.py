@@ -1,4 +1,4 @@
-"""What a turn about the vertical couples on the full model, and the gimbal rates that cancel it.
+"""The coupling by a turn about the vertical on the full model, and the gimbal rates that cancel it.
 
 The torques that the wheels' momentum asks of the joints are those of the rig whose wheels turn less those of the same
 rig whose wheels stand: MuJoCo's inverse dynamics at given rates, without accelerations.
@@ -34,7 +34,7 @@ def set_gimbals(data: mujoco.MjData, axis: Axis, angle: float, rate: float) -> N
         data.qvel[module.gimbal_dof] = module.direction * rate
 
 
-def asked_of(
+def gimbal_torques(
     plant: Plant, rates: dict[str, float], angles: list[float], u: list[float], off: float = 0.0
 ) -> np.ndarray:
     """The wheels' torques on yaw, roll and pitch [N m].
@@ -64,7 +64,7 @@ def asked_of(
     return np.array(torques[0]) - torques[1]
 
 
-def against(plant: Plant, w: float, angles: list[float]) -> list[float]:
+def compensation(plant: Plant, w: float, angles: list[float]) -> list[float]:
     """u_i = w sum_j c_ij sin(x3_j)/cos(x3_i)."""
     return [
         w * float(row @ np.sin(angles)) / math.cos(angle)
@@ -79,7 +79,7 @@ ANGLES = [[0.7, 0.2], [-0.4, 1.0], [0.0, -0.9], [0.5, 0.5]]
 @pytest.mark.parametrize("w", [1.0, -3.0])
 def test_the_swept_momentum_tilts_the_other_axis(plant: Plant, w: float, angles: list[float]) -> None:
     """Roll's momentum, swept round, tilts pitch with 2 H w sin(x3_R), pitch's roll with the opposite sign."""
-    _, roll, pitch = asked_of(plant, {"yaw": w}, angles, [0.0, 0.0])
+    _, roll, pitch = gimbal_torques(plant, {"yaw": w}, angles, [0.0, 0.0])
     x3_roll, x3_pitch = angles
     assert pitch == pytest.approx(-2.0 * H * w * math.sin(x3_roll), abs=1e-12)  # asked to hold it: the opposite
     assert roll == pytest.approx(2.0 * H * w * math.sin(x3_pitch), abs=1e-12)
@@ -88,7 +88,7 @@ def test_the_swept_momentum_tilts_the_other_axis(plant: Plant, w: float, angles:
 @pytest.mark.parametrize("angles", ANGLES)
 @pytest.mark.parametrize("w", [1.0, -3.0])
 def test_gimbals_turned_against_it_leave_nothing(plant: Plant, w: float, angles: list[float]) -> None:
-    _, roll, pitch = asked_of(plant, {"yaw": w}, angles, against(plant, w, angles))
+    _, roll, pitch = gimbal_torques(plant, {"yaw": w}, angles, compensation(plant, w, angles))
     assert max(abs(roll), abs(pitch)) < 1e-12
 
 
@@ -96,7 +96,7 @@ def test_the_tangent_of_the_other_angle_is_right_for_small_angles_alone(plant: P
     """u_P = -w tan(x3_R) leaves 2 H w sin(x3_R) (1 - cos(x3_P)/cos(x3_R)) of it, and nothing at equal angles."""
     w, (x3_roll, x3_pitch) = 2.0, (0.8, 0.2)
     u = [w * math.tan(x3_pitch), -w * math.tan(x3_roll)]
-    _, roll, pitch = asked_of(plant, {"yaw": w}, [x3_roll, x3_pitch], u)
+    _, roll, pitch = gimbal_torques(plant, {"yaw": w}, [x3_roll, x3_pitch], u)
     left = -2.0 * H * w * math.sin(x3_roll) * (1.0 - math.cos(x3_pitch) / math.cos(x3_roll))
     assert pitch == pytest.approx(left, abs=1e-12)
     assert abs(pitch) > 0.4 * 2.0 * H * w * math.sin(x3_roll)
@@ -105,8 +105,8 @@ def test_the_tangent_of_the_other_angle_is_right_for_small_angles_alone(plant: P
 
 def test_the_wrong_sign_doubles_it(plant: Plant) -> None:
     w, angles = 1.0, [0.6, 0.3]
-    none = asked_of(plant, {"yaw": w}, angles, [0.0, 0.0])
-    wrong = asked_of(plant, {"yaw": w}, angles, [-u for u in against(plant, w, angles)])
+    none = gimbal_torques(plant, {"yaw": w}, angles, [0.0, 0.0])
+    wrong = gimbal_torques(plant, {"yaw": w}, angles, [-u for u in compensation(plant, w, angles)])
     np.testing.assert_allclose(wrong[1:], 2.0 * none[1:], rtol=1e-9)
 
 
@@ -130,22 +130,22 @@ def rig_with(tmp_path: Path, *changes: tuple[str, str]) -> Plant:
 
 
 WHEELS = "0 0 0 0 314 0 -314 0 314 0 -314", "0 0 314 0 -314 0 314 0 -314"
-OTHERS = {
+OTHER_WHEELS = {
     "pitch's wheels the other way round": ("0 0 0 0 314 0 -314 0 -314 0 314", "0 0 314 0 -314 0 -314 0 314"),
     "pitch's wheels half as fast": ("0 0 0 0 314 0 -314 0 157 0 -157", "0 0 314 0 -314 0 157 0 -157"),
     "a wheel of roll's slow": ("0 0 0 0 282.6 0 -314 0 314 0 -314", "0 0 282.6 0 -314 0 314 0 -314"),
 }
 
 
-@pytest.mark.parametrize("wheels", OTHERS.values(), ids=OTHERS)
+@pytest.mark.parametrize("wheels", OTHER_WHEELS.values(), ids=OTHER_WHEELS)
 def test_other_wheels_have_other_signs_and_sizes(wheels: tuple[str, str], tmp_path: Path) -> None:
     """And the rates they give cancel what these wheels ask for."""
     plant = rig_with(tmp_path, *zip(WHEELS, wheels, strict=True))
     w, angles = 1.5, [0.6, -0.4]
-    _, roll, pitch = asked_of(plant, {"yaw": w}, angles, against(plant, w, angles))
+    _, roll, pitch = gimbal_torques(plant, {"yaw": w}, angles, compensation(plant, w, angles))
     assert max(abs(roll), abs(pitch)) < 1e-12
     u = [1.0, 1.0]  # a positive rate pushes about its axis, whichever way the wheels turn
-    assert np.all(asked_of(plant, {}, [0.0, 0.0], u)[1:] < -0.1)
+    assert np.all(gimbal_torques(plant, {}, [0.0, 0.0], u)[1:] < -0.1)
 
 
 # --- what else couples ------------------------------------------------------------------------------------------
@@ -154,7 +154,7 @@ def test_other_wheels_have_other_signs_and_sizes(wheels: tuple[str, str], tmp_pa
 def test_alike_wheels_couple_the_axes_through_the_vertical_alone() -> None:
     """The tilt of one axis sweeps the other's momentum round the vertical: the yaw servo holds 2 H sin(x3) x2."""
     plant = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0)
-    yaw, roll, pitch = asked_of(plant, {"pitch": 0.5}, [0.6, 0.0], [0.0, 0.0])
+    yaw, roll, pitch = gimbal_torques(plant, {"pitch": 0.5}, [0.6, 0.0], [0.0, 0.0])
     assert yaw == pytest.approx(2.0 * H * math.sin(0.6) * 0.5, rel=1e-9)
     assert max(abs(roll), abs(pitch)) < 1e-12
 
@@ -165,13 +165,13 @@ def test_a_slow_wheel_couples_the_axes_directly(tmp_path: Path) -> None:
     A pitch rate turns it against roll, a roll rate against pitch: 0.1 H x2, which is a tilt acceleration of 0.10/s
     times the other's rate, beside poles of 6.4/s. Turning gimbals change it, which yaw feels.
     """
-    plant = rig_with(tmp_path, *zip(WHEELS, OTHERS["a wheel of roll's slow"], strict=True))
+    plant = rig_with(tmp_path, *zip(WHEELS, OTHER_WHEELS["a wheel of roll's slow"], strict=True))
     left = 0.1 * H
-    _, roll, _ = asked_of(plant, {"pitch": 0.5}, [0.0, 0.0], [0.0, 0.0])
+    _, roll, _ = gimbal_torques(plant, {"pitch": 0.5}, [0.0, 0.0], [0.0, 0.0])
     assert abs(roll) == pytest.approx(left * 0.5, rel=1e-9)
-    _, _, pitch = asked_of(plant, {"roll": 0.5}, [0.0, 0.0], [0.0, 0.0])
+    _, _, pitch = gimbal_torques(plant, {"roll": 0.5}, [0.0, 0.0], [0.0, 0.0])
     assert pitch == pytest.approx(-roll, rel=1e-9)
-    yaw, _, _ = asked_of(plant, {}, [0.6, 0.0], [2.0, 0.0])
+    yaw, _, _ = gimbal_torques(plant, {}, [0.6, 0.0], [2.0, 0.0])
     assert abs(yaw) == pytest.approx(left * math.sin(0.6) * 2.0, rel=1e-9)
     rates = left / (2.0 * plant.axes[1].reduced.J1)
     print(f"a wheel 10 % slow: each tilt rate of 1 rad/s accelerates the other axis by {rates:.3f} rad/s^2")
@@ -184,18 +184,18 @@ def test_a_gimbal_that_is_off_pushes_yaw_and_is_made_up_for_on_the_mean() -> Non
     """5 degrees ahead of its partner: H sin(5 deg) lies along roll's line, and turns with the gimbals."""
     plant = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0)
     off = math.radians(5.0)
-    still, turned = [0.0, 0.0], [1.0, 0.0]
-    _, _, pitch = asked_of(plant, {"yaw": 1.0}, still, still, off)
+    zeros, gimbal_rates = [0.0, 0.0], [1.0, 0.0]
+    _, _, pitch = gimbal_torques(plant, {"yaw": 1.0}, zeros, zeros, off)
     assert pitch == pytest.approx(-H * math.sin(off), rel=1e-9)
-    yaw, roll, _ = asked_of(plant, {}, still, turned, off)
+    yaw, roll, _ = gimbal_torques(plant, {}, zeros, gimbal_rates, off)
     assert abs(yaw) == pytest.approx(H * math.sin(off), rel=1e-9)
     assert abs(roll) == pytest.approx(H * (1.0 + math.cos(off)), rel=1e-9)
-    mean = against(plant, 1.0, [off / 2.0, 0.0])
-    _, _, left = asked_of(plant, {"yaw": 1.0}, still, mean, off)
+    mean = compensation(plant, 1.0, [off / 2.0, 0.0])
+    _, _, left = gimbal_torques(plant, {"yaw": 1.0}, zeros, mean, off)
     assert abs(left) < 1e-3 * abs(pitch)
 
 
-def asked(plant: Plant, rates: dict[str, float]) -> np.ndarray:
+def tilt_torques(plant: Plant, rates: dict[str, float]) -> np.ndarray:
     """Torques on roll and pitch without accelerations, the wheels standing [N m]."""
     data = mujoco.MjData(plant.model)
     mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
@@ -209,22 +209,22 @@ def asked(plant: Plant, rates: dict[str, float]) -> np.ndarray:
 def test_a_tilt_that_is_swept_round_tilts_the_other_axis(plant: Plant) -> None:
     """By (I_roll + I_pitch - I_yaw) w x2; gimbals turned at w d x2 push as much the other way."""
     w, rate = 1.5, 0.2
-    for i, j, moving in ((0, 1, "pitch"), (1, 0, "roll")):
-        both, alone, turn = ({"yaw": w, moving: rate}, {moving: rate}, {"yaw": w})
-        swept = (asked(plant, both) - asked(plant, alone) - asked(plant, turn))[i]
+    for i, j, axis in ((0, 1, "pitch"), (1, 0, "roll")):
+        both, alone, turn = ({"yaw": w, axis: rate}, {axis: rate}, {"yaw": w})
+        coupling = (tilt_torques(plant, both) - tilt_torques(plant, alone) - tilt_torques(plant, turn))[i]
         u = [0.0, 0.0]
         u[i] = w * plant.turning.inertia[i, j] * rate
-        pushed = asked_of(plant, {}, [0.0, 0.0], u)[1 + i]
-        assert abs(swept) > 0.1
-        assert pushed == pytest.approx(-swept, rel=1e-3)
+        push = gimbal_torques(plant, {}, [0.0, 0.0], u)[1 + i]
+        assert abs(coupling) > 0.1
+        assert push == pytest.approx(-coupling, rel=1e-3)
 
 
 def test_what_accelerometers_show_of_a_tilt_that_is_swept_round(plant: Plant) -> None:
     w, rate = 1.5, 0.2
-    for i, j, moving in ((0, 1, "pitch"), (1, 0, "roll")):
+    for i, j, axis_name in ((0, 1, "pitch"), (1, 0, "roll")):
         data = plant.new_data()
         mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
-        data.joint("yaw").qvel[0], data.joint(moving).qvel[0] = w, rate
+        data.joint("yaw").qvel[0], data.joint(axis_name).qvel[0] = w, rate
         mujoco.mj_forward(plant.model, data)
         axis = plant.axes[i]
         forces = axis.ideal(data.sensordata, data.qvel).accelerations

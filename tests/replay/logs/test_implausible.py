@@ -15,13 +15,13 @@ from tests.replay.logs.test_interchanged import INNER_FIRST, readings
 SECOND = {"time": "t_s", "tilt": "tilt_rad", "acceleration": "a"}
 
 
-def of_two(
+def notes_on(
     path: Path,
-    given: dict[str, str],
+    unit_of: dict[str, str],
     radii: tuple[float, float] = (0.1, 0.3),
     scale: dict[str, float] | None = None,
 ) -> list[str]:
-    units = {role: given.get(role, given.get("all", "m_s2")) for role in ACCELEROMETERS}
+    units = {role: unit_of.get(role, unit_of.get("all", "m_s2")) for role in ACCELEROMETERS}
     return list(
         read_log(path, ReadOptions({"time": "t_s"} | INNER_FIRST, units=units, radii_m=radii, scale=scale or {})).notes
     )
@@ -31,11 +31,11 @@ def of_two(
 def test_accelerometers_in_a_wrong_unit(swing: float, tmp_path: Path) -> None:
     """The cure that is named is one; of violent swings and of noise alone nothing is said if the unit is right."""
     path = write_csv(tmp_path / "log.csv", readings(3, swing))
-    assert of_two(path, {}) == []
-    (wrong,) = of_two(path, {"all": "g"})
+    assert notes_on(path, {}) == []
+    (wrong,) = notes_on(path, {"all": "g"})
     assert wrong.endswith(": --units inner_x=m_s2,inner_z=m_s2,outer_x=m_s2,outer_z=m_s2")
     assert " 9.8" in wrong or swing == 0.5
-    (wrong,) = of_two(path, {"outer_x": "mm_s2", "outer_z": "mm_s2"})
+    (wrong,) = notes_on(path, {"outer_x": "mm_s2", "outer_z": "mm_s2"})
     assert wrong.endswith(": --units outer_x=m_s2,outer_z=m_s2")
     assert "the outer accelerometer's specific force is 0.001" in wrong
 
@@ -44,34 +44,34 @@ def test_large_specific_forces_that_are_motion(tmp_path: Path) -> None:
     """30 degrees at 2.5 Hz, 0.6 m from the pivot: most of what the outer one shows is motion."""
     t, w = DT * np.arange(2000), 2.0 * np.pi * 2.5
     y, rate, a = 0.52 * np.sin(w * t), 0.52 * w * np.cos(w * t), -0.52 * w**2 * np.sin(w * t)
-    found = {"t_s": t}
+    columns = {"t_s": t}
     for name, r in (("a", 0.3), ("b", 0.6)):
-        found |= {f"{name}_x": r * a - 9.81 * np.sin(y), f"{name}_z": 9.81 * np.cos(y) - r * rate**2}
-    assert np.median(np.hypot(found["b_x"], found["b_z"])) > 3.0 * 9.81
-    assert of_two(write_csv(tmp_path / "log.csv", found), {}, (0.3, 0.6)) == []
+        columns |= {f"{name}_x": r * a - 9.81 * np.sin(y), f"{name}_z": 9.81 * np.cos(y) - r * rate**2}
+    assert np.median(np.hypot(columns["b_x"], columns["b_z"])) > 3.0 * 9.81
+    assert notes_on(write_csv(tmp_path / "log.csv", columns), {}, (0.3, 0.6)) == []
 
 
 def test_a_scale_where_no_unit_fits(tmp_path: Path) -> None:
     """Counts of 16384 a g, taken as m/s^2, of sensors that are mounted the other way round."""
     raw = {name: values * (1.0 if name == "t_s" else -16384.0 / 9.80665) for name, values in readings(1, 0.1).items()}
     path = write_csv(tmp_path / "log.csv", raw)
-    turned: dict[str, float] = dict.fromkeys(ACCELEROMETERS, -1.0)
-    (wrong,) = of_two(path, {}, scale=turned)
+    inversion: dict[str, float] = dict.fromkeys(ACCELEROMETERS, -1.0)
+    (wrong,) = notes_on(path, {}, scale=inversion)
     scales = {role: float(text) for role, _, text in (p.partition("=") for p in wrong.split("--scale ")[1].split(","))}
     assert scales == pytest.approx(dict.fromkeys(ACCELEROMETERS, -9.80665 / 16384.0), rel=0.01)
-    assert of_two(path, {}, scale=scales) == []
+    assert notes_on(path, {}, scale=scales) == []
 
 
 @pytest.mark.parametrize("factor", [0.2, 3.0])
 def test_radii_that_are_wrong(factor: float, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", readings(2, 0.2, noise=0.01))
-    (wrong,) = of_two(path, {}, (0.1 * factor, 0.3 * factor))
+    (wrong,) = notes_on(path, {}, (0.1 * factor, 0.3 * factor))
     assert "are --units and --radii (in m) right?" in wrong
-    assert of_two(write_csv(tmp_path / "noise.csv", readings(2, 1e-5)), {}, (0.1 * factor, 0.3 * factor)) == []
+    assert notes_on(write_csv(tmp_path / "noise.csv", readings(2, 1e-5)), {}, (0.1 * factor, 0.3 * factor)) == []
 
 
 @pytest.mark.parametrize(
-    ("size", "scale", "says"),
+    ("size", "scale", "message"),
     [
         (1.0, 1.0, None),
         (1.3, 1.0, None),
@@ -91,18 +91,18 @@ def test_radii_that_are_wrong(factor: float, tmp_path: Path) -> None:
         (0.1, 2.0, "--scale acceleration=10"),
     ],
 )
-def test_a_given_acceleration(size: float, scale: float, says: str | None, tmp_path: Path) -> None:
+def test_a_given_acceleration(size: float, scale: float, message: str | None, tmp_path: Path) -> None:
     log = sine()
     noise = np.random.default_rng(0).standard_normal((2, len(log["t_s"])))
     columns = {"t_s": log["t_s"], "tilt_rad": log["tilt_rad"] + 1e-3 * noise[0]}
     columns["a"] = size * (-AMPLITUDE * OMEGA**2 * np.sin(OMEGA * log["t_s"]) + 0.5 * noise[1])
     path = write_csv(tmp_path / "log.csv", columns)
     notes = read_log(path, ReadOptions(SECOND, units={"acceleration": "rad_s2"}, scale={"acceleration": scale})).notes
-    if says is None:
+    if message is None:
         assert notes == ()
     else:
         (note,) = notes
-        assert note.endswith(says)
+        assert note.endswith(message)
 
 
 def test_noise_alone_says_nothing(tmp_path: Path) -> None:

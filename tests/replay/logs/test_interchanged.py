@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import ReadOptions, load_scenario, prepare, read_log
-from cmg_mj.replay.logs.acceleration_checks import SWAPPED, interchanged
+from cmg_mj.replay.logs.acceleration_checks import SWAPPED, TiltMotion, interchanged
 from cmg_mj.replay.logs.columns import ACCELEROMETERS
 from cmg_mj.sensors.tilt import RadialTilt
 from tests.replay.logs.motion import DT, write_csv
@@ -19,7 +19,7 @@ OUTER_FIRST: dict[str, str] = dict(zip(ACCELEROMETERS, ("b_x", "b_z", "a_x", "a_
 
 
 def readings(seed: int, swing: float, noise: float = 0.04, n: int = 2000) -> dict[str, np.ndarray]:
-    """Of a pendulum that swings at 0.7 and 1.9 Hz: specific forces r y'' - g sin y, g cos y - r y'^2 [m/s^2]."""
+    """Make readings of a pendulum that swings at 0.7 and 1.9 Hz: r y'' - g sin y, g cos y - r y'^2 [m/s^2]."""
     rng, t = np.random.default_rng(seed), DT * np.arange(n)
     y, rate, acceleration = np.zeros(n), np.zeros(n), np.zeros(n)
     for size, hertz in ((swing, 0.7), (0.3 * swing, 1.9)):
@@ -27,11 +27,11 @@ def readings(seed: int, swing: float, noise: float = 0.04, n: int = 2000) -> dic
         y += size * np.sin(w * t + phase)
         rate += size * w * np.cos(w * t + phase)
         acceleration -= size * w**2 * np.sin(w * t + phase)
-    found = {"t_s": t}
+    columns = {"t_s": t}
     for name, r in (("a", PLACES.r_inner), ("b", PLACES.r_outer)):
-        found[f"{name}_x"] = r * acceleration - 9.81 * np.sin(y) + noise * rng.standard_normal(n)
-        found[f"{name}_z"] = 9.81 * np.cos(y) - r * rate**2 + noise * rng.standard_normal(n)
-    return found
+        columns[f"{name}_x"] = r * acceleration - 9.81 * np.sin(y) + noise * rng.standard_normal(n)
+        columns[f"{name}_z"] = 9.81 * np.cos(y) - r * rate**2 + noise * rng.standard_normal(n)
+    return columns
 
 
 def notes(path: Path, columns: dict[str, str]) -> list[str]:
@@ -55,7 +55,7 @@ def test_noise_alone_says_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "said"),
+    ("scenario", "suspicion"),
     [
         ("push_recovery", True),
         ("bias_estimation", True),
@@ -64,14 +64,14 @@ def test_noise_alone_says_nothing(tmp_path: Path) -> None:
         ("luenberger_fails", False),  # over after two seconds: too short to tell
     ],
 )
-def test_the_runs_of_all_scenarios(scenario: str, said: bool) -> None:
+def test_the_runs_of_all_scenarios(scenario: str, suspicion: bool) -> None:
     """As recorded, and as they were with the columns interchanged: y + c a, -a."""
     experiment = prepare(load_scenario(scenario, ["duration_s=5"] if scenario != "bias_estimation" else []))
     trajectory, places = experiment.run().trajectory, experiment.plant.parameters.tilt
     assert trajectory is not None
     y, a = trajectory["y1_rad"], trajectory["acceleration_rad_s2"]
-    whole = [slice(0, len(y))]
+    everything = [slice(0, len(y))]
     dt = float(trajectory["time_s"][1] - trajectory["time_s"][0])
-    assert not interchanged(y, a, whole, dt, places)
-    other = y - (places.r_inner + places.r_outer) * a / 9.80665
-    assert interchanged(other, -a, whole, dt, places) == said
+    assert not interchanged(TiltMotion(y, a, everything, dt), places)
+    interchange = y - (places.r_inner + places.r_outer) * a / 9.80665
+    assert interchanged(TiltMotion(interchange, -a, everything, dt), places) == suspicion

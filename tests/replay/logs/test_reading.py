@@ -55,7 +55,7 @@ def test_units_by_their_names(heads: tuple, sizes: tuple, plain: Log, tmp_path: 
     assert_same(read_log(path, ReadOptions(dict(zip(COLUMNS, heads, strict=True)))), plain)
 
 
-def test_units_told(plain: Log, tmp_path: Path) -> None:
+def test_units_as_options(plain: Log, tmp_path: Path) -> None:
     t, y, w = sine().values()
     path = write_csv(tmp_path / "told.csv", {"a": t * 1e3, "b": np.degrees(y), "c": -np.degrees(w)})
     log = read_log(
@@ -163,17 +163,17 @@ def test_to_another_rate(tmp_path: Path) -> None:
 
 
 def test_a_short_gap_is_bridged_and_a_long_one_parts(tmp_path: Path) -> None:
-    kept = np.ones(N, dtype=bool)
-    kept[1000:1003] = False
-    kept[2000:2200] = False
-    log = read_log(write_csv(tmp_path / "gaps.csv", {k: v[kept] for k, v in sine().items()}), ReadOptions(COLUMNS))
+    mask = np.ones(N, dtype=bool)
+    mask[1000:1003] = False
+    mask[2000:2200] = False
+    log = read_log(write_csv(tmp_path / "gaps.csv", {k: v[mask] for k, v in sine().items()}), ReadOptions(COLUMNS))
     assert [(p.start, p.stop) for p in log.parts] == [(0, 2000), (2000, 3800)]
-    bridged, parted = log.notes
-    assert "1 gap bridged by straight lines; the longest is 20 ms at 4.995 s" in bridged
-    assert "1 gap not bridged" in parted
-    assert "1005 ms at 9.995 s" in parted
-    there = np.isin(np.arange(3800), np.arange(1000, 1003), invert=True)
-    np.testing.assert_allclose(log["y1_rad"][there], tilt(log["time_s"])[there], atol=1e-12)
+    short_gap_note, long_gap_note = log.notes
+    assert "1 gap bridged by straight lines; the longest is 20 ms at 4.995 s" in short_gap_note
+    assert "1 gap not bridged" in long_gap_note
+    assert "1005 ms at 9.995 s" in long_gap_note
+    measured_rows = np.isin(np.arange(3800), np.arange(1000, 1003), invert=True)
+    np.testing.assert_allclose(log["y1_rad"][measured_rows], tilt(log["time_s"])[measured_rows], atol=1e-12)
     np.testing.assert_allclose(log["y1_rad"], tilt(log["time_s"]), atol=3e-4)
     assert np.isnan(log["reference_rad_s"][1001])
     assert log.duration_s == pytest.approx((1999 + 1799) * DT)
@@ -203,16 +203,16 @@ def test_a_reference_at_times_of_its_own(tmp_path: Path) -> None:
         write_csv(tmp_path / "merged.csv", {"t_s": t, "tilt_rad": tilts, "gyro_rad_s": rates}), ReadOptions(COLUMNS)
     )
     assert log.dt == pytest.approx(DT)
-    known = np.isfinite(log["reference_rad_s"])
-    assert known.sum() >= N - 2
-    np.testing.assert_allclose(log["reference_rad_s"][known], rate(log["time_s"])[known], atol=1e-6)
+    measured_rows = np.isfinite(log["reference_rad_s"])
+    assert measured_rows.sum() >= N - 2
+    np.testing.assert_allclose(log["reference_rad_s"][measured_rows], rate(log["time_s"])[measured_rows], atol=1e-6)
 
 
 def test_a_tilt_that_starts_again_after_a_turn(tmp_path: Path) -> None:
     t = np.arange(N) * DT
-    turning = (2.0 * t + math.pi) % (2.0 * math.pi) - math.pi
+    wrapped_tilt = (2.0 * t + math.pi) % (2.0 * math.pi) - math.pi
     log = read_log(
-        write_csv(tmp_path / "turns.csv", {"t_s": t, "tilt_rad": turning}),
+        write_csv(tmp_path / "turns.csv", {"t_s": t, "tilt_rad": wrapped_tilt}),
         ReadOptions({"time": "t_s", "tilt": "tilt_rad"}),
     )
     np.testing.assert_allclose(np.diff(log["y1_rad"]), 2.0 * DT, atol=1e-9)
@@ -264,7 +264,7 @@ def backwards(columns: dict) -> None:
 
 
 @pytest.mark.parametrize(
-    ("edit", "says"),
+    ("edit", "message"),
     [
         (lambda c: c.pop("gyro_rad_s"), "has no column 'gyro_rad_s'; it has: 't_s', 'tilt_rad'"),
         (lambda c: c.update(tilt_rad=["x", *[0.1] * (N - 1)]), "row 1, column 'tilt_rad': 'x' is not a number"),
@@ -291,19 +291,19 @@ def backwards(columns: dict) -> None:
         (lambda c: c.update({k: v[:0] for k, v in c.items()}), "has a heading and no row"),
     ],
 )
-def test_what_cannot_be(edit: Edit, says: str, tmp_path: Path) -> None:
+def test_what_cannot_be(edit: Edit, message: str, tmp_path: Path) -> None:
     columns = dict(sine())
     edit(columns)
     path = write_csv(tmp_path / "wrong.csv", columns)
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError) as info:
         read_log(path, ReadOptions(COLUMNS))
-    assert str(path) in str(caught.value)
-    assert says in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert str(path) in str(info.value)
+    assert message in str(info.value)
+    assert "\n" not in str(info.value)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "message"),
     [
         ({"columns": {"tild": "a"}}, "--columns tild: no such role; did you mean 'tilt'?"),
         ({"columns": {"rate": "a_dps"}}, "there is no tilt"),
@@ -329,15 +329,15 @@ def test_what_cannot_be(edit: Edit, says: str, tmp_path: Path) -> None:
         ({}, "say which columns are what"),
     ],
 )
-def test_arguments_that_cannot_be(arguments: dict, says: str, tmp_path: Path) -> None:
+def test_arguments_that_cannot_be(arguments: dict, message: str, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "s.csv", sine())
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError) as info:
         read_log(path, ReadOptions(**arguments))
-    assert says in str(caught.value)
+    assert message in str(info.value)
 
 
 @pytest.mark.parametrize(
-    ("content", "says"),
+    ("content", "message"),
     [
         (b"", "empty"),
         (b"\n \n", "empty"),
@@ -354,10 +354,10 @@ def test_arguments_that_cannot_be(arguments: dict, says: str, tmp_path: Path) ->
         ("t_s,tilt_rad,gyro_rad_s\n0,1,2\n".encode("utf-32"), "is written in UTF-32; save it as UTF-8"),
     ],
 )
-def test_files_that_are_none(content: bytes, says: str, tmp_path: Path) -> None:
+def test_files_that_are_none(content: bytes, message: str, tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     path.write_bytes(content)
-    with pytest.raises(InputError, match=says):
+    with pytest.raises(InputError, match=message):
         read_log(path, ReadOptions(COLUMNS))
 
 
@@ -396,24 +396,28 @@ def test_a_rate_that_leaves_too_few_samples(rate: float, samples: int, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("torn", "says"),
+    ("n_lines", "message"),
     [
         (1, "1 line has another number of cells and was discarded; 2 cells instead of 3: "),
         (2, "2 lines have another number of cells and were discarded; the first, 2 cells instead of 3: "),
     ],
 )
-def test_torn_lines(torn: int, says: str, tmp_path: Path) -> None:
+def test_torn_lines(n_lines: int, message: str, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", sine())
     lines = path.read_text().splitlines()
-    for i in range(torn):
+    for i in range(n_lines):
         lines[100 + 500 * i] = "1,2"
     path.write_text("\n".join(lines))
-    assert read_log(path, ReadOptions(COLUMNS)).notes[0].startswith(says)
+    assert read_log(path, ReadOptions(COLUMNS)).notes[0].startswith(message)
 
 
 def test_no_file_and_no_regular_file(tmp_path: Path) -> None:
-    for path, says in ((tmp_path / "not.csv", "no such file"), (tmp_path, "no file"), (Path("/dev/zero"), "no file")):
-        with pytest.raises(InputError, match=says):
+    for path, message in (
+        (tmp_path / "not.csv", "no such file"),
+        (tmp_path, "no file"),
+        (Path("/dev/zero"), "no file"),
+    ):
+        with pytest.raises(InputError, match=message):
             read_log(path, ReadOptions(COLUMNS))
 
 

@@ -41,15 +41,15 @@ RIGS = [
 def test_it_is_the_integral_of_the_best_command(model: ReducedModel, rate: float, travel: float) -> None:
     pole = math.sqrt(model.gravity_torque / model.J1)
     S = quad(lambda t: math.exp(-pole * t) * rate * math.cos(rate * t), 0.0, travel / rate)[0] / pole
-    found = ceiling(model, rate, travel)
-    assert found.tilt == pytest.approx(model.J_d * model.omega_d / model.J1 * S, rel=1e-9)
-    assert found.pole == pytest.approx(pole)
+    result = ceiling(model, rate, travel)
+    assert result.tilt == pytest.approx(model.J_d * model.omega_d / model.J1 * S, rel=1e-9)
+    assert result.pole == pytest.approx(pole)
 
 
 @pytest.mark.parametrize("model", RIGS)
 @pytest.mark.parametrize("share", [0.98, 1.02])
-@pytest.mark.parametrize("by", ["tilt", "blow", "push"])
-def test_gimbals_that_turn_as_fast_as_they_can_recover_up_to_it(model: ReducedModel, share: float, by: str) -> None:
+@pytest.mark.parametrize("cause", ["tilt", "blow", "push"])
+def test_gimbals_that_turn_as_fast_as_they_can_recover_up_to_it(model: ReducedModel, share: float, cause: str) -> None:
     """The linearised motion itself: what is left of the growing part says to which side the rig goes.
 
     The push is one of 0.1 s, from whose first moment on the gimbals turn.
@@ -57,15 +57,15 @@ def test_gimbals_that_turn_as_fast_as_they_can_recover_up_to_it(model: ReducedMo
     rate, h = 4.7, 1e-4
     top = ceiling(model, rate)
     inertia = model.gimbals * model.J1
-    x1 = share * top.tilt if by == "tilt" else 0.0
-    x2 = share * top.impulse / inertia if by == "blow" else 0.0
-    pushed = share * top.push_impulse(PUSH_S) / PUSH_S / inertia if by == "push" else 0.0
+    x1 = share * top.tilt if cause == "tilt" else 0.0
+    x2 = share * top.impulse / inertia if cause == "blow" else 0.0
+    push_alpha = share * top.push_impulse(PUSH_S) / PUSH_S / inertia if cause == "push" else 0.0
     x3 = 0.0
     for step in range(math.ceil(max(math.pi / 2.0 / rate, PUSH_S) / h)):
-        turning = rate if x3 < math.pi / 2.0 else 0.0
-        alpha = (model.gravity_torque * x1 - turning * model.J_d * model.omega_d * math.cos(x3)) / model.J1
-        alpha += pushed if step * h < PUSH_S else 0.0
-        x1, x2, x3 = x1 + h * x2 + 0.5 * h * h * alpha, x2 + h * alpha, x3 + h * turning
+        gimbal_rate = rate if x3 < math.pi / 2.0 else 0.0
+        alpha = (model.gravity_torque * x1 - gimbal_rate * model.J_d * model.omega_d * math.cos(x3)) / model.J1
+        alpha += push_alpha if step * h < PUSH_S else 0.0
+        x1, x2, x3 = x1 + h * x2 + 0.5 * h * h * alpha, x2 + h * alpha, x3 + h * gimbal_rate
     assert (x1 + x2 / top.pole > 0.0) == (share > 1.0)
 
 
@@ -87,19 +87,22 @@ def fast(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
 
 
 @pytest.mark.parametrize(
-    "fed",
+    "feedback",
     [{}, {"controller.feedback": "truth"}, {"observer": {"kind": "gyro_free"}}],
     ids=["observer", "truth", "gyro"],
 )
-def test_no_controller_bears_more(fast: Experiment, fed: dict[str, Any]) -> None:
+def test_no_controller_bears_more(fast: Experiment, feedback: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor does the one that is fed the true rate; it bears more than any blow that can be recovered from."""
-    experiment = fast.with_settings(fed)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.WORLDS", 4)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.LEVELS", 16)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.largest_push.BEFORE_S", 0.3)
+    experiment = fast.with_settings(feedback)
     top = ceiling(experiment.plant.reduced, experiment.law.rate_limit)
     assert top.pole == pytest.approx(7.85, rel=0.01)
-    borne = push_margin(experiment.scenario, experiment.design).median_impulse
-    assert 0.4 * top.push_impulse(PUSH_S) < borne < top.push_impulse(PUSH_S)
-    if fed:
-        assert borne > top.impulse
+    impulse = push_margin(experiment.scenario, experiment.design).median_impulse
+    assert 0.4 * top.push_impulse(PUSH_S) < impulse < top.push_impulse(PUSH_S)
+    if feedback:
+        assert impulse > top.impulse
 
 
 def test_carried_over_gains_are_table_2_on_the_papers_rig() -> None:

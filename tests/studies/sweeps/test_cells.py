@@ -5,21 +5,21 @@ from __future__ import annotations
 import pytest
 
 from cmg_mj.studies.sweeps.cells import cells_in_blocks, fell_interval
-from tests.studies.sweeps.made_up import BIAS, made_up
+from tests.studies.sweeps.synthetic_trials import BIAS, make_trials
 
 
 def test_the_share_of_falls_is_of_those_that_fell_or_stood() -> None:
     """One that never ran tells nothing of falls; where none ran there is no share, and no interval."""
-    trials = made_up({BIAS: "0,1,2"}, ("linear",), 4, lambda _, __, world: None if world == 0 else 1.0)
+    trials = make_trials({BIAS: "0,1,2"}, ("linear",), 4, lambda _, __, world: None if world == 0 else 1.0)
     trials.outcome[1, 0, 1:3] = "stopped"
     trials.outcome[2] = "refused"
     trials.stood = trials.outcome == "done"
     (table,) = cells_in_blocks(trials)
-    whole, part, none = table.to_pylist()
-    for row, fell, stood in ((whole, 1, 3), (part, 1, 1)):
-        assert (row["fell"], row["stood"], row["stopped"]) == (fell, stood, 4 - fell - stood)
+    full, part, none = table.to_pylist()
+    for row, n_fallen, n_survivors in ((full, 1, 3), (part, 1, 1)):
+        assert (row["fell"], row["stood"], row["stopped"]) == (n_fallen, n_survivors, 4 - n_fallen - n_survivors)
         assert (row["fell_share"], row["fell_low"], row["fell_high"]) == pytest.approx(
-            fell_interval(fell, fell + stood)
+            fell_interval(n_fallen, n_fallen + n_survivors)
         )
     assert (none["trials"], none["stopped"]) == (4, 4)
     assert (none["fell_share"], none["fell_low"], none["fell_high"]) == (None, None, None)

@@ -21,13 +21,14 @@ from tests.command import COMMAND, ROOT, cmg_mj
 BIAS = "plant.equilibrium_bias_deg"
 SMALL = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--observers", "linear,gyro_free", "--worlds", "3"]
 SHORT = ["--set", "duration_s=0.5", "--set", "push=[]"]
+NOISES = ["--vary", "sensors.accelerometer.noise_density_ug_rthz=100:400:10"]
 
 
 @pytest.mark.slow
 def test_the_files_of_a_sweep(tmp_path: Path) -> None:
-    said = cmg_mj(*SMALL, *SHORT, "--out", str(tmp_path / "out"), "--json")
-    assert said.status == 0
-    cells = json.loads(said.out)["cells"]
+    outcome = cmg_mj(*SMALL, *SHORT, "--out", str(tmp_path / "out"), "--json")
+    assert outcome.status == 0
+    cells = json.loads(outcome.out)["cells"]
     assert [(cell[BIAS], cell["observer"]) for cell in cells] == [
         (0, "linear"),
         (0, "gyro_free"),
@@ -43,19 +44,19 @@ def test_the_files_of_a_sweep(tmp_path: Path) -> None:
     assert cells[2]["velocity_rms_error_rad_s"] == pytest.approx(np.mean(errors))
     assert cells[2]["velocity_rms_error_rad_s_behind_best_low"] > 0.0
     assert cells[2]["velocity_rms_error_rad_s_best"] == "gyro_free"
-    again = cmg_mj("sweep", str(tmp_path / "out" / "study.toml"), "--out", str(tmp_path / "again"))
-    assert again.status == 0
-    other = pq.read_table(tmp_path / "again" / "trials.parquet")
-    assert other.equals(pq.read_table(tmp_path / "out" / "trials.parquet"))
-    goes_on = cmg_mj(*SMALL, *SHORT, "--out", str(tmp_path / "out"))
-    assert "12 of 12 trials are there from before" in goes_on.err
+    rerun = cmg_mj("sweep", str(tmp_path / "out" / "study.toml"), "--out", str(tmp_path / "again"))
+    assert rerun.status == 0
+    rerun_trials = pq.read_table(tmp_path / "again" / "trials.parquet")
+    assert rerun_trials.equals(pq.read_table(tmp_path / "out" / "trials.parquet"))
+    second_outcome = cmg_mj(*SMALL, *SHORT, "--out", str(tmp_path / "out"))
+    assert "12 of 12 trials are there from before" in second_outcome.err
 
 
 WEIGHTS = "controller.lqr.state_cost"
 
 
 @pytest.mark.parametrize(
-    "varied",
+    "axes",
     [
         pytest.param(
             ["--set", f"{WEIGHTS}=[286, 3, 0, 0.08]", "--vary", "plant.flywheel_speed_rad_s=200,314"],
@@ -68,13 +69,13 @@ WEIGHTS = "controller.lqr.state_cost"
         ),
     ],
 )
-def test_gains_that_are_solved_for_rerun_from_their_weights(tmp_path: Path, varied: list[str]) -> None:
-    out, again = tmp_path / "out", tmp_path / "again"
-    pushed = ["--set", "duration_s=0.5", "--set", "push.0.start_s=0.2", "--worlds", 2]
-    assert cmg_mj("sweep", "push_recovery", *varied, *pushed, "--out", out).status == 0
-    assert cmg_mj("sweep", out / "study.toml", "--out", again).status == 0
+def test_gains_that_are_solved_for_rerun_from_their_weights(tmp_path: Path, axes: list[str]) -> None:
+    out, rerun = tmp_path / "out", tmp_path / "again"
+    settings = ["--set", "duration_s=0.5", "--set", "push.0.start_s=0.2", "--worlds", 2]
+    assert cmg_mj("sweep", "push_recovery", *axes, *settings, "--out", out).status == 0
+    assert cmg_mj("sweep", out / "study.toml", "--out", rerun).status == 0
     first = pq.read_table(out / "trials.parquet")
-    assert first.equals(pq.read_table(again / "trials.parquet"))
+    assert first.equals(pq.read_table(rerun / "trials.parquet"))
     commands = first["command_rms_rad_s"].to_pylist()
     assert commands[0] != commands[2]
 
@@ -83,17 +84,19 @@ def test_gains_that_are_solved_for_rerun_from_their_weights(tmp_path: Path, vari
 def test_a_row_reruns_alone(tmp_path: Path) -> None:
     """Worlds 0, 1 and 2, fields that go together, a push: `cmg-mj run` with the row's values has its figures."""
     rates, torque = ("controller.rate_hz", "sensors.accelerometer.rate_hz"), "push.0.torque_n_m"
-    varied = ["--vary", f"{'+'.join(rates)}=100,200", "--vary", f"{torque}=0.3:0.5"]
-    own = ["--set", "duration_s=0.5", "--set", "push.0.start_s=0.2"]
-    how = ["--sample", "2", "--worlds", "3", "--seed", "7", "--observers", "linear,gyro_free"]
-    assert cmg_mj("sweep", "push_recovery", *varied, *own, *how, "--out", tmp_path / "out").status == 0
+    axes = ["--vary", f"{'+'.join(rates)}=100,200", "--vary", f"{torque}=0.3:0.5"]
+    settings = ["--set", "duration_s=0.5", "--set", "push.0.start_s=0.2"]
+    design = ["--sample", "2", "--worlds", "3", "--seed", "7", "--observers", "linear,gyro_free"]
+    assert cmg_mj("sweep", "push_recovery", *axes, *settings, *design, "--out", tmp_path / "out").status == 0
     rows = pq.read_table(tmp_path / "out" / "trials.parquet").to_pylist()
     for row in (rows[0], rows[4], rows[8]):
-        of_row = [part for field in (*rates, torque) for part in ("--set", f"{field}={row[field]}")]
-        which = ["--observer", row["observer"], "--seed", row["seed"], "--world", row["world"]]
-        said = cmg_mj("run", "push_recovery", *own, *of_row, *which, "--json", "--out", tmp_path / "alone")
-        assert said.status == 0, said
-        alone = json.loads(said.out)
+        row_settings = [part for field in (*rates, torque) for part in ("--set", f"{field}={row[field]}")]
+        run_options = ["--observer", row["observer"], "--seed", row["seed"], "--world", row["world"]]
+        outcome = cmg_mj(
+            "run", "push_recovery", *settings, *row_settings, *run_options, "--json", "--out", tmp_path / "alone"
+        )
+        assert outcome.status == 0, outcome
+        alone = json.loads(outcome.out)
         figures = {key for key in FIGURES if row[key] is not None}
         assert len(figures) > 8
         assert {key: alone[key] for key in figures} == {key: row[key] for key in figures}
@@ -108,8 +111,8 @@ def test_the_report_of_a_map_with_an_order(tmp_path: Path) -> None:
     """Another order is no other study, and none leaves none behind."""
     out = tmp_path / "out"
     rates = ["--vary", "sensors.accelerometer.noise_density_ug_rthz=100,400"]
-    said = cmg_mj(*SMALL, *rates, *SHORT, "--order", "gyro_free,linear", "--out", str(out))
-    assert said.status == 0
+    outcome = cmg_mj(*SMALL, *rates, *SHORT, "--order", "gyro_free,linear", "--out", str(out))
+    assert outcome.status == 0
     report = (out / "report.md").read_text(encoding="utf-8")
     assert "![Push recovery: velocity RMS error [rad/s], 3 worlds a cell](map_velocity_error.png)" in report
     assert (out / "map_velocity_error.png").read_bytes().startswith(b"\x89PNG")
@@ -117,8 +120,8 @@ def test_the_report_of_a_map_with_an_order(tmp_path: Path) -> None:
     assert "## The order gyro_free < linear" in report
     assert [row["worlds"] for row in pq.read_table(out / "order.parquet").to_pylist()] == [3] * 8
     assert 'order = [\n    "gyro_free",' in (out / "study.toml").read_text(encoding="utf-8")
-    again = cmg_mj(*SMALL, *rates, *SHORT, "--out", str(out))
-    assert "24 of 24 trials are there from before" in again.err
+    rerun = cmg_mj(*SMALL, *rates, *SHORT, "--out", str(out))
+    assert "24 of 24 trials are there from before" in rerun.err
     assert not (out / "order.parquet").exists()
     assert "order" not in (out / "study.toml").read_text(encoding="utf-8")
 
@@ -126,18 +129,18 @@ def test_the_report_of_a_map_with_an_order(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_design_for_indices(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    varied = ["--vary", f"{BIAS}=-1:1", "--vary", "sensors.accelerometer.noise_density_ug_rthz=log:100:800"]
-    arguments = ["sweep", "push_recovery", *varied, "--sobol", "16", "--worlds", "2", *SHORT, "--out", str(out)]
-    said = cmg_mj(*arguments, "--observers", "linear")
-    assert said.status == 0
+    axes = ["--vary", f"{BIAS}=-1:1", "--vary", "sensors.accelerometer.noise_density_ug_rthz=log:100:800"]
+    arguments = ["sweep", "push_recovery", *axes, "--sobol", "16", "--worlds", "2", *SHORT, "--out", str(out)]
+    outcome = cmg_mj(*arguments, "--observers", "linear")
+    assert outcome.status == 0
     rows = pq.read_table(out / "indices.parquet").to_pylist()
-    of = {row["field"]: row for row in rows if row["figure"] == "velocity_rms_error_rad_s"}
-    noise = of["sensors.accelerometer.noise_density_ug_rthz"]
+    row_of = {row["field"]: row for row in rows if row["figure"] == "velocity_rms_error_rad_s"}
+    noise = row_of["sensors.accelerometer.noise_density_ug_rthz"]
     assert noise["total_low"] < noise["total"] < noise["total_high"]
     assert not any("push" in row["figure"] for row in rows)
-    in_short = f"{noise['total']:.3f} [{noise['total_low']:.3f}, {noise['total_high']:.3f}]"
-    assert "| total index, velocity RMS error |" in " ".join(said.out.split())
-    assert in_short in said.out
+    interval_text = f"{noise['total']:.3f} [{noise['total_low']:.3f}, {noise['total_high']:.3f}]"
+    assert "| total index, velocity RMS error |" in " ".join(outcome.out.split())
+    assert interval_text in outcome.out
     report = (out / "report.md").read_text(encoding="utf-8")
     assert f"| linear     | {BIAS} " in report
     assert f"{noise['total']:.3f} [{noise['total_low']:.3f}, {noise['total_high']:.3f}]" in report
@@ -146,7 +149,7 @@ def test_a_design_for_indices(tmp_path: Path) -> None:
 
 def test_one_world_is_shown_without_an_interval(tmp_path: Path) -> None:
     arguments = [*SMALL[:-1], "1", *SHORT, "--order", "gyro_free,linear"]
-    said = cmg_mj(*arguments, "--out", str(tmp_path / "out"))
+    outcome = cmg_mj(*arguments, "--out", str(tmp_path / "out"))
     trials = pq.read_table(tmp_path / "out" / "trials.parquet").to_pylist()
     cells = pq.read_table(tmp_path / "out" / "cells.parquet").to_pylist()
     for cell in cells:
@@ -154,8 +157,8 @@ def test_one_world_is_shown_without_an_interval(tmp_path: Path) -> None:
         error = trial["velocity_rms_error_rad_s"]
         assert cell["velocity_rms_error_rad_s"] == error
         assert (cell["velocity_rms_error_rad_s_low"], cell["velocity_rms_error_rad_s_high"]) == (None, None)
-        assert f" {error:.4f} |" in said.out
-    assert "The order gyro_free < linear: by the velocity RMS error [rad/s] it holds at 2 of 2 points" in said.out
+        assert f" {error:.4f} |" in outcome.out
+    assert "The order gyro_free < linear: by the velocity RMS error [rad/s] it holds at 2 of 2 points" in outcome.out
     report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "2 points, 2 observers, 1 world: 4 trials." in report
     assert cmg_mj(*arguments, "--dry-run").out.startswith(
@@ -174,8 +177,8 @@ def test_a_study_file_with_settings_and_its_own_model(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     out = tmp_path / "out"
-    said = cmg_mj("sweep", tmp_path / "s.toml", "--set", "controller.feedback=truth", "--worlds", 3, "--out", out)
-    assert said.status == 0
+    outcome = cmg_mj("sweep", tmp_path / "s.toml", "--set", "controller.feedback=truth", "--worlds", 3, "--out", out)
+    assert outcome.status == 0
     fields = tomllib.loads((out / "study.toml").read_text(encoding="utf-8"))
     assert (fields["scenario"]["controller"]["feedback"], fields["sweep"]["worlds"]) == ("truth", 3)
     wrong = cmg_mj("sweep", tmp_path / "s.toml", "--set", "controller.feedbak=truth", "--dry-run")
@@ -184,8 +187,8 @@ def test_a_study_file_with_settings_and_its_own_model(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_plan_runs_nothing(tmp_path: Path) -> None:
-    said = cmg_mj(*SMALL, "--dry-run", "--out", str(tmp_path / "out"))
-    assert said.out.startswith("2 points x 2 observers x 3 worlds = 12 trials in 2 chunks; about ")
+    outcome = cmg_mj(*SMALL, "--dry-run", "--out", str(tmp_path / "out"))
+    assert outcome.out.startswith("2 points x 2 observers x 3 worlds = 12 trials in 2 chunks; about ")
     assert not (tmp_path / "out").exists()
 
 
@@ -199,7 +202,7 @@ def test_a_plan_runs_nothing(tmp_path: Path) -> None:
         ([], "nothing is varied"),
         (["--vary", "observer.k1=10,20", "--observers", "homogeneous,linear"], "observer.k1"),
         (["--vary", "observer.k1=10,-20"], "observer.k1"),
-        (["--vary", f"{BIAS}=0:1:101", "--worlds", "10000"], "1010000 trials; beyond 1000000 say --yes"),
+        (["--vary", f"{BIAS}=0:1:11", *NOISES, "--worlds", "10000"], "1100000 trials; beyond 1000000 say --yes"),
         (["--vary", f"{BIAS}=0:1", "--sobol", "200"], "--sobol 200: must be a power of two, such as 256"),
         (["--vary", f"{BIAS}=0:1", "--sobol", "2", "--sample", "3"], "--sample and --sobol: one of them"),
         (["--vary", f"{BIAS}=0,1", "--order", "linear,ltv"], "--order linear,ltv: linear does not run here"),
@@ -207,8 +210,8 @@ def test_a_plan_runs_nothing(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_refused(tmp_path: Path, arguments: list[str], complaint: str) -> None:
-    said = cmg_mj("sweep", "push_recovery", *arguments, "--out", str(tmp_path / "out"))
-    assert complaint in said.complaint
+    outcome = cmg_mj("sweep", "push_recovery", *arguments, "--out", str(tmp_path / "out"))
+    assert complaint in outcome.complaint
     assert not (tmp_path / "out").exists()
 
 
@@ -216,8 +219,8 @@ def test_another_study_is_refused_and_nothing_lost(tmp_path: Path) -> None:
     out = str(tmp_path / "out")
     cmg_mj(*SMALL, *SHORT, "--out", out)
     before = (tmp_path / "out" / "trials.parquet").read_bytes()
-    said = cmg_mj(*SMALL, *SHORT, "--seed", "5", "--out", out)
-    assert "holds another study: scenario.seed = 0 there, 5 here; name another folder" in said.complaint
+    outcome = cmg_mj(*SMALL, *SHORT, "--seed", "5", "--out", out)
+    assert "holds another study: scenario.seed = 0 there, 5 here; name another folder" in outcome.complaint
     assert (tmp_path / "out" / "trials.parquet").read_bytes() == before
 
 
@@ -226,23 +229,26 @@ def test_another_study_is_refused_and_nothing_lost(tmp_path: Path) -> None:
 def test_killed_at_random_moments(tmp_path: Path) -> None:
     """The same command again and again, until it is done: the same trials as in one go."""
     arguments = [*SMALL[:-1], "40", "--vary", "controller.rate_hz=100,200", "--set", "duration_s=4", "--set", "push=[]"]
-    whole, killed = tmp_path / "whole", tmp_path / "killed"
-    cmg_mj(*arguments, "--out", str(whole))
+    uninterrupted, interrupted = tmp_path / "whole", tmp_path / "killed"
+    cmg_mj(*arguments, "--out", str(uninterrupted))
     rng = np.random.default_rng(5)
     kills = 0
     while kills < int(os.environ.get("CMG_MJ_KILLS", "3")):
         process = subprocess.Popen(
-            [*COMMAND, *arguments, "--out", str(killed)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, cwd=ROOT
+            [*COMMAND, *arguments, "--out", str(interrupted)],
+            stderr=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            cwd=ROOT,
         )
         time.sleep(rng.uniform(0.5, 6.0))
         if process.poll() is None:
             process.send_signal(signal.SIGKILL)
         process.wait()
         kills += 1
-        chunks = killed / "chunks"
+        chunks = interrupted / "chunks"
         if chunks.exists() and kills % 3 == 0:  # all over again, now and then
             for path in chunks.iterdir():
                 path.unlink()
-    assert cmg_mj(*arguments, "--out", str(killed)).status == 0
-    assert (killed / "trials.parquet").read_bytes() == (whole / "trials.parquet").read_bytes()
-    assert not list(killed.rglob("*.partial"))
+    assert cmg_mj(*arguments, "--out", str(interrupted)).status == 0
+    assert (interrupted / "trials.parquet").read_bytes() == (uninterrupted / "trials.parquet").read_bytes()
+    assert not list(interrupted.rglob("*.partial"))

@@ -22,7 +22,7 @@ from tests.command import cmg_mj
 SWEEP = ["sweep", "push_recovery", "--vary", "plant.equilibrium_bias_deg=0,1", "--worlds", "2", "--set", "push=[]"]
 SWEEP += ["--set", "duration_s=0.2", "--observers", "linear,gyro_free,high_gain", "--out"]
 FULL = OSError(28, "No space left on device")
-GOES_ON = (
+CONTINUATION = (
     "cannot be written: No space left on device; what is finished is kept, and the same command goes on from there"
 )
 
@@ -39,7 +39,7 @@ def whole_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def whole(whole_folder: Path) -> bytes:
+def trials_bytes(whole_folder: Path) -> bytes:
     return (whole_folder / "trials.parquet").read_bytes()
 
 
@@ -48,33 +48,35 @@ def times(folder: Path) -> dict[str, int]:
 
 
 @pytest.mark.slow
-def test_a_disk_that_is_full_in_the_middle(tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_is_full_in_the_middle(
+    tmp_path: Path, trials_bytes: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
     calls = count()
     monkeypatch.setattr(files.os, "fsync", lambda number: next(calls) == 2 and full())  # the study, a chunk, a chunk
-    said = cmg_mj(*SWEEP, tmp_path)
-    assert said.complaint == f"{tmp_path / 'chunks' / '000001.parquet'}: {GOES_ON}"
-    kept = times(tmp_path / "chunks")
-    assert list(kept) == ["000000.parquet"]  # nothing half written either
+    outcome = cmg_mj(*SWEEP, tmp_path)
+    assert outcome.complaint == f"{tmp_path / 'chunks' / '000001.parquet'}: {CONTINUATION}"
+    chunk_times = times(tmp_path / "chunks")
+    assert list(chunk_times) == ["000000.parquet"]  # nothing half written either
     monkeypatch.undo()
-    again = cmg_mj(*SWEEP, tmp_path)
-    assert again.status == 0
-    assert "4 of 12 trials are there from before" in again.err
-    assert kept.items() <= times(tmp_path / "chunks").items()
-    assert (tmp_path / "trials.parquet").read_bytes() == whole
+    rerun = cmg_mj(*SWEEP, tmp_path)
+    assert rerun.status == 0
+    assert "4 of 12 trials are there from before" in rerun.err
+    assert chunk_times.items() <= times(tmp_path / "chunks").items()
+    assert (tmp_path / "trials.parquet").read_bytes() == trials_bytes
 
 
 @pytest.mark.slow
-def test_a_disk_that_is_full_at_the_end(tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_is_full_at_the_end(tmp_path: Path, trials_bytes: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.studies.sweeps.report.merged", full)
     monkeypatch.setattr("cmg_mj.studies.sweeps.report.draw", full)
     complaint = cmg_mj(*SWEEP, tmp_path).complaint
     assert complaint.startswith(f"{tmp_path / 'trials.parquet'}: cannot be written: No space left on device; ")
-    assert complaint.endswith(f"{tmp_path / 'curves.png'}: {GOES_ON}")
-    kept = times(tmp_path / "chunks")
+    assert complaint.endswith(f"{tmp_path / 'curves.png'}: {CONTINUATION}")
+    chunk_times = times(tmp_path / "chunks")
     monkeypatch.undo()
     assert cmg_mj(*SWEEP, tmp_path).status == 0
-    assert times(tmp_path / "chunks") == kept
-    assert (tmp_path / "trials.parquet").read_bytes() == whole
+    assert times(tmp_path / "chunks") == chunk_times
+    assert (tmp_path / "trials.parquet").read_bytes() == trials_bytes
 
 
 def test_a_disk_that_is_full_at_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,40 +96,40 @@ def test_a_folder_that_may_not_be_written(tmp_path: Path) -> None:
         tmp_path.chmod(0o700)
 
 
-def test_two_sweeps_in_one_folder(tmp_path: Path, whole: bytes) -> None:
+def test_two_sweeps_in_one_folder(tmp_path: Path) -> None:
     assert cmg_mj(*SWEEP, tmp_path).status == 0
-    before = times(tmp_path)
+    before, trials = times(tmp_path), (tmp_path / "trials.parquet").read_bytes()
     with RunFolder(tmp_path):
         assert cmg_mj(*SWEEP, tmp_path).complaint == f"--out {tmp_path}: another run is writing to it"
     assert times(tmp_path) == before
-    assert (tmp_path / "trials.parquet").read_bytes() == whole
+    assert (tmp_path / "trials.parquet").read_bytes() == trials
 
 
-def flipped(chunk: Path) -> None:
+def flip_bit(chunk: Path) -> None:
     content = bytearray(chunk.read_bytes())
     content[40] ^= 1
     chunk.write_bytes(content)
 
 
-def rewritten(chunk: Path, table: pa.Table) -> None:
+def rewrite(chunk: Path, table: pa.Table) -> None:
     """Write other trials under the fingerprint that is there."""
     metadata = pq.read_schema(chunk).metadata
     pq.write_table(table.replace_schema_metadata(metadata), chunk)
 
 
-def edited(chunk: Path) -> None:
+def edit_value(chunk: Path) -> None:
     table = pq.read_table(chunk)
     column = table.column_names.index("velocity_rms_rad_s")
     values = [2.0 * value for value in table.column(column).to_pylist()]
-    rewritten(chunk, table.set_column(column, "velocity_rms_rad_s", pa.array(values)))
+    rewrite(chunk, table.set_column(column, "velocity_rms_rad_s", pa.array(values)))
 
 
 DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
     "the first bytes alone": (lambda chunk: chunk.write_bytes(chunk.read_bytes()[:100]), "cannot be read: .*"),
     "no byte": (lambda chunk: chunk.write_bytes(b""), "cannot be read: .*"),
-    "one bit": (flipped, "cannot be read: .*|holds other values than were computed"),
-    "a value": (edited, "holds other values than were computed"),
-    "one trial less": (lambda chunk: rewritten(chunk, pq.read_table(chunk)[:3]), "holds 3 trials of 4"),
+    "one bit": (flip_bit, "cannot be read: .*|holds other values than were computed"),
+    "a value": (edit_value, "holds other values than were computed"),
+    "one trial less": (lambda chunk: rewrite(chunk, pq.read_table(chunk)[:3]), "holds 3 trials of 4"),
 }
 
 
@@ -138,18 +140,18 @@ def finished(tmp_path: Path, whole_folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_chunk_is_computed_again(finished: Path, whole: bytes, damage: str) -> None:
+def test_a_damaged_chunk_is_computed_again(finished: Path, trials_bytes: bytes, damage: str) -> None:
     harm, message = DAMAGES[damage]
     chunk = finished / "chunks" / "000002.parquet"
-    kept = times(finished / "chunks")
+    before = times(finished / "chunks")
     harm(chunk)
-    again = cmg_mj(*SWEEP, finished)
-    assert again.status == 0
-    assert re.match(f"cmg-mj: {chunk}: ({message}); it is computed again, and kept as 000002.damaged\n", again.err)
-    assert "8 of 12 trials are there from before" in again.err
-    assert (finished / "trials.parquet").read_bytes() == whole
+    rerun = cmg_mj(*SWEEP, finished)
+    assert rerun.status == 0
+    assert re.match(f"cmg-mj: {chunk}: ({message}); it is computed again, and kept as 000002.damaged\n", rerun.err)
+    assert "8 of 12 trials are there from before" in rerun.err
+    assert (finished / "trials.parquet").read_bytes() == trials_bytes
     unharmed = ("000000.parquet", "000001.parquet")
-    assert {name: times(finished / "chunks")[name] for name in unharmed} == {name: kept[name] for name in unharmed}
+    assert {name: times(finished / "chunks")[name] for name in unharmed} == {name: before[name] for name in unharmed}
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("nowhere", path)])

@@ -10,7 +10,7 @@ import pytest
 from cmg_mj.studies.sweeps.points import sampled
 from cmg_mj.studies.sweeps.sobol import LOG_RATIO, LOST, IndexRow, Indices, index_rows, indices
 from cmg_mj.studies.sweeps.study import SweepStudy
-from tests.studies.sweeps.made_up import BIAS, NOISE, VELOCITY, made_up
+from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, VELOCITY, make_trials
 
 
 def ishigami(shares: np.ndarray) -> np.ndarray:
@@ -22,20 +22,23 @@ def test_the_indices_of_a_known_function() -> None:
     """Ishigami's: 0.314, 0.442, 0 and 0.558, 0.442, 0.244 in closed form."""
     first, total = np.array([0.3139, 0.4424, 0.0]), np.array([0.5576, 0.4424, 0.2437])
     n = 1024
-    found = indices(ishigami(sampled(3, n, 1, indices=True)), n, 0)
-    np.testing.assert_allclose(found.first, first, atol=0.03)
-    np.testing.assert_allclose(found.total, total, atol=0.03)
-    for low, of, high in ((found.first_low, first, found.first_high), (found.total_low, total, found.total_high)):
-        assert (low <= of).all()
-        assert (of <= high).all()
+    result = indices(ishigami(sampled(3, n, 1, indices=True)), n, 0)
+    np.testing.assert_allclose(result.first, first, atol=0.03)
+    np.testing.assert_allclose(result.total, total, atol=0.03)
+    for low, known_index, high in (
+        (result.first_low, first, result.first_high),
+        (result.total_low, total, result.total_high),
+    ):
+        assert (low <= known_index).all()
+        assert (known_index <= high).all()
         assert (high - low < 0.4).all()
-    again = indices(ishigami(sampled(3, n, 1, indices=True)), n, 0)
-    assert all(np.array_equal(a, b) for a, b in zip(found, again, strict=True))
+    rerun = indices(ishigami(sampled(3, n, 1, indices=True)), n, 0)
+    assert all(np.array_equal(a, b) for a, b in zip(result, rerun, strict=True))
 
 
 def test_the_indices_of_a_list() -> None:
     """y = a + b, a of 0, 1, 2, 3 and b evenly from 0 to 4: variances 5/4 and 4/3."""
-    trials = made_up(
+    trials = make_trials(
         {BIAS: "0,1,2,3", NOISE: "0:4"},
         ("linear",),
         1,
@@ -43,11 +46,11 @@ def test_the_indices_of_a_list() -> None:
         design="sobol",
         n=1024,
     )
-    of = {row.field: row for row in index_rows(trials) if row.figure == VELOCITY}
+    row_of = {row.field: row for row in index_rows(trials) if row.figure == VELOCITY}
     for field, variance in ((BIAS, 5.0 / 4.0), (NOISE, 4.0 / 3.0)):
         share = variance / (5.0 / 4.0 + 4.0 / 3.0)
-        assert of[field].first == pytest.approx(share, abs=0.01)
-        assert of[field].total == pytest.approx(share, abs=0.01)
+        assert row_of[field].first == pytest.approx(share, abs=0.01)
+        assert row_of[field].total == pytest.approx(share, abs=0.01)
 
 
 @pytest.mark.parametrize(("weights", "decisive"), [((4.0, 1.0), [True, False]), ((1.0, 1.0), [False, False])])
@@ -64,7 +67,7 @@ def test_an_estimate_above_an_interval_is_not_decisive_if_its_own_reaches_down()
 
 
 def sobol(error: Any, n: int = 64) -> list[IndexRow]:
-    trials = made_up({BIAS: "0:1", NOISE: "100:200"}, ("linear", "ltv"), 2, error, design="sobol", n=n)
+    trials = make_trials({BIAS: "0:1", NOISE: "100:200"}, ("linear", "ltv"), 2, error, design="sobol", n=n)
     assert isinstance(trials.study, SweepStudy)
     return [row for row in index_rows(trials) if row.figure == VELOCITY]
 
@@ -72,15 +75,15 @@ def sobol(error: Any, n: int = 64) -> list[IndexRow]:
 def test_what_is_decomposed_is_the_mean_over_the_worlds() -> None:
     """Worlds that pull apart by the noise, and by nothing in their mean."""
     rows = sobol(lambda point, _, world: point[BIAS] + (2 * world - 1) * point[NOISE])
-    by = {(row.observer, row.field): row for row in rows}
-    assert by["linear", BIAS].total == pytest.approx(1.0, abs=0.1)
-    assert by["linear", NOISE].total == pytest.approx(0.0, abs=1e-9)
-    assert (by["ltv", BIAS].decisive, by["ltv", NOISE].decisive) == (True, False)
+    row_of = {(row.observer, row.field): row for row in rows}
+    assert row_of["linear", BIAS].total == pytest.approx(1.0, abs=0.1)
+    assert row_of["linear", NOISE].total == pytest.approx(0.0, abs=1e-9)
+    assert (row_of["ltv", BIAS].decisive, row_of["ltv", NOISE].decisive) == (True, False)
 
 
 def test_the_logarithm_of_a_ratio() -> None:
     """exp(a) by exp(0.02 b), a of 0 to 1 and b of 100 to 200: the logarithm is a - 0.02 b, variances 1/12 and 4/12."""
-    trials = made_up(
+    trials = make_trials(
         {BIAS: "0:1", NOISE: "100:200"},
         ("linear", "ltv"),
         2,
@@ -89,14 +92,14 @@ def test_the_logarithm_of_a_ratio() -> None:
         n=256,
         order=("ltv", "linear"),
     )
-    of = [row for row in index_rows(trials) if row.figure == f"{LOG_RATIO}{VELOCITY}"]
-    assert [(row.observer, row.field) for row in of] == [("ltv / linear", BIAS), ("ltv / linear", NOISE)]
-    assert [row.total for row in of] == pytest.approx([0.2, 0.8], abs=0.02)
-    assert [row.decisive for row in of] == [False, True]
+    rows = [row for row in index_rows(trials) if row.figure == f"{LOG_RATIO}{VELOCITY}"]
+    assert [(row.observer, row.field) for row in rows] == [("ltv / linear", BIAS), ("ltv / linear", NOISE)]
+    assert [row.total for row in rows] == pytest.approx([0.2, 0.8], abs=0.02)
+    assert [row.decisive for row in rows] == [False, True]
 
 
 def test_the_share_of_falls_has_indices() -> None:
-    trials = made_up(
+    trials = make_trials(
         {BIAS: "0:1", NOISE: "100:200"},
         ("linear",),
         1,
@@ -111,15 +114,15 @@ def test_the_share_of_falls_has_indices() -> None:
 
 def test_refused_with_counts_where_a_world_fell() -> None:
     rows = sobol(lambda point, name, world: None if name == "ltv" and world and point[BIAS] > 0.5 else point[BIAS])
-    fell = sum(1 for point in made_up_points() if point[BIAS] > 0.5)
+    n_fallen = sum(1 for point in make_points() if point[BIAS] > 0.5)
     for row in rows:
         if row.observer == "ltv":
-            assert row.refused == f"no value at {fell} of 256 points: of 512 trials {fell} fell"
+            assert row.refused == f"no value at {n_fallen} of 256 points: of 512 trials {n_fallen} fell"
             assert row.total is None
             assert row.decisive is None
         else:
             assert row.refused is None
-    assert 0 < fell < 256
+    assert 0 < n_fallen < 256
 
 
 def test_refused_with_counts_where_every_point_has_lost_one_of_its_worlds() -> None:
@@ -130,14 +133,14 @@ def test_refused_with_counts_where_every_point_has_lost_one_of_its_worlds() -> N
 
 def test_refused_where_only_points_of_the_crossed_blocks_differ() -> None:
     """The variance is that of A and B: with none there indices would be 0, from 0 to 0."""
-    points = made_up_points()
-    lost = points[-1]
-    assert lost not in points[:128]
-    trials = made_up(
+    points = make_points()
+    fallen_point = points[-1]
+    assert fallen_point not in points[:128]
+    trials = make_trials(
         {BIAS: "0:1", NOISE: "100:200"},
         ("linear",),
         1,
-        lambda point, *_: None if point == lost else 1.0,
+        lambda point, *_: None if point == fallen_point else 1.0,
         design="sobol",
         n=64,
     )
@@ -149,8 +152,8 @@ def test_refused_where_only_points_of_the_crossed_blocks_differ() -> None:
         )
 
 
-def made_up_points() -> list[dict[str, Any]]:
-    trials = made_up({BIAS: "0:1", NOISE: "100:200"}, ("linear",), 1, lambda *_: 1.0, design="sobol", n=64)
+def make_points() -> list[dict[str, Any]]:
+    trials = make_trials({BIAS: "0:1", NOISE: "100:200"}, ("linear",), 1, lambda *_: 1.0, design="sobol", n=64)
     return list(trials.study.points)
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
-from cmg_mj.studies.sweeps.plot_scales import is_logarithmic, round_values
-from cmg_mj.studies.sweeps.report import PICTURES, pictures_of
+from cmg_mj.studies.sweeps.pictures import is_logarithmic, pictures_of, round_values
+from cmg_mj.studies.sweeps.report import PICTURES
 from cmg_mj.visualization.plots.figure_spec import Map, Picture
 from cmg_mj.visualization.plots.map_plot import edges
 from cmg_mj.visualization.plots.run_plot import draw
-from tests.studies.sweeps.made_up import BIAS, NOISE, RATE, made_up
+from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, RATE, make_trials
 
 OBSERVERS = ("linear", "ltv")
 
@@ -30,97 +30,97 @@ def error(point: dict[str, Any], name: str, world: int) -> float | None:
     return 1e-3 * (noise - better + 10.0 * chance)
 
 
-def on_a_grid() -> Trials:
+def make_grid_trials() -> Trials:
     """The values of the second field fall: the map's rise."""
-    return made_up({BIAS: "0,1,2", NOISE: "400,200,100"}, OBSERVERS, 4, error)
+    return make_trials({BIAS: "0,1,2", NOISE: "400,200,100"}, OBSERVERS, 4, error)
 
 
 def the_map(picture: Picture) -> Map:
-    found = picture.panels[0].map
-    assert found is not None
-    return found
+    result = picture.panels[0].map
+    assert result is not None
+    return result
 
 
 def test_a_map_has_the_best_of_every_cell() -> None:
-    velocity, falls = pictures_of(on_a_grid())
-    drawn = the_map(velocity)
-    assert drawn.x.tolist() == [0.0, 1.0, 2.0]
-    assert drawn.y.tolist() == [100.0, 200.0, 400.0]
-    assert drawn.best.tolist() == [[0, 0, -1], [1, 0, -1], [1, 0, -1]]
-    assert drawn.values[0, 0] == pytest.approx(0.1)
-    assert drawn.values[2, 0] == pytest.approx(0.1999)
-    assert np.isnan(drawn.values[:, 2]).all()
-    assert drawn.sure[:, 0].tolist() == [True, True, False]  # at 400 the worlds pull apart
-    assert drawn.boundaries["ltv"].tolist() == [[0.0, 0.75, 1.0]] * 3
-    assert drawn.boundaries["linear"].tolist() == [[0.0, 0.0, 1.0]] * 3
-    assert all(drawn.values[0, 0] < level < 0.2 for level in drawn.levels)
-    assert drawn.levels
-    fell = the_map(falls)
-    assert fell.best.tolist() == [[-1, 0, -1]] * 3
-    assert not fell.sure.any()  # none of 4 beside 3 of 4
+    velocity, fall_picture = pictures_of(make_grid_trials())
+    error_map = the_map(velocity)
+    assert error_map.x.tolist() == [0.0, 1.0, 2.0]
+    assert error_map.y.tolist() == [100.0, 200.0, 400.0]
+    assert error_map.best.tolist() == [[0, 0, -1], [1, 0, -1], [1, 0, -1]]
+    assert error_map.values[0, 0] == pytest.approx(0.1)
+    assert error_map.values[2, 0] == pytest.approx(0.1999)
+    assert np.isnan(error_map.values[:, 2]).all()
+    assert error_map.sure[:, 0].tolist() == [True, True, False]  # at 400 the worlds pull apart
+    assert error_map.boundaries["ltv"].tolist() == [[0.0, 0.75, 1.0]] * 3
+    assert error_map.boundaries["linear"].tolist() == [[0.0, 0.0, 1.0]] * 3
+    assert all(error_map.values[0, 0] < level < 0.2 for level in error_map.levels)
+    assert error_map.levels
+    fall_map = the_map(fall_picture)
+    assert fall_map.best.tolist() == [[-1, 0, -1]] * 3
+    assert not fall_map.sure.any()  # none of 4 beside 3 of 4
     assert (velocity.panels[0].x_scale, velocity.panels[0].y_scale) == ("linear", "log")
-    assert {f"{picture.name}.png" for picture in (velocity, falls)} <= set(PICTURES)
+    assert {f"{picture.name}.png" for picture in (velocity, fall_picture)} <= set(PICTURES)
 
 
 def test_a_stop_is_no_share_of_falls() -> None:
     """A world that stopped neither fell nor stood: the share is that of the others, and of none there is none."""
-    trials = on_a_grid()
+    trials = make_grid_trials()
     trials.outcome[0, 0, :] = "stopped"
     trials.outcome[3, 1, 0] = "stopped"  # one of the three of four that fell at 1 degree and 400
     trials.stood = trials.outcome == "done"
-    drawn = the_map(pictures_of(trials)[0])
-    assert math.isnan(drawn.boundaries["linear"][2, 0])
-    assert drawn.best[2, 0] == 1
-    assert drawn.boundaries["ltv"][2, 1] == pytest.approx(2.0 / 3.0)
+    error_map = the_map(pictures_of(trials)[0])
+    assert math.isnan(error_map.boundaries["linear"][2, 0])
+    assert error_map.best[2, 0] == 1
+    assert error_map.boundaries["ltv"][2, 1] == pytest.approx(2.0 / 3.0)
 
 
 def test_a_curve_of_falls_is_of_those_that_fell_or_stood() -> None:
     """The interval, too."""
-    trials = made_up({NOISE: "100,200"}, OBSERVERS, 4, lambda p, name, w: error({BIAS: 1, **p}, name, w))
+    trials = make_trials({NOISE: "100,200"}, OBSERVERS, 4, lambda p, name, w: error({BIAS: 1, **p}, name, w))
     trials.outcome[0, 1, 0] = "stopped"
     trials.outcome[1, 1, :] = "refused"
     trials.stood = trials.outcome == "done"
     (picture,) = pictures_of(trials)
     line = picture.panels[-1].lines[1]
     assert np.asarray(line.y) == pytest.approx([2.0 / 3.0, math.nan], nan_ok=True)
-    below, above = np.asarray(line.spread)[:, 0]
+    lower, upper = np.asarray(line.spread)[:, 0]
     interval = fell_interval(2, 3)
-    assert (2.0 / 3.0 - below, 2.0 / 3.0 + above) == pytest.approx((interval.low, interval.high))
+    assert (2.0 / 3.0 - lower, 2.0 / 3.0 + upper) == pytest.approx((interval.low, interval.high))
 
 
 def test_one_field_makes_curves() -> None:
-    trials = made_up({NOISE: "400,100,200"}, OBSERVERS, 4, lambda p, name, w: error({BIAS: 1, **p}, name, w))
+    trials = make_trials({NOISE: "400,100,200"}, OBSERVERS, 4, lambda p, name, w: error({BIAS: 1, **p}, name, w))
     (picture,) = pictures_of(trials)
-    errors, falls = picture.panels
+    errors, fall_panel = picture.panels
     assert [line.label for line in errors.lines if line.label] == list(OBSERVERS)
     first = errors.lines[0]
     assert list(first.x) == [100.0, 200.0, 400.0]
     assert list(first.y) == pytest.approx([0.1, 0.2, 0.2])
     assert first.spread is not None
-    below = np.asarray(first.spread)[0]
-    assert below[:2] == pytest.approx([0.0, 0.0], abs=1e-12)
-    assert below[2] == pytest.approx(3.1824 * np.std([1, -1, 1, -1], ddof=1) * 0.01 / 2.0, rel=1e-3)
-    crosses = [line for line in errors.lines if line.style == "x"]
-    assert [(line.color, len(line.x)) for line in crosses] == [("ltv", 3)]
+    lower = np.asarray(first.spread)[0]
+    assert lower[:2] == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert lower[2] == pytest.approx(3.1824 * np.std([1, -1, 1, -1], ddof=1) * 0.01 / 2.0, rel=1e-3)
+    missing_points = [line for line in errors.lines if line.style == "x"]
+    assert [(line.color, len(line.x)) for line in missing_points] == [("ltv", 3)]
     assert errors.x_scale == "log"
-    assert np.asarray(falls.lines[1].y).tolist() == [0.75] * 3
-    spread = np.asarray(falls.lines[1].spread)
+    assert np.asarray(fall_panel.lines[1].y).tolist() == [0.75] * 3
+    spread = np.asarray(fall_panel.lines[1].spread)
     assert (0.75 - spread[0, 0], 0.75 + spread[1, 0]) == pytest.approx((0.3006, 0.9544), abs=1e-4)
 
 
 @pytest.mark.parametrize(
-    "varied", [{BIAS: "0,1", NOISE: "100,200", RATE: "100,200"}, {BIAS: "0,1", "plant.integrator": "RK4,implicit"}]
+    "axes", [{BIAS: "0,1", NOISE: "100,200", RATE: "100,200"}, {BIAS: "0,1", "plant.integrator": "RK4,implicit"}]
 )
-def test_other_sweeps_have_the_table_only(varied: dict[str, str]) -> None:
-    assert pictures_of(made_up(varied, OBSERVERS, 2, lambda *_: 0.1)) == []
+def test_other_sweeps_have_the_table_only(axes: dict[str, str]) -> None:
+    assert pictures_of(make_trials(axes, OBSERVERS, 2, lambda *_: 0.1)) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("worlds", [1, 4])
 def test_they_can_be_drawn(tmp_path: Path, worlds: int) -> None:
-    of_one = made_up({BIAS: "0,1,2"}, OBSERVERS, worlds, lambda p, name, w: error({NOISE: 100, **p}, name, w))
-    all_fell = made_up({BIAS: "0,1", NOISE: "1,2"}, OBSERVERS, worlds, lambda *_: None)
-    for trials in (made_up({BIAS: "0,1,2", NOISE: "400,200,100"}, OBSERVERS, worlds, error), of_one, all_fell):
+    one_field = make_trials({BIAS: "0,1,2"}, OBSERVERS, worlds, lambda p, name, w: error({NOISE: 100, **p}, name, w))
+    all_fell = make_trials({BIAS: "0,1", NOISE: "1,2"}, OBSERVERS, worlds, lambda *_: None)
+    for trials in (make_trials({BIAS: "0,1,2", NOISE: "400,200,100"}, OBSERVERS, worlds, error), one_field, all_fell):
         pictures = pictures_of(trials)
         assert pictures
         for picture in pictures:

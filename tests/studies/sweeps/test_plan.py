@@ -18,21 +18,21 @@ BIAS, TORQUE = "plant.equilibrium_bias_deg", "plant.initial_tilt_deg"
 
 
 def test_ctrl_c_before_the_first_tick(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: Any) -> None:
+    def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plan, "compute", interrupted)
-    said = cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run")
-    assert (said.status, said.out, said.err) == (130, "", "cmg-mj: interrupted\n")
+    monkeypatch.setattr(plan, "compute", interrupt)
+    outcome = cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run")
+    assert (outcome.status, outcome.out, outcome.err) == (130, "", "cmg-mj: interrupted\n")
 
 
 def test_ctrl_c_after_it_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(study: SweepStudy, piece: Chunk, tick: Callable[[float], None]) -> None:
+    def interrupt(study: SweepStudy, piece: Chunk, tick: Callable[[float], None]) -> None:
         tick(0.1)
         tick(0.2)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plan, "compute", interrupted)
+    monkeypatch.setattr(plan, "compute", interrupt)
     assert cmg_mj("sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--dry-run").status == 130
 
 
@@ -41,12 +41,12 @@ def test_ctrl_c_after_it_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
     [(0.0012, "about 0.072 s on"), (0.5, "about 30 s on"), (12.0, "about 12 min on"), (480.0, "about 8.0 h on")],
 )
 def test_how_long_in_words(minutes: float, words: str) -> None:
-    counts = plan.Cost(points=1, observers=1, worlds=1, trials=1, chunks=1, minutes=minutes, memory_mb=230.0)
-    assert words in _cost_text(counts)
+    counts = dict.fromkeys(("points", "observers", "worlds", "trials", "chunks"), 1.0)
+    assert words in _cost_text({**counts, "minutes": minutes, "memory_mb": 230.0})
 
 
 @pytest.mark.parametrize(
-    ("said", "options", "points"),
+    ("axis_text", "options", "points"),
     [
         ("-1:1", {"design": "sample", "n": 20_000_000}, 20_000_000),
         ("-1:1", {"design": "sobol", "n": 2**22}, 2**24),
@@ -54,19 +54,21 @@ def test_how_long_in_words(minutes: float, words: str) -> None:
     ],
 )
 def test_the_points_of_a_very_large_study_are_not_drawn(
-    said: str, options: dict[str, Any], points: int, monkeypatch: pytest.MonkeyPatch
+    axis_text: str, options: dict[str, Any], points: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drawn: list[int] = []
-    sampled = study.sampled
+    counts: list[int] = []
+    sample = study.sampled
 
-    def noted(dimensions: int, n: int, *others: Any, **options: Any) -> Any:
-        drawn.append(n)
-        return sampled(dimensions, n, *others, **options)
+    def count_points(dimensions: int, n: int, *arguments: Any, **options: Any) -> Any:
+        counts.append(n)
+        return sample(dimensions, n, *arguments, **options)
 
-    monkeypatch.setattr(study, "sampled", noted)
-    monkeypatch.setattr(plan, "compute", lambda study, piece, tick: [study.points[at] for at, _ in piece.trials])
-    axes = tuple(parse_axis(field, said, field) for field in (BIAS, TORQUE))
+    monkeypatch.setattr(study, "sampled", count_points)
+    monkeypatch.setattr(
+        plan, "compute", lambda study, piece, tick: [study.points[number] for number, _ in piece.trials]
+    )
+    axes = tuple(parse_axis(field, axis_text, field) for field in (BIAS, TORQUE))
     takes = plan.estimate_cost(SweepStudy(load_scenario("push_recovery"), axes, ("linear",), 2, **options))
-    assert drawn == [plan.POINTS]
+    assert counts == [plan.POINTS]
     assert (takes["points"], takes["trials"]) == (points, 2 * points)
     assert takes["chunks"] == -(-2 * points // study.CHUNK)

@@ -1,4 +1,4 @@
-"""What a sweep refuses before anything is computed, in one line, whoever asks: the command, a study file, Python."""
+"""Refusals of a sweep before anything is computed, in one line, for the command, a study file and Python."""
 
 from __future__ import annotations
 
@@ -113,10 +113,10 @@ def test_in_a_study_file(sweep: str, complaint: str) -> None:
     ],
 )
 def test_from_python(options: dict[str, Any], complaint: str) -> None:
-    given: dict[str, Any] = {"vary": {BIAS: [0, 1]}} | options
-    with pytest.raises(InputError) as refused:
-        swept.sweep("push_recovery", **given)
-    assert_in(complaint, str(refused.value))
+    arguments: dict[str, Any] = {"vary": {BIAS: [0, 1]}} | options
+    with pytest.raises(InputError) as info:
+        swept.sweep("push_recovery", **arguments)
+    assert_in(complaint, str(info.value))
 
 
 def test_values_from_python(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,10 +124,10 @@ def test_values_from_python(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()
     worlds: Any = np.int64(1)
     vary = {BIAS: 0.5, NOISE: np.array([200.0, 400.0]), "controller.rate_hz": [np.int64(100)]}
-    found = swept.sweep(load_scenario("push_recovery", SHORT), vary, ["linear"], worlds=worlds)
+    result = swept.sweep(load_scenario("push_recovery", SHORT), vary, ["linear"], worlds=worlds)
     columns = ["point", *vary]
-    assert [str(found.trials.schema.field(name).type) for name in columns] == ["int64", "double", "double", "int64"]
-    assert found.trials.select(columns).to_pylist()[1] == {
+    assert [str(result.trials.schema.field(name).type) for name in columns] == ["int64", "double", "double", "int64"]
+    assert result.trials.select(columns).to_pylist()[1] == {
         "point": 1,
         BIAS: 0.5,
         NOISE: 400.0,
@@ -137,8 +137,8 @@ def test_values_from_python(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_what_fits_only_with_another_value_is_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()
-    found = swept.sweep(load_scenario("push_recovery", SHORT), {INNER: [0.05, 0.5], OUTER: [0.2, 0.6]}, worlds=1)
-    assert found.trials["outcome"].to_pylist() == ["done", "done", "refused", "done"]
+    result = swept.sweep(load_scenario("push_recovery", SHORT), {INNER: [0.05, 0.5], OUTER: [0.2, 0.6]}, worlds=1)
+    assert result.trials["outcome"].to_pylist() == ["done", "done", "refused", "done"]
 
 
 def test_a_whole_number_that_no_column_of_them_holds() -> None:
@@ -153,9 +153,9 @@ def test_a_whole_number_that_no_column_of_them_holds() -> None:
     assert (str(column.type), column.to_pylist()) == ("double", [0.0, 1e20])
 
 
-def assert_in(pattern: str, said: str) -> None:
+def assert_in(pattern: str, message: str) -> None:
     """The parts of a pattern, with ` .* ` between, stand in a line one after the other."""
-    at = 0
+    position = 0
     for part in pattern.split(" .* "):
-        at = said.find(part, at)
-        assert at >= 0, f"{part!r} is not in {said!r}"
+        position = message.find(part, position)
+        assert position >= 0, f"{part!r} is not in {message!r}"

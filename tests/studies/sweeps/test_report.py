@@ -9,7 +9,7 @@ import pytest
 
 from cmg_mj.studies.sweeps.cells import Trials
 from cmg_mj.studies.sweeps.report import report, summary, tables_of
-from tests.studies.sweeps.made_up import BIAS, NOISE, made_up
+from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, make_trials
 
 RATES = "controller.rate_hz+sensors.accelerometer.rate_hz"
 
@@ -20,29 +20,29 @@ def row_of(text: str, first: str) -> list[str]:
     return [cell.strip() for cell in line.strip("|").split("|")]
 
 
-def sampled() -> Trials:
+def sample() -> Trials:
     """At 24 points an error that is the bias, and 0.1 more in world 1, in which ltv falls at half of them."""
 
     def error(point: dict[str, Any], name: str, world: int) -> float | None:
         return None if name == "ltv" and world == 1 and point[BIAS] > 0.5 else point[BIAS] + 0.1 * world
 
-    varied = {BIAS: "0:1", NOISE: "log:100:800", RATES: "100,200"}
-    return made_up(varied, ("linear", "ltv", "kalman"), 2, error, design="sample", n=24)
+    axes = {BIAS: "0:1", NOISE: "log:100:800", RATES: "100,200"}
+    return make_trials(axes, ("linear", "ltv", "kalman"), 2, error, design="sample", n=24)
 
 
 def test_of_a_design_an_observer_has_a_row() -> None:
-    trials = sampled()
+    trials = sample()
     trials.outcome[:, 2] = "refused"
     trials.stood = trials.outcome == "done"
-    found = tables_of(trials)
+    tables = tables_of(trials)
     bias = np.array([point[BIAS] for point in trials.study.points])
-    fell = bias > 0.5
-    for text in (report(found, []), summary(found)):
-        for name, means in (("linear", bias + 0.05), ("ltv", bias + 0.05 * ~fell)):
-            figures = [means.mean(), *np.quantile(means, (0.1, 0.5, 0.9))]
+    falls = bias > 0.5
+    for text in (report(tables, []), summary(tables)):
+        for name, errors in (("linear", bias + 0.05), ("ltv", bias + 0.05 * ~falls)):
+            figures = [errors.mean(), *np.quantile(errors, (0.1, 0.5, 0.9))]
             assert row_of(text, name)[1:6] == ["24 of 24", *(f"{figure:.4f}" for figure in figures)]
         assert row_of(text, "linear")[6] == "0 of 48 (0.0 %)"
-        assert row_of(text, "ltv")[6] == f"{fell.sum()} of 48 ({100 * fell.sum() / 48:.1f} %)"
+        assert row_of(text, "ltv")[6] == f"{falls.sum()} of 48 ({100 * falls.sum() / 48:.1f} %)"
         assert row_of(text, "kalman")[1:] == ["0 of 24", "-", "-", "-", "-", "0 of 0"]
         assert "Every point is in cells.parquet." in text
         assert max(len(line) for line in text.splitlines() if line.startswith("|")) < 120
@@ -50,16 +50,18 @@ def test_of_a_design_an_observer_has_a_row() -> None:
 
 
 def test_a_report_of_a_design_says_what_is_varied() -> None:
-    lines = report(tables_of(sampled()), []).splitlines()
+    lines = report(tables_of(sample()), []).splitlines()
     assert f"- {BIAS}: 0 to 1" in lines
     assert f"- {NOISE}: 100 to 800, evenly in the logarithm" in lines
     assert f"- {RATES}: 100, 200" in lines
-    many = made_up({BIAS: "0:1:30"}, ("linear",), 1, lambda *_: 1.0, design="sample", n=4)
+    many = make_trials({BIAS: "0:1:30"}, ("linear",), 1, lambda *_: 1.0, design="sample", n=4)
     assert any(line.endswith(", ..., 1 (30 values)") for line in report(tables_of(many), []).splitlines())
 
 
 def test_of_a_grid_a_point_has_a_row() -> None:
-    trials = made_up({RATES: "100,200"}, ("linear", "ltv"), 2, lambda _, name, w: None if w and name == "ltv" else 0.5)
+    trials = make_trials(
+        {RATES: "100,200"}, ("linear", "ltv"), 2, lambda _, name, w: None if w and name == "ltv" else 0.5
+    )
     for text in (report(tables_of(trials), []), summary(tables_of(trials))):
         assert [cell.strip() for cell in text.splitlines()[-1].strip("|").split("|")] == [
             "200",
@@ -71,30 +73,30 @@ def test_of_a_grid_a_point_has_a_row() -> None:
 
 @pytest.mark.parametrize("order", [(), ("ltv", "linear")])
 def test_the_terminal_says_why_there_are_no_indices(order: tuple[str, ...]) -> None:
-    """Of everything, or of one observer and its ratio alone."""
+    """For everything, or for one observer and its ratio alone."""
     names = ("linear", "ltv")
 
-    def sobol(fallen: tuple[str, ...]) -> str:
+    def sobol(fallen_observers: tuple[str, ...]) -> str:
         def error(point: dict[str, Any], name: str, _: int) -> float | None:
-            return None if name in fallen else point[BIAS] + point[NOISE]
+            return None if name in fallen_observers else point[BIAS] + point[NOISE]
 
         return summary(
-            tables_of(made_up({BIAS: "0:1", NOISE: "1:2"}, names, 1, error, design="sobol", n=16, order=order))
+            tables_of(make_trials({BIAS: "0:1", NOISE: "1:2"}, names, 1, error, design="sobol", n=16, order=order))
         )
 
-    said = sobol(names)
-    assert "total index" not in said
+    text = sobol(names)
+    assert "total index" not in text
     for name in names:
-        assert f"No indices of {name}, velocity RMS error, error in push window: no value at 64 of 64 points: " in said
-    said = sobol(("ltv",))
-    lines = [line for line in said.splitlines() if line.startswith("| linear ") and BIAS in line]
+        assert f"No indices of {name}, velocity RMS error, error in push window: no value at 64 of 64 points: " in text
+    text = sobol(("ltv",))
+    lines = [line for line in text.splitlines() if line.startswith("| linear ") and BIAS in line]
     assert len(lines) == 1
-    assert "No indices of ltv, velocity RMS error: no value at 64 of 64 points: of 64 trials 64 fell." in said
-    assert ("No indices of log(ltv / linear), velocity RMS error: no value at 64 of 64 points" in said) == bool(order)
+    assert "No indices of ltv, velocity RMS error: no value at 64 of 64 points: of 64 trials 64 fell." in text
+    assert ("No indices of log(ltv / linear), velocity RMS error: no value at 64 of 64 points" in text) == bool(order)
 
 
 def test_the_terminal_has_the_indices_of_a_ratio() -> None:
-    trials = made_up(
+    trials = make_trials(
         {BIAS: "0:1", NOISE: "1:2"},
         ("linear", "ltv"),
         1,

@@ -16,25 +16,25 @@ from cmg_mj.studies.sweeps.study import CHUNK, SweepStudy, check_values
 BIAS, NOISE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz"
 
 
-def study(*varied: str, worlds: int = 3, **options: Any) -> SweepStudy:
-    parts = [setting.partition("=") for setting in varied]
-    axes = [parse_axis(field, said, f"--vary {field}") for field, _, said in parts]
+def study(*settings: str, worlds: int = 3, **options: Any) -> SweepStudy:
+    parts = [setting.partition("=") for setting in settings]
+    axes = [parse_axis(field, text, f"--vary {field}") for field, _, text in parts]
     return SweepStudy(load_scenario("push_recovery"), tuple(axes), ("linear", "ltv"), worlds, **options)
 
 
 def test_a_grid_is_every_combination() -> None:
-    of = study(f"{BIAS}=0,1", f"{NOISE}=200,400,800")
-    assert of.points[1] == {BIAS: 0, NOISE: 400}
-    assert (len(of.points), of.cells, of.trials) == (6, 12, 36)
+    sweep = study(f"{BIAS}=0,1", f"{NOISE}=200,400,800")
+    assert sweep.points[1] == {BIAS: 0, NOISE: 400}
+    assert (len(sweep.points), sweep.cells, sweep.trials) == (6, 12, 36)
 
 
 def test_fields_that_go_together() -> None:
     rates = "controller.rate_hz+sensors.accelerometer.rate_hz"
-    of = study(f"{rates}=100,200", f"{BIAS}=0,1")
-    assert of.points[2] == {"controller.rate_hz": 200, "sensors.accelerometer.rate_hz": 200, BIAS: 0}
-    assert len(of.points) == 4
-    assert of.as_fields({})["vary"] == {rates: [100, 200], BIAS: [0, 1]}
-    check_values(of)
+    sweep = study(f"{rates}=100,200", f"{BIAS}=0,1")
+    assert sweep.points[2] == {"controller.rate_hz": 200, "sensors.accelerometer.rate_hz": 200, BIAS: 0}
+    assert len(sweep.points) == 4
+    assert sweep.as_fields({})["vary"] == {rates: [100, 200], BIAS: [0, 1]}
+    check_values(sweep)
     with pytest.raises(InputError, match=r"sensors\.accelerometer\.rate_hzz: no such field"):
         check_values(study("controller.rate_hz+sensors.accelerometer.rate_hzz=100,200"))
     with pytest.raises(InputError, match=r"controller\.rate_hz: given twice"):
@@ -44,70 +44,72 @@ def test_fields_that_go_together() -> None:
 
 
 def test_every_trial_is_in_one_chunk() -> None:
-    of = study(f"{BIAS}=0:1:800", worlds=5)
-    assert max(len(chunk.trials) for chunk in of.chunks) == CHUNK
-    trials = [(chunk.observer, *trial) for chunk in of.chunks for trial in chunk.trials]
-    assert len(set(trials)) == len(trials) == of.trials == 8000
-    assert [chunk.number for chunk in of.chunks] == list(range(len(of.chunks)))
+    sweep = study(f"{BIAS}=0:1:800", worlds=5)
+    assert max(len(chunk.trials) for chunk in sweep.chunks) == CHUNK
+    trials = [(chunk.observer, *trial) for chunk in sweep.chunks for trial in chunk.trials]
+    assert len(set(trials)) == len(trials) == sweep.trials == 8000
+    assert [chunk.number for chunk in sweep.chunks] == list(range(len(sweep.chunks)))
 
 
 def test_trials_that_run_in_one_batch_stand_together() -> None:
-    of = study(f"{BIAS}=0,1", "controller.rate_hz=100,200")
-    rates: list[Any] = [of.points[point]["controller.rate_hz"] for point, _ in of.chunks[0].trials]
+    sweep = study(f"{BIAS}=0,1", "controller.rate_hz=100,200")
+    rates: list[Any] = [sweep.points[point]["controller.rate_hz"] for point, _ in sweep.chunks[0].trials]
     assert rates == sorted(rates)
 
 
 def test_a_design_for_indices_is_saltellis() -> None:
     """scipy's own indices of a function, from its values at these points."""
     d, n = 3, 64
-    of = study("a=0:1", "b=0:1", "c=0:1", design="sobol", n=n)
-    assert len(of.points) == n * (d + 2)
-    x = np.array([list(point.values()) for point in of.points])
+    sweep = study("a=0:1", "b=0:1", "c=0:1", design="sobol", n=n)
+    assert len(sweep.points) == n * (d + 2)
+    x = np.array([list(point.values()) for point in sweep.points])
     y = 4.0 * x[:, 0] + 2.0 * x[:, 1] * x[:, 2]
     f_A, f_B, f_AB = y[None, :n], y[None, n : 2 * n], y[2 * n :].reshape(d, 1, n)
-    found = sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": f_AB}, n=n)
+    result = sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": f_AB}, n=n)
     generator: Any = {"random_state": np.random.default_rng(1)}  # as all versions of scipy call it
 
     def function(z: np.ndarray) -> np.ndarray:
         return 4.0 * z[0] + 2.0 * z[1] * z[2]
 
-    known = sobol_indices(func=function, n=8192, dists=[uniform()] * d, **generator)
-    np.testing.assert_allclose(found.first_order, known.first_order, atol=0.1)
-    np.testing.assert_allclose(found.total_order, known.total_order, atol=0.1)
+    expected = sobol_indices(func=function, n=8192, dists=[uniform()] * d, **generator)
+    np.testing.assert_allclose(result.first_order, expected.first_order, atol=0.1)
+    np.testing.assert_allclose(result.total_order, expected.total_order, atol=0.1)
 
 
 def test_the_same_study_has_the_same_points() -> None:
-    def sampled() -> SweepStudy:
+    def sample() -> SweepStudy:
         return study(f"{BIAS}=-1:1", f"{NOISE}=log:100:800", design="sample", n=50)
 
-    assert list(sampled().points) == list(sampled().points)
-    noise: list[Any] = [point[NOISE] for point in sampled().points]
+    assert list(sample().points) == list(sample().points)
+    noise: list[Any] = [point[NOISE] for point in sample().points]
     assert np.median(noise) == pytest.approx(np.sqrt(80_000.0), rel=0.1)
 
 
 @pytest.mark.parametrize("design", ["sample", "sobol"])
 def test_a_design_takes_each_value_of_a_list_equally_often(design: Any) -> None:
     rates = "controller.rate_hz"
-    of = study(f"{BIAS}=-1:1", f"{rates}=50,100,200,400", f"{NOISE}=log:100:800:4", design=design, n=64)
-    assert {type(point[rates]) for point in of.points} == {int}
+    sweep = study(f"{BIAS}=-1:1", f"{rates}=50,100,200,400", f"{NOISE}=log:100:800:4", design=design, n=64)
+    assert {type(point[rates]) for point in sweep.points} == {int}
     for field, values in ((rates, [50, 100, 200, 400]), (NOISE, [100.0, 200.0, 400.0, 800.0])):
-        found, times = np.unique(np.array([point[field] for point in list(of.points)[:64]]), return_counts=True)
-        assert (found.tolist(), times.tolist()) == (values, [16] * 4)
-    points: list[dict[str, Any]] = list(of.points)
+        actual_values, times = np.unique(
+            np.array([point[field] for point in list(sweep.points)[:64]]), return_counts=True
+        )
+        assert (actual_values.tolist(), times.tolist()) == (values, [16] * 4)
+    points: list[dict[str, Any]] = list(sweep.points)
     pairs = {(point[rates], point[NOISE]) for point in points}
     assert len(pairs) == 16  # and every combination is there
     assert len({point[BIAS] for point in points[:64]}) == 64
-    assert sum(len(chunk.trials) for chunk in of.chunks) == of.trials
+    assert sum(len(chunk.trials) for chunk in sweep.chunks) == sweep.trials
 
 
 def test_a_list_that_is_no_power_of_two_comes_out_about_evenly() -> None:
-    of = study("controller.rate_hz=50,100,200", design="sample", n=100)
-    _, times = np.unique(np.array([point["controller.rate_hz"] for point in of.points]), return_counts=True)
+    sweep = study("controller.rate_hz=50,100,200", design="sample", n=100)
+    _, times = np.unique(np.array([point["controller.rate_hz"] for point in sweep.points]), return_counts=True)
     assert abs(times - 100 / 3).max() < 2.0
 
 
 @pytest.mark.parametrize(
-    ("varied", "options", "complaint"),
+    ("settings", "options", "complaint"),
     [
         ((), {}, "--vary: nothing is varied"),
         ((f"{BIAS}=0,1", f"{BIAS}=2,3"), {}, f"--vary {BIAS}: given twice"),
@@ -116,6 +118,6 @@ def test_a_list_that_is_no_power_of_two_comes_out_about_evenly() -> None:
         ((f"{BIAS}=0:1",), {"design": "sobol", "n": 1}, "must be a power of two"),
     ],
 )
-def test_what_is_no_study(varied: tuple[str, ...], options: dict[str, Any], complaint: str) -> None:
+def test_what_is_no_study(settings: tuple[str, ...], options: dict[str, Any], complaint: str) -> None:
     with pytest.raises(InputError, match=complaint):
-        study(*varied, **options)
+        study(*settings, **options)

@@ -28,8 +28,10 @@ from cmg_mj.studies.sweeps.study import SweepStudy
 SETTINGS = ("duration_s=0.6", "push=[]")
 
 
-def study(varied: dict[str, str], observers: tuple[str, ...] = ("linear", "gyro_free"), worlds: int = 2) -> SweepStudy:
-    axes = [parse_axis(field, said, field) for field, said in varied.items()]
+def study(
+    axes_text: dict[str, str], observers: tuple[str, ...] = ("linear", "gyro_free"), worlds: int = 2
+) -> SweepStudy:
+    axes = [parse_axis(field, text, field) for field, text in axes_text.items()]
     return SweepStudy(load_scenario("push_recovery", SETTINGS), tuple(axes), observers, worlds)
 
 
@@ -51,10 +53,10 @@ def trials() -> pa.Table:
 @pytest.mark.slow
 def test_each_trial_is_the_run_of_its_own_row() -> None:
     """`cmg-mj run` with the row's own values, to the last bit."""
-    of = small()
-    assert trials().num_rows == of.trials == 32
+    sweep = small()
+    assert trials().num_rows == sweep.trials == 32
     for row in trials().to_pylist()[::5]:
-        settings = [f"{axis.field}={row[axis.field]}" for axis in of.axes]
+        settings = [f"{axis.field}={row[axis.field]}" for axis in sweep.axes]
         alone = prepare(load_scenario("push_recovery", [*SETTINGS, *settings], row["observer"]))
         (summary,) = alone.run(world=row["world"]).summaries
         assert {key: row[key] for key in summary if key in row} == {key: summary[key] for key in summary if key in row}
@@ -69,26 +71,26 @@ def test_the_noise_of_a_world_is_the_same_in_every_cell() -> None:
 
 @pytest.mark.slow
 def test_killed_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is there is not computed again, and the whole is the same as in one go."""
+    """Finished trials are not computed again, and the whole is the same as in one go."""
     monkeypatch.setattr(study_module, "CHUNK", 5)
     store = Store(tmp_path, small())
     assert store.open() == 0
-    computed = 0
 
-    def stop(done: float) -> None:
-        nonlocal computed
-        if done > 12:
+    def stop(n_trials: float) -> None:
+        if n_trials > 12:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         run(store, stop)
-    there = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}
-    assert 1 <= len(there) < len(small().chunks)
-    again = Store(tmp_path, small())
-    assert again.open() == 5 * len(there)
-    run(again)
-    assert there.items() <= {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}.items()
-    merged(again, tmp_path / "trials.parquet")
+    chunk_times = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}
+    assert 1 <= len(chunk_times) < len(small().chunks)
+    rerun = Store(tmp_path, small())
+    assert rerun.open() == 5 * len(chunk_times)
+    run(rerun)
+    assert (
+        chunk_times.items() <= {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}.items()
+    )
+    merged(rerun, tmp_path / "trials.parquet")
     assert pq.read_table(tmp_path / "trials.parquet").equals(trials())
 
 
@@ -152,16 +154,16 @@ def test_an_observer_that_raises_at_a_rig_that_lies_costs_nothing() -> None:
 def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     batches = []
 
-    def fails(experiments: list[Experiment], worlds: list[int], **options: Unpack[SimulationOptions]) -> Result:
+    def fail(experiments: list[Experiment], worlds: list[int], **options: Unpack[SimulationOptions]) -> Result:
         batches.append(len(worlds))
-        if any(each.scenario.plant.initial_tilt_deg == 5.0 for each in experiments):
+        if any(experiment.scenario.plant.initial_tilt_deg == 5.0 for experiment in experiments):
             raise MemoryError("not in there")
         return run_batch(experiments, worlds, **options)
 
-    monkeypatch.setattr(work, "run_batch", fails)
-    told = []
-    of = study({"plant.initial_tilt_deg": "0,5,1,2"}, ("linear",), 1)
-    rows = work.compute(of, of.chunks[0], told.append)
+    monkeypatch.setattr(work, "run_batch", fail)
+    shares = []
+    sweep = study({"plant.initial_tilt_deg": "0,5,1,2"}, ("linear",), 1)
+    rows = work.compute(sweep, sweep.chunks[0], shares.append)
     assert [(row["outcome"], row["reason"] or "") for row in rows] == [
         ("done", ""),
         ("stopped", "MemoryError: not in there"),
@@ -169,8 +171,8 @@ def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyP
         ("done", ""),
     ]
     assert batches == [4, 2, 1, 1, 2]
-    assert told == sorted(told)  # what runs again is no step back
-    assert told[-1] == pytest.approx(1.0)
+    assert shares == sorted(shares)  # what runs again is no step back
+    assert shares[-1] == pytest.approx(1.0)
 
 
 def test_columns_are_those_of_a_worlds_table() -> None:

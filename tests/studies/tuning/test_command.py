@@ -12,7 +12,7 @@ from cmg_mj.cli.tune import tune as tune_command
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.tuning import tune
 from tests.command import cmg_mj
-from tests.studies.tuning.own import OWN
+from tests.studies.tuning.user_observer import USER_OBSERVER
 
 
 @pytest.fixture
@@ -23,22 +23,22 @@ def quick(elsewhere: None) -> str:
 
 
 def test_command_prints_a_table_and_writes_what_reruns(quick: str) -> None:
-    said = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--out", "tuned")
-    assert said.status == 0
-    assert "Quick: linear, seed 0" in said.out
-    assert "given 0.02" in said.out
-    assert said.err == "Written to tuned. Run with the tuned observer: cmg-mj run tuned/scenario.toml\n"
+    outcome = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--out", "tuned")
+    assert outcome.status == 0
+    assert "Quick: linear, seed 0" in outcome.out
+    assert "given 0.02" in outcome.out
+    assert outcome.err == "Written to tuned. Run with the tuned observer: cmg-mj run tuned/scenario.toml\n"
     figures = json.loads(Path("tuned/tuned.json").read_text())
     (level,) = figures["levels"]
-    tuned = load_scenario("tuned/scenario.toml")
-    assert tuned.observer.kind == "linear"
-    assert tuned.observer.parameters == level["parameters"]
+    scenario = load_scenario("tuned/scenario.toml")
+    assert scenario.observer.kind == "linear"
+    assert scenario.observer.parameters == level["parameters"]
     assert cmg_mj("run", "tuned/scenario.toml", "--json").status == 0
 
 
 def test_json_has_every_figure(quick: str) -> None:
-    said = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--noise-levels", "200,400", "--json")
-    figures = json.loads(said.out)
+    outcome = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--noise-levels", "200,400", "--json")
+    figures = json.loads(outcome.out)
     assert figures["tuned"] == ["tau"]
     assert figures["worlds_fitted"] == 3
     assert figures["window_s"] == pytest.approx([0.2, 0.6])
@@ -55,39 +55,39 @@ def test_json_has_every_figure(quick: str) -> None:
 
 
 def test_several_noises_make_a_scenario_each(quick: str) -> None:
-    said = cmg_mj(
+    outcome = cmg_mj(
         "tune", quick, "--observer", "linear", "--worlds", 2, "--noise-levels", "200,400", "--out", "t", "--json"
     )
-    assert said.err == ""
+    assert outcome.err == ""
     for noise in (200.0, 400.0):
         scenario = load_scenario(f"t/scenario-{noise:g}.toml")
         assert scenario.sensors.accelerometer.noise_density_ug_rthz == noise
 
 
 def test_an_interruption_keeps_the_noises_that_are_done(quick: str) -> None:
-    def until_the_second(share: float) -> None:
+    def stop_in_the_second(share: float) -> None:
         if share > 0.6:
             raise KeyboardInterrupt
 
     scenario = load_scenario(quick, ["observer.kind=linear"])
-    study = tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=until_the_second)
+    study = tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=stop_in_the_second)
     assert [level.noise_ug_rthz for level in study.levels] == [200.0]
 
-    def at_once(share: float) -> None:
+    def stop_at_once(share: float) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=at_once)
+        tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=stop_at_once)
 
 
 def test_without_a_push_it_says_what_the_window_is(quick: str) -> None:
-    said = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 2, "--set", "push=[]")
-    assert "There is no push: the window is the whole run" in said.out
+    outcome = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 2, "--set", "push=[]")
+    assert "There is no push: the window is the whole run" in outcome.out
 
 
 def test_a_users_own_observer_by_its_path(quick: str) -> None:
-    said = cmg_mj("tune", quick, "--observer", OWN, "--worlds", 2, "--json")
-    assert json.loads(said.out)["tuned"] == ["gain"]
+    outcome = cmg_mj("tune", quick, "--observer", USER_OBSERVER, "--worlds", 2, "--json")
+    assert json.loads(outcome.out)["tuned"] == ["gain"]
 
 
 def test_help_names_the_experiment() -> None:
@@ -124,7 +124,7 @@ def test_wrong_input_is_one_line(quick: str, arguments: list[str], line: str) ->
 
 def test_figures_are_plain_json(quick: str) -> None:
     """Nothing that JSON does not know, such as NaN."""
-    said = cmg_mj("tune", quick, "--observer", "homogeneous", "--parameters", "k1", "--worlds", 2, "--json")
-    assert TypeAdapter(dict).validate_json(said.out)
-    assert "NaN" not in said.out
-    assert "Infinity" not in said.out
+    outcome = cmg_mj("tune", quick, "--observer", "homogeneous", "--parameters", "k1", "--worlds", 2, "--json")
+    assert TypeAdapter(dict).validate_json(outcome.out)
+    assert "NaN" not in outcome.out
+    assert "Infinity" not in outcome.out

@@ -18,10 +18,12 @@ from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.tuning import Recorded, best_noise, tune, tuning_table
 from tests.observers.reference import DT
-from tests.studies.tuning.own import OWN
+from tests.studies.tuning.user_observer import USER_OBSERVER
 
 
-def planted(kind: str, parameters: Mapping[str, Any], seed: int, gyro_noise: float, worlds: int = 4) -> Recorded:
+def plant_parameters(
+    kind: str, parameters: Mapping[str, Any], seed: int, gyro_noise: float, worlds: int = 4
+) -> Recorded:
     """A recording whose gyro is an observer's estimate: the loss of those parameters is zero."""
     rng = np.random.default_rng(seed)
     t = np.arange(150) * DT
@@ -42,14 +44,14 @@ def recorder(
 ) -> Callable[..., Recorded]:
     """Recordings with parameters that depend on the noise and on whether the worlds are held out."""
 
-    def recorded(scenario: Scenario, worlds: range, *, noise_ug_rthz: float, warm_up_s: float) -> Recorded:
-        return planted(kind, truth(noise_ug_rthz, worlds.start > 0), worlds.start, gyro_noise)
+    def record_planted(scenario: Scenario, worlds: range, *, noise_ug_rthz: float, warm_up_s: float) -> Recorded:
+        return plant_parameters(kind, truth(noise_ug_rthz, worlds.start > 0), worlds.start, gyro_noise)
 
-    return recorded
+    return record_planted
 
 
 @pytest.mark.parametrize(
-    ("kind", "chosen", "truth"),
+    ("kind", "parameters", "truth"),
     [
         ("linear", [], {"tau": 0.0337123}),
         pytest.param(
@@ -67,9 +69,9 @@ def recorder(
         ),
     ],
 )
-def test_planted_parameters_are_found(kind: str, chosen: list[str], truth: dict) -> None:
+def test_planted_parameters_are_found(kind: str, parameters: list[str], truth: dict) -> None:
     scenario = load_scenario("observer_tuning", observer=kind)
-    study = tune(scenario, worlds=4, parameters=chosen, recorded=recorder(kind, lambda *_: truth), starts=1)
+    study = tune(scenario, worlds=4, parameters=parameters, recorded=recorder(kind, lambda *_: truth), starts=1)
     (level,) = study.levels
     for name, value in truth.items():
         np.testing.assert_allclose(np.array(level.parameters[name], dtype=float), value, rtol=0.02)
@@ -90,40 +92,40 @@ def test_the_verdict_is_of_the_worlds_that_were_not_fitted() -> None:
 
 
 def test_where_the_given_parameters_are_the_best_the_verdict_is_a_tie() -> None:
-    recorded = recorder("linear", lambda *_: {"tau": 0.02})
-    study = tune(load_scenario("observer_tuning", observer="linear"), worlds=4, recorded=recorded)
+    recordings = recorder("linear", lambda *_: {"tau": 0.02})
+    study = tune(load_scenario("observer_tuning", observer="linear"), worlds=4, recorded=recordings)
     assert study.levels[0].sizes == {"tau": 0.02}
     assert study.levels[0].verdict == "tie"
 
 
 def test_the_verdict_is_that_of_the_ratio_in_the_table() -> None:
     """Differences of 1 in large errors, ratios either side of 1: the difference alone would say better."""
-    tuned = np.array([0.100, 0.101, 0.102, 10.0])
-    recorded = recorder("linear", lambda *_: {"tau": 0.02})
-    level = tune(load_scenario("observer_tuning", observer="linear"), worlds=4, recorded=recorded).levels[0]
+    tuned_rms = np.array([0.100, 0.101, 0.102, 10.0])
+    recordings = recorder("linear", lambda *_: {"tau": 0.02})
+    level = tune(load_scenario("observer_tuning", observer="linear"), worlds=4, recorded=recordings).levels[0]
     for factor, verdict in (([1.2, 1.3, 1.25, 1.22], "better"), ([0.9, 1.1, 1.0, 1.3], "tie"), ([0.8] * 4, "worse")):
-        changed = dataclasses.replace(level, rms=tuned, given_rms=tuned * factor)
+        changed = dataclasses.replace(level, rms=tuned_rms, given_rms=tuned_rms * factor)
         assert changed.verdict == verdict
         assert (changed.ratio.low > 1.0) == (verdict == "better")
         assert (changed.ratio.high < 1.0) == (verdict == "worse")
 
 
 @pytest.mark.parametrize(
-    ("zeros", "said"), [((0.104, 0.10402), "0.1040 rad/s"), ((0.1, 0.2), "0.1000 to 0.2000 rad/s")]
+    ("zeros", "message"), [((0.104, 0.10402), "0.1040 rad/s"), ((0.1, 0.2), "0.1000 to 0.2000 rad/s")]
 )
-def test_an_estimate_of_zero_is_one_number_where_it_is_the_same(zeros: tuple[float, float], said: str) -> None:
-    recorded = recorder("linear", lambda *_: {"tau": 0.03})
-    study = tune(load_scenario("observer_tuning", observer="linear"), worlds=2, recorded=recorded)
+def test_an_estimate_of_zero_is_one_number_where_it_is_the_same(zeros: tuple[float, float], message: str) -> None:
+    recordings = recorder("linear", lambda *_: {"tau": 0.03})
+    study = tune(load_scenario("observer_tuning", observer="linear"), worlds=2, recorded=recordings)
     levels = [dataclasses.replace(study.levels[0], zero_rms=zero) for zero in zeros]
     caption = str(tuning_table(dataclasses.replace(study, levels=levels)).caption)
-    assert f"An estimate of zero: {said}." in caption
+    assert f"An estimate of zero: {message}." in caption
 
 
 @pytest.mark.slow
 def test_numbers_that_do_not_matter_are_left_alone() -> None:
-    recorded = recorder("ltv", lambda *_: {"Q": (1.0, 2.3e5, 1.0)})
+    recordings = recorder("ltv", lambda *_: {"Q": (1.0, 2.3e5, 1.0)})
     scenario = load_scenario("observer_tuning", observer="ltv")
-    study = tune(scenario, worlds=4, recorded=recorded, parameters=["Q[1]", "Q[2]"])
+    study = tune(scenario, worlds=4, recorded=recordings, parameters=["Q[1]", "Q[2]"])
     assert study.insensitive_parameters == ["Q[2]"]  # the third state decouples
     assert [n.name for n in study.numbers] == ["Q[1]"]
     assert np.array(study.levels[0].parameters["Q"])[2] == 1.0
@@ -132,28 +134,30 @@ def test_numbers_that_do_not_matter_are_left_alone() -> None:
 @pytest.mark.slow
 def test_the_noise_at_which_the_given_parameters_are_best() -> None:
     """Planted: the best tau is 0.02 sqrt(noise/300), a straight line on logarithms, so 0.02 is best at 300."""
-    recorded = recorder("linear", lambda noise, _: {"tau": 0.02 * math.sqrt(noise / 300.0)})
+    recordings = recorder("linear", lambda noise, _: {"tau": 0.02 * math.sqrt(noise / 300.0)})
     scenario = load_scenario("observer_tuning", observer="linear")
-    study = tune(scenario, worlds=4, recorded=recorded, noise_ug_rthz=[800.0, 100.0, 400.0])
+    study = tune(scenario, worlds=4, recorded=recordings, noise_ug_rthz=[800.0, 100.0, 400.0])
     assert [level.noise_ug_rthz for level in study.levels] == [100.0, 400.0, 800.0]
     best = best_noise(study)
     assert best.where == "found"
     assert best.noise_ug_rthz == pytest.approx(300.0, rel=0.02)
     for noises, side in (([400.0, 800.0], "below"), ([100.0, 200.0], "above")):
-        beyond = tune(scenario, worlds=4, recorded=recorded, noise_ug_rthz=noises)
-        assert best_noise(beyond) == (side, None)
-        assert f"best at a noise {side} these, if at any" in str(tuning_table(beyond).caption)
+        study_beyond = tune(scenario, worlds=4, recorded=recordings, noise_ug_rthz=noises)
+        assert best_noise(study_beyond) == (side, None)
+        assert f"best at a noise {side} these, if at any" in str(tuning_table(study_beyond).caption)
     assert best_noise(dataclasses.replace(study, levels=study.levels[:1])) == ("not bracketed", None)
 
 
 @pytest.mark.slow
 def test_of_several_numbers_the_level_with_the_least_loss_counts() -> None:
     """Planted: the given epsilon is nearly the best at 200; the gyro's own noise keeps every loss from zero."""
-    truths = {100.0: 0.02, 200.0: 0.029, 400.0: 0.04}
-    recorded = recorder("linear_high_gain", lambda noise, _: {"epsilon": truths[noise], "a1": 1.5}, gyro_noise=0.05)
+    true_values = {100.0: 0.02, 200.0: 0.029, 400.0: 0.04}
+    recordings = recorder(
+        "linear_high_gain", lambda noise, _: {"epsilon": true_values[noise], "a1": 1.5}, gyro_noise=0.05
+    )
     scenario = load_scenario("observer_tuning", observer="linear_high_gain")
-    options: dict[str, Any] = {"worlds": 4, "recorded": recorded, "parameters": ["epsilon", "a1"], "starts": 1}
-    study = tune(scenario, noise_ug_rthz=list(truths), **options)
+    options: dict[str, Any] = {"worlds": 4, "recorded": recordings, "parameters": ["epsilon", "a1"], "starts": 1}
+    study = tune(scenario, noise_ug_rthz=list(true_values), **options)
     assert best_noise(study) == ("found", 200.0)
     assert "the given parameters lose least at 200 ug/rtHz." in str(tuning_table(study).caption)
     thousands = [dataclasses.replace(level, noise_ug_rthz=16.0 * level.noise_ug_rthz) for level in study.levels]
@@ -164,14 +168,14 @@ def test_of_several_numbers_the_level_with_the_least_loss_counts() -> None:
 
 
 def test_parameters_at_which_an_observer_fails_are_no_candidates() -> None:
-    """`Own` raises below 0.05, is not a number above 5, and is refused above 10."""
-    recorded = recorder("finite_difference", lambda *_: {})  # which is `Own` with a gain of 1
-    study = tune(load_scenario("observer_tuning", observer=OWN), worlds=4, recorded=recorded)
+    """`UserObserver` raises below 0.05, is not a number above 5, and is refused above 10."""
+    recordings = recorder("finite_difference", lambda *_: {})  # which is `UserObserver` with a gain of 1
+    study = tune(load_scenario("observer_tuning", observer=USER_OBSERVER), worlds=4, recorded=recordings)
     assert study.levels[0].sizes["gain"] == pytest.approx(1.0, rel=0.01)
 
 
 def test_given_parameters_that_lose_the_observer_are_worse_than_any() -> None:
-    recorded = recorder("finite_difference", lambda *_: {})
-    study = tune(load_scenario("observer_tuning", ["observer.gain=7.0"], OWN), worlds=4, recorded=recorded)
+    recordings = recorder("finite_difference", lambda *_: {})
+    study = tune(load_scenario("observer_tuning", ["observer.gain=7.0"], USER_OBSERVER), worlds=4, recorded=recordings)
     assert study.levels[0].verdict == "better"
     assert study.levels[0].sizes["gain"] == pytest.approx(1.0, rel=0.01)

@@ -12,14 +12,14 @@ from cmg_mj.observers import make_observer
 from cmg_mj.studies.tuning.parameters import TunedScalar, numbers_of, parameters_of, replaced
 from cmg_mj.studies.tuning.search import crossing, search
 from tests.observers.reference import DT, PAPER
-from tests.studies.tuning.own import OWN
+from tests.studies.tuning.user_observer import USER_OBSERVER
 
 
-def numbers(kind: str, *chosen: str) -> list[TunedScalar]:
+def numbers(kind: str, *names: str) -> list[TunedScalar]:
     def make(**parameters: Any) -> Any:
         return make_observer(kind, DT, PAPER, **parameters)
 
-    return numbers_of(kind, parameters_of(kind, make(), {}), make, chosen)
+    return numbers_of(kind, parameters_of(kind, make(), {}), make, names)
 
 
 def test_every_number_is_found_also_in_tuples() -> None:
@@ -40,10 +40,10 @@ def test_limits_are_where_the_observer_refuses() -> None:
 
 @pytest.mark.parametrize("kind", ["linear", "ltv", "homogeneous", "luenberger", "super_twisting", "linear_high_gain"])
 def test_the_observer_takes_each_number_at_its_limits(kind: str) -> None:
-    given = parameters_of(kind, make_observer(kind, DT, PAPER), {})
+    parameters = parameters_of(kind, make_observer(kind, DT, PAPER), {})
     for number in numbers(kind):
         for size in (number.low, number.high):
-            make_observer(kind, DT, PAPER, **replaced(given, [number], [size]))
+            make_observer(kind, DT, PAPER, **replaced(parameters, [number], [size]))
 
 
 def test_a_sign_stays() -> None:
@@ -52,14 +52,14 @@ def test_a_sign_stays() -> None:
 
 
 def test_a_users_own_observer_is_read_as_well() -> None:
-    (gain,) = numbers(OWN)
+    (gain,) = numbers(USER_OBSERVER)
     assert gain.name == "gain"
     assert gain.start == 2.0
     assert gain.high == pytest.approx(10.0)
 
 
-def number(name: str, given: float, low: float = 1e-3, high: float = 1e3) -> TunedScalar:
-    return TunedScalar(name, (), given, low, high)
+def number(name: str, start: float, low: float = 1e-3, high: float = 1e3) -> TunedScalar:
+    return TunedScalar(name, (), start, low, high)
 
 
 @pytest.mark.parametrize("best", [0.0021, 0.3, 4.0, 700.0])

@@ -22,7 +22,7 @@ SIGHT = {
     "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
     "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
 }
-"""What is left of linear red, green, blue: Machado, Oliveira, Fernandes 2009, severity 1."""
+"""The rest of linear red, green, blue: Machado, Oliveira, Fernandes 2009, severity 1."""
 
 LMS = [[0.4122214708, 0.5363325363, 0.0514459929], [0.2119034982, 0.6806995451, 0.1073969566]]
 LMS += [[0.0883024619, 0.2817188376, 0.6299787005]]
@@ -31,28 +31,28 @@ LAB += [[0.0259040371, 0.7827717662, -0.8086757660]]
 """Oklab (Ottosson 2020): distances in it are about those that are seen; black and white are 1 apart."""
 
 
-def linear(shown: list[Colour]) -> np.ndarray:
+def linear(colours: list[Colour]) -> np.ndarray:
     """Linear light, (n, 3), of sRGB."""
-    c = np.array(shown) / 255.0
+    c = np.array(colours) / 255.0
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
-def least_distance(shown: list[Colour], sight: str) -> float:
-    """How far apart the two most alike are for one kind of sight."""
-    seen = np.clip(linear(shown) @ np.transpose(SIGHT[sight]), 0.0, 1.0)
-    lab = np.cbrt(seen @ np.transpose(LMS)) @ np.transpose(LAB)
-    apart = np.linalg.norm(lab[:, None] - lab, axis=-1)
-    return float(apart[np.triu_indices(len(shown), 1)].min())
+def least_distance(colours: list[Colour], sight: str) -> float:
+    """Return the distance of the two most alike for one kind of sight."""
+    response = np.clip(linear(colours) @ np.transpose(SIGHT[sight]), 0.0, 1.0)
+    lab = np.cbrt(response @ np.transpose(LMS)) @ np.transpose(LAB)
+    distances = np.linalg.norm(lab[:, None] - lab, axis=-1)
+    return float(distances[np.triu_indices(len(colours), 1)].min())
 
 
-def luminance(shown: list[Colour]) -> np.ndarray:
-    return linear(shown) @ [0.2126, 0.7152, 0.0722]
+def luminance(colours: list[Colour]) -> np.ndarray:
+    return linear(colours) @ [0.2126, 0.7152, 0.0722]
 
 
 @pytest.mark.parametrize(
     ("sight", "least"), [("all three cones", 0.13), ("protanopia", 0.1), ("deuteranopia", 0.1), ("tritanopia", 0.045)]
 )
-def test_the_bundled_observers_can_be_told_apart(sight: str, least: float) -> None:
+def test_the_bundled_observers_can_be_distinguished(sight: str, least: float) -> None:
     assert least_distance(list(COLOURS.values()), sight) > least
 
 

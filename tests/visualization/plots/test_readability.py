@@ -22,7 +22,7 @@ TRUE = 0.5 * np.sin(np.linspace(0.0, 20.0, 2001))
 """From -0.5 to 0.5."""
 
 
-def seen(low: float, high: float) -> object:
+def with_margin(low: float, high: float) -> object:
     room = MARGIN * (high - low)
     return pytest.approx((low - room, high + room), rel=1e-3)
 
@@ -34,35 +34,35 @@ def noise(size: float) -> np.ndarray:
 def test_what_must_be_seen_is_seen_whole() -> None:
     spike = TRUE.copy()
     spike[7] = 4.0
-    assert axis_range([spike]) == seen(-0.5, 4.0)
-    assert axis_range([TRUE, spike]) == seen(-0.5, 4.0)
+    assert axis_range([spike]) == with_margin(-0.5, 4.0)
+    assert axis_range([TRUE, spike]) == with_margin(-0.5, 4.0)
 
 
 def test_an_outlier_of_an_estimate_is_not() -> None:
     spike = TRUE.copy()
     spike[7] = 1e6
-    assert axis_range([TRUE], [spike]) == seen(-0.5, 0.5)
+    assert axis_range([TRUE], [spike]) == with_margin(-0.5, 0.5)
 
 
 @pytest.mark.parametrize("bad", [noise(100.0), np.geomspace(1.0, 1e300, 2001), np.geomspace(1.0, 1e300, 2001) * -1.0])
 def test_a_noisy_or_diverging_estimate_leaves_room_for_the_truth(bad: np.ndarray) -> None:
-    found = axis_range([TRUE], [bad])
-    assert found is not None
-    assert found[1] - found[0] <= (1.0 + 2.0 * REACH) * (1.0 + 2.0 * MARGIN) * 1.001
-    assert found[0] < -0.5
-    assert found[1] > 0.5
+    result = axis_range([TRUE], [bad])
+    assert result is not None
+    assert result[1] - result[0] <= (1.0 + 2.0 * REACH) * (1.0 + 2.0 * MARGIN) * 1.001
+    assert result[0] < -0.5
+    assert result[1] > 0.5
 
 
 def test_a_moderate_estimate_has_its_noise_shown() -> None:
-    found = axis_range([TRUE], [noise(0.4)])
-    assert found is not None
-    assert found[0] < -0.8
-    assert found[1] > 0.8
+    result = axis_range([TRUE], [noise(0.4)])
+    assert result is not None
+    assert result[0] < -0.8
+    assert result[1] > 0.8
 
 
 def test_values_that_are_none_are_passed_over() -> None:
     broken = np.array([math.nan, math.inf, -math.inf])
-    assert axis_range([TRUE, broken], [broken]) == seen(-0.5, 0.5)
+    assert axis_range([TRUE, broken], [broken]) == with_margin(-0.5, 0.5)
     assert axis_range([broken], [TRUE]) == axis_range([], [TRUE])
 
 

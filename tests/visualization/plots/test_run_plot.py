@@ -24,7 +24,7 @@ BAND, LIMIT = 1.0, 4.7
 @pytest.fixture(scope="module")
 def all_observers() -> tuple[Trajectory, dict[str, Any]]:
     """A short run with every observer."""
-    short = ("duration_s=0.6", "push.0.start_s=0.2")
+    short = ("duration_s=0.4", "push.0.start_s=0.2")
     result = prepare(load_scenario("observer_tuning", short)).run()
     assert result.trajectory is not None
     return result.trajectory, result.summaries[0]
@@ -33,18 +33,18 @@ def all_observers() -> tuple[Trajectory, dict[str, Any]]:
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[matplotlib.figure.Figure]:
     """The figures that are saved, as they are then."""
-    saved: list[matplotlib.figure.Figure] = []
+    saved_figures: list[matplotlib.figure.Figure] = []
     save = matplotlib.figure.Figure.savefig
 
-    def keep(figure: matplotlib.figure.Figure, *args: Any, **kwargs: Any) -> None:
-        saved.append(figure)
-        save(figure, *args, **kwargs)
+    def save_and_keep(saved_figure: matplotlib.figure.Figure, *args: Any, **kwargs: Any) -> None:
+        saved_figures.append(saved_figure)
+        save(saved_figure, *args, **kwargs)
 
-    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", keep)
-    return saved
+    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", save_and_keep)
+    return saved_figures
 
 
-def plotted(path: Path, trajectory: Trajectory, summary: dict[str, Any], figures: list[Any]) -> Any:
+def plot(path: Path, trajectory: Trajectory, summary: dict[str, Any], figures: list[Any]) -> Any:
     plot_run(path / "plot.png", trajectory, "A title", summary, settle_band_deg=BAND, rate_limit_rad_s=LIMIT)
     assert (path / "plot.png").read_bytes().startswith(b"\x89PNG")
     return figures[-1]
@@ -59,7 +59,7 @@ def test_eleven_lines_on_one_page(
     all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
 ) -> None:
     trajectory, summary = all_observers
-    figure = plotted(tmp_path, trajectory, summary, figures)
+    figure = plot(tmp_path, trajectory, summary, figures)
     width, height = figure.get_size_inches()
     assert width <= PAGE[0]
     assert height <= PAGE[1]
@@ -74,30 +74,34 @@ def test_eleven_lines_on_one_page(
     np.testing.assert_allclose(
         error.lines[1].get_ydata(), trajectory["estimate/homogeneous/x2_rad_s"] - trajectory["x2_rad_s"]
     )
-    shown = [text.split(" ")[0] for text in labels(rate)[2:]]
-    assert shown[0] == trajectory.observers[0]
-    assert shown == [name for name in trajectory.observers if name in shown]
-    named = {axes.get_title(loc="left") for axes in small}
-    assert named | set(shown) == set(trajectory.observers)
-    for line, name in zip(rate.lines[2:], shown, strict=True):
+    observers = [text.split(" ")[0] for text in labels(rate)[2:]]
+    assert observers[0] == trajectory.observers[0]
+    assert observers == [name for name in trajectory.observers if name in observers]
+    panel_titles = {axes.get_title(loc="left") for axes in small}
+    assert panel_titles | set(observers) == set(trajectory.observers)
+    for line, name in zip(rate.lines[2:], observers, strict=True):
         assert line.get_color() == hexadecimal(colour(name))
 
 
 def test_an_estimate_that_goes_astray_takes_no_axis(
-    all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+    all_observers: tuple[Trajectory, dict[str, Any]],
+    tmp_path: Path,
+    figures: list[matplotlib.figure.Figure],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     trajectory, summary = all_observers
     columns = dict(trajectory.columns)
-    astray = columns["x2_rad_s"].copy()
-    astray[50:] = [*[1e300, -np.inf], *[np.nan] * (len(trajectory) - 52)]
+    estimate = columns["x2_rad_s"].copy()
+    estimate[50:] = [*[1e300, -np.inf], *[np.nan] * (len(trajectory) - 52)]
     for name in trajectory.observers[:3]:
-        columns[f"estimate/{name}/x2_rad_s"] = astray
+        columns[f"estimate/{name}/x2_rad_s"] = estimate
     layout = replace(
         trajectory.layout, observers=trajectory.observers[:3], extra_signals=trajectory.layout.extra_signals[:3]
     )
     few = replace(trajectory, columns=columns, layout=layout)
     true = trajectory["x2_rad_s"]
-    for axes in plotted(tmp_path, few, summary, figures).axes[1:3]:
+    monkeypatch.setattr(matplotlib.figure.Figure, "get_layout_engine", lambda figure: None)  # takes as long as drawing
+    for axes in plot(tmp_path, few, summary, figures).axes[1:3]:
         low, high = axes.get_ylim()
         assert low <= true.min()
         assert true.max() <= high
@@ -105,8 +109,18 @@ def test_an_estimate_that_goes_astray_takes_no_axis(
 
 
 def test_long_names_do_not_narrow_the_panels(
-    all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, figures: list[matplotlib.figure.Figure]
+    all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """The layout alone is computed: drawing takes as long again."""
+
+    figures: list[matplotlib.figure.Figure] = []
+
+    def lay_out(figure: matplotlib.figure.Figure, path: Path, **_: Any) -> None:
+        figures.append(figure)
+        figure.draw_without_rendering()
+        path.touch()
+
+    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lay_out)
     trajectory, summary = all_observers
     longest = sorted(OBSERVERS, key=len)[-3:]
     figures_of = summary["open_loop_observers"] | {"homogeneous": summary}
@@ -114,7 +128,9 @@ def test_long_names_do_not_narrow_the_panels(
     signals = tuple(trajectory.extra_signals(name) for name in longest)
     layout = replace(trajectory.layout, observers=tuple(longest), extra_signals=signals)
     few = replace(trajectory, layout=layout)
-    figure = plotted(tmp_path, few, {**figures_of[longest[0]], "open_loop_observers": open_loop_observers}, figures)
+    summary = {**figures_of[longest[0]], "open_loop_observers": open_loop_observers}
+    plot_run(tmp_path / "plot.png", few, "A title", summary, settle_band_deg=BAND, rate_limit_rad_s=LIMIT)
+    (figure,) = figures
     assert figure.axes[0].get_position().x0 < 0.15
 
 
@@ -134,4 +150,4 @@ def test_a_run_of_no_length(
 ) -> None:
     trajectory, _ = all_observers
     columns = {name: values[:ticks] for name, values in trajectory.columns.items()}
-    plotted(tmp_path, replace(trajectory, columns=columns), {}, figures)
+    plot(tmp_path, replace(trajectory, columns=columns), {}, figures)

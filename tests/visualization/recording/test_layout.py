@@ -1,4 +1,4 @@
-"""How a recording opens, read from its blueprint: what is switched on, axes, order, and whether the rig is in view."""
+"""The layout of a recording, read from its blueprint: observers switched on, axes, order, and the rig in view."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class View:
         contents: The entities asked for.
         hidden: Entities that are switched off, out of the legend.
         grey: Entities that are switched off in the legend.
-        listed: Entities whose line is overall_observers in the legend, whether on or off.
+        legend: Entities whose line is in the legend, whether on or off.
         axis: Range of y.
         eye: Position and target of the camera.
     """
@@ -52,7 +52,7 @@ class View:
     contents: list[str] = field(default_factory=list)
     hidden: set[str] = field(default_factory=set)
     grey: set[str] = field(default_factory=set)
-    listed: set[str] = field(default_factory=set)
+    legend: set[str] = field(default_factory=set)
     axis: tuple[float, float] | None = None
     eye: dict[str, np.ndarray] = field(default_factory=dict)
 
@@ -60,38 +60,38 @@ class View:
 def views(path: Path) -> list[View]:
     reader = RrdReader(path)
     (store,) = reader.blueprints()
-    found: dict[str, View] = {}
+    result: dict[str, View] = {}
     for chunk in reader.stream(store=store):
-        matched = re.match(r"/view/([^/]+)/?(.*)", chunk.entity_path)
-        if not matched:
+        match = re.match(r"/view/([^/]+)/?(.*)", chunk.entity_path)
+        if not match:
             continue
-        view, below = found.setdefault(matched[1], View()), matched[2]
+        view, entity_path = result.setdefault(match[1], View()), match[2]
         batch = chunk.to_record_batch()
         values: dict[str, Any] = {name: batch.column(name).to_pylist()[0] for name in batch.schema.names if ":" in name}
-        overall_observers = re.sub(r"^ViewContents/overrides(/.*?)/visualizers.*", r"\1", below)
+        entity = re.sub(r"^ViewContents/overrides(/.*?)/visualizers.*", r"\1", entity_path)
         if "ViewBlueprint:display_name" in values:
             (view.name,) = values["ViewBlueprint:display_name"]
         if "ViewContents:query" in values:
             view.contents = values["ViewContents:query"]
         if values.get("EntityBehavior:visible") == [False]:
-            view.hidden.add(overall_observers)
+            view.hidden.add(entity)
         if "SeriesLines:visible_series" in values:
-            view.listed.add(overall_observers)
+            view.legend.add(entity)
             if values["SeriesLines:visible_series"] == [False]:
-                view.grey.add(overall_observers)
+                view.grey.add(entity)
         if "ScalarAxis:range" in values:
             (view.axis,) = values["ScalarAxis:range"]
         for name in ("position", "look_target"):
             if values.get(f"EyeControls3D:{name}"):
                 view.eye[name] = np.array(values[f"EyeControls3D:{name}"][0])
-    return list(found.values())
+    return list(result.values())
 
 
-def named(found: Sequence[View], name: str) -> list[View]:
-    return [view for view in found if view.name == name]
+def select(layout: Sequence[View], name: str) -> list[View]:
+    return [view for view in layout if view.name == name]
 
 
-def recorded(experiment: Experiment) -> Run:
+def record(experiment: Experiment) -> Run:
     result = experiment.run()
     assert result.trajectory is not None
     summary = report_run(experiment, result).summary
@@ -117,14 +117,14 @@ def write(path: Path, experiment: Experiment, runs: Sequence[Run]) -> Path:
 def all_observers() -> tuple[Experiment, Run]:
     """A run with every observer."""
     experiment = prepare(load_scenario("observer_tuning", SHORT))
-    return experiment, recorded(experiment)
+    return experiment, record(experiment)
 
 
 @pytest.fixture(scope="module")
-def compared() -> tuple[Experiment, list[Run]]:
+def comparison() -> tuple[Experiment, list[Run]]:
     """Every observer closes the loop."""
     experiments = prepare_comparison(load_scenario("push_recovery", SHORT), list(OBSERVERS))
-    return experiments[0], [recorded(experiment) for experiment in experiments]
+    return experiments[0], [record(experiment) for experiment in experiments]
 
 
 # --- many observers ------------------------------------------------------------------------------------------
@@ -132,7 +132,7 @@ def compared() -> tuple[Experiment, list[Run]]:
 
 def test_the_best_open_loop_observers_are_on(all_observers: tuple[Experiment, Run], tmp_path: Path) -> None:
     experiment, run = all_observers
-    found = views(write(tmp_path / "it.rrd", experiment, [run]))
+    layout = views(write(tmp_path / "it.rrd", experiment, [run]))
     few = best_observers(run)
     assert few[0] == "homogeneous"
     assert len(few) == 3
@@ -142,7 +142,7 @@ def test_the_best_open_loop_observers_are_on(all_observers: tuple[Experiment, Ru
         ("Tilt rate [rad/s]", "rate_estimate"),
         ("Estimation error of the tilt rate [rad/s]", "rate_error"),
     ):
-        first, second = sorted(named(found, title), key=lambda view: len(view.grey))
+        first, second = sorted(select(layout, title), key=lambda view: len(view.grey))
         assert first.hidden == {f"/homogeneous/{folder}/{part}" for part in off}
         assert second.grey == first.hidden
         assert f"/homogeneous/{folder}/**" in first.contents
@@ -150,30 +150,30 @@ def test_the_best_open_loop_observers_are_on(all_observers: tuple[Experiment, Ru
 
 
 @pytest.mark.slow
-def test_the_best_runs_are_on(compared: tuple[Experiment, list[Run]], tmp_path: Path) -> None:
-    experiment, runs = compared
-    found = views(write(tmp_path / "it.rrd", experiment, runs))
+def test_the_best_runs_are_on(comparison: tuple[Experiment, list[Run]], tmp_path: Path) -> None:
+    experiment, runs = comparison
+    layout = views(write(tmp_path / "it.rrd", experiment, runs))
     few = best_runs(runs)
-    on = {f"{i:02}_{run.name}" for i, run in enumerate(runs, 1) if run.name in few}
+    best_parts = {f"{i:02}_{run.name}" for i, run in enumerate(runs, 1) if run.name in few}
     for title in ("Tilt, true [deg]", "Command, gimbal rate [rad/s]"):
         first, second = sorted(
-            (view for view in named(found, title) if len(view.contents) > 2), key=lambda v: len(v.grey)
+            (view for view in select(layout, title) if len(view.contents) > 2), key=lambda v: len(v.grey)
         )
         assert len(first.contents) == len(runs)
         assert first.contents == second.contents == sorted(first.contents)
-        assert {entity.split("/")[1] for entity in set(first.contents) - first.hidden} == on
-        assert second.listed == set(second.contents)
-        assert {entity.split("/")[1] for entity in second.listed - second.grey} == on
-    lanes = {len(view.contents) for view in named(found, "Phase")}
+        assert {entity.split("/")[1] for entity in set(first.contents) - first.hidden} == best_parts
+        assert second.legend == set(second.contents)
+        assert {entity.split("/")[1] for entity in second.legend - second.grey} == best_parts
+    lanes = {len(view.contents) for view in select(layout, "Phase")}
     assert lanes == {1, len(few), len(runs)}
     text = summary_of_runs(experiment, runs)
     names = [line.split("|")[1].strip().strip("*") for line in text.splitlines() if line.startswith("| ")]
     assert [name for name in names if name] == [run.name for run in runs] * len(ROW_TABLES)
 
 
-def test_tables_fit_their_view(compared: tuple[Experiment, list[Run]]) -> None:
+def test_tables_fit_their_view(comparison: tuple[Experiment, list[Run]]) -> None:
     """As wide as those that were looked at, in a window of 1400 pixels."""
-    experiment, runs = compared
+    experiment, runs = comparison
     text = summary_of_runs(experiment, runs)
     tables = [part.splitlines() for part in text.split("\n\n") if part.startswith("|")]
     assert len(tables) == len(ROW_TABLES)
@@ -185,7 +185,7 @@ def test_tables_fit_their_view(compared: tuple[Experiment, list[Run]]) -> None:
 def test_a_noisy_observer_takes_no_axis(all_observers: tuple[Experiment, Run], tmp_path: Path) -> None:
     experiment, run = all_observers
     noisy = run.trajectory["estimate/finite_difference/x2_rad_s"]
-    for view in named(views(write(tmp_path / "it.rrd", experiment, [run])), "Tilt rate [rad/s]"):
+    for view in select(views(write(tmp_path / "it.rrd", experiment, [run])), "Tilt rate [rad/s]"):
         assert view.axis is not None
         low, high = view.axis
         true = run.trajectory["x2_rad_s"]
@@ -195,13 +195,13 @@ def test_a_noisy_observer_takes_no_axis(all_observers: tuple[Experiment, Run], t
         assert high - low < 0.15 * np.ptp(noisy)
 
 
-def test_a_fall_takes_no_axis_from_those_that_stand(compared: tuple[Experiment, list[Run]], tmp_path: Path) -> None:
-    experiment, runs = compared
+def test_a_fall_takes_no_axis_from_those_that_stand(comparison: tuple[Experiment, list[Run]], tmp_path: Path) -> None:
+    experiment, runs = comparison
     columns = {**runs[0].trajectory.columns, "x1_rad": runs[0].trajectory["x1_rad"] + 0.5}
     trajectory = replace(runs[0].trajectory, columns=columns)
-    fallen = replace(runs[0], trajectory=trajectory, outcome=Outcome("fell", 0.6))
-    two = [fallen, runs[1]]
-    (view,) = named(views(write(tmp_path / "it.rrd", experiment, two)), "Tilt, true [deg]")
+    fallen_run = replace(runs[0], trajectory=trajectory, outcome=Outcome("fell", 0.6))
+    two = [fallen_run, runs[1]]
+    (view,) = select(views(write(tmp_path / "it.rrd", experiment, two)), "Tilt, true [deg]")
     assert view.axis is not None
     assert view.axis[1] < np.degrees(0.3)
 
@@ -217,16 +217,16 @@ def test_numbers_put_paths_into_the_order_given() -> None:
 # --- the camera ----------------------------------------------------------------------------------------------
 
 
-def moved(model: mujoco.MjModel, scale: float, by: np.ndarray) -> mujoco.MjModel:
+def move(model: mujoco.MjModel, scale: float, shift: np.ndarray) -> mujoco.MjModel:
     """The same rig, larger or smaller, elsewhere."""
     for name in ("body_pos", "geom_pos", "geom_size", "geom_aabb", "site_pos", "jnt_pos", "body_ipos"):
         getattr(model, name)[:] *= scale
-    model.body_pos[1] += by
+    model.body_pos[1] += shift
     return model
 
 
 def corners(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
-    """Of all boxes around geoms of moving bodies, (n, 3) [m]."""
+    """Return the corners of all boxes around geoms of moving bodies, (n, 3) [m]."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
@@ -241,12 +241,12 @@ def corners(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("scenario", ["push_recovery", "single_gimbal"])
-@pytest.mark.parametrize(("scale", "by"), [(1.0, (0, 0, 0)), (10.0, (0, 0, 0)), (0.1, (0, 0, 0)), (1.0, (5, -3, 1))])
+@pytest.mark.parametrize(("scale", "shift"), [(1.0, (0, 0, 0)), (10.0, (0, 0, 0)), (0.1, (0, 0, 0)), (1.0, (5, -3, 1))])
 def test_a_rig_is_framed_whole(
-    monkeypatch: pytest.MonkeyPatch, scenario: str, scale: float, by: tuple[float, float, float]
+    monkeypatch: pytest.MonkeyPatch, scenario: str, scale: float, shift: tuple[float, float, float]
 ) -> None:
     plant = prepare(load_scenario(scenario, ())).plant
-    model = moved(copy.copy(plant.drawn_model), scale, np.array(by, float))
+    model = move(copy.copy(plant.drawn_model), scale, np.array(shift, float))
     monkeypatch.setitem(plant.__dict__, "drawn_model", model)
     qpos = plant.new_data().qpos[None]
     rig = enclosing_ball(plant, qpos)
@@ -262,12 +262,12 @@ def test_a_rig_is_framed_whole(
 def test_a_rig_is_framed_where_it_goes() -> None:
     plant = prepare(load_scenario("push_recovery", ())).plant
     start = plant.new_data().qpos
-    fallen = start.copy()
-    fallen[plant.tilt] += math.radians(60.0)
-    seen = enclosing_ball(plant, np.stack([start, fallen]))
-    for qpos in (start, fallen):
-        distance = np.linalg.norm(corners(plant.drawn_model, qpos) - seen.centre, axis=1)
-        assert distance.max() <= seen.radius * (1.0 + 1e-9)
+    end_pose = start.copy()
+    end_pose[plant.tilt] += math.radians(60.0)
+    ball = enclosing_ball(plant, np.stack([start, end_pose]))
+    for qpos in (start, end_pose):
+        distance = np.linalg.norm(corners(plant.drawn_model, qpos) - ball.centre, axis=1)
+        assert distance.max() <= ball.radius * (1.0 + 1e-9)
     at_start = enclosing_ball(plant, start[None]).radius
     assert enclosing_ball(plant, np.full((3, len(start)), math.nan)).radius == at_start
-    assert at_start < seen.radius < FARTHEST * at_start
+    assert at_start < ball.radius < FARTHEST * at_start

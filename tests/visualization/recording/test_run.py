@@ -42,7 +42,7 @@ def scenario(*overrides: str) -> Scenario:
     return load_scenario("push_recovery", [*SHORT, *overrides])
 
 
-def recorded(experiment: Experiment, name: str | None = None) -> Run:
+def record(experiment: Experiment, name: str | None = None) -> Run:
     result = experiment.run()
     assert result.trajectory is not None
     name = name or experiment.scenario.observer.kind
@@ -69,7 +69,7 @@ def experiment() -> Experiment:
 
 @pytest.fixture(scope="module")
 def run(experiment: Experiment) -> Run:
-    return recorded(experiment)
+    return record(experiment)
 
 
 @pytest.fixture(scope="module")
@@ -113,17 +113,17 @@ def rerun(home: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str
 
 
 def test_everything_promised_is_there(path: Path, experiment: Experiment) -> None:
-    below = {
+    branch_entities = {
         *("phase", "tilt/true", "tilt/measured", "tilt/settle_band", "rate/true", "rate/gyro"),
         *(f"{kind}/{name}" for kind in ("rate_estimate", "rate_error") for name in ("1_homogeneous", "2_linear")),
         *("command/u", "command/limit", "integrator/x_e", "rig/frame/push"),
-        *(f"{kind}/{cube}" for kind in ("gimbal", "flywheel") for cube in ("cube1", "cube2")),
+        *(f"{kind}/{module}" for kind in ("gimbal", "flywheel") for module in ("cube1", "cube2")),
         *(f"rig/{body}" for body in ("thrust_bearing", "frame", "cube1.gimbal", "cube2.flywheel")),
         *("rig/world/floor", "rig/frame/site/fog", "rig/frame/cube1/servo", "rig/cube1.gimbal/cube1/ring"),
         "rig/cube2.flywheel/slowed/cube2/disc",
     }
-    promised = {"/summary", "/scenario", *(f"/homogeneous/{entity}" for entity in below)}
-    assert promised <= entities(path)
+    expected = {"/summary", "/scenario", *(f"/homogeneous/{entity}" for entity in branch_entities)}
+    assert expected <= entities(path)
     geoms = [name for name in entities(path) if name.startswith("/homogeneous/rig/")]
     model = experiment.plant.drawn_model
     # Every geom and site, every moving body, and besides: two slowed flywheels, one push.
@@ -148,10 +148,10 @@ def test_values_equal_the_trajectory(path: Path, run: Run, experiment: Experimen
         "flywheel/cube2": -t["rate/cube2/flywheel_rad_s"],
     }
     for entity, values in expected.items():
-        times, read = scalars(path, f"/homogeneous/{entity}")
+        times, recorded_values = scalars(path, f"/homogeneous/{entity}")
         assert np.array_equal(np.rint(times * NANOSECONDS), np.rint(t["time_s"] * NANOSECONDS)), entity
-        np.testing.assert_allclose(read, values, rtol=1e-13, atol=1e-13, err_msg=entity)
-        assert np.ptp(read) > 0.0, entity
+        np.testing.assert_allclose(recorded_values, values, rtol=1e-13, atol=1e-13, err_msg=entity)
+        assert np.ptp(recorded_values) > 0.0, entity
     _, limits = column(path, "/homogeneous/command/limit", "Scalars:scalars")
     assert limits.tolist() == [[experiment.law.rate_limit, -experiment.law.rate_limit]] * 2
 
@@ -169,20 +169,20 @@ def test_an_observer_keeps_its_colour(path: Path) -> None:
 
 def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
     """In degrees, in the loop and open loop; the summary has its figures."""
-    of = prepare(
+    setup = prepare(
         scenario("observer.kind=adaptive", "open_loop_observers=['homogeneous_adaptive']", "metrics.bias_from_s=0.1")
     )
-    ran = recorded(of)
-    where = write(tmp_path / "bias.rrd", of, [ran])
+    run = record(setup)
+    path = write(tmp_path / "bias.rrd", setup, [run])
     assert {"/adaptive/bias/1_adaptive", "/adaptive/bias/2_homogeneous_adaptive", "/adaptive/bias/true"} <= entities(
-        where
+        path
     )
     for i, name in enumerate(("adaptive", "homogeneous_adaptive"), 1):
-        _, shown = scalars(where, f"/adaptive/bias/{i}_{name}")
-        np.testing.assert_allclose(shown, np.degrees(ran.trajectory[f"estimate/{name}/bias_rad"]), rtol=1e-12)
-    _, true = scalars(where, "/adaptive/bias/true")
-    np.testing.assert_allclose(true, of.scenario.plant.equilibrium_bias_deg, rtol=1e-12)
-    (summary,) = static(where, "/summary", "TextDocument:text")
+        _, estimate = scalars(path, f"/adaptive/bias/{i}_{name}")
+        np.testing.assert_allclose(estimate, np.degrees(run.trajectory[f"estimate/{name}/bias_rad"]), rtol=1e-12)
+    _, true = scalars(path, "/adaptive/bias/true")
+    np.testing.assert_allclose(true, setup.scenario.plant.equilibrium_bias_deg, rtol=1e-12)
+    (summary,) = static(path, "/summary", "TextDocument:text")
     assert heading("bias_estimate_deg") in summary
 
 
@@ -190,8 +190,8 @@ def test_summary_scenario_name_and_layout(path: Path, run: Run) -> None:
     (summary,) = static(path, "/summary", "TextDocument:text")
     assert {key for keys in ROW_TABLES for key in keys} <= run.summary.keys()
     assert heading("bias_estimate_deg") not in summary
-    shown = [key for key in KEYS if heading(key) in summary]
-    assert shown == [key for key in KEYS if key in run.summary]
+    summary_keys = [key for key in KEYS if heading(key) in summary]
+    assert summary_keys == [key for key in KEYS if key in run.summary]
     assert "# A title" in summary
     assert "+1 N m for 0.1 s at 0.2 s" in summary
     rows = [[cell.strip() for cell in line.split("|")] for line in summary.splitlines()]
@@ -246,7 +246,7 @@ def test_bodies_stand_where_kinematics_puts_them(path: Path, run: Run, experimen
 @pytest.mark.parametrize("module", [0, 1])
 def test_flywheels_are_drawn_slowed(path: Path, run: Run, experiment: Experiment, module: int) -> None:
     plant = experiment.plant
-    joint, k = plant.modules[module].flywheel, 30
+    joint, k = plant.axis.modules[module].flywheel, 30
     name = plant.model.body(plant.model.jnt_bodyid[joint]).name.replace("/", ".")
     _, true_place, true_turn = pose(path, f"/homogeneous/rig/{name}", k)
     time, place, turn = pose(path, f"/homogeneous/rig/{name}/slowed", k)
@@ -256,8 +256,8 @@ def test_flywheels_are_drawn_slowed(path: Path, run: Run, experiment: Experiment
     data.qpos[joint] = qpos[joint] / FLYWHEEL_SLOWDOWN
     mujoco.mj_kinematics(plant.model, data)
     body = plant.model.jnt_bodyid[joint]
-    drawn = matrix(true_turn) @ matrix(turn)
-    np.testing.assert_allclose(drawn, data.xmat[body].reshape(3, 3), atol=1e-6)
+    rotation = matrix(true_turn) @ matrix(turn)
+    np.testing.assert_allclose(rotation, data.xmat[body].reshape(3, 3), atol=1e-6)
     np.testing.assert_allclose(true_place + matrix(true_turn) @ place, data.xpos[body], atol=1e-7)
 
 
@@ -302,10 +302,10 @@ SHAPES = """
 
 def test_other_robots_shapes() -> None:
     model = mujoco.MjModel.from_xml_string(SHAPES)
-    drawn = {name: shape for _, name, shape in drawn_shapes(model, 0.25)}
-    assert drawn.keys() == {"ball", "egg", "sheet", "wedge", "geom4"}
-    assert isinstance(drawn["ball"], rr.Ellipsoids3D)
-    egg, plane, mesh = drawn["egg"], drawn["sheet"], drawn["wedge"]
+    shapes = {name: shape for _, name, shape in drawn_shapes(model, 0.25)}
+    assert shapes.keys() == {"ball", "egg", "sheet", "wedge", "geom4"}
+    assert isinstance(shapes["ball"], rr.Ellipsoids3D)
+    egg, plane, mesh = shapes["egg"], shapes["sheet"], shapes["wedge"]
     assert isinstance(egg, rr.Ellipsoids3D)
     assert egg.half_sizes is not None
     assert isinstance(plane, rr.Mesh3D)
@@ -325,10 +325,10 @@ def test_other_robots_shapes() -> None:
 
 def test_the_push_is_an_arrow_while_it_lasts(path: Path) -> None:
     entity = "/homogeneous/rig/frame/push"
-    shown, vectors = column(path, entity, "Arrows3D:vectors")
-    cleared, _ = column(path, entity, "Clear:is_recursive")
-    assert shown.tolist() == [0.2]
-    assert cleared.tolist() == [0.3]
+    start_times, vectors = column(path, entity, "Arrows3D:vectors")
+    end_times, _ = column(path, entity, "Clear:is_recursive")
+    assert start_times.tolist() == [0.2]
+    assert end_times.tolist() == [0.3]
     # A positive torque about +y moves the frame's upper edge, on the diagonal of its x and z, towards +x and -z.
     ((vector,),) = vectors
     assert vector[0] > 0.0 > vector[2]
@@ -344,20 +344,20 @@ def test_the_torque_as_steps() -> None:
 
 def test_times_are_rounded_to_the_nanosecond() -> None:
     milliseconds = np.arange(20_000)
-    stored = time_column(milliseconds * 0.001).as_arrow_array().to_numpy(zero_copy_only=False)
-    assert np.array_equal(stored.astype(np.int64), milliseconds * 1_000_000)
+    times = time_column(milliseconds * 0.001).as_arrow_array().to_numpy(zero_copy_only=False)
+    assert np.array_equal(times.astype(np.int64), milliseconds * 1_000_000)
     assert instant(0.001 * 4.35e3) == np.timedelta64(4_350, "ms")
 
 
 def test_phases_are_recorded(path: Path, run: Run, experiment: Experiment) -> None:
     times, states = column(path, "/homogeneous/phase", "StateChange:state")
-    read = [(time, state) for time, (state,) in zip(times, states, strict=True)]
+    recorded_phases = [(time, state) for time, (state,) in zip(times, states, strict=True)]
     expected = phases(run, experiment.scenario.push, experiment.scenario.metrics)
-    assert read == [(round(time, 9), name) for time, name in expected]
-    assert [state for _, state in read][:3] == ["balancing", "push", "recovering"]
+    assert recorded_phases == [(round(time, 9), name) for time, name in expected]
+    assert [state for _, state in recorded_phases][:3] == ["balancing", "push", "recovering"]
 
 
-def made_up(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Run:
+def make_run(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Run:
     """A run of 100 Hz whose tilt steps at given times."""
     time = np.arange(round(end_s * 100.0)) / 100.0
     x1 = np.zeros(len(time))
@@ -370,15 +370,15 @@ def made_up(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Run
     ("run", "pushes", "expected"),
     [
         pytest.param(
-            made_up({0.0: 0.5, 1.0: 3.0, 1.5: 0.5}, 4.0),
+            make_run({0.0: 0.5, 1.0: 3.0, 1.5: 0.5}, 4.0),
             [Push(1.0, 0.1)],
             [(0.0, "balancing"), (1.0, "push"), (1.1, "recovering"), (1.5, "settled")],
             id="one push",
         ),
-        pytest.param(made_up({0.0: 3.0, 0.7: 0.5}, 2.0), [], [(0.0, "recovering"), (0.7, "settled")], id="no push"),
-        pytest.param(made_up({}, 2.0), [Push(0.5)], [(0, "balancing"), (0.5, "push"), (0.6, "settled")], id="calm"),
+        pytest.param(make_run({0.0: 3.0, 0.7: 0.5}, 2.0), [], [(0.0, "recovering"), (0.7, "settled")], id="no push"),
+        pytest.param(make_run({}, 2.0), [Push(0.5)], [(0, "balancing"), (0.5, "push"), (0.6, "settled")], id="calm"),
         pytest.param(
-            made_up({1.0: 3.0, 1.5: 0.0, 2.0: 3.0}, 3.0),
+            make_run({1.0: 3.0, 1.5: 0.0, 2.0: 3.0}, 3.0),
             [Push(1.0, 0.1), Push(2.0, 0.5), Push(2.2, 0.5)],
             [
                 *[(0.0, "balancing"), (1.0, "push"), (1.1, "recovering"), (1.5, "settled")],
@@ -387,14 +387,14 @@ def made_up(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Run
             id="overlapping pushes",
         ),
         pytest.param(
-            made_up({1.0: 20.0}, 1.5, "fell"),
+            make_run({1.0: 20.0}, 1.5, "fell"),
             [Push(1.0, 0.1), Push(9.0)],
             [(0.0, "balancing"), (1.0, "push"), (1.1, "recovering"), (1.5, "fallen")],
             id="fall",
         ),
-        pytest.param(made_up({}, 0.0, "fell"), [Push(1.0)], [(0.0, "fallen")], id="fall at once"),
+        pytest.param(make_run({}, 0.0, "fell"), [Push(1.0)], [(0.0, "fallen")], id="fall at once"),
         pytest.param(
-            made_up({}, 0.5, "interrupted"),
+            make_run({}, 0.5, "interrupted"),
             [Push(0.0)],
             [(0, "push"), (0.1, "settled"), (0.5, "interrupted")],
             id="interrupted",
@@ -402,18 +402,20 @@ def made_up(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Run
     ],
 )
 def test_phases(run: Run, pushes: list[Push], expected: list[tuple[float, str]]) -> None:
-    read = phases(run, pushes, MetricsSettings())
-    assert [name for _, name in read] == [name for _, name in expected]
-    assert [time for time, _ in read] == pytest.approx([time for time, _ in expected])
+    actual = phases(run, pushes, MetricsSettings())
+    assert [name for _, name in actual] == [name for _, name in expected]
+    assert [time for time, _ in actual] == pytest.approx([time for time, _ in expected])
 
 
 def test_settled_when_the_summary_says(experiment: Experiment) -> None:
-    run = recorded(prepare(scenario("duration_s=3.0")))
+    run = record(prepare(scenario("duration_s=3.0")))
     push_end = max(push.end_s for push in experiment.scenario.push)
-    settled = [time for time, name in phases(run, experiment.scenario.push, MetricsSettings()) if name == "settled"]
+    settle_times = [
+        time for time, name in phases(run, experiment.scenario.push, MetricsSettings()) if name == "settled"
+    ]
     settle_time = run.summary["settle_time_s"]
     assert isinstance(settle_time, float)
-    assert settled == [pytest.approx(push_end + settle_time)]
+    assert settle_times == [pytest.approx(push_end + settle_time)]
 
 
 # --- the file ------------------------------------------------------------------------------------------------
@@ -421,30 +423,30 @@ def test_settled_when_the_summary_says(experiment: Experiment) -> None:
 
 def test_rerun_verifies_it_and_finds_a_cut(path: Path, tmp_path: Path) -> None:
     assert rerun(tmp_path, "verify", path).returncode == 0
-    cut = tmp_path / "cut.rrd"
-    cut.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
-    assert rerun(tmp_path, "verify", cut).returncode != 0
+    cut_path = tmp_path / "cut.rrd"
+    cut_path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+    assert rerun(tmp_path, "verify", cut_path).returncode != 0
 
 
 def test_the_same_run_gives_the_same_recording(path: Path, experiment: Experiment, tmp_path: Path) -> None:
-    again = write(tmp_path / "again.rrd", experiment, [recorded(experiment)])
+    repetition = write(tmp_path / "again.rrd", experiment, [record(experiment)])
     compare = ("compare", "--unordered")
-    assert rerun(tmp_path, *compare, path, again).returncode == 0
-    other = write(tmp_path / "other.rrd", experiment, [recorded(prepare(scenario("seed=1")))])
+    assert rerun(tmp_path, *compare, path, repetition).returncode == 0
+    other = write(tmp_path / "other.rrd", experiment, [record(prepare(scenario("seed=1")))])
     assert rerun(tmp_path, *compare, path, other).returncode != 0
 
 
 def test_two_observers_have_a_branch_each(tmp_path: Path) -> None:
     experiments = [prepare(scenario().with_observer(kind)) for kind in ("homogeneous", "ltv")]
-    runs = [recorded(experiment) for experiment in experiments]
+    runs = [record(experiment) for experiment in experiments]
     path = write(tmp_path / "compare.rrd", experiments[0], runs)
     for i, run in enumerate(runs, 1):
         for signal, entity in (
             ("x2_rad_s", "rate/true"),
             (f"estimate/{run.name}/x2_rad_s", f"rate_estimate/1_{run.name}"),
         ):
-            _, read = scalars(path, f"/{i}_{run.name}/{entity}")
-            assert np.array_equal(read, run.trajectory[signal])
+            _, recorded_values = scalars(path, f"/{i}_{run.name}/{entity}")
+            assert np.array_equal(recorded_values, run.trajectory[signal])
     branches = [
         {name.removeprefix(f"/{i}_{run.name}") for name in entities(path) if name.startswith(f"/{i}_{run.name}/")}
         for i, run in enumerate(runs, 1)
@@ -458,8 +460,8 @@ def test_two_observers_have_a_branch_each(tmp_path: Path) -> None:
 def test_a_run_of_no_length(run: Run, experiment: Experiment, tmp_path: Path, ticks: int) -> None:
     short = replace(run.trajectory, columns={name: values[:ticks] for name, values in run.trajectory.columns.items()})
     end = ticks * experiment.law.dt
-    fell = replace(run, trajectory=short, summary={"settle_time_s": None}, outcome=Outcome("fell", end))
-    path = write(tmp_path / "short.rrd", experiment, [fell])
+    short_run = replace(run, trajectory=short, summary={"settle_time_s": None}, outcome=Outcome("fell", end))
+    path = write(tmp_path / "short.rrd", experiment, [short_run])
     assert rerun(tmp_path, "verify", path).returncode == 0
     times, _ = column(path, "/homogeneous/rig/frame", "Transform3D:translation")
     assert len(times) == (1 if ticks < 2 else 2)
@@ -469,7 +471,7 @@ def test_a_run_of_no_length(run: Run, experiment: Experiment, tmp_path: Path, ti
 
 def test_a_fall_in_the_first_tick(tmp_path: Path) -> None:
     experiment = prepare(scenario("plant.initial_tilt_deg=40.0"))
-    run = recorded(experiment)
+    run = record(experiment)
     assert (run.outcome.kind, len(run.trajectory)) == ("fell", 0)
     path = write(tmp_path / "fell.rrd", experiment, [run])
     _, translation, quaternion = pose(path, "/homogeneous/rig/cube1.gimbal", 0)
@@ -483,16 +485,16 @@ def test_an_open_loop_observer_that_diverged(run: Run, experiment: Experiment, t
     columns["estimate/linear/x2_rad_s"] = columns["x2_rad_s"].copy()
     columns["estimate/linear/x2_rad_s"][50:] = [*[1e300, -np.inf], *[np.nan] * (len(run.trajectory) - 52)]
     path = write(tmp_path / "nan.rrd", experiment, [replace(run, trajectory=replace(run.trajectory, columns=columns))])
-    _, read = scalars(path, "/homogeneous/rate_estimate/2_linear")
-    assert np.array_equal(read, columns["estimate/linear/x2_rad_s"], equal_nan=True)
+    _, recorded_values = scalars(path, "/homogeneous/rate_estimate/2_linear")
+    assert np.array_equal(recorded_values, columns["estimate/linear/x2_rad_s"], equal_nan=True)
 
 
 def test_a_users_observer_may_have_any_name(run: Run, experiment: Experiment, tmp_path: Path) -> None:
     name = "my_lab.observers:Kalman"
     columns = {key.replace("/linear/", f"/{name}/"): values for key, values in run.trajectory.columns.items()}
     layout = replace(run.trajectory.layout, observers=("homogeneous", name))
-    named = replace(run, name=name, trajectory=replace(run.trajectory, columns=columns, layout=layout))
-    path = write(tmp_path / "named.rrd", experiment, [named])
+    users_run = replace(run, name=name, trajectory=replace(run.trajectory, columns=columns, layout=layout))
+    path = write(tmp_path / "named.rrd", experiment, [users_run])
     part = rr.escape_entity_path_part(name)
     assert {f"/{part}/rig/frame", f"/{part}/rate_estimate/2_{part}"} <= entities(path)
     color = static(path, f"/{part}/rate_estimate/2_{part}", "SeriesLines:colors")

@@ -26,32 +26,32 @@ from cmg_mj.visualization.studio.settings import Settings
 from cmg_mj.visualization.studio.stepping import Stepping
 
 SIGNALS = ("x2_rad_s", "y1_rad", "y2_rad", "fog_rad_s", "u_rad_s", "x_e_rad_times_s", "push_n_m")
-Said = TypeVar("Said", bound=messages.Message)
+MessageT = TypeVar("MessageT", bound=messages.Message)
 
 
-class Recorded(Stepping):
+class RecordingStepping(Stepping):
     """Keeps every tick: time, what the controller made of it on each axis, the joints."""
 
-    def __init__(self, opened: Callable[[str], Experiment], **others: Any) -> None:
-        super().__init__(opened, **others)
+    def __init__(self, open_experiment: Callable[[str], Experiment], **options: Any) -> None:
+        super().__init__(open_experiment, **options)
         self.rows: list[tuple[float, ...]] = []
 
     @messages.handler
     def on_load_model(self, event: messages.LoadModelEvent) -> bool:
         before = self.live
-        done = super().on_load_model(event)
+        is_done = super().on_load_model(event)
         if self.live is not None and self.live is not before:
             vars(self.live)["step"] = recording(self.live, self.rows)
-        return done
+        return is_done
 
 
 def recording(live: StudioSession, rows: list[tuple[float, ...]]) -> Callable[[mujoco.MjData], bool]:
     step, lines = live.step, [axis.line for axis in live.plant.axes]
 
-    def recorded(data: mujoco.MjData) -> bool:
+    def record_step(data: mujoco.MjData) -> bool:
         time, q, v = data.time, data.qpos.tolist(), data.qvel.tolist()
-        ticked = step(data)
-        if ticked:
+        has_ticked = step(data)
+        if has_ticked:
             row = [time]
             for line, part in zip(lines, live.controller.parts, strict=True):
                 tick = part.tick
@@ -59,17 +59,17 @@ def recording(live: StudioSession, rows: list[tuple[float, ...]]) -> Callable[[m
                 push = sum(float(data.qfrc_applied[dof]) * share for dof, share in zip(*line.push, strict=True))
                 row += [float(line.rate(v)), tick.y1, tick.y2, tick.fog, tick.u, tick.x_e, push]
             rows.append((*row, *q, *v))
-        return ticked
+        return has_ticked
 
-    return recorded
+    return record_step
 
 
 class Session:
     """Studio's simulation, and what its viewer sends and hears."""
 
-    def __init__(self, opened: Callable[[str], Experiment], history_s: float = 10.0) -> None:
+    def __init__(self, open_experiment: Callable[[str], Experiment], history_s: float = 10.0) -> None:
         self.now = 100.0
-        self.stepping = Recorded(opened, clock=lambda: self.now, sleep=lambda _: None)
+        self.stepping = RecordingStepping(open_experiment, clock=lambda: self.now, sleep=lambda _: None)
         self.viewer: endpoints.ViewerEndpoint
         self.viewer, end = launch_thread.make_thread_endpoints()
         history = sim_history.SimHistory(min_seconds=history_s)
@@ -90,33 +90,33 @@ class Session:
     def rows(self) -> np.ndarray:
         return np.array(self.stepping.rows)
 
-    def send(self, *said: messages.Message) -> None:
-        for message in said:
+    def send(self, *sent_messages: messages.Message) -> None:
+        for message in sent_messages:
             self.viewer.send_to_sim(message)
         self.handle.sync()
 
     def run(self, seconds: float, every_s: float = 0.017) -> None:
         """Let the clock go so far, and the simulation with it."""
-        until, most = self.data.time + seconds, self.now + 2.0 * seconds + 1.0
-        while self.data.time < until - 1e-9:
+        end, most = self.data.time + seconds, self.now + 2.0 * seconds + 1.0
+        while self.data.time < end - 1e-9:
             assert self.now < most, "it stands still"
-            self.now += min(every_s, until - self.data.time + 1e-7)
+            self.now += min(every_s, end - self.data.time + 1e-7)
             self.handle.sync()
 
-    def pause(self, paused: bool = True) -> None:
-        state = sim.PauseState.NORMAL_PAUSED if paused else sim.PauseState.UNPAUSED
+    def pause(self, is_paused: bool = True) -> None:
+        state = sim.PauseState.NORMAL_PAUSED if is_paused else sim.PauseState.UNPAUSED
         self.send(messages.StepControlSnapshot(pause_state=state))
 
-    def heard(self, kind: type[Said]) -> list[Said]:
-        said = [*self.viewer.get_sim_events(), *self.viewer.get_sim_snapshots()]
-        return [message for message in said if isinstance(message, kind)]
+    def receive(self, kind: type[MessageT]) -> list[MessageT]:
+        received = [*self.viewer.get_sim_events(), *self.viewer.get_sim_snapshots()]
+        return [message for message in received if isinstance(message, kind)]
 
     def session_state(self) -> SessionState:
         """The next state that the panel receives."""
-        self.heard(SessionState)
+        self.receive(SessionState)
         self.now += 1.0 / 29.0
         self.handle.sync()
-        return self.heard(SessionState)[-1]
+        return self.receive(SessionState)[-1]
 
     def settings(self) -> Settings:
         settings = self.session_state().settings
@@ -129,12 +129,12 @@ class Session:
 
 
 @contextmanager
-def session(*settings: str, scenario: str = "push_recovery", **others: Any) -> Iterator[Session]:
-    opened = Session(lambda path: prepare(load_scenario(scenario, list(settings))), **others)
+def session(*settings: str, scenario: str = "push_recovery", **options: Any) -> Iterator[Session]:
+    studio = Session(lambda path: prepare(load_scenario(scenario, list(settings))), **options)
     try:
-        yield opened
+        yield studio
     finally:
-        opened.handle.close()
+        studio.handle.close()
 
 
 def as_rows(trajectory: Trajectory) -> np.ndarray:

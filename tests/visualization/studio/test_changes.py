@@ -1,4 +1,4 @@
-"""What a user changes while it runs: observer, law, noise, e, pushes by button and by mouse; and what goes wrong."""
+"""Changes by a user during a run: observer, law, noise, e, pushes by button and by mouse; and failures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cmg_mj.observers import OBSERVERS, Estimate
 from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, choosable_laws
 from tests.visualization.studio.session import Session, session
-from tests.visualization.studio.test_session import of_runner, same
+from tests.visualization.studio.test_session import runner_rows, same
 
 TIME, RATE, U, PUSH = 0, 1, 5, 7
 
@@ -31,8 +31,8 @@ def test_a_push_by_button_is_a_push_of_the_scenario() -> None:
         studio.run(1.0)
         studio.send(PushRequest(-0.8, 0.2))
         studio.run(2.0)
-        pushed = ("duration_s=3.0", "push.0.start_s=1.0", "push.0.duration_s=0.2", "push.0.torque_n_m=-0.8")
-        expected = of_runner(*pushed)
+        settings = ("duration_s=3.0", "push.0.start_s=1.0", "push.0.duration_s=0.2", "push.0.torque_n_m=-0.8")
+        expected = runner_rows(*settings)
         same(studio.rows, expected)
         assert np.count_nonzero(studio.rows[:, PUSH]) == 40
 
@@ -54,7 +54,7 @@ def test_studios_mouse_reaches_the_rig_and_adds_up_with_a_push() -> None:
     def tilts(button: float, mouse: float) -> np.ndarray:
         with session("push=[]") as studio:
             force = np.zeros((studio.live.model.nbody, 6))
-            force[studio.live.plant.frame, 4] = mouse  # about y, the tilt's axis, in the world's directions
+            force[studio.live.plant.axis.frame, 4] = mouse  # about y, the tilt's axis, in the world's directions
             state = int(mujoco.mjtState.mjSTATE_XFRC_APPLIED)
             studio.run(0.5)
             if button:
@@ -83,7 +83,7 @@ def test_every_observer_takes_over_without_a_bump() -> None:
     with session("push.0.start_s=0.5") as studio:
         studio.run(0.62)
         assert abs(studio.rows[-1, RATE]) > 0.3
-        undisturbed = of_runner("push.0.start_s=0.5")
+        undisturbed = runner_rows("push.0.start_s=0.5")
         for i, kind in enumerate(OBSERVERS):
             studio.send(messages.LoadModelEvent())
             studio.stepping.rows.clear()
@@ -94,7 +94,7 @@ def test_every_observer_takes_over_without_a_bump() -> None:
             same(rows[: 124 + 20], undisturbed)
             alone = i == list(OBSERVERS).index("homogeneous")
             assert np.array_equal(rows[:, U], undisturbed[: len(rows), U]) == alone, kind
-            assert studio.settings()[OBSERVER] == kind
+            assert studio.settings().observer == kind
 
 
 def test_the_scenarios_observer_has_its_parameters_again() -> None:
@@ -112,18 +112,18 @@ def test_gains_and_feedback() -> None:
         laws = choosable_laws(studio.live.base)
         studio.send(ChangeSettings(laws["LQR"]), ChangeSettings({FEEDBACK: "truth"}))
         studio.run(1.0)
-        said = studio.session_state()
-        assert said.settings is not None
-        assert (said.law, said.settings[FEEDBACK]) == ("LQR", "truth")
-        same(studio.rows, of_runner("controller.lqr.state_cost=[1,1,1,1]", "controller.feedback=truth"))
+        state = studio.session_state()
+        assert state.settings is not None
+        assert (state.law, state.settings.feedback) == ("LQR", "truth")
+        same(studio.rows, runner_rows("controller.lqr.state_cost=[1,1,1,1]", "controller.feedback=truth"))
         studio.send(ChangeSettings(laws["Table 2"]))
         assert studio.session_state().gains == (35.0, 4.0, -1.0, 0.3)
         studio.run(4.0)
         studio.send(ChangeSettings(laws["LQG"]))
         assert "lqg takes nothing of the observer" in studio.session_state().note
         studio.send(ChangeSettings({FEEDBACK: "observer"}), ChangeSettings(laws["LQG"]))
-        said = studio.session_state()
-        assert (said.law, said.note) == ("LQG", "")
+        state = studio.session_state()
+        assert (state.law, state.note) == ("LQG", "")
         assert np.isfinite(studio.rows[-1, U + 1])
         before = studio.rows[-2:, U + 1]
         assert abs(before[1] - before[0]) < 1e-3  # the integrator goes on
@@ -149,7 +149,7 @@ def test_noise_and_bias() -> None:
 def test_what_is_refused_changes_nothing_and_is_said() -> None:
     with session() as studio:
         studio.run(0.5)
-        for values, said in (
+        for values, complaint in (
             ({OBSERVER: "no_such"}, "no such observer"),
             ({BIAS: 60.0}, "less than 45"),
             ({NOISE: -1.0}, "noise_density_ug_rthz"),
@@ -157,9 +157,9 @@ def test_what_is_refused_changes_nothing_and_is_said() -> None:
             ({"controller.rate_hz": 100.0}, "stays 200 Hz"),
         ):
             studio.send(ChangeSettings(values))
-            assert said in studio.session_state().note
+            assert complaint in studio.session_state().note
         studio.run(1.0)
-        same(studio.rows, of_runner("duration_s=2.5"))
+        same(studio.rows, runner_rows("duration_s=2.5"))
 
 
 def test_studios_physics_settings_cannot_change_the_step() -> None:
@@ -170,7 +170,7 @@ def test_studios_physics_settings_cannot_change_the_step() -> None:
         studio.send(messages.MjOptionSnapshot(opt=opt))
         assert studio.live.model.opt.timestep == 0.005
         assert "the physics step stays 0.005 s" in studio.session_state().note
-        assert [said.opt.timestep for said in studio.heard(messages.MjOptionSnapshot)][-1:] in ([], [0.005])
+        assert [snapshot.opt.timestep for snapshot in studio.receive(messages.MjOptionSnapshot)][-1:] in ([], [0.005])
         studio.send(messages.StepControlSnapshot(noise_scale=0.1))
         assert "noise on the controls is not applied" in studio.session_state().note
 
@@ -181,7 +181,7 @@ def test_studios_physics_settings_cannot_change_the_step() -> None:
 class Fragile:
     """A user's observer that works for two seconds."""
 
-    def __init__(self, dt: float, **others: object) -> None:
+    def __init__(self, dt: float, **options: object) -> None:
         self.dt = dt
 
     def init(self, y: object) -> int:
@@ -196,7 +196,7 @@ class Fragile:
 FRAGILE = "tests.visualization.studio.test_changes:Fragile"
 
 
-def failed(studio: Session) -> None:
+def run_until_failure(studio: Session) -> None:
     studio.run(0.5)
     studio.send(ChangeSettings({OBSERVER: FRAGILE, FEEDBACK: "truth"}))
     studio.run(3.0, every_s=0.004)
@@ -204,9 +204,9 @@ def failed(studio: Session) -> None:
 
 def test_an_observer_that_raises_stops_the_controller_and_nothing_else() -> None:
     with session() as studio:
-        failed(studio)
-        said = studio.session_state()
-        assert said.stopped == "observer Fragile raised KeyError: 'gone' at t = 2.505 s"
+        run_until_failure(studio)
+        state = studio.session_state()
+        assert state.stopped == "observer Fragile raised KeyError: 'gone' at t = 2.505 s"
         assert studio.data.time == pytest.approx(3.5, abs=0.05)
         assert np.all(studio.data.ctrl[studio.live.plant.axis.servos] == 0.0)
         assert studio.rows[-1, TIME] < 2.51
@@ -214,7 +214,7 @@ def test_an_observer_that_raises_stops_the_controller_and_nothing_else() -> None
 
 def test_history_goes_back_to_before_an_observer_failed() -> None:
     with session() as studio:
-        failed(studio)
+        run_until_failure(studio)
         rows = studio.rows
         studio.scrub(-160)  # 1.9 s
         assert studio.session_state().stopped == ""
@@ -230,7 +230,7 @@ def test_history_goes_back_to_before_an_observer_failed() -> None:
 
 def test_a_stopped_controller_starts_again_with_another_observer() -> None:
     with session("push=[]") as studio:
-        failed(studio)
+        run_until_failure(studio)
         studio.scrub(-100)  # 2.5 s: before its last sample
         studio.pause(False)
         studio.run(0.02)
@@ -244,11 +244,11 @@ def test_a_stopped_controller_starts_again_with_another_observer() -> None:
         studio.pause(False)
         rows = studio.rows
         studio.run(0.2)
-        again = studio.rows[len(rows) :]
-        first = np.searchsorted(rows[:, TIME], again[0, TIME] - 1e-9)
-        common = min(len(again), len(rows) - first)
+        rerun = studio.rows[len(rows) :]
+        first = np.searchsorted(rows[:, TIME], rerun[0, TIME] - 1e-9)
+        common = min(len(rerun), len(rows) - first)
         assert common > 10
-        same(again[:common], rows[first : first + common])
+        same(rerun[:common], rows[first : first + common])
 
 
 def test_a_fall_is_said_and_reset_stands_up_again() -> None:
@@ -262,7 +262,7 @@ def test_a_fall_is_said_and_reset_stands_up_again() -> None:
         studio.send(messages.ResetEvent(key=-1))
         studio.stepping.rows.clear()
         studio.run(1.0)
-        same(studio.rows, of_runner("push.0.start_s=0.5"))
+        same(studio.rows, runner_rows("push.0.start_s=0.5"))
 
 
 def test_physics_that_diverges_is_paused() -> None:
@@ -273,13 +273,13 @@ def test_physics_that_diverges_is_paused() -> None:
             studio.now += 0.02
             studio.handle.sync()
         assert studio.live.stopped == "the physics diverged at t = 0.505 s; reset"
-        paused = studio.heard(messages.StepControlSnapshot)[-1]
-        assert paused.pause_state == sim.PauseState.NORMAL_PAUSED
+        snapshot = studio.receive(messages.StepControlSnapshot)[-1]
+        assert snapshot.pause_state == sim.PauseState.NORMAL_PAUSED
         studio.send(messages.ResetEvent(key=-1))
         studio.pause(False)
         studio.stepping.rows.clear()
         studio.run(1.0)
-        same(studio.rows, of_runner("duration_s=2.5"))
+        same(studio.rows, runner_rows("duration_s=2.5"))
 
 
 # --- other rigs --------------------------------------------------------------------------------------------
@@ -302,9 +302,9 @@ def test_a_model_dropped_on_the_viewer_takes_the_rigs_place(tmp_path: Path) -> N
         studio.stepping.rows.clear()
         studio.send(messages.LoadModelEvent(path=str(other)))
         studio.run(3.0)
-        expected = of_runner(f"plant.model={other}")
+        expected = runner_rows(f"plant.model={other}")
         same(studio.rows, expected)
-        assert not np.array_equal(expected, of_runner())
+        assert not np.array_equal(expected, runner_rows())
         other.write_text("<mujoco/>", encoding="utf-8")
         studio.send(messages.LoadModelEvent(path=str(other)))
         assert "joint" in studio.session_state().note

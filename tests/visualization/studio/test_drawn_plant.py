@@ -31,8 +31,8 @@ VARIATIONS = {
 }
 OUTSIDE_THE_MODEL = {"initial_tilt_deg", "gimbal_backlash_arcmin"}
 OPTIONS = {"timestep_s", "integrator"}
-COMPILED = {"model", "lock_thrust_bearing", "locked_axes"}
-SEEN = ("cam_", "light_")
+COMPILE_OPTIONS = {"model", "lock_thrust_bearing", "locked_axes"}
+VIEW_ARRAYS = ("cam_", "light_")
 
 
 @cache
@@ -42,13 +42,13 @@ def experiment(scenario: str) -> Experiment:
 
 def arrays(model: mujoco.MjModel) -> dict[str, np.ndarray]:
     """All arrays but the addresses of names."""
-    named = {name: getattr(model, name) for name in dir(model) if not name.startswith(("_", "name"))}
-    return {name: value for name, value in named.items() if isinstance(value, np.ndarray)}
+    attributes = {name: getattr(model, name) for name in dir(model) if not name.startswith(("_", "name"))}
+    return {name: value for name, value in attributes.items() if isinstance(value, np.ndarray)}
 
 
 def test_every_setting_of_a_plant_is_here() -> None:
     fields = {field.name for field in dataclasses.fields(PlantSettings)}
-    assert fields == {*VARIATIONS, *OUTSIDE_THE_MODEL, *OPTIONS, *COMPILED}
+    assert fields == {*VARIATIONS, *OUTSIDE_THE_MODEL, *OPTIONS, *COMPILE_OPTIONS}
 
 
 @pytest.mark.parametrize("name", VARIATIONS)
@@ -58,26 +58,26 @@ def test_what_a_setting_changes_is_copied(scenario: str, name: str) -> None:
         pytest.skip("the scissored pair has no yaw servo")
     base = experiment(scenario)
     fields = {f"plant.{name}": VARIATIONS[name], "plant.timestep_s": base.plant.timestep}
-    varied = base.with_settings(fields).plant.model
+    variation = base.with_settings(fields).plant.model
     before = arrays(base.plant.model)
-    changed = {array for array, value in arrays(varied).items() if not np.array_equal(value, before[array])}
-    changed = {array for array in changed if not array.startswith(SEEN)}
+    changed = {array for array, value in arrays(variation).items() if not np.array_equal(value, before[array])}
+    changed = {array for array in changed if not array.startswith(VIEW_ARRAYS)}
     assert changed
     assert changed <= set(PHYSICS_ARRAYS)
-    drawn = drawn_plant(base.plant).model
-    copy_physics_numbers(drawn, varied)
-    assert all(np.array_equal(getattr(drawn, array), getattr(varied, array)) for array in changed)
-    copy_physics_numbers(drawn, base.plant.model)
-    assert all(np.array_equal(getattr(drawn, array), before[array]) for array in changed)
+    drawing = drawn_plant(base.plant).model
+    copy_physics_numbers(drawing, variation)
+    assert all(np.array_equal(getattr(drawing, array), getattr(variation, array)) for array in changed)
+    copy_physics_numbers(drawing, base.plant.model)
+    assert all(np.array_equal(getattr(drawing, array), before[array]) for array in changed)
 
 
 @pytest.mark.parametrize("scenario", ["push_recovery", "single_gimbal", "two_axes"])
 def test_only_visual_geoms_differ(scenario: str) -> None:
     plant = experiment(scenario).plant
-    drawn, stepped = arrays(drawn_plant(plant).model), arrays(plant.model)
-    visual = ("geom_", "mesh_", "mat_", "tex_", "bvh_", "body_geom", "body_bvh", *SEEN)
+    drawn_arrays, stepped_arrays = arrays(drawn_plant(plant).model), arrays(plant.model)
+    visual = ("geom_", "mesh_", "mat_", "tex_", "bvh_", "body_geom", "body_bvh", *VIEW_ARRAYS)
     assert all(
-        np.array_equal(drawn[name], value, equal_nan=True)
-        for name, value in stepped.items()
+        np.array_equal(drawn_arrays[name], value, equal_nan=True)
+        for name, value in stepped_arrays.items()
         if not name.startswith(visual)
     )

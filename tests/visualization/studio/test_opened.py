@@ -7,15 +7,18 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+from mujoco.studio import endpoints, messages, viewer_protocol
 
 from cmg_mj.errors import InputError
 from cmg_mj.visualization.studio import viewers
-from tests.command import COMMAND, cmg_mj, cmg_mj_process
+from cmg_mj.visualization.studio.messages import SessionState
+from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, cmg_mj_process
 
-REFUSED = [
+BAD_ARGUMENTS = [
     (["no_such"], "'no_such': no such file, nor a bundled one"),
     (["push_recovery", "--set", "plant.no_such=1"], "plant.no_such"),
     (["push_recovery", "--observer", "homogenous"], "did you mean 'homogeneous'"),
@@ -23,54 +26,82 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "said"), REFUSED)
-def test_a_bad_scenario_is_one_line(arguments: list[str], said: str, elsewhere: None) -> None:
-    assert said in cmg_mj("studio", *arguments).complaint
+@pytest.mark.parametrize(("arguments", "message"), BAD_ARGUMENTS)
+def test_a_bad_scenario_is_one_line(arguments: list[str], message: str, elsewhere: None) -> None:
+    assert message in cmg_mj("studio", *arguments).complaint
 
 
 def test_graphics_that_cannot_be_had_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a screen a window would end the process; Python 3.11 has no windows at all."""
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    said = cmg_mj("studio", "push_recovery", "--viewer", "native").complaint
-    assert said.startswith("--viewer native: MuJoCo Studio")
-    assert said.endswith("; take --viewer web")
+    complaint = cmg_mj("studio", "push_recovery", "--viewer", "native").complaint
+    assert complaint.startswith("--viewer native: MuJoCo Studio")
+    assert complaint.endswith("; take --viewer web")
 
 
 @pytest.mark.parametrize(
-    ("returned", "said"),
+    ("status_and_error", "message"),
     [
         ((1, "x\nValueError: Target not found: out\nbye"), "(ValueError: Target not found: out)"),
         ((134, ""), "(a window ends the process, status 134)"),
     ],
 )
 def test_graphics_are_tried_in_a_process_of_their_own(
-    monkeypatch: pytest.MonkeyPatch, returned: tuple[int, str], said: str
+    monkeypatch: pytest.MonkeyPatch, status_and_error: tuple[int, str], message: str
 ) -> None:
     monkeypatch.setattr(sys, "version_info", (3, 12, 0))
-    tried = subprocess.CompletedProcess([], returned[0], "", returned[1])
-    monkeypatch.setattr(viewers.subprocess, "run", lambda *_, **__: tried)
+    process = subprocess.CompletedProcess([], status_and_error[0], "", status_and_error[1])
+    monkeypatch.setattr(viewers.subprocess, "run", lambda *_, **__: process)
     with pytest.raises(InputError, match="take --viewer web") as error:
         viewers.check_graphics("vulkan")
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
 def free_port() -> int:
     """Not one that another test, in another process, might look for at the same time."""
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
+    with socket.socket() as result:
+        result.bind(("127.0.0.1", 0))
+        return result.getsockname()[1]
+
+
+class Looker:
+    """Stands for the web viewer: it sees the simulation go on, and closes."""
+
+    def __init__(self, config: viewer_protocol.ViewerConfig, endpoint: endpoints.ViewerEndpoint, **_: object) -> None:
+        self.config, self.endpoint, self.ticks = config, endpoint, 0
+
+    def look(self) -> None:
+        for _ in range(10_000):  # a simulation that stands still is not waited for without end
+            time.sleep(0.01)
+            states = [state for state in self.endpoint.get_sim_snapshots() if isinstance(state, SessionState)]
+            self.ticks = max([self.ticks, *(len(state.ticks) for state in states)])
+            if self.ticks >= 10:
+                break
+        self.endpoint.send_to_sim(messages.ExitEvent())
+
+
+def test_the_command_opens_a_scenario_until_its_viewer_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All but the browser's view, which the slow tests open."""
+    opened: list[Looker] = []
+    monkeypatch.setattr(viewers, "LoopbackViewer", Looker)
+    monkeypatch.setattr(viewer_protocol, "run_viewer_loop", lambda looker: (opened.append(looker), looker.look()))
+    outcome = cmg_mj("studio", "push_recovery", "--observer", "ltv", "--port", "8123")
+    assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
+    (looker,) = opened
+    assert (looker.config.title, looker.config.gfx, looker.config.http_port) == ("Push recovery", "web", 8123)
+    assert looker.ticks >= 10
 
 
 @pytest.mark.slow
 def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
     """In a process of its own: Studio hooks into Python's log, warnings and exceptions for as long as one lasts."""
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        said = cmg_mj_process("studio", "push_recovery", "--port", port, cwd=tmp_path)
-    assert f"Port {port} is already in use" in said.complaint
+    with socket.socket() as other_socket:
+        other_socket.bind(("127.0.0.1", 0))
+        other_socket.listen()
+        port = other_socket.getsockname()[1]
+        outcome = cmg_mj_process("studio", "push_recovery", "--port", port, cwd=tmp_path)
+    assert f"Port {port} is already in use" in outcome.complaint
 
 
 BOTH_THREADS = """
@@ -78,6 +109,7 @@ import sys, time
 from mujoco.studio import app, messages, sim_history, viewer_protocol
 from cmg_mj import load_scenario, prepare
 from cmg_mj.visualization.studio import viewers
+from cmg_mj.visualization.studio.messages import SessionState
 from cmg_mj.visualization.studio.panel import StudioPanel
 from cmg_mj.visualization.studio.stepping import Stepping
 opened = prepare(load_scenario("push_recovery"))
@@ -85,21 +117,21 @@ plugins = [app.App(), StudioPanel(), Stepping(lambda path: opened), sim_history.
 with viewers.launch(viewer_protocol.ViewerConfig(gfx="web", http_port=int(sys.argv[1])), plugins) as handle:
     handle.dispatch(messages.LoadModelEvent())
     start = time.monotonic()
-    while time.monotonic() - start < 1.0:
+    while handle.data.time < 0.5:
         assert handle.is_running()
         handle.sync()
-    assert 0.3 < handle.data.time < 1.1, handle.data.time
+    assert handle.data.time < time.monotonic() - start + 0.1, handle.data.time
 assert not handle.is_running()
 """
 
 
 @pytest.mark.slow
 def test_both_threads_and_nobody_looking() -> None:
-    """The viewer in its thread: the simulation keeps the clock's pace, and the viewer ends when it is told."""
-    done = subprocess.run(
-        [sys.executable, "-c", BOTH_THREADS, str(free_port())], capture_output=True, text=True, timeout=120
+    """The viewer in its thread: the simulation is not ahead of the clock, and the viewer ends when it is told."""
+    process = subprocess.run(
+        [sys.executable, "-c", BOTH_THREADS, str(free_port())], capture_output=True, text=True, timeout=HANGS_AFTER_S
     )
-    assert done.returncode == 0, done.stderr
+    assert process.returncode == 0, process.stderr
 
 
 @pytest.mark.slow
@@ -114,31 +146,31 @@ def test_the_command_listens_on_loopback_alone_and_ends_with_ctrl_c(tmp_path: Pa
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     try:
-        said = []
+        output = []
         assert process.stdout is not None
         for line in process.stdout:
-            said.append(line)
+            output.append(line)
             if "Model changed" in line:
                 break
-        assert any("http://localhost:" in line for line in said)
-        assert set(listening(process.pid)) == {"127.0.0.1"}
+        assert any("http://localhost:" in line for line in output)
+        assert set(listening_addresses(process.pid)) == {"127.0.0.1"}
         process.send_signal(signal.SIGINT)
-        rest, _ = process.communicate(timeout=30)
+        rest, _ = process.communicate(timeout=HANGS_AFTER_S)
         assert process.returncode == 0
         assert "Traceback" not in rest
     finally:
         process.kill()
 
 
-def listening(pid: int) -> list[str]:
+def listening_addresses(pid: int) -> list[str]:
     """The addresses at which a process listens."""
     sockets = {os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir() if entry.is_symlink()}
-    found = []
+    addresses = []
     for table in ("tcp", "tcp6"):
         path = Path(f"/proc/{pid}/net/{table}")
         for line in path.read_text().splitlines()[1:] if path.exists() else []:
             fields = line.split()
             if fields[3] == "0A" and f"socket:[{fields[9]}]" in sockets:
                 address = bytes.fromhex(fields[1].split(":")[0])
-                found.append(socket.inet_ntop(socket.AF_INET, address[::-1]) if table == "tcp" else address.hex())
-    return found
+                addresses.append(socket.inet_ntop(socket.AF_INET, address[::-1]) if table == "tcp" else address.hex())
+    return addresses

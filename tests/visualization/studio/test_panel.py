@@ -52,17 +52,17 @@ def screen() -> Iterator[Screen]:
 
 
 @pytest.fixture(scope="module")
-def standing() -> SessionState:
+def state_of_balance() -> SessionState:
     with session() as studio:
         studio.run(3.0)
         return studio.session_state()
 
 
-def pressed(label: str) -> Callable[..., bool]:
+def press(label: str) -> Callable[..., bool]:
     return lambda text, *_: text == label
 
 
-def picked(label: str, choice: str) -> Callable[..., tuple[bool, int]]:
+def pick(label: str, choice: str) -> Callable[..., tuple[bool, int]]:
     def combo(text: str, place: int, options: list[str]) -> tuple[bool, int]:
         return (True, options.index(choice)) if text == label else (False, place)
 
@@ -70,13 +70,13 @@ def picked(label: str, choice: str) -> Callable[..., tuple[bool, int]]:
 
 
 def test_it_is_drawn_from_the_first_frame_on(
-    screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch
+    screen: Screen, state_of_balance: SessionState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines: dict[str, int] = {}
     monkeypatch.setattr(module.implot, "PlotLine", lambda label, xs, ys: lines.update({label: len(xs)}))
     screen.frame()
     assert lines == {}
-    screen.panel.on_state(standing)
+    screen.panel.on_state(state_of_balance)
     for _ in range(3):
         screen.frame()
     assert not screen.panel._broken
@@ -85,40 +85,42 @@ def test_it_is_drawn_from_the_first_frame_on(
 
 
 @pytest.mark.parametrize(
-    ("widget", "does", "sends"),
+    ("widget", "action", "message"),
     [
-        ("Button", pressed("Push +"), PushRequest(1.0, 0.1)),
-        ("Button", pressed("Push -"), PushRequest(-1.0, 0.1)),
-        ("Combo", picked("observer", "adaptive"), ChangeSettings({OBSERVER: "adaptive"})),
-        ("Combo", picked("rate fed back", "the gyro's"), ChangeSettings({FEEDBACK: "fog"})),
-        ("Combo", picked("law", "LQG"), ChangeSettings({LAW: LQG})),
+        ("Button", press("Push +"), PushRequest(1.0, 0.1)),
+        ("Button", press("Push -"), PushRequest(-1.0, 0.1)),
+        ("Combo", pick("observer", "adaptive"), ChangeSettings({OBSERVER: "adaptive"})),
+        ("Combo", pick("rate fed back", "the gyro's"), ChangeSettings({FEEDBACK: "fog"})),
+        ("Combo", pick("law", "LQG"), ChangeSettings({LAW: LQG})),
     ],
 )
 def test_what_is_pressed_is_sent(
     screen: Screen,
-    standing: SessionState,
+    state_of_balance: SessionState,
     monkeypatch: pytest.MonkeyPatch,
     widget: str,
-    does: Any,
-    sends: messages.Message,
+    action: Any,
+    message: messages.Message,
 ) -> None:
-    screen.panel.on_state(standing)
+    screen.panel.on_state(state_of_balance)
     screen.frame()
-    monkeypatch.setattr(module.imgui, widget, does)
+    monkeypatch.setattr(module.imgui, widget, action)
     screen.frame()
-    assert screen.sent == [sends]
+    assert screen.sent == [message]
 
 
-def test_of_several_axes_one_is_chosen(screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_several_axes_one_is_chosen(
+    screen: Screen, state_of_balance: SessionState, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lists: list[str] = []
     combo = module.imgui.Combo
 
-    def listed(label: str, place: int, options: list[str]) -> tuple[bool, int]:
+    def record_list(label: str, place: int, options: list[str]) -> tuple[bool, int]:
         lists.append(label)
         return combo(label, place, options)
 
-    monkeypatch.setattr(module.imgui, "Combo", listed)
-    screen.panel.on_state(standing)
+    monkeypatch.setattr(module.imgui, "Combo", record_list)
+    screen.panel.on_state(state_of_balance)
     screen.frame()
     assert lists == ["observer", "law", "rate fed back"]
     with session(scenario="two_axes") as studio:
@@ -126,54 +128,54 @@ def test_of_several_axes_one_is_chosen(screen: Screen, standing: SessionState, m
         screen.panel.on_state(studio.session_state())
     screen.frame()
     assert lists[3:] == ["axis shown and pushed", *lists[:3]]
-    monkeypatch.setattr(module.imgui, "Combo", picked("axis shown and pushed", "pitch"))
+    monkeypatch.setattr(module.imgui, "Combo", pick("axis shown and pushed", "pitch"))
     screen.frame()
     assert screen.sent == [ShowAxis("pitch")]
     assert not screen.panel._broken
 
 
 def test_a_number_counts_once_it_is_typed_to_the_end(
-    screen: Screen, standing: SessionState, monkeypatch: pytest.MonkeyPatch
+    screen: Screen, state_of_balance: SessionState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    screen.panel.on_state(standing)
-    done = {"now": False}
-    typed = iter([1.0, 1.2, 1.25])
+    screen.panel.on_state(state_of_balance)
+    edit = {"now": False}
+    values = iter([1.0, 1.2, 1.25])
     current = {"label": ""}
 
     def number(label: str, value: float, *_: Any) -> tuple[bool, float]:
         current["label"] = label
-        return (True, next(typed)) if label.startswith("e ") else (False, value)
+        return (True, next(values)) if label.startswith("e ") else (False, value)
 
     def is_e() -> bool:
         return current["label"].startswith("e ")
 
     monkeypatch.setattr(module.imgui, "InputDouble", number)
-    monkeypatch.setattr(module.imgui, "IsItemActive", lambda: is_e() and not done["now"])
-    monkeypatch.setattr(module.imgui, "IsItemDeactivatedAfterEdit", lambda: is_e() and done["now"])
+    monkeypatch.setattr(module.imgui, "IsItemActive", lambda: is_e() and not edit["now"])
+    monkeypatch.setattr(module.imgui, "IsItemDeactivatedAfterEdit", lambda: is_e() and edit["now"])
     screen.frame()
     screen.frame()
     assert screen.sent == []
-    done["now"] = True
+    edit["now"] = True
     screen.frame()
     assert screen.sent == [ChangeSettings({BIAS: 1.25})]
 
 
 def test_a_stopped_controller_is_said_and_can_be_started(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
-    said: list[str] = []
-    monkeypatch.setattr(module.imgui, "TextWrapped", said.append)
-    monkeypatch.setattr(module.imgui, "Button", pressed("Start it again"))
+    texts: list[str] = []
+    monkeypatch.setattr(module.imgui, "TextWrapped", texts.append)
+    monkeypatch.setattr(module.imgui, "Button", press("Start it again"))
     screen.panel.on_state(SessionState(title="x", stopped="observer Mine raised KeyError: 'gone' at t = 2 s"))
     screen.frame()
-    assert "The controller has stopped: observer Mine raised KeyError: 'gone' at t = 2 s" in said
+    assert "The controller has stopped: observer Mine raised KeyError: 'gone' at t = 2 s" in texts
     assert screen.sent == [RestartController()]
 
 
 def test_what_goes_wrong_in_the_panel_ends_the_panel_alone(
-    screen: Screen, standing: SessionState, caplog: pytest.LogCaptureFixture
+    screen: Screen, state_of_balance: SessionState, caplog: pytest.LogCaptureFixture
 ) -> None:
     incomplete: Any = {"observer.kind": "linear"}
     screen.panel.on_state(SessionState(settings=incomplete))
     screen.frame()
     assert "the panel has failed and is gone" in caplog.text
-    screen.panel.on_state(standing)
+    screen.panel.on_state(state_of_balance)
     screen.frame()

@@ -18,15 +18,17 @@ Error = Callable[[dict[str, Any], str, int], float | None]
 """Point, observer, world -> the velocity error; None for a fall."""
 
 
-def made_up(varied: dict[str, str], observers: tuple[str, ...], worlds: int, error: Error, **options: Any) -> Trials:
+def make_trials(
+    axes_text: dict[str, str], observers: tuple[str, ...], worlds: int, error: Error, **options: Any
+) -> Trials:
     """A sweep whose velocity errors are given."""
-    axes = tuple(parse_axis(field, said, field) for field, said in varied.items())
+    axes = tuple(parse_axis(field, text, field) for field, text in axes_text.items())
     study = SweepStudy(load_scenario("push_recovery"), axes, observers, worlds, **options)
     rows = []
     for number, point in enumerate(study.points):
         for observer in observers:
             for world in range(worlds):
-                found = error(point, observer, world)
+                result = error(point, observer, world)
                 row = {"point": number, **point, "observer": observer, "world": world, "seed": 0}
-                rows.append(row | {"outcome": "fell" if found is None else "done", VELOCITY: found})
+                rows.append(row | {"outcome": "fell" if result is None else "done", VELOCITY: result})
     return Trials(study, [table_of(study, rows)])

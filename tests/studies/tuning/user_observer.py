@@ -13,14 +13,14 @@ from cmg_mj.observers.reduced_model import ReducedModel
 
 
 @dataclass(frozen=True)
-class Own:
+class UserObserver:
     """A user's observer: a plain dataclass, integers among its numbers, a limit that only its constructor knows."""
 
     dt: float
     model: ReducedModel
     gain: float = 2
     order: int = 3
-    on: bool = True
+    is_on: bool = True
     name: str = "own"
 
     def __post_init__(self) -> None:
@@ -39,4 +39,4 @@ class Own:
         return y[0], Estimate(y[0], rate, y[1])
 
 
-OWN = f"{__name__}:Own"
+USER_OBSERVER = f"{__name__}:UserObserver"

@@ -1,0 +1,262 @@
+"""Pictures of a sweep: curves over one varied field, maps of the best observer over two."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from cmg_mj.results.intervals import Interval, finite_values, known_interval
+from cmg_mj.results.summary_keys import heading
+from cmg_mj.studies.sweeps.axes import is_number
+from cmg_mj.studies.sweeps.cells import Trials, fell_interval
+from cmg_mj.studies.sweeps.study import counted
+from cmg_mj.visualization.plots.figure_spec import Line, Map, Panel, Picture
+
+ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
+"""Figures that are drawn, and whose indices are shown, where a trial has them; tables show the first."""
+MOST_TICKS = 10
+CURVES = "curves"
+LOGARITHMIC = 10.0
+"""Errors that differ by more than this factor are drawn on a logarithmic axis."""
+ASIDE = 0.3
+"""Share of the smallest step between values over which the observers' shares of falls are spread."""
+UNKNOWN = Interval(math.nan, math.nan, math.nan)
+MAPS = {ERRORS[0]: "map_velocity_error", ERRORS[1]: "map_push_error", "fell": "map_falls"}
+"""Figure -> its picture."""
+
+
+def pictures_of(trials: Trials) -> list[Picture]:
+    """Draw curves over one varied numeric field, a map a figure over two in a grid; else nothing."""
+    study = trials.study
+    axes = [axis for axis in study.axes if axis.is_range or len(axis.values) > 1]
+    if not all(is_number(value) for axis in axes for value in axis.values):
+        return []
+    if len(axes) == 1 and study.design != "sobol":
+        pictures = [curves(trials, axes[0].field)]
+    elif len(axes) == 2 and study.design == "grid":
+        pictures = maps(trials, axes[0].field, axes[1].field)
+    else:
+        return []
+    return [picture for picture in pictures if picture.panels]
+
+
+def curves(trials: Trials, field: str) -> Picture:
+    """Draw a panel a figure, and one of the share of falls if there are any, over the values of a field."""
+    study = trials.study
+    x = np.array([point[field] for point in study.points], dtype=float)
+    order = np.argsort(x, kind="stable")
+    x = x[order]
+    scale = scale_of(trials, field, x)
+    panel = partial(
+        Panel,
+        x_label=field,
+        x_scale=scale,
+        x_ticks=ticks_of(x) if study.design == "grid" else None,
+    )
+    panels = []
+    for key in ERRORS:
+        values = trials.figure(key)[order]
+        if np.isfinite(values).any():
+            lines = _error_lines(study.observers, x, values)
+            y = np.concatenate([line.y for line in lines])
+            if np.nanmin(y) > 0.0 and np.nanmax(y) > LOGARITHMIC * np.nanmin(y):
+                panels.append(panel(heading(key), lines, y_scale="log", y_ticks=round_values(y)))
+            else:
+                panels.append(panel(heading(key), lines))
+    if trials.fell.any():
+        lines = _fall_lines(trials, x, order, scale)
+        panels.append(panel("share of falls", lines, y_range=(-0.03, 1.03)))
+    if panels:
+        names = itertools.chain(study.observers, itertools.repeat(""))
+        labelled = [replace(line, label=name) for line, name in zip(panels[0].lines, names, strict=False)]
+        panels[0] = replace(panels[0], lines=labelled)
+    return Picture(CURVES, title_of(trials), panels, panel_height=2.9)
+
+
+def _error_lines(observers: Sequence[str], x: np.ndarray, values: np.ndarray) -> list[Line]:
+    """Make a line an observer, then its marks, of values (n_points, n_observers, n_worlds).
+
+    A mark is a dot where every world stood, a cross where only some did.
+    """
+    lines, marks = [], []
+    for place, name in enumerate(observers):
+        worlds = values[:, place]
+        intervals = [known_interval(point) or _without_interval(point) for point in worlds]
+        mean = np.array([interval.mean for interval in intervals])
+        lines.append(Line(x, mean, color=name, spread=_heights(intervals)))
+        whole = np.isfinite(worlds).all(axis=1)
+        for mark, where in ((".", whole), ("x", np.isfinite(mean) & ~whole)):
+            if where.any():
+                marks.append(Line(x[where], mean[where], style=mark, color=name))
+    return lines + marks
+
+
+def _without_interval(worlds: np.ndarray) -> Interval:
+    """Take the only world that stood, if one did, for the mean."""
+    stood = finite_values(worlds)
+    mean = float(stood[0]) if len(stood) else math.nan
+    return Interval(mean, mean, mean)
+
+
+def _heights(intervals: Sequence[Interval]) -> np.ndarray:
+    """Stack the intervals' heights below and above the mean, (2, n)."""
+    return np.array([[i.mean - i.low for i in intervals], [i.high - i.mean for i in intervals]])
+
+
+def _fall_lines(trials: Trials, x: np.ndarray, order: np.ndarray, scale: Literal["linear", "log"]) -> list[Line]:
+    """Make a line an observer over x, of points in that order, next to each other: many are 0 or 1 together."""
+    counts = [count[order] for count in fall_counts(trials)]
+    shares = fall_shares(*counts)
+    lines = []
+    on_axis = np.log(x) if scale == "log" else x
+    step = np.diff(on_axis).min(initial=math.inf)
+    for place, name in enumerate(trials.study.observers):
+        aside = ASIDE * (step if math.isfinite(step) else 0.0) * (place / max(1, len(trials.study.observers) - 1) - 0.5)
+        at = np.exp(on_axis + aside) if scale == "log" else on_axis + aside
+        pairs = zip(*(count[:, place] for count in counts), strict=True)
+        intervals = [fell_interval(fell, known) if known else UNKNOWN for fell, known in pairs]
+        lines.append(Line(at, shares[:, place], style=".-", color=name, spread=_heights(intervals), bars=True))
+    return lines
+
+
+def maps(trials: Trials, across: str, up: str) -> list[Picture]:
+    """Draw a map a figure, and one of the share of falls if there are any; both fields in a grid."""
+    study = trials.study
+    values = {axis.field: np.array(axis.values, dtype=float) for axis in study.axes if axis.field in (across, up)}
+    x_order, y_order = np.argsort(values[across]), np.argsort(values[up])
+    x, y = values[across][x_order], values[up][y_order]
+
+    def gridded(points: np.ndarray) -> np.ndarray:
+        """(n_points, ...) -> (n_y, n_x, ...); points go through the second field first."""
+        return points.reshape(len(x), len(y), *points.shape[1:]).swapaxes(0, 1)[y_order][:, x_order]
+
+    fell, known = (gridded(counts) for counts in fall_counts(trials))
+    shares = fall_shares(fell, known)
+    halves = {name: shares[:, :, i] for i, name in enumerate(study.observers)}
+    boundaries = {name: half for name, half in halves.items() if (half < 0.5).any() and (half > 0.5).any()}
+    pictures = []
+    for key, name in MAPS.items():
+        if key == "fell":
+            if not trials.fell.any():
+                continue
+            best, sure, least = _least_falls(fell, known)
+            label, value, levels, nobody = "share of falls", "share", (0.1, 0.9), "several alike"
+        else:
+            figure = gridded(trials.figure(key))
+            if not np.isfinite(figure).any():
+                continue
+            best, sure, least = _least_error(figure)
+            label, value, levels, nobody = heading(key), "mean", round_values(least), "none stood in every world"
+        cells = Map(x, y, study.observers, best, sure, least, levels, boundaries, nobody, "half of the worlds fall")
+        panel = Panel(
+            up,
+            (),
+            f"colour: the best observer; contours: its {value}",
+            across,
+            scale_of(trials, across, x),
+            scale_of(trials, up, y),
+            x_ticks=ticks_of(x),
+            y_ticks=ticks_of(y),
+            map=cells,
+        )
+        pictures.append(Picture(name, title_of(trials, label), [panel], panel_height=4.7))
+    return pictures
+
+
+def _least_error(figure: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find the best mean among those that stood in every world, (n_y, n_x, n_observers, n_worlds) -> (n_y, n_x) each.
+
+    The best is sure if its mean difference to every other, world by world, is beyond its 95 % interval.
+    """
+    means = figure.mean(axis=3)
+    best, least = _smallest(means)
+    sure = np.zeros(best.shape, dtype=bool)
+    for at in zip(*np.nonzero(best >= 0), strict=True):
+        others = [i for i in np.nonzero(np.isfinite(means[at]))[0] if i != best[at]]
+        behind = [known_interval(figure[at][i] - figure[at][best[at]]) for i in others]
+        sure[at] = all(interval is not None and interval.low > 0.0 for interval in behind)
+    return best, sure, least
+
+
+def _least_falls(fell: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find who falls the least, unless several do, (n_y, n_x, n_observers) -> (n_y, n_x) each.
+
+    The best is sure if its Wilson interval is below those of all others.
+    """
+    shares = fall_shares(fell, known)
+    best, least = _smallest(shares)
+    best[(shares == least[:, :, None]).sum(axis=2) > 1] = -1
+    sure = np.zeros(best.shape, dtype=bool)
+    for at in zip(*np.nonzero(best >= 0), strict=True):
+        intervals = [fell_interval(n, trials) for n, trials in zip(fell[at], known[at], strict=True) if trials]
+        low = sorted(intervals, key=lambda interval: interval.mean)
+        sure[at] = all(low[0].high < other.low for other in low[1:])
+    return best, sure, least
+
+
+def _smallest(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the place of the smallest along the last axis, -1 where there is none, and its value."""
+    filled = np.where(np.isfinite(values), values, np.inf)
+    least = filled.min(axis=-1)
+    return np.where(np.isfinite(least), filled.argmin(axis=-1), -1), np.where(np.isfinite(least), least, math.nan)
+
+
+def is_logarithmic(values: Sequence[float] | np.ndarray) -> bool:
+    """Judge whether values are spaced more evenly in their logarithm, such as 100, 200, 500, 1000."""
+    sorted_values = np.unique(np.asarray(values, dtype=float))
+    if len(sorted_values) < 3 or sorted_values[0] <= 0.0:
+        return False
+    steps, ratios = np.diff(sorted_values), np.diff(np.log(sorted_values))
+    return bool(ratios.max() / ratios.min() < steps.max() / steps.min() * (1.0 - 1e-9))
+
+
+def scale_of(trials: Trials, field: str, values: np.ndarray) -> Literal["linear", "log"]:
+    """Choose the scale of a varied field's axis."""
+    axis = next(axis for axis in trials.study.axes if axis.field == field)
+    return "log" if (axis.log if axis.is_range else is_logarithmic(values)) else "linear"
+
+
+def ticks_of(values: np.ndarray) -> list[float]:
+    """Choose values to mark, not too many."""
+    return [float(value) for value in values[:: math.ceil(len(values) / MOST_TICKS)]]
+
+
+def round_values(values: np.ndarray) -> tuple[float, ...]:
+    """Choose at most seven round numbers between the least and the greatest value; none if they are too alike."""
+    known = values[np.isfinite(values) & (values > 0.0)]
+    if not len(known) or known.min() == known.max():
+        return ()
+    low, high = float(known.min()), float(known.max())
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    levels: list[float] = []
+    for marks in ((10, 20, 50), (10, 15, 20, 30, 50, 70), range(10, 100, 5), range(10, 100), range(100, 1000, 2)):
+        scale = 100.0 if marks[0] == 100 else 10.0
+        levels = [float(f"{mark / scale * 10.0**decade:.4g}") for decade in decades for mark in marks]
+        levels = [level for level in levels if low < level < high]
+        if len(levels) >= 3:
+            break
+    return tuple(levels[:: math.ceil(len(levels) / 7)]) if levels else ()
+
+
+def fall_counts(trials: Trials) -> tuple[np.ndarray, np.ndarray]:
+    """Count the worlds that fell, and those that fell or stood, (n_points, n_observers) each."""
+    fell = trials.fell
+    return fell.sum(axis=2), (fell | trials.stood).sum(axis=2)
+
+
+def fall_shares(fell: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Compute shares of falls from such counts; NaN where every world was refused or stopped, which says neither."""
+    return np.divide(fell, known, out=np.full(fell.shape, math.nan), where=known > 0)
+
+
+def title_of(trials: Trials, figure: str = "") -> str:
+    """Title a picture with the scenario, the figure that it shows and the number of worlds."""
+    study = trials.study
+    worlds = f"{counted(study.worlds, 'world')} a cell"
+    return f"{study.scenario.title or 'Sweep'}: {f'{figure}, {worlds}' if figure else worlds}"
