@@ -96,6 +96,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         for name in few:
             rate = replayed.estimates[name]["x2_rad_s"]
             _line(axes, replayed, rate, detail, color=palette[name], linewidth=0.8, label=labels[name].lstrip("_"))
+            del rate
         axes.set_ylabel("tilt rate\n[rad/s]")
         estimates = [_outline(replayed.estimates[name]["x2_rad_s"]) for name in few]
         rates = fit(axes, [_outline(log[REFERENCE])] if referred else [], estimates)
@@ -105,6 +106,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
             text = f"{labels[name].lstrip('_')} {_rms(replayed.summaries[name])}"
             error = replayed.estimates[name]["x2_rad_s"] - log[REFERENCE]
             _line(panels[2], replayed, error, None, color=palette[name], linewidth=0.6, label=text)
+            del error  # of a long log, a column takes much memory
         panels[2].set_ylabel("estimate less\nreference [rad/s]")
         errors = [_outline(replayed.estimates[n]["x2_rad_s"] - log[REFERENCE]) for n in few]
         fit(panels[2], [_outline(log[REFERENCE])], errors)
