@@ -97,6 +97,7 @@ def run(
             options: SimulationOptions = (
                 {"on_progress": on_progress} if live_view is None else live_view.options(on_progress)
             )
+            options["spool"] = folder.path
             result = experiment.run(driver=driver, world=world, **options)
         report = runs.report_run(experiment, result)
         if live_view is not None:

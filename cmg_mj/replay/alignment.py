@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from cmg_mj.replay.lag import lag
+from cmg_mj.results.stored_columns import LONG, stretches
 
 SPAN_S = 0.2
 """Time over which increments of the tilt and of the integrated reference are compared [s]; slopes are mostly noise."""
@@ -40,6 +43,8 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
         The alignment.
     """
     span = max(2, round(SPAN_S / dt))
+    if sum(map(len, tilt)) > LONG:
+        return _alignment_by_stretches(tilt, reference, dt, span)
     pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
     rises = [y[span:] - y[:-span] for y, _ in pieces]
     lag_s = lag([_travelled(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
@@ -54,6 +59,72 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
     correlation = float(np.corrcoef(rise, travel)[0, 1])
     slope, start = np.polynomial.polynomial.polyfit(travel, rise, 1)[::-1]
     return Alignment(lag_s, float(slope), float(start / (span * dt)), correlation)
+
+
+@dataclass(frozen=True)
+class _Rises:
+    """Increments of the tilt over a span of samples, computed where they are asked for."""
+
+    tilt: np.ndarray
+    span: int
+
+    def __len__(self) -> int:
+        return len(self.tilt) - self.span
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        start, stop, _ = rows.indices(len(self))
+        return self.tilt[start + self.span : stop + self.span] - self.tilt[start:stop]
+
+
+@dataclass(frozen=True)
+class _Travels:
+    """Increments of the integrated reference, shifted by its lag: see `_travelled`."""
+
+    rate: np.ndarray
+    span: int
+    dt: float
+    lag_s: float
+
+    def __len__(self) -> int:
+        return len(self.rate) - self.span
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        start, stop, _ = rows.indices(len(self))
+        margin = math.ceil(abs(self.lag_s) / self.dt) + 2
+        first = max(0, start - margin)
+        rate = self.rate[first : stop + self.span + margin]
+        return _travelled(rate, self.span, self.dt, self.lag_s)[start - first : stop - first]
+
+
+def _alignment_by_stretches(
+    tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: float, span: int
+) -> Alignment:
+    """Compare as `alignment` does, in sums over stretches."""
+    pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
+    rises = [_Rises(y, span) for y, _ in pieces]
+    lag_s = lag([_Travels(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
+    travels = [_Travels(rate, span, dt, lag_s or 0.0) for _, rate in pieces]
+    sums, middle = np.zeros((3, 3)), None
+    for rise, travel in zip(rises, travels, strict=True):
+        for rows in stretches(len(rise)):
+            pairs = np.stack([np.ones(rows.stop - rows.start), travel[rows], rise[rows]])
+            pairs = pairs[:, np.isfinite(pairs[1])]
+            if not pairs.shape[1]:
+                continue
+            if middle is None:  # sums of numbers near zero lose nothing
+                middle = np.array([0.0, *pairs[1:].mean(axis=1)])
+            pairs -= middle[:, None]
+            sums += pairs @ pairs.T
+    n = sums[0, 0]
+    if middle is None or n < 3:
+        return Alignment(lag_s, None, None, None)
+    means = sums[0, 1:] / n
+    (xx, xy), (_, yy) = sums[1:, 1:] - n * np.outer(means, means)
+    if not xx > 0.0 or not yy > 0.0:
+        return Alignment(lag_s, None, None, None)
+    slope = xy / xx
+    start = (means[1] + middle[2]) - slope * (means[0] + middle[1])
+    return Alignment(lag_s, float(slope), float(start / (span * dt)), float(xy / math.sqrt(xx * yy)))
 
 
 def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float) -> np.ndarray:

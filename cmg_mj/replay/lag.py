@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
+
+from cmg_mj.results.stored_columns import stretches
 
 LONGEST_LAG_S = 0.5
 """Longest lag that is searched, and no longer than a quarter of the signal [s]."""
@@ -19,9 +22,21 @@ TAPS = 15
 """The correlation is smoothed over so many lags either way, if there are as many."""
 
 
+class Piece(Protocol):
+    """A signal that may be computed a stretch at a time, such as an array."""
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        ...
+
+    def __getitem__(self, rows: slice, /) -> np.ndarray:
+        """Return successive samples."""
+        ...
+
+
 def lag(
-    behind: Sequence[np.ndarray],
-    ahead: Sequence[np.ndarray],
+    behind: Sequence[Piece],
+    ahead: Sequence[Piece],
     dt: float,
     longest_s: float = LONGEST_LAG_S,
 ) -> float | None:
@@ -59,7 +74,7 @@ def lag(
     return peak * dt if error <= max(1.0, abs(peak) / 2.0) else None
 
 
-def _sums(behind: Sequence[np.ndarray], ahead: Sequence[np.ndarray], reach: int) -> np.ndarray:
+def _sums(behind: Sequence[Piece], ahead: Sequence[Piece], reach: int) -> np.ndarray:
     """Sum counts, values, squares and products of the known pairs, (stretches, 6, lags)."""
     from scipy.signal import correlate
 
@@ -83,10 +98,14 @@ def _sums(behind: Sequence[np.ndarray], ahead: Sequence[np.ndarray], reach: int)
     return sums
 
 
-def _mean(pieces: Sequence[np.ndarray]) -> float:
-    known = [piece[np.isfinite(piece)] for piece in pieces]
-    count = sum(map(len, known))
-    return sum(float(piece.sum()) for piece in known) / count if count else 0.0
+def _mean(pieces: Sequence[Piece]) -> float:
+    total, count = 0.0, 0
+    for piece in pieces:
+        for rows in stretches(len(piece)):
+            some = piece[rows]
+            known = some[np.isfinite(some)]
+            total, count = total + float(known.sum()), count + len(known)
+    return total / count if count else 0.0
 
 
 def _stretches(sizes: Sequence[int], least: int) -> Iterator[tuple[int, int, slice]]:

@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from cmg_mj.controllers.dry_run import dry_run_observer
 from cmg_mj.errors import InputError, raised
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
-from cmg_mj.observers.protocol import needs
+from cmg_mj.observers.protocol import extra_signals, needs
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay.alignment import Alignment
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
-from cmg_mj.replay.open_loop import replay_all
+from cmg_mj.replay.open_loop import replay_stretches
 from cmg_mj.replay.parameter_options import Parameters
 from cmg_mj.replay.reference import alignment_of
 from cmg_mj.replay.scores import Figures, noise_gain, scores
 from cmg_mj.replay.user_noise import noise_of
 from cmg_mj.results.baselines import ZERO
+from cmg_mj.results.stored_columns import LONG, ColumnStore, StoredColumns, shelved, stored
+from cmg_mj.results.trajectory import ESTIMATES
 from cmg_mj.sensors.tilt import TiltNoise
 
 SETTLE_S = 1.0
@@ -110,10 +115,11 @@ def replay_log(
         if isinstance(signals, str):
             left_out[name] = signals
             continue
-        estimates[name], rate = signals, signals["x2_rad_s"]
+        estimates[name] = signals
         disturbed = _estimates(observer, noisy)
-        gain = None if isinstance(disturbed, str) else noise_gain(disturbed["x2_rad_s"] - rate, noise.tilt, scored)
-        summaries[name] = {**scores(log, rate, scored), "noise_gain_1_s": gain}
+        gain = None if isinstance(disturbed, str) else noise_gain(disturbed, signals, noise.tilt, scored)
+        del disturbed
+        summaries[name] = {**scores(log, signals["x2_rad_s"], scored), "noise_gain_1_s": gain}
     zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
     return ReplayResult(
         log, estimates, {**summaries, ZERO: zero}, left_out, alignment_of(log), settle_s, noise, parameters
@@ -172,36 +178,65 @@ def _ready(
     return ready, left_out
 
 
-def _estimates(observer: Observer, log: Log) -> dict[str, np.ndarray] | str:
+def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
     """Return the observer's estimates, part by part; or how it failed."""
-    parts = []
+    names = (*ESTIMATES, *extra_signals(observer))
+    store = ColumnStore(len(names), Path(tempfile.gettempdir()) if len(log) > LONG else None)
     for part in log.parts:
-        try:
-            with np.errstate(all="ignore"):
-                signals = replay_all(observer, log.trajectory(part))
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # a user's observer may fail in any way
-            return f"raised {raised(error)}"
-        for name, values in signals.items():
-            if not np.isfinite(values).all():
-                time = log["time_s"][part][int(np.argmin(np.isfinite(values)))]
-                return f"{name} is not finite from {time:.6g} s on"
-        parts.append(signals)
-    columns = {name: np.full(len(log), np.nan) for name in parts[0]}
-    for part, signals in zip(log.parts, parts, strict=True):
-        for name, values in signals.items():
-            columns[name][part] = values
-    return columns
+        _fill(store, part.start - len(store))
+        pieces = replay_stretches(observer, log.trajectory(part))
+        while True:
+            try:
+                with np.errstate(all="ignore"):
+                    piece = next(pieces, None)
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # a user's observer may fail in any way
+                return f"raised {raised(error)}"
+            if piece is None:
+                break
+            if message := _not_finite(piece, log, len(store)):
+                return message
+            store.append([values[:, None] for values in piece.values()])
+    _fill(store, len(log) - len(store))
+    columns = StoredColumns({name: partial(_column, store, i) for i, name in enumerate(names)}, 0, len(log))
+    return columns if len(log) > LONG else dict(columns)
+
+
+def _column(store: ColumnStore, column: int, start: int, end: int) -> np.ndarray:
+    return store.read(column, start, end)[:, 0]
+
+
+def _fill(store: ColumnStore, n_rows: int) -> None:
+    """Add rows between two parts, which no observer estimates."""
+    if n_rows > 0:
+        store.append([np.full((n_rows, 1), np.nan)] * store.n_columns)
+
+
+def _not_finite(piece: Mapping[str, np.ndarray], log: Log, first: int) -> str:
+    """Say from when on an estimate is not finite, if one is not; the piece begins at a row of the log."""
+    for name, values in piece.items():
+        if not np.isfinite(values).all():
+            time = log["time_s"][first + int(np.argmin(np.isfinite(values)))]
+            return f"{name} is not finite from {time:.6g} s on"
+    return ""
 
 
 def _with_noise(log: Log, noise: TiltNoise) -> Log:
     """Add noise to the tilt, and to the angular acceleration if there is one, with the given correlation."""
-    first, second = np.random.default_rng(SEED).standard_normal((2, len(log)))
-    second = noise.correlation * first + math.sqrt(1.0 - noise.correlation**2) * second
-    columns = {**log.columns, "y1_rad": log["y1_rad"] + noise.tilt * first}
-    columns["acceleration_rad_s2"] = log["acceleration_rad_s2"] + noise.acceleration * second
-    return dataclasses.replace(log, columns=columns)
+    random, n = np.random.default_rng(SEED), len(log)
+    first, other = shelved(random.standard_normal(n)), shelved(random.standard_normal(n))
+    known = stored(log.columns)
+
+    def tilt(start: int, end: int) -> np.ndarray:
+        return known.read("y1_rad", slice(start, end)) + noise.tilt * first(start, end)
+
+    def acceleration(start: int, end: int) -> np.ndarray:
+        second = noise.correlation * first(start, end) + math.sqrt(1.0 - noise.correlation**2) * other(start, end)
+        return known.read("acceleration_rad_s2", slice(start, end)) + noise.acceleration * second
+
+    noisy = StoredColumns({"y1_rad": tilt, "acceleration_rad_s2": acceleration}, 0, n)
+    return dataclasses.replace(log, columns=known.joined(noisy))
 
 
 def describe_log(log: Log) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -32,19 +32,33 @@ def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
 
 def replay_all(observer: Observer, trajectory: Trajectory) -> dict[str, np.ndarray]:
     """Replay as `replay` does; return x and the observer's other estimates (zero at the first row) by name."""
+    pieces = list(replay_stretches(observer, trajectory))
+    return {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+
+
+def replay_stretches(observer: Observer, trajectory: Trajectory) -> Iterator[dict[str, np.ndarray]]:
+    """Replay as `replay_all` does, a stretch after the other; the observer goes on where the last one ended."""
     names = (*ESTIMATES, *extra_signals(observer))
-    y1, y2, u = (_rows(trajectory[name]) for name in ("y1_rad", "y2_rad", "u_rad_s"))
-    measured = trajectory.columns.get("acceleration_rad_s2")
-    acceleration = _rows(np.full_like(trajectory["y1_rad"], np.nan) if measured is None else measured)
-    zero = 0.0 * y1[0]
-    state = observer.init(Measurement(y1[0], y2[0], acceleration[0]))
-    rows: list[Sequence[Scalar]] = [(y1[0], zero, y2[0], *[zero] * (len(names) - len(ESTIMATES)))]
-    for k in range(1, len(y1)):
-        state, estimate = observer.step(state, Measurement(y1[k], y2[k], acceleration[k]), u[k - 1])
-        rows.append(estimate)
-    shape = trajectory["y1_rad"].shape
-    columns = zip(*(row[: len(names)] for row in rows), strict=True)
-    return {name: np.array(column, dtype=float).reshape(shape) for name, column in zip(names, columns, strict=True)}
+    state, held = None, None
+    for part in trajectory.stretches():
+        stretch = trajectory.rows(part)
+        y1, y2, u = (_rows(stretch[name]) for name in ("y1_rad", "y2_rad", "u_rad_s"))
+        measured = stretch.columns.get("acceleration_rad_s2")
+        acceleration = _rows(np.full_like(stretch["y1_rad"], np.nan) if measured is None else measured)
+        rows: list[Sequence[Scalar]] = []
+        for k in range(len(y1)):
+            measurement = Measurement(y1[k], y2[k], acceleration[k])
+            if held is None:
+                zero = 0.0 * y1[k]
+                state = observer.init(measurement)
+                rows.append((y1[k], zero, y2[k], *[zero] * (len(names) - len(ESTIMATES))))
+            else:
+                state, estimate = observer.step(state, measurement, held)
+                rows.append(estimate)
+            held = u[k]
+        shape = stretch["y1_rad"].shape
+        columns = zip(*(row[: len(names)] for row in rows), strict=True)
+        yield {name: np.array(column, dtype=float).reshape(shape) for name, column in zip(names, columns, strict=True)}
 
 
 def _rows(values: np.ndarray) -> Sequence[Scalar] | np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from cmg_mj.replay.log_replay import ReplayResult, describe_log
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import figure_text, shown_first
 from cmg_mj.replay.scores import Figures
+from cmg_mj.results.stored_columns import LONG, select_rows, stretches
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import (
@@ -24,12 +26,15 @@ from cmg_mj.visualization.plots.run_plot import (
     pyplot,
     save_figure,
 )
+from cmg_mj.visualization.plots.thinning import thinned
 
 if TYPE_CHECKING:
     from cmg_mj.visualization.plots.run_plot import Axes
 
 DETAIL_S = 2.0
 """Length of the detail [s]."""
+FEW_DRAWN = 1000
+"""Number of samples that are left of a stretch of a long log where its outline is enough."""
 
 
 def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
@@ -37,8 +42,9 @@ def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
     log = replayed.log
     length = max(2, round(DETAIL_S / log.dt))
     liveliest, where = -1.0, (log["time_s"][0], log["time_s"][-1])
-    for part in log.parts:
-        time, tilt = log["time_s"][part], log["y1_rad"][part]
+    for part in _overlapping(log.parts, length):
+        stretch = select_rows(log.columns, part)
+        time, tilt = stretch["time_s"], stretch["y1_rad"]
         rise = max(1, length // 20)
         bend = np.zeros(len(tilt))
         bend[rise:-rise] = (tilt[2 * rise :] - 2.0 * tilt[rise:-rise] + tilt[: -2 * rise]) ** 2
@@ -52,6 +58,13 @@ def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
             start = int(np.clip(start + middle - n / 2.0, 0, len(time) - n))
             where = float(time[start]), float(time[start + n - 1])
     return where
+
+
+def _overlapping(parts: Sequence[slice], length: int) -> Iterator[slice]:
+    """Divide long parts into stretches that share a span of so many samples, and its bends."""
+    for part in parts:
+        for rows in stretches(part.stop - part.start):
+            yield slice(part.start + rows.start, min(part.stop, part.start + rows.stop + 2 * length))
 
 
 def plot_replay(path: Path, replayed: ReplayResult) -> None:
@@ -73,26 +86,30 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
     panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
     start, end = liveliest_span(replayed)
-    _line(panels[0], replayed, np.degrees(log["y1_rad"]), color=MEASURED, linewidth=0.8, label="measured")
+    _line(panels[0], replayed, np.degrees(log["y1_rad"]), None, color=MEASURED, linewidth=0.8, label="measured")
     panels[0].set_ylabel("tilt [deg]")
     rates = None
     for axes in (panels[1], panels[-1]):
+        detail = (start, end) if axes is panels[-1] else None
         if referred:
-            _line(axes, replayed, log[REFERENCE], color=INK, linewidth=1.6, label="reference")
+            _line(axes, replayed, log[REFERENCE], detail, color=INK, linewidth=1.6, label="reference")
         for name in few:
             rate = replayed.estimates[name]["x2_rad_s"]
-            _line(axes, replayed, rate, color=palette[name], linewidth=0.8, label=labels[name].lstrip("_"))
+            _line(axes, replayed, rate, detail, color=palette[name], linewidth=0.8, label=labels[name].lstrip("_"))
+            del rate
         axes.set_ylabel("tilt rate\n[rad/s]")
-        estimates = [replayed.estimates[name]["x2_rad_s"] for name in few]
-        rates = fit(axes, [log[REFERENCE]] if referred else [], estimates)
+        estimates = [_outline(replayed.estimates[name]["x2_rad_s"]) for name in few]
+        rates = fit(axes, [_outline(log[REFERENCE])] if referred else [], estimates)
     if referred:
         panels[2].plot([], [], " ", label="RMS:")
         for name in few:
             text = f"{labels[name].lstrip('_')} {_rms(replayed.summaries[name])}"
             error = replayed.estimates[name]["x2_rad_s"] - log[REFERENCE]
-            _line(panels[2], replayed, error, color=palette[name], linewidth=0.6, label=text)
+            _line(panels[2], replayed, error, None, color=palette[name], linewidth=0.6, label=text)
+            del error  # of a long log, a column takes much memory
         panels[2].set_ylabel("estimate less\nreference [rad/s]")
-        fit(panels[2], [log[REFERENCE]], [replayed.estimates[n]["x2_rad_s"] - log[REFERENCE] for n in few])
+        errors = [_outline(replayed.estimates[n]["x2_rad_s"] - log[REFERENCE]) for n in few]
+        fit(panels[2], [_outline(log[REFERENCE])], errors)
     panels[-1].set_xlim(start, end)
     for axes in panels[:-1]:
         axes.axvspan(start, end, color="0.5", alpha=0.15, linewidth=0, zorder=0)
@@ -111,9 +128,32 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
 
 
 def _line(
-    axes: Axes, replayed: ReplayResult, values: np.ndarray, color: str, linewidth: float, label: str | None = None
+    axes: Axes,
+    replayed: ReplayResult,
+    values: np.ndarray,
+    detail: tuple[float, float] | None,
+    color: str,
+    linewidth: float,
+    label: str | None = None,
 ) -> None:
-    axes.plot(*replayed.log.broken(values), color=color, linewidth=linewidth, label=label)
+    """Draw a signal; of a long one, the outline, or all of it around the detail."""
+    log = replayed.log
+    if len(log) <= LONG:
+        x, y = log.broken(values)
+    elif detail is None:
+        pieces = [thinned(*log.broken(values[rows], rows), FEW_DRAWN) for rows in stretches(len(log))]
+        x, y = (np.concatenate(part) for part in zip(*pieces, strict=True))
+    else:
+        first, last = np.searchsorted(log["time_s"], (detail[0] - DETAIL_S, detail[1] + DETAIL_S)).tolist()
+        x, y = log.broken(values[first:last], slice(first, last))
+    axes.plot(x, y, color=color, linewidth=linewidth, label=label)
+
+
+def _outline(values: np.ndarray) -> np.ndarray:
+    """Return enough of a long signal to choose an axis by."""
+    if len(values) <= LONG:
+        return values
+    return np.concatenate([thinned(values[rows], values[rows], FEW_DRAWN)[1] for rows in stretches(len(values))])
 
 
 def _draw_small(
@@ -126,9 +166,9 @@ def _draw_small(
     span: tuple[float, float],
 ) -> None:
     """Draw another observer in detail, on the axis of the few."""
-    _line(axes, replayed, replayed.estimates[name]["x2_rad_s"], color=color, linewidth=0.7)
+    _line(axes, replayed, replayed.estimates[name]["x2_rad_s"], span, color=color, linewidth=0.7)
     if "reference" in replayed.log.has:
-        _line(axes, replayed, replayed.log[REFERENCE], color=INK, linewidth=0.8)
+        _line(axes, replayed, replayed.log[REFERENCE], span, color=INK, linewidth=0.8)
     text = f"{label} {_rms(replayed.summaries[name])}".strip()
     axes.set_title(text, loc="left", fontsize="small", parse_math=False, pad=2.0)
     axes.set_xlim(*span)

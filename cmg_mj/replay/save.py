@@ -12,6 +12,7 @@ from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.plot import plot_replay
 from cmg_mj.replay.report import log_figures, replay_figures
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
+from cmg_mj.results.stored_columns import LONG, stored
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.scenario.differences import safe_name
@@ -81,8 +82,9 @@ def signals(replayed: ReplayResult) -> Trajectory:
     known = [name for name in log.columns if np.isfinite(log[name]).any()]
     names = tuple(replayed.estimates)
     extra = tuple(tuple(name for name in replayed.estimates[kind] if name not in ESTIMATES) for kind in names)
-    columns = {name: np.ascontiguousarray(log[name]) for name in known}
+    columns = stored(log.columns).renamed({name: name for name in known})
     for kind in names:
-        columns |= {f"estimate/{kind}/{name}": values for name, values in replayed.estimates[kind].items()}
+        estimates = stored(replayed.estimates[kind])
+        columns = columns.joined(estimates.renamed({f"estimate/{kind}/{name}": name for name in estimates}))
     metadata = {"replay": finite(log_figures(replayed))}
-    return Trajectory(columns, metadata, Layout(names, extra, ()))
+    return Trajectory(columns if len(log) > LONG else dict(columns), metadata, Layout(names, extra, ()))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from cmg_mj.replay.lag import lag
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.results.stored_columns import LONG, stretches
 from cmg_mj.scenario.disturbances import inside
 
 RECONSTRUCTED_S = 1.0
@@ -40,26 +43,49 @@ def scores(log: Log, rate: np.ndarray, scored: np.ndarray) -> Figures:
 def _against(log: Log, rate: np.ndarray, scored: np.ndarray) -> Figures:
     true = log[REFERENCE]
     counted = scored & np.isfinite(true)
-    error, motion = _rms((rate - true)[counted]), _rms(true[counted])
+    error, motion = _error_and_motion(rate, true, counted)
     figures = {
         "velocity_rms_error_rad_s": error,
         "velocity_rms_rad_s": motion,
         "velocity_fit": _fit(error, motion),
-        "lag_s": _lag(log, rate, scored),
+        "lag_s": _lag(log, rate, true, scored),
     }
     if log.windows:
         counted &= inside(log["time_s"], log.windows)
-        error, motion = _rms((rate - true)[counted]), _rms(true[counted])
+        error, motion = _error_and_motion(rate, true, counted)
         figures |= {"velocity_rms_error_push_rad_s": error, "velocity_fit_push": _fit(error, motion)}
     return figures
 
 
-def _lag(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
+def _error_and_motion(rate: np.ndarray, true: np.ndarray, counted: np.ndarray) -> tuple[float | None, float | None]:
+    error = _rms_of(len(true), lambda rows: (rate[rows] - true[rows])[counted[rows]])
+    return error, _rms_of(len(true), lambda rows: true[rows][counted[rows]])
+
+
+def _lag(log: Log, rate: np.ndarray, true: np.ndarray, scored: np.ndarray) -> float | None:
     """Find the lag of the estimate behind the reference [s]."""
-    true = np.where(scored, log[REFERENCE], np.nan)
-    rate = np.where(scored & np.isfinite(rate), rate, np.nan)
+    known = scored & np.isfinite(rate)
     pieces = _pieces(log, scored)
-    return lag([rate[piece] for piece in pieces], [true[piece] for piece in pieces], log.dt)
+    return lag(
+        [_Masked(rate, known, piece) for piece in pieces], [_Masked(true, scored, piece) for piece in pieces], log.dt
+    )
+
+
+@dataclass(frozen=True)
+class _Masked:
+    """A piece of a signal, NaN where a mask is false."""
+
+    values: np.ndarray
+    mask: np.ndarray
+    piece: slice
+
+    def __len__(self) -> int:
+        return self.piece.stop - self.piece.start
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        start, stop, _ = rows.indices(len(self))
+        rows = slice(self.piece.start + start, self.piece.start + stop)
+        return np.where(self.mask[rows], self.values[rows], np.nan)
 
 
 def reconstruction(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
@@ -104,18 +130,22 @@ def roughness(log: Log, rate: np.ndarray, scored: np.ndarray) -> float | None:
     return None if rms is None else rms / math.sqrt(6.0)
 
 
-def noise_gain(response: np.ndarray, size: float, scored: np.ndarray) -> float | None:
+def noise_gain(
+    noisy: Mapping[str, np.ndarray], clean: Mapping[str, np.ndarray], size: float, scored: np.ndarray
+) -> float | None:
     """Compute the gain from white noise of the tilt to an estimate.
 
     Args:
-        response: The change of the estimate due to the noise, (n,) [rad/s].
+        noisy: The estimates with the noise, (n,) each.
+        clean: The estimates without it.
         size: Standard deviation of one sample of the noise [rad].
         scored: Which samples count, (n,).
 
     Returns:
         RMS of the response, divided by the size [1/s].
     """
-    rms = _rms(response[scored])
+    noisy_rate, rate = noisy["x2_rad_s"], clean["x2_rad_s"]
+    rms = _rms_of(len(scored), lambda rows: (noisy_rate[rows] - rate[rows])[scored[rows]])
     return None if rms is None or not size > 0.0 else rms / size
 
 
@@ -135,6 +165,18 @@ def _rms(values: np.ndarray) -> float | None:
         return None
     with np.errstate(over="ignore", invalid="ignore"):
         return _number(math.sqrt(float(np.mean(values**2))))
+
+
+def _rms_of(n_rows: int, values: Callable[[slice], np.ndarray]) -> float | None:
+    """Return the RMS of the values that are computed from rows, stretch by stretch."""
+    if n_rows <= LONG:
+        return _rms(values(slice(0, n_rows)))
+    total, count = 0.0, 0
+    with np.errstate(over="ignore", invalid="ignore"):
+        for rows in stretches(n_rows):
+            some = values(rows)
+            total, count = total + float(np.sum(some**2)), count + len(some)
+    return _number(math.sqrt(total / count)) if count else None
 
 
 def _fit(error: float | None, motion: float | None) -> float | None:

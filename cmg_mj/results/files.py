@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -60,13 +60,32 @@ def write_parquet(
         metadata: What the file says of the table beside it; by default nothing.
         durable: Whether the file must outlast a power cut.
     """
+    write_row_groups(path, [table], metadata, durable=durable)
+
+
+def write_row_groups(
+    path: Path, tables: Iterable[pa.Table], metadata: Mapping[str, Any] | None = None, *, durable: bool = False
+) -> None:
+    """Write tables with the same columns as one Parquet file, a row group each.
+
+    Args:
+        path: The file.
+        tables: The tables, at least one; each is written before the next is asked for.
+        metadata: What the file says of the table beside it; by default nothing.
+        durable: Whether the file must outlast a power cut.
+    """
     import pyarrow.parquet as pq
 
-    if metadata is not None:
-        table = table.replace_schema_metadata({METADATA_KEY: json.dumps(metadata).encode()})
+    stored = None if metadata is None else {METADATA_KEY: json.dumps(metadata).encode()}
     # Opened here: Arrow takes no path with bytes that are no UTF-8.
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        pq.write_table(table, file)
+        writer = None
+        for rows in tables:
+            table = rows if stored is None else rows.replace_schema_metadata(stored)
+            writer = writer or pq.ParquetWriter(file, table.schema)
+            writer.write_table(table)
+        assert writer is not None
+        writer.close()
         if durable:
             file.flush()
             os.fsync(file.fileno())

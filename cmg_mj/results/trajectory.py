@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,8 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.results.files import METADATA_KEY, write_parquet
+from cmg_mj.results.files import METADATA_KEY, write_row_groups
+from cmg_mj.results.stored_columns import STRETCH, StoredColumns, number_of_rows, select_rows
 
 SIGNALS = (
     "x1_rad",
@@ -106,12 +107,12 @@ class Trajectory:
 
     Attributes:
         columns: Name -> values, (n_ticks,) for one world, (n_ticks, n_worlds) for many; the unit ends the name.
-            In many worlds, rows after a world's end are NaN.
+            In many worlds, rows after a world's end are NaN. `StoredColumns` are read when they are asked for.
         metadata: The outcome and the resolved scenario.
         layout: The observers, joints and axes that have columns; empty for a trajectory put together by hand.
     """
 
-    columns: dict[str, np.ndarray]
+    columns: Mapping[str, np.ndarray]
     metadata: Mapping[str, Any] = field(default_factory=dict)
     layout: Layout = Layout((), (), ())
 
@@ -119,7 +120,7 @@ class Trajectory:
         return self.columns[name]
 
     def __len__(self) -> int:
-        return len(self.columns["time_s"])
+        return number_of_rows(self.columns)
 
     @property
     def observers(self) -> tuple[str, ...]:
@@ -157,10 +158,10 @@ class Trajectory:
         layout = replace(
             self.layout.axes[self.axes.index(axis)], joints=self.layout.joints, kinds=self.layout.kinds, name=""
         )
-        columns = {"time_s": self["time_s"]}
+        names = {"time_s": "time_s"}
         for name in layout.columns():
-            columns[name] = self.columns[name if name in self.columns else f"{axis}/{name}"]
-        return replace(self, columns=columns, layout=layout)
+            names[name] = name if name in self.columns else f"{axis}/{name}"
+        return replace(self, columns=_renamed(self.columns, names), layout=layout)
 
     @staticmethod
     def joined(axes: Mapping[str, Trajectory]) -> Trajectory:
@@ -168,15 +169,16 @@ class Trajectory:
         first = next(iter(axes.values()))
         parts = tuple(replace(axis.layout, joints=(), kinds=(), name=name) for name, axis in axes.items())
         layout = replace(first.layout, axes=parts)
-        columns = {"time_s": first["time_s"]}
+        columns = _renamed(first.columns, {"time_s": "time_s"})
         for part, axis in zip(parts, axes.values(), strict=True):
-            columns |= {f"{part.name}/{name}": axis[name] for name in part.columns()}
-        joints = (*layout.positions(), *layout.rates())
-        return Trajectory(columns | {name: first[name] for name in joints}, layout=layout)
+            names = {f"{part.name}/{name}": name for name in part.columns()}
+            columns = _joined(columns, _renamed(axis.columns, names))
+        joints = {name: name for name in (*layout.positions(), *layout.rates())}
+        return Trajectory(_joined(columns, _renamed(first.columns, joints)), layout=layout)
 
-    def qpos(self) -> np.ndarray:
+    def qpos(self, ticks: slice | np.ndarray = slice(None)) -> np.ndarray:
         """Stack the joint positions as MuJoCo has them, (n_ticks, nq) [rad, m, quaternions w, x, y, z]."""
-        return np.stack([self.columns[name] for name in self.layout.positions()], axis=-1)
+        return np.stack([self.columns[name][ticks] for name in self.layout.positions()], axis=-1)
 
     def world(self, index: int) -> Trajectory:
         """Select one world of many, up to its end."""
@@ -191,7 +193,17 @@ class Trajectory:
 
     def from_tick(self, tick: int) -> Trajectory:
         """Select the rows from a tick on."""
-        return replace(self, columns={name: values[tick:] for name, values in self.columns.items()})
+        return self.rows(slice(tick, None))
+
+    def rows(self, rows: slice) -> Trajectory:
+        """Select successive rows."""
+        return replace(self, columns=select_rows(self.columns, rows))
+
+    def stretches(self) -> Iterator[slice]:
+        """Divide the rows into stretches to be handled one after the other; there is at least one."""
+        n_rows = len(self)
+        for start in range(0, max(n_rows, 1), STRETCH):
+            yield slice(start, min(start + STRETCH, n_rows))
 
     def between(self, start_s: float, end_s: float) -> Trajectory:
         """Select the rows from one time to another, both included."""
@@ -199,10 +211,11 @@ class Trajectory:
         return replace(self, columns={name: values[rows] for name, values in self.columns.items()})
 
     def save(self, path: Path) -> None:
-        """Write one world's trajectory as Parquet, whole or not at all."""
+        """Write one world's trajectory as Parquet, a row group a stretch, whole or not at all."""
         import pyarrow as pa
 
-        write_parquet(path, pa.table(self.columns), {"layout": asdict(self.layout), **self.metadata})
+        tables = (pa.table(dict(self.rows(rows).columns)) for rows in self.stretches())
+        write_row_groups(path, tables, {"layout": asdict(self.layout), **self.metadata})
 
     @staticmethod
     def load(path: Path) -> Trajectory:
@@ -236,3 +249,17 @@ class Trajectory:
                 f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"
             ) from error
         return Trajectory({name: table[name].to_numpy() for name in table.column_names}, stored, layout)
+
+
+def _renamed(columns: Mapping[str, np.ndarray], names: Mapping[str, str]) -> Mapping[str, np.ndarray]:
+    """Select columns: new name -> the one they have."""
+    if isinstance(columns, StoredColumns):
+        return columns.renamed(names)
+    return {new: columns[name] for new, name in names.items()}
+
+
+def _joined(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+    """Put the columns of two together: both in memory, or both stored."""
+    if isinstance(one, StoredColumns) and isinstance(other, StoredColumns):
+        return one.joined(other)
+    return {**one, **other}

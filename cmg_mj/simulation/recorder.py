@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import chain
+from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import References
 from cmg_mj.results.metrics import Metrics, TickBlock
+from cmg_mj.results.stored_columns import ColumnStore, StoredColumns
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.simulation.physics import Joints
 
@@ -29,6 +32,7 @@ class TickRecorder:
         metrics: Takes every piece.
         keep: Whether to keep the pieces for a trajectory.
         joints: Whether to keep the joints.
+        spool: Folder whose disk takes what a long trajectory of one world would need in memory, if any.
     """
 
     def __init__(
@@ -40,6 +44,7 @@ class TickRecorder:
         *,
         keep: bool,
         joints: bool,
+        spool: Path | None = None,
     ) -> None:
         self._axis = plants[0].axis
         self._bias = np.array([plant.bias for plant in plants])
@@ -54,7 +59,7 @@ class TickRecorder:
         self._keep = keep
         self._single = isinstance(worlds, int)
         self._waiting: list[tuple] = []
-        self._pieces: list[dict[str, np.ndarray]] = []
+        self._kept = ColumnStore(len(self._layout.columns()), spool if isinstance(worlds, int) else None)
 
     def add(self, q: Joints, v: Joints, tick: Tick, torque: Scalar, running: np.ndarray | None) -> None:
         """Take one tick.
@@ -81,7 +86,7 @@ class TickRecorder:
             columns, ended = piece.columns, piece.ended
             if ended is not None:
                 columns = {name: np.where(ended, np.nan, column) for name, column in columns.items()}
-            self._pieces.append(columns)
+            self._kept.append([columns[name] for name in self._layout.columns()])
 
     def _piece(self, waiting: Sequence[tuple]) -> TickBlock:
         qs, vs, ticks, torques, runnings = zip(*waiting, strict=True)
@@ -109,29 +114,40 @@ class TickRecorder:
         return np.swapaxes(np.array(ticks), 0, 1)
 
     def trajectory(self) -> Trajectory | None:
-        """All that was kept."""
-        return self._joined(self._pieces, 0) if self._keep else None
+        """All that was kept: in memory, or read from the file when it is asked for."""
+        if not self._keep:
+            return None
+        if self._kept.in_memory:
+            return self._since(0)
+        readers = {name: partial(self._read, i) for i, name in enumerate(self._layout.columns())}
+        columns = StoredColumns({"time_s": self._times, **readers}, 0, len(self._kept))
+        return Trajectory(columns, layout=self._layout)
 
     def since(self, tick: int) -> Trajectory:
         """The ticks from one on, of one world whose trajectory is kept, as far as the run has come.
 
         Those that wait go on waiting: whoever looks on changes no number.
         """
-        first = min(tick // TICKS_A_PIECE, len(self._pieces))
-        pieces = self._pieces[first:]
-        if self._waiting:
-            pieces = [*pieces, self._piece(self._waiting).columns]
-        return self._joined(pieces, TICKS_A_PIECE * first).from_tick(tick - TICKS_A_PIECE * first)
+        return self._since(tick, self._piece(self._waiting).columns if self._waiting else None)
 
-    def _joined(self, pieces: Sequence[Mapping[str, np.ndarray]], first: int) -> Trajectory:
-        """Pieces as one trajectory, whose first tick has this number."""
+    def _since(self, tick: int, waiting: Mapping[str, np.ndarray] | None = None) -> Trajectory:
+        end = n_kept = len(self._kept)
         columns = {}
-        names = self._layout.columns()
-        for name in names:
-            whole = np.concatenate([piece[name] for piece in pieces]) if pieces else np.zeros((0, len(self._bias)))
-            columns[name] = whole[:, 0] if self._single else whole
-        n_ticks = len(columns[names[0]])
-        return Trajectory({"time_s": np.arange(first, first + n_ticks) * self._dt, **columns}, layout=self._layout)
+        for i, name in enumerate(self._layout.columns()):
+            columns[name] = self._read(i, tick, n_kept)
+            if waiting is not None:
+                columns[name] = np.concatenate([columns[name], waiting[name][max(0, tick - n_kept) :, 0]])
+                end = n_kept + len(waiting[name])
+        return Trajectory({"time_s": self._times(min(tick, end), end), **columns}, layout=self._layout)
+
+    def _read(self, column: int, start: int, end: int) -> np.ndarray:
+        values = self._kept.read(column, start, end)
+        if not len(values):
+            values = np.zeros((0, len(self._bias)))
+        return values[:, 0] if self._single else values
+
+    def _times(self, start: int, end: int) -> np.ndarray:
+        return np.arange(start, end) * self._dt
 
 
 class MultiAxisRecorder:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -45,6 +46,8 @@ class SimulationOptions(TypedDict, total=False):
     """Called after every tick with the simulated time [s]; a KeyboardInterrupt it raises ends the run."""
     on_start: Callable[[Recorder], None] | None
     """Called before the first tick with the recorder, whose `since` shows the ticks meanwhile."""
+    spool: Path
+    """Folder whose disk takes what a long trajectory of one world would need in memory; it is read from there."""
     threads: int
     """On which many worlds are stepped; 0: as many as there are processors."""
 
@@ -113,8 +116,7 @@ class _Simulation:
         self.timestep = timestep = plants[0].timestep
         steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
         self.fall_angle = np.radians(settings.fall_angle_deg).item()
-        keep = options.get("keep_trajectory", True)
-        self.recorders = [self._recorder_of(*pair, keep) for pair in zip(names, controller.parts, strict=True)]
+        self.recorders = [self._recorder_of(*pair, options) for pair in zip(names, controller.parts, strict=True)]
         several = MultiAxisRecorder(dict(zip(names, self.recorders, strict=True))) if len(names) > 1 else None
         self.recorder: Recorder = several or self.recorders[0]
         self.on_progress = options.get("on_progress")
@@ -124,7 +126,7 @@ class _Simulation:
         instants = sampling_instants(steps, controller.steps_per_sample, pushes, timestep, names)
         self.instants = with_swing_torques(instants, swings, timestep, names) if swings else instants
 
-    def _recorder_of(self, axis: str, controller: Controller, keep: bool) -> TickRecorder:
+    def _recorder_of(self, axis: str, controller: Controller, options: SimulationOptions) -> TickRecorder:
         """Make what records and judges the ticks of one axis; that of the first axis has the joints."""
         plants, observers = [plant.single_axis(axis) for plant in self.plants], self.observers[axis]
         pairs = list(zip(plants, split_values(controller.sensors, len(plants)), strict=True))
@@ -133,7 +135,9 @@ class _Simulation:
         noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
         floors = Floors(noises, max(dt, 1.0 / controller.sensors.accelerometer.rate_hz))
         metrics = Metrics(observers, len(plants), dt, self.pushes, limit, self.settings, targets, RATES, floors)
-        return TickRecorder(plants, observers, controller, metrics, keep=keep, joints=axis == self.axis_names[0])
+        keep, first = options.get("keep_trajectory", True), axis == self.axis_names[0]
+        spool = options.get("spool")
+        return TickRecorder(plants, observers, controller, metrics, keep=keep, joints=first, spool=spool)
 
     def advance(self, physics: Physics, driver: Driver) -> None:
         """Run to the end, whatever that is."""

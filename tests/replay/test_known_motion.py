@@ -44,8 +44,8 @@ def test_the_linear_differentiator_of_a_sine(tmp_path: Path) -> None:
     response = 1.0 / (1.0 + 0.02j * OMEGA) ** 2
     assert result["lag_s"] == pytest.approx(-np.angle(response) / OMEGA, rel=2e-3)
     assert result["velocity_fit"] == pytest.approx(1.0 - abs(1.0 - response), abs=2e-3)
-    impulse = Trajectory({"time_s": np.arange(400) * DT, **dict.fromkeys(("y2_rad", "u_rad_s"), np.zeros(400))})
-    impulse.columns["y1_rad"] = np.eye(1, 400, 1)[0]
+    nothing = dict.fromkeys(("y2_rad", "u_rad_s"), np.zeros(400))
+    impulse = Trajectory({"time_s": np.arange(400) * DT, **nothing, "y1_rad": np.eye(1, 400, 1)[0]})
     response = replay(make_observer("linear", DT, PAPER), impulse).x2
     assert result["noise_gain_1_s"] == pytest.approx(math.sqrt(np.sum(response**2)), rel=0.03)
 

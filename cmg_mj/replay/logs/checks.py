@@ -90,9 +90,11 @@ def check_assumed(path: Path, name: str, time: np.ndarray) -> None:
 
 def check_motion(path: Path, columns: Mapping[str, np.ndarray], referred: bool) -> None:
     """Refuse a log without motion."""
-    tilt, reference = columns["y1_rad"], columns[REFERENCE]
+    tilt = columns["y1_rad"]
     if np.ptp(tilt) == 0.0:
         raise InputError(f"{path}: the tilt is {tilt[0]:g} rad in every row: nothing moves")
+    del tilt  # a long log's columns are read one by one
+    reference = columns[REFERENCE]
     known = reference[np.isfinite(reference)]
     if referred and not len(known):
         raise InputError(f"{path}: the reference has no number where the tilt has one")

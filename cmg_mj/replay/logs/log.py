@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.errors import TomlValue
+from cmg_mj.results.stored_columns import number_of_rows, select_rows
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Window
 from cmg_mj.sensors.tilt import RadialTilt
@@ -88,7 +89,7 @@ class Log:
         return self.columns[name]
 
     def __len__(self) -> int:
-        return len(self.columns["time_s"])
+        return number_of_rows(self.columns)
 
     @property
     def duration_s(self) -> float:
@@ -97,7 +98,7 @@ class Log:
 
     def trajectory(self, part: slice) -> Trajectory:
         """Return one part, as `cmg_mj.replay.replay` takes it."""
-        return Trajectory({name: values[part] for name, values in self.columns.items()})
+        return Trajectory(select_rows(self.columns, part))
 
     def scored(self, settle_s: float) -> np.ndarray:
         """Return which samples count: those from `settle_s` after the start of a part on, (n,)."""
@@ -106,15 +107,32 @@ class Log:
             counted[part.start + math.ceil(min(settle_s / self.dt, len(self)) - 1e-9) : part.stop] = True
         return counted
 
-    def broken(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return times and values with a NaN between two parts, so that no line is drawn across a gap."""
-        time = [np.append(self["time_s"][part], self["time_s"][part][-1] + self.dt) for part in self.parts]
-        drawn = [np.append(values[part], np.nan) for part in self.parts]
-        return np.concatenate(time)[:-1], np.concatenate(drawn)[:-1]
+    def broken(self, values: np.ndarray, rows: slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """Return times and values with a NaN between two parts, so that no line is drawn across a gap.
+
+        Args:
+            values: The values in some rows, (n,).
+            rows: These rows.
+
+        Returns:
+            Times [s] and values.
+        """
+        start, stop, _ = rows.indices(len(self))
+        clock = select_rows(self.columns, slice(start, stop))["time_s"]
+        time, drawn = [], []
+        for part in self.parts:
+            some = slice(max(part.start, start) - start, min(part.stop, stop) - start)
+            if some.start < some.stop:
+                time.append(clock[some])
+                drawn.append(values[some])
+                if start + some.stop == part.stop < self.parts[-1].stop:
+                    time.append(clock[some][-1:] + self.dt)
+                    drawn.append(np.array([np.nan]))
+        return np.concatenate(time), np.concatenate(drawn)
 
     def cut(self, rows: slice) -> Log:
         """Return the log's part in a range of rows."""
         start, stop, _ = rows.indices(len(self))
         parts = [slice(max(p.start, start) - start, min(p.stop, stop) - start) for p in self.parts]
-        columns = {name: values[start:stop] for name, values in self.columns.items()}
+        columns = select_rows(self.columns, slice(start, stop))
         return replace(self, columns=columns, parts=[part for part in parts if part.stop - part.start > 1])

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cmg_mj.errors import InputError
 from cmg_mj.replay.logs.acceleration_checks import TiltMotion, implausible_acceleration
@@ -27,6 +28,14 @@ from cmg_mj.replay.logs.resampling import sampled_where_known
 from cmg_mj.replay.logs.sampling import SAME_TIME, Part, Sampler
 from cmg_mj.replay.logs.table import read_table
 from cmg_mj.replay.logs.units import in_si
+from cmg_mj.results.stored_columns import (
+    LONG,
+    Reader,
+    StoredColumns,
+    masked,
+    shelved,
+    stretches,
+)
 from cmg_mj.sensors.tilt import RadialTilt
 
 UNWRAP_STEP = 1.5 * math.pi
@@ -62,9 +71,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     measured = _measured(rows)
     dt, parts = sampler.parts(rows.time, measured)
     joined = _join(parts, rows, options)
-    check_motion(path, joined, rows.reference is not None)
+    check_motion(path, joined, rows.referred)
     has = _signals_in(measured, rows)
-    if options.windows_s and rows.reference is None:
+    if options.windows_s and not rows.referred:
         raise InputError("--window: there is no reference to score against; name it, --columns rate=...")
     windows = windows_inside(path, options.windows_s, joined["time_s"])
     ends = np.cumsum([len(part.time) for part in parts]).tolist()
@@ -97,17 +106,25 @@ class _Rows:
         columns: Role -> column.
         tilt: Geometry of the accelerometers, if they measure the tilt.
         time: Stamps, (n_rows,) [s]; None without a time column.
-        signals: Role -> values, (n_rows,), without time and reference.
-        reference: The reference rate, (n_rows,) [rad/s].
+        signals: Role -> values, (n_rows,), without the time; those of a long log are read when they are asked for.
         notes: Changes to the rows, a line each; reading adds more.
     """
 
     columns: Mapping[str, Column]
     tilt: RadialTilt | None
     time: np.ndarray | None
-    signals: Mapping[str, np.ndarray]
-    reference: np.ndarray | None
+    signals: StoredColumns
     notes: list[str]
+
+    @property
+    def referred(self) -> bool:
+        """Whether there is a reference."""
+        return "rate" in self.signals
+
+    @property
+    def reference(self) -> np.ndarray:
+        """The reference rate, (n_rows,) [rad/s]."""
+        return self.signals["rate"]
 
 
 def _convert(path: Path, options: ReadOptions) -> _Rows:
@@ -123,21 +140,29 @@ def _convert(path: Path, options: ReadOptions) -> _Rows:
     if dated:  # seconds already, whatever the heading ends in
         clock = columns["time"]
         columns["time"] = replace(clock, unit="s", factor=clock.factor / in_si("time", clock.unit), unit_known=True)
-    with np.errstate(over="ignore"):
-        signals = {role: table[column.name.strip()] * column.factor + column.offset for role, column in columns.items()}
+    signals = StoredColumns({role: _converter(table, column) for role, column in columns.items()}, 0, table.n_rows)
     check_sizes(path, columns, signals)
     check_numbers(path, columns, signals)
-    time = signals.pop("time", None)
+    time = signals.get("time")
     if time is not None and not columns["time"].unit_known:
         check_assumed(path, columns["time"].name, time)
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
-    reference = signals.pop("rate", None)
-    return _Rows(columns, tilt, time, signals, reference, notes)
+    return _Rows(columns, tilt, time, signals.renamed({role: role for role in columns if role != "time"}), notes)
+
+
+def _converter(table: StoredColumns, column: Column) -> Reader:
+    """Make what reads rows of a column in SI units."""
+
+    def read(start: int, end: int) -> np.ndarray:
+        with np.errstate(over="ignore"):
+            return table.read(column.name.strip(), slice(start, end)) * column.factor + column.offset
+
+    return read
 
 
 def _cut(path: Path, rows: _Rows, time_range: tuple[float, float], rate: float | None) -> _Rows:
     """Return the rows between two times, counted from the earliest."""
-    n = len(next(iter(rows.signals.values())))
+    n = rows.signals.n_rows
     if rows.time is None:
         clock = np.arange(n) / (rate or 1.0)
     else:
@@ -150,33 +175,38 @@ def _cut(path: Path, rows: _Rows, time_range: tuple[float, float], rate: float |
     return replace(
         rows,
         time=None if rows.time is None else rows.time[inside],
-        signals={role: values[inside] for role, values in rows.signals.items()},
-        reference=None if rows.reference is None else rows.reference[inside],
+        signals=masked(rows.signals, inside),
     )
 
 
-def _measured(rows: _Rows) -> dict[str, np.ndarray]:
+def _measured(rows: _Rows) -> StoredColumns:
     """Return row by row the observers' measurements, by their names in a trajectory."""
-    signals = rows.signals
-    measured: dict[str, np.ndarray] = {}
+    signals, measured = rows.signals, {}
+
+    def of(formula: Callable[..., ArrayLike], *roles: str) -> Reader:
+        return lambda start, end: np.asarray(formula(*(signals.read(role, slice(start, end)) for role in roles)))
+
     if rows.tilt is not None:
-        forces = [signals[role] for role in ACCELEROMETERS]
-        measured["y1_rad"] = unwrapped(np.asarray(rows.tilt(*forces)), rows.notes)
-        measured["acceleration_rad_s2"] = np.asarray(rows.tilt.acceleration(signals["inner_x"], signals["outer_x"]))
+        angle = of(rows.tilt, *ACCELEROMETERS)
+        measured["acceleration_rad_s2"] = of(rows.tilt.acceleration, "inner_x", "outer_x")
     else:
-        measured["y1_rad"] = unwrapped(signals["tilt"], rows.notes)
+        angle = of(np.asarray, "tilt")
         if "acceleration" in signals:
-            measured["acceleration_rad_s2"] = signals["acceleration"]
+            measured["acceleration_rad_s2"] = of(np.asarray, "acceleration")
+    whole = np.empty(signals.n_rows)
+    for some in stretches(signals.n_rows):
+        whole[some] = angle(some.start, some.stop)
+    measured = {"y1_rad": shelved(unwrapped(whole, rows.notes)), **measured}
     if "gimbal" in signals:
-        measured["y2_rad"] = signals["gimbal"]
+        measured["y2_rad"] = of(np.asarray, "gimbal")
     elif "gimbal1" in signals:
-        measured["y2_rad"] = (signals["gimbal1"] - signals["gimbal2"]) / 2.0
+        measured["y2_rad"] = of(lambda one, two: (one - two) / 2.0, "gimbal1", "gimbal2")
     if "command" in signals:
-        measured["u_rad_s"] = signals["command"]
-    return measured
+        measured["u_rad_s"] = of(np.asarray, "command")
+    return StoredColumns(measured, 0, signals.n_rows)
 
 
-def _signals_in(measured: Mapping[str, np.ndarray], rows: _Rows) -> frozenset[str]:
+def _signals_in(measured: StoredColumns, rows: _Rows) -> frozenset[str]:
     """Return which signals a log has, and note a gimbal without command or a command without gimbal."""
     gimbal, command = "y2_rad" in measured, "u_rad_s" in measured
     if gimbal != command:
@@ -185,38 +215,62 @@ def _signals_in(measured: Mapping[str, np.ndarray], rows: _Rows) -> frozenset[st
     present = {
         "gimbals": gimbal and command,
         "acceleration": "acceleration_rad_s2" in measured,
-        "reference": rows.reference is not None,
+        "reference": rows.referred,
     }
     return frozenset(name for name, known in present.items() if known)
 
 
-def _join(parts: Sequence[Part], rows: _Rows, options: ReadOptions) -> dict[str, np.ndarray]:
+def _join(parts: Sequence[Part], rows: _Rows, options: ReadOptions) -> Mapping[str, np.ndarray]:
     """Join all parts, with every column of a log."""
-    time = np.concatenate([part.time for part in parts])
-    columns = {"time_s": time - parts[0].time[0] if abs(parts[0].time[0]) > 1e6 else time}
+    n = sum(len(part.time) for part in parts)
     absent = {"y2_rad": 0.0, "u_rad_s": 0.0, "acceleration_rad_s2": math.nan}
+    columns = {}
     for name in ("y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2"):
-        values = [part.values.get(name, np.full(len(part.time), absent.get(name, 0.0))) for part in parts]
-        columns[name] = np.concatenate(values)
-    columns[REFERENCE] = np.full(len(time), np.nan)
+        values = np.full(n, absent.get(name, 0.0))
+        start = 0
+        for part in parts:
+            if name in part.values:
+                values[start : start + len(part.time)] = part.values[name]
+            start += len(part.time)
+        columns[name] = shelved(values)
+        del values
+    columns[REFERENCE] = shelved(_reference(parts, rows, options) if rows.referred else np.full(n, np.nan))
+    time = np.concatenate([part.time for part in parts])
+    columns = {"time_s": shelved(time - parts[0].time[0] if abs(parts[0].time[0]) > 1e6 else time), **columns}
+    joined = StoredColumns(columns, 0, n)
+    return joined if n > LONG else dict(joined)
+
+
+def _reference(parts: Sequence[Part], rows: _Rows, options: ReadOptions) -> np.ndarray:
+    """Sample the reference where the parts are."""
     reference = rows.reference
-    if reference is not None:
-        stamps = np.arange(len(reference)) / (options.rate_hz or 1.0) if rows.time is None else rows.time
-        known = np.isfinite(stamps)
+    stamps = np.arange(len(reference)) / (options.rate_hz or 1.0) if rows.time is None else rows.time
+    if not (known := np.isfinite(stamps)).all():
         stamps, reference = stamps[known], reference[known]
+    if (np.diff(stamps) < 0.0).any():
         order = np.argsort(stamps, kind="stable")
         stamps, reference = stamps[order], reference[order]
-        first = np.concatenate([[True], np.diff(stamps) > SAME_TIME * parts[0].step])
+    first = np.concatenate([[True], np.diff(stamps) > SAME_TIME * parts[0].step])
+    if not first.all():
         stamps, reference = stamps[first], reference[first]
-        columns[REFERENCE] = np.concatenate(
-            [sampled_where_known(part.time, part.when(stamps) - options.delay_s, reference) for part in parts]
-        )
-    return columns
+    sampled = np.empty(sum(len(part.time) for part in parts))
+    start = 0
+    for part in parts:
+        when = np.empty(len(stamps))
+        for some in stretches(len(stamps)):
+            when[some] = part.when(stamps[some]) - options.delay_s
+        sampled[start : start + len(part.time)] = sampled_where_known(part.time, when, reference)
+        start += len(part.time)
+    return sampled
 
 
 def unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
     """Unwrap an angle that starts again after a turn; a single row that leaps out and back is a spike, and stays."""
-    known = np.flatnonzero(np.isfinite(angle))
+    present = np.isfinite(angle)
+    steps = np.diff(angle if present.all() else angle[present])
+    if not len(steps) or max(steps.max(), -steps.min()) <= UNWRAP_STEP:
+        return angle
+    known = np.flatnonzero(present)
     spikes = _spikes(angle[known])
     if len(spikes):
         rows = f"row {known[spikes[0]] + 1}"

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+
+from cmg_mj.results.stored_columns import LONG, stretches
 
 EVEN = 0.02
 """Deviation from an even grid, in periods, up to which stamps count as even."""
 GAP_PERIODS = 1.5
 """A gap is longer than so many periods."""
 FEWEST = 20
+MARGIN = 100
+"""Rows to either side of a stretch from which its spline is made: a row's influence falls to a quarter from each row to
+the next."""
 """A part with fewer rows is discarded."""
 
 
@@ -29,10 +36,27 @@ def resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float,
 
     if held:
         return values[np.clip(np.searchsorted(time, grid + 1e-9, side="right") - 1, 0, len(values) - 1)]
+    if len(grid) > LONG:
+        return _in_stretches(lambda some, part, v: resample(some, part, v, gap), grid, time, values)
     after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
     in_gap = time[after] - time[after - 1] > gap
     spline = CubicSpline(time, values)(grid)
     return np.where(in_gap, np.interp(grid, time, values), spline)
+
+
+def _in_stretches(
+    function: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
+    grid: np.ndarray,
+    time: np.ndarray,
+    values: np.ndarray,
+) -> np.ndarray:
+    """Interpolate stretch by stretch, each from its own rows and `MARGIN` more to either side."""
+    out = np.empty(len(grid))
+    for some in stretches(len(grid)):
+        first, last = np.searchsorted(time, [grid[some.start], grid[some.stop - 1]])
+        rows = slice(max(0, int(first) - MARGIN), int(last) + MARGIN)
+        out[some] = function(grid[some], time[rows], values[rows])
+    return out
 
 
 def sampled_where_known(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -47,10 +71,17 @@ def sampled_where_known(grid: np.ndarray, time: np.ndarray, values: np.ndarray) 
         (n,).
     """
     known = np.isfinite(values)
-    time, values = time[known], values[known]
+    if not known.all():
+        time, values = time[known], values[known]
     if len(time) < FEWEST:
         return np.full(len(grid), np.nan)
-    gap = GAP_PERIODS * float(np.median(np.diff(time)))
+    gap = GAP_PERIODS * float(np.median(np.diff(time), overwrite_input=True))
+    if len(grid) > LONG:
+        return _in_stretches(lambda some, part, v: _sampled(some, part, v, gap), grid, time, values)
+    return _sampled(grid, time, values, gap)
+
+
+def _sampled(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float) -> np.ndarray:
     slack = 1e-6 * gap
     inside = (grid >= time[0] - slack) & (grid <= time[-1] + slack)
     after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)

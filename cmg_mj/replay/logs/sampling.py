@@ -20,6 +20,7 @@ from cmg_mj.replay.logs.resampling import (
     rounded_period,
 )
 from cmg_mj.replay.logs.table import MOST_ROWS
+from cmg_mj.results.stored_columns import StoredColumns, masked, number_of_rows, reversed_rows, shelved
 
 BRIDGED = 5
 """Longest gap that is bridged by default, in rows."""
@@ -93,7 +94,7 @@ class Sampler:
         Raises:
             InputError: Times run backward or stand still, too few rows are complete, or the rate is impossible.
         """
-        n = len(next(iter(measured.values())))
+        n = number_of_rows(measured)
         if time is None:
             if self.rate_hz is None:
                 raise InputError(f"{self.where}: no time: name its column, --columns time=..., or give --rate HZ")
@@ -103,17 +104,17 @@ class Sampler:
             raise InputError(f"{self.where}: no row has a number in each of its columns")
         if not present.all():
             self.notes.append(_missing(present, time, measured))
-        time, values = self._forward(time[present], {name: column[present] for name, column in measured.items()})
+        time, values = self._forward(time if present.all() else time[present], masked(measured, present))
         if len(time) < FEWEST:
             raise InputError(f"{self.where}: {_rows(len(time))} with all that is needed; at least {FEWEST}")
         return self._on_a_grid(time, values)
 
-    def _forward(self, time: np.ndarray, values: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    def _forward(self, time: np.ndarray, values: StoredColumns) -> tuple[np.ndarray, StoredColumns]:
         """Return the rows with growing times."""
         steps = np.diff(time)
         if len(steps) and (steps <= 0.0).all() and (steps < 0.0).any():
             self.notes.append("the time runs backward from the first row to the last: read from its end")
-            time, values = time[::-1], {name: column[::-1] for name, column in values.items()}
+            time, values = time[::-1], reversed_rows(values)
             steps = np.diff(time)
         if (steps < 0.0).any():
             at = int(np.argmax(steps < 0.0))
@@ -132,10 +133,10 @@ class Sampler:
             first = time[1:][again][0]
             self.notes.append(f"{_rows(again.sum())} with the time of the row before discarded, first at {first:.6g} s")
             mask = np.concatenate([[True], ~again])
-            time, values = time[mask], {name: column[mask] for name, column in values.items()}
+            time, values = time[mask], masked(values, mask)
         return time, values
 
-    def _on_a_grid(self, time: np.ndarray, values: Mapping[str, np.ndarray]) -> tuple[float, list[Part]]:
+    def _on_a_grid(self, time: np.ndarray, values: StoredColumns) -> tuple[float, list[Part]]:
         steps = np.diff(time)
         usual = float(np.median(steps))
         period = float(steps[steps <= GAP_PERIODS * usual].mean())
@@ -165,7 +166,7 @@ class Sampler:
         if total > MOST_ROWS:
             raise InputError(f"{self.where}: {total:,.0f} samples at {1.0 / dt:g} Hz; at most {MOST_ROWS:,}")
         parts = [
-            self._part(time[s], {name: column[s] for name, column in values.items()}, period, dt, resampled)
+            self._part(time[s], values.rows(s), period, dt, resampled)
             for s in stretches
             if (time[s][-1] - time[s][0]) / dt >= FEWEST - 1.5
         ]
@@ -197,9 +198,7 @@ class Sampler:
                 f"{1.0 / period:.6g} Hz, and taken as such"
             )
 
-    def _part(
-        self, time: np.ndarray, values: Mapping[str, np.ndarray], period: float, dt: float, resampled: bool
-    ) -> Part:
+    def _part(self, time: np.ndarray, values: StoredColumns, period: float, dt: float, resampled: bool) -> Part:
         if not resampled and len(time) == round((time[-1] - time[0]) / dt) + 1:
             grid = time[0] + dt * np.arange(len(time))
             return Part(grid, values, time, grid)
@@ -208,17 +207,17 @@ class Sampler:
             places = np.maximum.accumulate(places)
             mask = np.concatenate([[True], np.diff(places) > 0])
             time, places = time[mask], places[mask]
-            values = {name: column[mask] for name, column in values.items()}
+            values = masked(values, mask)
             stamps, grid = places * dt, dt * np.arange(places[-1] + 1)
-            filled = {name: bridge(grid, stamps, column, name in self.held) for name, column in values.items()}
-            return Part(time[0] + grid, filled, time, time[0] + stamps)
+            filled = {name: shelved(bridge(grid, stamps, column, name in self.held)) for name, column in values.items()}
+            return Part(time[0] + grid, StoredColumns(filled, 0, len(grid)), time, time[0] + stamps)
         grid = dt * np.arange(int((time[-1] - time[0]) / dt + 1e-6) + 1)
         stamps = time - time[0]
         sampled = {
-            name: resample(grid, stamps, column, GAP_PERIODS * period, name in self.held)
+            name: shelved(resample(grid, stamps, column, GAP_PERIODS * period, name in self.held))
             for name, column in values.items()
         }
-        return Part(time[0] + grid, sampled, time, time)
+        return Part(time[0] + grid, StoredColumns(sampled, 0, len(grid)), time, time)
 
 
 def _missing(present: np.ndarray, time: np.ndarray, measured: Mapping[str, np.ndarray]) -> str:

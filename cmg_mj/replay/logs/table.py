@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import codecs
 import os
-from collections.abc import Iterator, Sequence
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
+from cmg_mj.results.stored_columns import ColumnStore, StoredColumns, stored
 
 if TYPE_CHECKING:
     import pyarrow as pa
     import pyarrow.csv as pacsv
 
 MOST_ROWS = 5_000_000
-"""Most rows of a log; more take hours and gigabytes."""
+"""Most rows of a log; more take hours."""
 DELIMITERS = (",", ";", "\t", "|")
 HEAD = 1 << 16
 """Size of the part of a CSV that is searched for its heading, which must end in it [bytes]."""
@@ -30,8 +33,8 @@ MISSING = ["", "NA", "N/A", "#N/A", "null", "NULL", "None", "none", *NOT_FINITE]
 COMMENTS = ("#", "%", "//")
 
 
-def read_table(path: Path, headings: Sequence[str], time: str | None) -> tuple[dict[str, np.ndarray], list[str], bool]:
-    """Read columns of a log.
+def read_table(path: Path, headings: Sequence[str], time: str | None) -> tuple[StoredColumns, list[str], bool]:
+    """Read columns of a log; a long one's go to a file, a piece at a time, unless they have text.
 
     Args:
         path: A CSV (with a heading) or a Parquet file.
@@ -55,7 +58,8 @@ def read_table(path: Path, headings: Sequence[str], time: str | None) -> tuple[d
         if head.startswith(PARQUET)
         else _of_csv(path, head, headings, time, notes, dated)
     )
-    if not len(next(iter(columns.values()))):
+    columns = stored(columns)
+    if not columns.n_rows:
         raise InputError(f"{path}: has a heading and no row")
     return columns, notes, bool(dated)
 
@@ -78,7 +82,7 @@ def head_of(path: Path) -> bytes:
     raise InputError(f"{path}: {what}; name a CSV or Parquet file, or the folder of a run")
 
 
-def _of_parquet(path: Path, headings: Sequence[str], time: str | None, dated: list[str]) -> dict[str, np.ndarray]:
+def _of_parquet(path: Path, headings: Sequence[str], time: str | None, dated: list[str]) -> Mapping[str, np.ndarray]:
     import pyarrow.parquet as pq
 
     with _arrow_errors(path), path.open("rb") as source:
@@ -88,7 +92,10 @@ def _of_parquet(path: Path, headings: Sequence[str], time: str | None, dated: li
         spelled = {name.strip(): name for name in names}
         if file.metadata.num_rows > MOST_ROWS:
             raise _too_long(path, file.metadata.num_rows)
-        table = file.read(columns=list(dict.fromkeys(spelled[name.strip()] for name in headings)))
+        names = list(dict.fromkeys(spelled[name.strip()] for name in headings))
+        if all(_is_number(file.schema_arrow.field(name).type) for name in names):
+            return _in_pieces(path, names, file.iter_batches(columns=names))
+        table = file.read(columns=names)
     return {
         name.strip(): _numbers(path, name, table[spelled[name.strip()]], dated if name == time else None)
         for name in headings
@@ -97,7 +104,7 @@ def _of_parquet(path: Path, headings: Sequence[str], time: str | None, dated: li
 
 def _of_csv(
     path: Path, head: bytes, headings: Sequence[str], time: str | None, notes: list[str], dated: list[str]
-) -> dict[str, np.ndarray]:
+) -> Mapping[str, np.ndarray]:
     import pyarrow as pa
     import pyarrow.csv as pacsv
 
@@ -129,39 +136,65 @@ def _of_csv(
         spelled = {name.strip(): name for name in names}
         headings = [spelled[name.strip()] for name in headings]
         time = spelled.get(time.strip()) if time else None
+        table: pa.Table | None = None
+        columns: Mapping[str, np.ndarray] = {}
         try:
             torn.clear()
-            table = _batches(path, read, parse, convert(pa.float64()))
+            names = list(dict.fromkeys(headings))
+            columns = _in_pieces(path, names, _batches(path, read, parse, convert(pa.float64())))
+            n_rows = columns.n_rows
         except pa.ArrowInvalid as error:
             if "onversion error" not in str(error):
                 raise
             torn.clear()
-            table = _batches(path, read, parse, convert(pa.string()))
-    if torn and not len(table):
+            texts = pa.Table.from_batches(list(_batches(path, read, parse, convert(pa.string()))))
+            table, n_rows = texts, texts.num_rows
+    if torn and not n_rows:
         raise InputError(f"{path}: no line has as many cells as the heading; the first, {torn[0]}")
     if torn:
         one = len(torn) == 1
         lines = f"{len(torn)} {'line has' if one else 'lines have'} another number of cells"
         notes.append(f"{lines} and {'was' if one else 'were'} discarded; {'' if one else 'the first, '}{torn[0]}")
+    if table is None:
+        return columns
     return {
         name.strip(): _numbers(path, name, table[name], dated if name == time else None, comma=comma)
         for name in headings
     }
 
 
-def _batches(path: Path, read: pacsv.ReadOptions, parse: pacsv.ParseOptions, convert: pacsv.ConvertOptions) -> pa.Table:
-    """Read all batches of a CSV, and refuse one that is too long."""
+def _batches(
+    path: Path, read: pacsv.ReadOptions, parse: pacsv.ParseOptions, convert: pacsv.ConvertOptions
+) -> Iterator[pa.RecordBatch]:
+    """Read a CSV, a batch at a time, first an empty one; refuse one that is too long."""
     import pyarrow as pa
     import pyarrow.csv as pacsv
 
-    rows, batches = 0, []
+    rows = 0
     with path.open("rb") as file, pacsv.open_csv(file, read, parse, convert) as reader:
+        yield pa.RecordBatch.from_pylist([], schema=reader.schema)
         for batch in reader:
             rows += len(batch)
             if rows > MOST_ROWS:
                 raise _too_long(path, None)
-            batches.append(batch)
-        return pa.Table.from_batches(batches, reader.schema)
+            yield batch
+
+
+def _in_pieces(path: Path, names: Sequence[str], batches: Iterable[pa.RecordBatch]) -> StoredColumns:
+    """Keep columns of numbers, a batch at a time: a long log's go to a file."""
+    import pyarrow as pa
+
+    store = ColumnStore(len(names), Path(tempfile.gettempdir()))
+    for batch in batches:
+        if len(batch):
+            chunks = (pa.chunked_array([batch.column(name)]) for name in names)
+            store.append([_numbers(path, name, c, None)[:, None] for name, c in zip(names, chunks, strict=True)])
+    readers = {name.strip(): partial(_column, store, i) for i, name in enumerate(names)}
+    return StoredColumns(readers, 0, len(store))
+
+
+def _column(store: ColumnStore, column: int, start: int, end: int) -> np.ndarray:
+    return store.read(column, start, end)[:, 0]
 
 
 def _heading(path: Path, head: bytes) -> tuple[str, int, str]:
@@ -205,6 +238,12 @@ def _check_columns(path: Path, headings: Sequence[str], names: Sequence[str]) ->
             raise InputError(f"{path}: has the column {name!r} {list(names).count(name)} times: rename all but one")
 
 
+def _is_number(kind: pa.DataType) -> bool:
+    import pyarrow as pa
+
+    return pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
+
+
 def _numbers(
     path: Path, name: str, column: pa.ChunkedArray, dated: list[str] | None, *, comma: bool = False
 ) -> np.ndarray:
@@ -218,7 +257,7 @@ def _numbers(
             raise InputError(f"{path}: column {name!r} holds times, not numbers")
         dated.append(name)
         return _seconds(column)
-    if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
+    if _is_number(kind):
         values = column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False).astype(float)
         return np.where(np.isfinite(values), values, np.nan)
     if pa.types.is_null(kind):

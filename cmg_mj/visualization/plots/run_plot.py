@@ -23,6 +23,7 @@ from cmg_mj.visualization.plots.readability import (
     observers_to_draw,
     short_names,
 )
+from cmg_mj.visualization.plots.thinning import thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -169,12 +170,13 @@ def plot_run(
             if j == 0:
                 axes.set_ylabel("tilt rate\n[rad/s]", fontsize="small")
             panels.append(axes)
-    t, pushed = trajectory["time_s"], trajectory["push_n_m"] != 0.0
+    pushes = (trajectory["push_n_m"] != 0.0).astype(float)
+    t, pushed = thinned(trajectory["time_s"], pushes)
     for axes in panels:
-        if pushed.any():
+        if pushes.any():
             label = "push" if axes is panels[0] else None
             style = {"color": "C3", "alpha": 0.25, "linewidth": 0, "zorder": 0, "label": label}
-            axes.fill_between(t, 0, 1, where=pushed, transform=axes.get_xaxis_transform(), **style)
+            axes.fill_between(t, 0, 1, where=pushed != 0.0, transform=axes.get_xaxis_transform(), **style)
         axes.grid(alpha=0.3)
         axes.margins(x=0.0)
     for axes in panels[:5]:
@@ -189,8 +191,8 @@ def plot_run(
 def _draw_tilt(axes: Axes, trajectory: Trajectory, band: float) -> None:
     t = trajectory["time_s"]
     measured, true = np.degrees(trajectory["y1_rad"]), np.degrees(trajectory["x1_rad"])
-    axes.plot(t, measured, color=MEASURED, linewidth=0.6, alpha=0.7, label="measured $y_1$")
-    axes.plot(t, true, color=INK, linewidth=1.3, label="true $x_1$ (from equilibrium)")
+    axes.plot(*thinned(t, measured), color=MEASURED, linewidth=0.6, alpha=0.7, label="measured $y_1$")
+    axes.plot(*thinned(t, true), color=INK, linewidth=1.3, label="true $x_1$ (from equilibrium)")
     _draw_bounds(axes, band, "settle band")
     axes.set_ylabel("tilt [deg]")
     fit(axes, [true], [measured, np.array([band, -band])])
@@ -207,8 +209,8 @@ def _draw_estimates(
     """Draw tilt rate and error of some observers; return the range of the rates."""
     t, true = trajectory["time_s"], trajectory["x2_rad_s"]
     estimates = {name: trajectory[f"estimate/{name}/x2_rad_s"] for name in palette}
-    rates.plot(t, trajectory["fog_rad_s"], color=MEASURED, linewidth=0.6, label="gyro")
-    rates.plot(t, true, color=INK, linewidth=1.8, label="true $x_2$")
+    rates.plot(*thinned(t, trajectory["fog_rad_s"]), color=MEASURED, linewidth=0.6, label="gyro")
+    rates.plot(*thinned(t, true), color=INK, linewidth=1.8, label="true $x_2$")
     ranking_key = next(
         (key for key in RANKING_KEYS if any(summaries[name].get(key) is not None for name in palette)), ""
     )
@@ -218,10 +220,9 @@ def _draw_estimates(
         label = labels[name].lstrip("_")  # matplotlib hides what begins with an underscore
         style = {"color": color, "linewidth": 0.8}
         rms = summaries[name].get(ranking_key)
-        rates.plot(t, estimates[name], **style, label=f"{label} $\\hat x_2$")
+        rates.plot(*thinned(t, estimates[name]), **style, label=f"{label} $\\hat x_2$")
         errors.plot(
-            t,
-            estimates[name] - true,
+            *thinned(t, estimates[name] - true),
             **style,
             label=f"{label} {format_figure(ranking_key, rms)}" if ranking_key else label,
         )
@@ -236,8 +237,8 @@ def _draw_small(
 ) -> None:
     """Draw one observer's estimate on the range of the others."""
     t = trajectory["time_s"]
-    axes.plot(t, trajectory[f"estimate/{name}/x2_rad_s"], color=color, linewidth=0.5)
-    axes.plot(t, trajectory["x2_rad_s"], color=INK, linewidth=0.8)
+    axes.plot(*thinned(t, trajectory[f"estimate/{name}/x2_rad_s"]), color=color, linewidth=0.5)
+    axes.plot(*thinned(t, trajectory["x2_rad_s"]), color=INK, linewidth=0.8)
     axes.set_title(label, loc="left", fontsize="small", parse_math=False, pad=2.0)
     if rates is not None:
         axes.set_ylim(*rates)
@@ -245,9 +246,9 @@ def _draw_small(
 
 def _draw_actuators(gimbal: Axes, command: Axes, trajectory: Trajectory, limit: float) -> None:
     t, u = trajectory["time_s"], trajectory["u_rad_s"]
-    gimbal.plot(t, np.degrees(trajectory["x3_rad"]), color=INK, linewidth=1.3, label="true $x_3$")
+    gimbal.plot(*thinned(t, np.degrees(trajectory["x3_rad"])), color=INK, linewidth=1.3, label="true $x_3$")
     gimbal.set_ylabel("gimbal angle\n[deg]")
-    command.step(t, u, where="post", color=INK, linewidth=0.6, label="command $u$")
+    command.step(*thinned(t, u), where="post", color=INK, linewidth=0.6, label="command $u$")
     _draw_bounds(command, limit, "rate limit")
     command.set_ylabel("gimbal rate\n[rad/s]")
     fit(command, [u], [np.array([limit, -limit])])

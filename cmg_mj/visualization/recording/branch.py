@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmg_mj.plant.plant import Plant
+from cmg_mj.results.stored_columns import STRETCH
 from cmg_mj.scenario.disturbances import Push
-from cmg_mj.visualization.recording.camera import Ball, enclosing_ball
+from cmg_mj.visualization.recording.camera import POSES, Ball, enclosing_ball
 from cmg_mj.visualization.recording.legend import LegendEntry, legend
-from cmg_mj.visualization.recording.run import RecordingHeader, Run, pose_samples
+from cmg_mj.visualization.recording.run import RecordingHeader, Run, pose_ticks, poses_at
 from cmg_mj.visualization.recording.signals import Lines, run_series
 
 
@@ -25,8 +26,7 @@ class Branch(Lines):
         observers: The run's observers in the legends.
         plant: The plant; of several axes, with the run's axis alone.
         pushes: The pushes about the run's axis.
-        pose_times: Times of the recorded poses, (n_poses,) [s].
-        qpos: Joint angles of the recorded poses, (n_poses, n_joints) [rad].
+        pose_ticks: Ticks of the recorded poses, (n_poses,); none of a run without ticks.
         ball: A ball that encloses the rig during the run.
         radius: Radius of the rig at its start, the scale of arrows and floors [m].
     """
@@ -36,8 +36,7 @@ class Branch(Lines):
     observers: Sequence[LegendEntry]
     plant: Plant
     pushes: Sequence[Push]
-    pose_times: np.ndarray
-    qpos: np.ndarray
+    pose_ticks: np.ndarray
     ball: Ball
     radius: float
 
@@ -57,9 +56,10 @@ def make_branches(header: RecordingHeader, runs: Sequence[Run]) -> list[Branch]:
 
 def _make_branch(header: RecordingHeader, run: Run, entry: LegendEntry) -> Branch:
     plant = header.plant if run.axis is None else header.plant.single_axis(run.axis)
-    times, qpos = pose_samples(plant, run)
+    ticks = pose_ticks(run.trajectory)
+    _, qpos = poses_at(plant, run.trajectory, _few(ticks))
     observers = legend(run.observers, always=run.trajectory.observers[:1])
-    series = run_series(run, plant, observers, header.settings, header.rate_limit_rad_s)
+    series = run_series(run, plant, observers, header.settings, header.rate_limit_rad_s, thin=True)
     return Branch(
         path=f"/{entry.part}",
         label=entry.label,
@@ -69,8 +69,12 @@ def _make_branch(header: RecordingHeader, run: Run, entry: LegendEntry) -> Branc
         observers=observers,
         plant=plant,
         pushes=[push for push in header.pushes if run.axis is None or push.axis == run.axis],
-        pose_times=times,
-        qpos=qpos,
+        pose_ticks=ticks,
         ball=enclosing_ball(plant, qpos),
         radius=enclosing_ball(plant, np.empty((0, plant.model.nq))).radius,
     )
+
+
+def _few(ticks: np.ndarray) -> np.ndarray:
+    """Select the ticks of a long run whose poses suffice to enclose the rig."""
+    return ticks if len(ticks) <= STRETCH else ticks[np.linspace(0, len(ticks) - 1, POSES).astype(int)]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import rerun.blueprint as rrb
 
 from cmg_mj.visualization.recording.legend import numbered_parts
-from cmg_mj.visualization.recording.signals import Lines, Series, log_series
+from cmg_mj.visualization.recording.signals import Lines, Series, log_styles, log_values
 from cmg_mj.visualization.recording.stream import application_name, log_page, open_recording
 from cmg_mj.visualization.recording.views import Choice, Plot, page_tabs, plot_view, tabbed_blueprint
 
@@ -38,12 +38,14 @@ class LogSeries:
         series: The series, in the folders that `PLOTS` names: angles in degrees, rates in rad/s.
         observers: Names of all observers.
         best: Names of the observers that are switched on at first.
+        stretches: Returns the series' values, stretch by stretch, where `series` has only the outlines; None otherwise.
     """
 
     name: str
     series: Sequence[Series]
     observers: Sequence[str]
     best: Sequence[str]
+    stretches: Callable[[], Iterator[Sequence[Series]]] | None = None
 
 
 def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping[str, str]) -> None:
@@ -67,8 +69,11 @@ def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping
     boards = [_board(branch, log, list(texts)) for branch, log in zip(branches, logs, strict=True)]
     blueprint = tabbed_blueprint(boards, TIMELINE, "paused")
     with open_recording(path, title, application_name(names, branches), blueprint) as rec:
-        for branch in branches:
-            log_series(rec, branch)
+        for branch, log in zip(branches, logs, strict=True):
+            log_styles(rec, branch)
+            for rows in log.stretches() if log.stretches else [log.series]:
+                log_values(rec, replace(branch, series={row.path: row for row in rows}))
+                rec.flush()
         for name, text in texts.items():
             log_page(rec, name.lower(), text)
 

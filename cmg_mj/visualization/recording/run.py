@@ -159,20 +159,26 @@ def pose_stride(dt: float) -> int:
     return max(1, round(1.0 / (POSE_RATE_HZ * dt)))
 
 
-def pose_samples(plant: Plant, run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Choose the ticks at which poses are recorded; the initial pose, if the run has no tick.
+def pose_ticks(trajectory: Trajectory) -> np.ndarray:
+    """Choose the ticks at which poses are recorded, (n_poses,); none, if there is no tick."""
+    n = len(trajectory)
+    if n == 0:
+        return np.zeros(0, dtype=int)
+    time = trajectory.rows(slice(2))["time_s"]
+    return np.union1d(np.arange(0, n, pose_stride(time[1] - time[0]) if n > 1 else 1), n - 1)
+
+
+def poses_at(plant: Plant, trajectory: Trajectory, ticks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the poses at some ticks; the initial pose, if the run has no tick.
 
     Args:
         plant: The plant.
-        run: The run.
+        trajectory: The run's trajectory.
+        ticks: The ticks, (n_poses,).
 
     Returns:
         Times, (n_poses,) [s], and joint angles, (n_poses, n_joints) [rad].
     """
-    trajectory = run.trajectory
-    n = len(trajectory)
-    if n == 0:
+    if len(trajectory) == 0:
         return np.zeros(1), plant.new_data().qpos[None].copy()
-    time = trajectory["time_s"]
-    ticks = np.union1d(np.arange(0, n, pose_stride(time[1] - time[0]) if n > 1 else 1), n - 1)
-    return time[ticks], trajectory.qpos()[ticks]
+    return trajectory["time_s"][ticks], trajectory.qpos(ticks)

@@ -28,9 +28,8 @@ PUSH_LENGTH, PUSH_RADIUS = 0.8, 0.047
 
 
 def log_rig(rec: rr.RecordingStream, branch: Branch) -> None:
-    """Record the mechanism of one run under `<branch>/rig`."""
+    """Record the mechanism of one run under `<branch>/rig`, but for its poses."""
     log_shapes(rec, branch.path, branch.plant, branch.radius)
-    log_poses(rec, branch.path, branch.plant, branch.pose_times, branch.qpos)
     steps, largest = torque_steps(branch.pushes, branch.run.outcome.time_s), largest_torque(branch.pushes)
     log_torques(rec, branch.path, branch.plant, steps, largest, branch.radius)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import rerun as rr
@@ -13,6 +13,7 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, Colour
+from cmg_mj.visualization.plots.thinning import thinned
 from cmg_mj.visualization.recording.legend import LegendEntry
 from cmg_mj.visualization.recording.run import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Run, phases
 
@@ -89,7 +90,13 @@ def time_column(seconds: np.ndarray, timeline: str = TIMELINE) -> rr.TimeColumn:
 
 
 def run_series(
-    run: Run, plant: Plant, observers: Sequence[LegendEntry], settings: MetricsSettings, rate_limit: float | None
+    run: Run,
+    plant: Plant,
+    observers: Sequence[LegendEntry],
+    settings: MetricsSettings,
+    rate_limit: float | None,
+    *,
+    thin: bool = False,
 ) -> list[Series]:
     """Make all time series of a run.
 
@@ -99,25 +106,39 @@ def run_series(
         observers: The run's observers.
         settings: The settle band.
         rate_limit: Largest gimbal rate, if it is known [rad/s].
+        thin: Whether the outlines of a long run's series are enough.
 
     Returns:
         The series: tilt and gimbal angles in degrees, rates in rad/s, the integrator in rad s.
     """
+    rows = _series(run, plant, observers, settings, rate_limit)
+    return [_thinned(row) for row in rows] if thin else list(rows)
+
+
+def _thinned(row: Series) -> Series:
+    if row.values.ndim > 1:
+        return row
+    time, values = thinned(row.time, row.values)
+    return replace(row, time=time, values=values)
+
+
+def _series(
+    run: Run, plant: Plant, observers: Sequence[LegendEntry], settings: MetricsSettings, rate_limit: float | None
+) -> Iterator[Series]:
+    """Make the series one by one: of a long run, all at once take much memory."""
     t = run.trajectory
     time = t["time_s"]
     true, gyro = BASELINE_COLOURS["true"], BASELINE_COLOURS["gyro"]
-    rows = [
-        Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), gyro, 1.0, whole=False),
-        Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), true, 2.5),
-        _bounds("tilt/settle_band", "settle band", time, settings.settle_band_deg),
-        Series("rate/true", "true", time, t["x2_rad_s"], true, 3.0),
-        Series("rate/gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0, whole=False),
-    ]
+    yield Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), gyro, 1.0, whole=False)
+    yield Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), true, 2.5)
+    yield _bounds("tilt/settle_band", "settle band", time, settings.settle_band_deg)
+    yield Series("rate/true", "true", time, t["x2_rad_s"], true, 3.0)
+    yield Series("rate/gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0, whole=False)
     for observer in observers:
-        rows += _estimates(run, observer)
-    rows.append(Series("command/u", "command", time, t["u_rad_s"], CONTROLLER))
+        yield from _estimates(run, observer)
+    yield Series("command/u", "command", time, t["u_rad_s"], CONTROLLER)
     if rate_limit is not None:
-        rows.append(_bounds("command/limit", "rate limit", time, rate_limit))
+        yield _bounds("command/limit", "rate limit", time, rate_limit)
     for i, module in enumerate(plant.axis.modules):
         color = MODULES[i % len(MODULES)]
         part = rr.escape_entity_path_part(module.of_axis)
@@ -127,31 +148,28 @@ def run_series(
             3.0 if i == 0 and len(plant.axis.modules) > 1 else 1.5
         )  # the modules' speeds agree: one must shine through
         suffix = "" if module.speed > 0.0 else " (spins backwards)"
-        rows += [
-            Series(f"gimbal/{part}", module.name, time, np.degrees(angle), color),
-            Series(f"flywheel/{part}", module.name + suffix, time, speed, color, width),
-        ]
-    rows.append(Series("integrator/x_e", "x_e", time, t["x_e_rad_times_s"], CONTROLLER))
-    return rows
+        yield Series(f"gimbal/{part}", module.name, time, np.degrees(angle), color)
+        yield Series(f"flywheel/{part}", module.name + suffix, time, speed, color, width)
+    yield Series("integrator/x_e", "x_e", time, t["x_e_rad_times_s"], CONTROLLER)
 
 
-def _estimates(run: Run, observer: LegendEntry) -> list[Series]:
+def _estimates(run: Run, observer: LegendEntry) -> Iterator[Series]:
     """Make the series of one observer's estimates."""
     t, name = run.trajectory, observer.name
     time, rate = t["time_s"], t[f"estimate/{name}/x2_rad_s"]
-    estimates = {"rate_estimate": rate, "rate_error": rate - t["x2_rad_s"]}
-    if BIAS in t.extra_signals(name):
-        estimates["bias"] = np.degrees(t[f"estimate/{name}/{BIAS}"])
     part, label, color = observer.part, observer.label, observer.color
     width = 1.5 if name == t.observers[0] else 1.0
-    rows = [
-        Series(f"{folder}/{part}", label, time, values, color, width, whole=False, observer=name)
-        for folder, values in estimates.items()
-    ]
-    if "bias" in estimates and isinstance(bias := run.observers[name].get("bias_deg"), (int, float)):
-        ends = _ends(time)
-        rows.append(Series("bias/true", "true", ends, np.full(len(ends), bias), BASELINE_COLOURS["true"], 2.5))
-    return rows
+
+    def line(folder: str, values: np.ndarray) -> Series:
+        return Series(f"{folder}/{part}", label, time, values, color, width, whole=False, observer=name)
+
+    yield line("rate_estimate", rate)
+    yield line("rate_error", rate - t["x2_rad_s"])
+    if BIAS in t.extra_signals(name):
+        yield line("bias", np.degrees(t[f"estimate/{name}/{BIAS}"]))
+        if isinstance(bias := run.observers[name].get("bias_deg"), (int, float)):
+            ends = _ends(time)
+            yield Series("bias/true", "true", ends, np.full(len(ends), bias), BASELINE_COLOURS["true"], 2.5)
 
 
 def log_series(rec: rr.RecordingStream, branch: Lines) -> None:

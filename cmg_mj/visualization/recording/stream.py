@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
+import threading
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -14,6 +17,11 @@ import rerun.blueprint as rrb
 from cmg_mj.errors import InputError
 from cmg_mj.results.files import whole_file
 from cmg_mj.visualization.recording.signals import Lines
+
+PIPES = "/dev/fd"
+"""Folder in which a process finds its pipes as files."""
+PIPED = 1 << 20
+"""Largest number of bytes read from a pipe at once."""
 
 LONGEST_LIST = 120
 """Longest list of runs in an application's name [characters]."""
@@ -36,18 +44,74 @@ def open_recording(path: Path, name: str, application: str, blueprint: rrb.Bluep
         InputError: The environment turns rerun off.
         OSError: The file cannot be written.
     """
-    with strict(), rr.RecordingStream(application) as rec:
+    with whole_file(path) as temporary, strict(), rr.RecordingStream(application) as rec:
         require_enabled(rec)
-        # Rerun's own writing to a file hides a full disk, or waits for ever.
-        memory = rec.memory_recording()
-        try:
+        with _written(rec, temporary):
             rec.send_blueprint(blueprint, make_active=False, make_default=True)
             set_up(rec, name)
             yield rec
-        finally:  # rerun would complain on standard error about data left in memory
-            content = memory.drain_as_bytes()
-    with whole_file(path) as temporary:
-        temporary.write_bytes(content)
+
+
+@contextmanager
+def _written(rec: rr.RecordingStream, path: Path) -> Iterator[None]:
+    """Write what is logged to a file, while it is logged.
+
+    Rerun's own writing to a file hides a full disk, or waits for ever: it writes to a pipe, whose other end is here.
+    """
+    with path.open("wb") as file:
+        read_end, write_end = os.pipe()
+        entry = f"{PIPES}/{write_end}"
+        if not os.path.exists(entry):  # as on Windows: memory takes all of it
+            os.close(read_end)
+            os.close(write_end)
+            memory = rec.memory_recording()
+            try:
+                yield
+            finally:  # rerun would complain on standard error about data left in memory
+                content = memory.drain_as_bytes()
+            file.write(content)
+            return
+        pump = _Pump(read_end, file)
+        try:
+            try:
+                rec.save(entry)
+            finally:
+                os.close(write_end)  # rerun has opened one of its own
+            yield
+        finally:
+            rec.disconnect()
+            pump.join()
+    if pump.error is not None:
+        raise pump.error
+
+
+class _Pump(threading.Thread):
+    """Copies a pipe to a file until its writers have closed it; what the file does not take is lost.
+
+    Args:
+        read_end: The pipe.
+        file: The file.
+
+    Attributes:
+        error: The reason why the file is not whole.
+    """
+
+    def __init__(self, read_end: int, file: IO[bytes]) -> None:
+        super().__init__(name="recording", daemon=True)
+        self.error: OSError | ValueError | None = None
+        self._read_end, self._file = read_end, file
+        self.start()
+
+    def run(self) -> None:
+        """Copy."""
+        with open(self._read_end, "rb", buffering=0) as pipe:
+            while content := pipe.read(PIPED):
+                if self.error is None:
+                    try:
+                        self._file.write(content)
+                        self._file.flush()
+                    except (OSError, ValueError) as error:  # of a full disk; of a file closed by a second Ctrl-C
+                        self.error = error
 
 
 def require_enabled(rec: rr.RecordingStream) -> None:

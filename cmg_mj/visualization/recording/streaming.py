@@ -21,6 +21,7 @@ from cmg_mj.visualization.recording.run import (
     largest_torque,
     phases,
     pose_stride,
+    poses_at,
     torque_steps,
 )
 from cmg_mj.visualization.recording.scene import log_poses, log_shapes, log_torques
@@ -179,7 +180,8 @@ class _StreamedBranch:
         end = branch.run.outcome.time_s
         self.add(rec, last)
         if not self._ticks or (self._ticks - 1) % self._stride:
-            log_poses(rec, self.path, self._plant, branch.pose_times[-1:], branch.qpos[-1:])
+            poses = poses_at(self._plant, branch.run.trajectory, branch.pose_ticks[-1:])
+            log_poses(rec, self.path, self._plant, *poses)
         self._push(rec, torque_steps(self._pushes, end))
         self._phase(rec, phase_steps(branch.run, self._pushes, self._header.settings, end))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import subprocess
 import sys
 from dataclasses import replace
@@ -16,6 +17,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from cmg_mj.errors import InputError
+from cmg_mj.results import trajectory
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.summary_keys import KEYS, format_figure, heading
@@ -24,7 +26,7 @@ from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import Scenario, load_scenario
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.visualization.recording import RecordingHeader, Run, save, write_recording
+from cmg_mj.visualization.recording import RecordingHeader, Run, save, stream, write_recording
 from cmg_mj.visualization.recording.run import POSE_RATE_HZ, phases, torque_steps
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
 from cmg_mj.visualization.recording.shapes import drawn_shapes
@@ -514,28 +516,59 @@ def test_runs_need_names_of_their_own(run: Run, experiment: Experiment, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError("disk full")])
+@pytest.mark.parametrize("through", ["pipe", "memory"])
 @pytest.mark.parametrize("old", [[], ["recording.rrd"]])
-def test_an_interrupted_write_leaves_no_half_file(
+def test_a_full_disk_leaves_no_half_file(
     run: Run,
     experiment: Experiment,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    error: BaseException,
+    through: str,
     old: list[str],
 ) -> None:
     for name in old:
         (tmp_path / name).write_text("old")
-
-    def half(path: Path, content: bytes) -> None:
-        with path.open("wb") as file:
-            file.write(content[: len(content) // 2])
-        raise error
-
-    monkeypatch.setattr(Path, "write_bytes", half)
-    with pytest.raises(type(error)):
-        write(tmp_path / "recording.rrd", experiment, [run])
+    if through == "memory":
+        monkeypatch.setattr(stream, "PIPES", "/nowhere")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5000, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            write(tmp_path / "recording.rrd", experiment, [run])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "old") for name in old]
+
+
+def test_a_pipe_and_memory_record_alike(
+    run: Run, experiment: Experiment, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stream, "PIPES", "/nowhere")
+    other = write(tmp_path / "other.rrd", experiment, [run])
+    assert rerun(tmp_path, "compare", path, other).returncode == 0
+
+
+def test_stretches_record_what_the_whole_does(
+    run: Run, experiment: Experiment, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(trajectory, "STRETCH", 33)
+    other = write(tmp_path / "other.rrd", experiment, [run])
+    assert rerun(tmp_path, "verify", other).returncode == 0
+    assert rows_by_entity(other) == rows_by_entity(path)
+
+
+def rows_by_entity(path: Path) -> dict[tuple[str, str], list[tuple]]:
+    """Entity and component -> (time, value), in order, but for the bounds, which are drawn from end to end."""
+    rows: dict[tuple[str, str], list[tuple]] = {}
+    for chunk in RrdReader(path).stream().filter(has_timeline="sim_time"):
+        batch = chunk.to_record_batch()
+        names = {"Scalars:scalars", "Transform3D:translation", "StateChange:state"} & set(batch.schema.names)
+        if chunk.entity_path.rpartition("/")[2] not in ("settle_band", "limit"):
+            times = batch.column("sim_time").cast("int64").to_pylist()
+            for name in names:
+                row = rows.setdefault((chunk.entity_path, name), [])
+                row += zip(times, batch.column(name).to_pylist(), strict=True)
+    return {key: sorted(row) for key, row in rows.items()}
 
 
 def test_an_interrupted_recording_leaves_nothing(

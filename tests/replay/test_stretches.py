@@ -1,0 +1,107 @@
+"""A long log, handled in stretches, is the log handled whole."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from cmg_mj.replay.log_replay import ReplayResult, replay_log
+from cmg_mj.replay.logs import ReadOptions, read_log
+from cmg_mj.replay.plot import liveliest_span, plot_replay
+from cmg_mj.replay.recording import write_replay
+from cmg_mj.replay.save import signals
+from cmg_mj.results.stored_columns import StoredColumns
+from cmg_mj.results.trajectory import Trajectory
+
+OBSERVERS = ["finite_difference", "linear_high_gain"]
+COLUMNS = {"time": "t_s", "tilt": "tilt_rad", "rate": "rate_rad_s", "acceleration": "acceleration_rad_s2"}
+N, DT, OMEGA = 1500, 0.005, 9.0
+
+
+def in_stretches(monkeypatch: pytest.MonkeyPatch, length: int) -> None:
+    """Take rows beyond so many for a long log, in every module that asks."""
+    for name, module in list(sys.modules.items()):
+        if name.startswith("cmg_mj.") and hasattr(module, "LONG"):
+            monkeypatch.setattr(module, "LONG", length)
+        if name.startswith("cmg_mj.") and hasattr(module, "STRETCH"):
+            monkeypatch.setattr(module, "STRETCH", length // 2)
+
+
+def log_file(folder: Path, kind: str) -> Path:
+    """Write a log with even rows; or uneven ones with missing numbers and two gaps."""
+    random = np.random.default_rng(1)
+    t = DT * np.arange(N)
+    if kind == "uneven":
+        t += random.uniform(-0.3, 0.3, N) * DT
+        t[400:] += 0.5
+        t[1100:] += 0.2
+    t = np.round(t, 6)
+    tilt = 0.1 * np.sin(OMEGA * t) + 0.03 * np.sin(2.3 * OMEGA * t) + 1e-4 * random.standard_normal(N)
+    rate = 0.1 * OMEGA * np.cos(OMEGA * (t - 0.01)) + 0.069 * OMEGA * np.cos(2.3 * OMEGA * (t - 0.01))
+    rows = np.stack([t, tilt, rate + 1e-3 * random.standard_normal(N), random.standard_normal(N)], axis=1)
+    text = [",".join(f"{value:.9g}" for value in row) for row in rows]
+    if kind == "uneven":
+        text[777] = text[777].replace(text[777].split(",")[1], "", 1)
+    path = folder / f"{kind}.csv"
+    path.write_text("\n".join([",".join(COLUMNS.values()), *text]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("kind", ["even", "uneven"])
+def test_stretches_give_what_the_whole_gives(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, options = log_file(tmp_path, kind), ReadOptions(columns=COLUMNS)
+    whole = replay_log(read_log(path, options), OBSERVERS, settle_s=0.1)
+    in_stretches(monkeypatch, 256)
+    long = replay_log(read_log(path, options), OBSERVERS, settle_s=0.1)
+    assert isinstance(long.log.columns, StoredColumns)
+    assert (long.log.parts, long.log.notes, long.log.dt) == (whole.log.parts, whole.log.notes, whole.log.dt)
+    assert len(long.log.parts) == (3 if kind == "uneven" else 1)
+    rtol, atol = (1e-9, 1e-11) if kind == "uneven" else (0.0, 0.0)  # splines: to rounding
+    for name, values in whole.log.columns.items():
+        np.testing.assert_allclose(long.log[name], values, rtol, atol, err_msg=name)
+    for kind_of, estimates in whole.estimates.items():
+        for name, values in estimates.items():
+            estimate = long.estimates[kind_of][name]
+            np.testing.assert_allclose(estimate, values, 1e2 * rtol, 1e3 * atol, err_msg=name)  # differences
+        assert long.summaries[kind_of] == pytest.approx(whole.summaries[kind_of], rel=1e-7)
+    assert long.alignment is not None
+    assert whole.alignment is not None
+    assert long.alignment._asdict() == pytest.approx(whole.alignment._asdict(), rel=1e-5, abs=1e-9)
+    assert liveliest_span(long) == pytest.approx(liveliest_span(whole), abs=2.0 * DT)
+    assert_saved_alike(long, whole, tmp_path)
+
+
+def assert_saved_alike(long: ReplayResult, whole: ReplayResult, folder: Path) -> None:
+    signals(long).save(folder / "long.parquet")
+    read = Trajectory.load(folder / "long.parquet")
+    assert list(read.columns) == list(signals(whole).columns)
+    for name, values in signals(long).columns.items():
+        np.testing.assert_array_equal(read[name], values)
+
+
+def test_a_long_log_is_drawn_and_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = log_file(tmp_path, "uneven")
+    in_stretches(monkeypatch, 256)
+    replayed = replay_log(read_log(path, ReadOptions(columns=COLUMNS)), OBSERVERS[:1], settle_s=0.1)
+    plot_replay(tmp_path / "plot.png", replayed)
+    assert (tmp_path / "plot.png").stat().st_size > 10000
+    write_replay(tmp_path / "recording.rrd", [replayed], ["log"], "")
+    batches = [
+        chunk.to_record_batch()
+        for chunk in RrdReader(tmp_path / "recording.rrd").stream().filter(has_timeline="time")
+        if chunk.entity_path.endswith("tilt/measured")
+    ]
+    rows = sorted(
+        row
+        for batch in batches
+        for row in zip(
+            batch.column("time").cast("int64").to_pylist(), batch.column("Scalars:scalars").to_pylist(), strict=True
+        )
+    )
+    _, expected = replayed.log.broken(np.degrees(replayed.log["y1_rad"]))
+    assert len(batches) == -(-len(replayed.log) // 256)
+    np.testing.assert_array_equal([value for _, (value,) in rows], expected)
