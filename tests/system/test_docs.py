@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import re
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -15,7 +16,8 @@ import pytest
 
 import cmg_mj
 from cmg_mj.observers import OBSERVERS
-from tests.command import ROOT, environment
+from cmg_mj.results.trajectory import Trajectory
+from tests.command import COMMAND, HANGS_AFTER_S, ROOT, environment
 from tests.observers import test_contract
 
 DOCS = ROOT / "docs"
@@ -92,3 +94,52 @@ def test_the_observer_of_contributing_is_one(tmp_path: Path, monkeypatch: pytest
     test_contract.test_step_has_no_memory_but_the_state(kind)
     test_contract.test_arrays_equal_floats_bit_by_bit(kind, 5)
     module("a_test_of_contributing", test, tmp_path).test_equals_the_continuous_observer()
+
+
+@pytest.mark.slow
+def test_the_field_of_contributing_is_one(tmp_path: Path) -> None:
+    """In a copy of the package: it runs, reruns, is switched off again, and the export refuses it."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    recipe = text.split("\n## Add a field of the scenario\n")[1].split("\n## ")[0]
+    field, use, effect = re.findall(r" *```python\n(.*?)```", recipe, flags=re.DOTALL)
+    for name in ("cmg_mj", "models", "scenarios"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+
+    def insert(file: str, block: str, before: str, indent: int) -> None:
+        path = tmp_path / "cmg_mj" / file
+        content = path.read_text(encoding="utf-8")
+        assert content.count(before) == 1, before
+        lines = textwrap.indent(textwrap.dedent(block), indent * " ")
+        path.write_text(content.replace(before, lines + before), encoding="utf-8")
+
+    insert("scenario/schema.py", field, "    feedback: Annotated[Feedback", 4)
+    insert("scenario/schema.py", use, "        return make_law(", 8)
+    (law_field,) = re.findall(r"`(dead_band_rad_s: float = 0\.0)`", recipe)
+    insert("controllers/laws/state_feedback.py", law_field + "\n", "\n    @property\n    def trim_gain", 4)
+    insert("controllers/laws/state_feedback.py", effect, "        if u is not demanded:", 8)
+
+    def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*COMMAND, *arguments],
+            cwd=tmp_path,
+            env=environment() | {"PYTHONPATH": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            timeout=HANGS_AFTER_S,
+            check=False,
+        )
+
+    def commands(folder: str, *arguments: str) -> list[float]:
+        run = command("run", *arguments, "--out", folder)
+        assert run.returncode == 0, run.stderr
+        return Trajectory.load(tmp_path / folder / "trajectory.parquet")["u_rad_s"].tolist()
+
+    short = ("push_recovery", "--set", "duration_s=0.5", "--set", "push=[]")
+    dead_band = ("--set", "controller.dead_band_rad_s=0.05")
+    without, with_it = commands("without", *short), commands("with", *short, *dead_band)
+    assert min(abs(u) for u in with_it if u) >= 0.05 > min(abs(u) for u in without if u)
+    assert commands("again", "with/scenario.toml") == with_it
+    assert commands("off", "with/scenario.toml", "--set", "controller.dead_band_rad_s=0.0") == without
+    export = command("export", "linear", *dead_band)
+    assert export.returncode == 2
+    assert "dead_band_rad_s" in export.stderr
