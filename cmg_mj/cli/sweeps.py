@@ -25,9 +25,9 @@ from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.results.summary_keys import SummaryValue
-    from cmg_mj.studies.sweeps.file import SweepFields
     from cmg_mj.studies.sweeps.report import SweepTables
     from cmg_mj.studies.sweeps.study import SweepStudy
+    from cmg_mj.studies.sweeps.study_file import SweepFields
 
 
 @click.command(short_help="Run a scenario with varied fields, observers and noise.")
@@ -138,8 +138,8 @@ def _study(
     """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
-    from cmg_mj.studies.sweeps.file import axes_of, design_of, scenario_of, study_file
     from cmg_mj.studies.sweeps.study import SweepStudy, sampling
+    from cmg_mj.studies.sweeps.study_file import axes_of, design_of, scenario_of, study_file
 
     design = sampling(sample, sobol)
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
