@@ -93,7 +93,8 @@ def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, *
     recovers from.
     """
     from cmg_mj.plant.mounting.request import MountRequest
-    from cmg_mj.studies.push_limits.mount_files import mount_and_write, mount_report_lines
+    from cmg_mj.studies.push_limits.mount_files import mount_and_write
+    from cmg_mj.studies.push_limits.mount_report import mount_report_lines
 
     result = mount_and_write(robot, MountRequest(**request), out, observer, overwrite=overwrite)
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cmg_mj.cli.arguments import RunArguments, claim_output, observers_option, run_options, worlds_option
+from cmg_mj.cli.progress_rate import ProgressRate, duration_text
 from cmg_mj.cli.terminal import (
     CtrlC,
-    ProgressRate,
-    duration_text,
     end_interrupted,
     note,
     progress,

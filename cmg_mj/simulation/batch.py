@@ -13,7 +13,8 @@ import numpy as np
 from cmg_mj.controllers.controller import PlantInterface
 from cmg_mj.controllers.laws import LAW_CLASSES, Law
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.inputs.field_types import Batched, NoEffect, marked_fields
+from cmg_mj.inputs.field_types import Batched, NoEffect
+from cmg_mj.inputs.marks import marked_fields
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
