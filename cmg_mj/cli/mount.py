@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
@@ -12,6 +12,23 @@ from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.plant.mounting.axes import AxisLike
+    from cmg_mj.plant.mounting.held_joints import Hold
+    from cmg_mj.plant.mounting.request import Base
+
+
+class MountOptions(TypedDict):
+    """The options that go to `MountRequest`, by click's names."""
+
+    body: str
+    axis: AxisLike
+    position: list[float] | None
+    modules: int
+    scale: float
+    name: str
+    keyframe: str | None
+    hold: Hold
+    release: tuple[str, ...]
+    base: Base
 
 
 def _hinge_or_direction(context: click.Context, option: click.Parameter, axis: str) -> AxisLike:
@@ -85,7 +102,7 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
 @with_json
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount.")
 @users_code()
-def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, **request: Any) -> None:
+def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, **options: Unpack[MountOptions]) -> None:
     """Mount control moment gyroscopes on a robot, and print the largest pushes it recovers from.
 
     Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario has the
@@ -96,7 +113,7 @@ def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, *
     from cmg_mj.studies.push_limits.mount_files import mount_and_write
     from cmg_mj.studies.push_limits.mount_report import mount_report_lines
 
-    result = mount_and_write(robot, MountRequest(**request), out, observer, overwrite=overwrite)
+    result = mount_and_write(robot, MountRequest(**options), out, observer, overwrite=overwrite)
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:
         note_hints(result.prospects.hints)
