@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
-from cmg_mj.cli.arguments import observer_option, with_json
+from cmg_mj.cli.arguments import json_option, observer_option
 from cmg_mj.cli.terminal import note, note_hints, show, users_code
 from cmg_mj.errors import InputError
 
@@ -99,7 +99,7 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     help="Replace the joints of the robot's root by a free joint.",
 )
 @observer_option(default="homogeneous")
-@with_json
+@json_option()
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount.")
 @users_code()
 def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, **options: Unpack[MountOptions]) -> None:
