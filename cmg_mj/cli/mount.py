@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
-from cmg_mj.cli.arguments import observer_option, with_json
+from cmg_mj.cli.arguments import json_option, observer_option
 from cmg_mj.cli.terminal import note, note_hints, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.plant.mounting.axes import AxisLike
+    from cmg_mj.plant.mounting.held_joints import Hold
+    from cmg_mj.plant.mounting.request import Base
+
+
+class MountOptions(TypedDict):
+    """The options that go to `MountRequest`, by click's names."""
+
+    body: str
+    axis: AxisLike
+    position: list[float] | None
+    modules: int
+    scale: float
+    name: str
+    keyframe: str | None
+    hold: Hold
+    release: tuple[str, ...]
+    base: Base
 
 
 def _hinge_or_direction(context: click.Context, option: click.Parameter, axis: str) -> AxisLike:
@@ -82,10 +99,10 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     help="Replace the joints of the robot's root by a free joint.",
 )
 @observer_option(default="homogeneous")
-@with_json
+@json_option()
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount.")
 @users_code()
-def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, **request: Any) -> None:
+def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, **options: Unpack[MountOptions]) -> None:
     """Mount control moment gyroscopes on a robot, and print the largest pushes it recovers from.
 
     Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario has the
@@ -93,9 +110,10 @@ def mount(robot: str, out: str, observer: str, as_json: bool, overwrite: bool, *
     recovers from.
     """
     from cmg_mj.plant.mounting.request import MountRequest
-    from cmg_mj.studies.push_limits.mount_files import mount_and_write, mount_report_lines
+    from cmg_mj.studies.push_limits.mount_files import mount_and_write
+    from cmg_mj.studies.push_limits.mount_report import mount_report_lines
 
-    result = mount_and_write(robot, MountRequest(**request), out, observer, overwrite=overwrite)
+    result = mount_and_write(robot, MountRequest(**options), out, observer, overwrite=overwrite)
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:
         note_hints(result.prospects.hints)

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
 from cmg_mj.cli.arguments import RunArguments, claim_output, observers_option, run_options, worlds_option
+from cmg_mj.cli.progress_rate import ProgressRate, duration_text
 from cmg_mj.cli.terminal import (
     CtrlC,
-    ProgressRate,
-    duration_text,
     end_interrupted,
     note,
     progress,
@@ -28,6 +27,17 @@ if TYPE_CHECKING:
     from cmg_mj.studies.sweeps.report import SweepTables
     from cmg_mj.studies.sweeps.study import SweepStudy
     from cmg_mj.studies.sweeps.study_file import SweepFields
+
+
+class StudyOptions(TypedDict):
+    """The options that make the study, by click's names."""
+
+    varied: tuple[str, ...]
+    observers: list[str] | None
+    worlds: int | None
+    sample: int | None
+    sobol: int | None
+    order: str | None
 
 
 @click.command(short_help="Run a scenario with varied fields, observers and noise.")
@@ -58,7 +68,9 @@ if TYPE_CHECKING:
 )
 @click.option("--yes", is_flag=True, help="Run the sweep even if it is very large.")
 @users_code()
-def sweep(arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool, **design: Any) -> None:
+def sweep(
+    arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool, **options: Unpack[StudyOptions]
+) -> None:
     """Run SCENARIO, or the study file of a sweep, in many worlds with every observer at every varied value.
 
     World i has the same noise for every observer and value. An interrupted sweep resumes when the same command runs
@@ -81,7 +93,7 @@ def sweep(arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool
         from cmg_mj.studies.sweeps.dask_cluster import local_workers
 
         local_workers(cluster)
-    study = _study(arguments, **design)
+    study = _study(arguments, **options)
     check_values(study)
     if dry_run:
         cost = estimate_cost(study)
