@@ -141,7 +141,7 @@ def _study(
     from cmg_mj.studies.sweeps.file import axes_of, design_of, scenario_of, study_file
     from cmg_mj.studies.sweeps.study import SweepStudy, sampling
 
-    design = sampling(sample, sobol)
+    design = sampling(sample, sobol, prefix="--")
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
     fields = study_file(arguments.name)
     settings: SweepFields = {}

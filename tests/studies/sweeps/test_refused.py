@@ -112,6 +112,7 @@ def test_a_design_that_there_is_not(options: list[str]) -> None:
         ({"worlds": True}, "worlds = true: must be"),
         ({"sample": 0}, "n = 0: must be a whole number of points"),
         ({"sample": -2}, "n = -2: must be"),
+        ({"sample": 2, "sobol": 2}, "sample and sobol: one of them"),
         ({"sobol": 0}, "--sobol 0: must be a power of two"),
         ({"sobol": 2.0}, "--sobol 2.0: must be a power of two"),
         ({"observers": [1]}, "observers: 1: must be an observer's name"),
