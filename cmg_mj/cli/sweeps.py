@@ -153,7 +153,7 @@ def _study(
     from cmg_mj.studies.sweeps.study import SweepStudy, sampling
     from cmg_mj.studies.sweeps.study_file import axes_of, design_of, scenario_of, study_file
 
-    design = sampling(sample, sobol)
+    design = sampling(sample, sobol, prefix="--")
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
     fields = study_file(arguments.name)
     settings: SweepFields = {}
@@ -168,8 +168,8 @@ def _study(
     names = observers or settings.get("observers", [scenario.observer.kind])
     expected = settings.get("order", []) if order is None else [name.strip() for name in order.split(",")]
     worlds_per_cell = worlds or settings.get("worlds", WORLDS)
-    design = design or design_of(arguments.name, settings)
-    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *design, tuple(expected))
+    file_design = design_of(arguments.name, settings)  # refused if wrong, also where an option replaces it
+    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *(design or file_design), tuple(expected))
 
 
 def _split(setting: str) -> tuple[str, str]:

@@ -107,7 +107,7 @@ class Experiment:
         Raises:
             InputError: The plant has several axes.
         """
-        part = self.require_single_axis("one controller")
+        part = self.require_single_axis("one controller" if processor is None else "a board or other processor")
         return part.design.controller(part.plant.interface, worlds=worlds, processor=processor, observer=observer)
 
     def of_axes(self, controllers: Sequence[Controller]) -> AnyController:
