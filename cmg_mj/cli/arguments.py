@@ -87,7 +87,7 @@ def run_options(command: Command) -> Command:
     ) -> None:
         command(RunArguments(scenario, settings, seed, out, as_json), **others)
 
-    return all_of(click.argument("scenario"), settings_option(), with_seed, with_out, with_json)(with_arguments)
+    return all_of(click.argument("scenario"), settings_option(), with_seed, with_new_out, with_json)(with_arguments)
 
 
 def all_of(*decorators: Decorator) -> Decorator:
@@ -164,6 +164,7 @@ def observers_option(otherwise: str = "", *, distinct: bool = True) -> Decorator
 
 with_seed = number_option("--seed", "Seed of the sensors' noise.", 2**128 - 1)
 with_out = click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: one in runs/]")
+with_new_out = click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: a new one in runs/]")
 with_json = click.option("--json", "as_json", is_flag=True, help="Print only the figures, as JSON, on standard output.")
 with_markdown = click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 

@@ -16,7 +16,7 @@ from cmg_mj.cli.arguments import (
     settings_option,
     with_json,
     with_markdown,
-    with_out,
+    with_new_out,
 )
 from cmg_mj.cli.terminal import CtrlC, end_interrupted, final_path, progress, say_written, show, users_code
 from cmg_mj.errors import InputError
@@ -144,7 +144,7 @@ def span(text: str, option: str) -> tuple[float, float]:
     metavar="SECONDS",
     help="Seconds to ignore at the start of each part of a log.  [default: 1; 0 for a run's recording]",
 )
-@with_out
+@with_new_out
 @with_markdown
 @with_json
 @users_code()
