@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from click.testing import CliRunner
 
 import cmg_mj
 from cmg_mj.observers import OBSERVERS
@@ -20,6 +21,7 @@ from cmg_mj.results.trajectory import Trajectory
 from tests.command import COMMAND, HANGS_AFTER_S, ROOT, environment
 from tests.observers import test_contract
 
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 REFERENCE = "\n".join(path.read_text(encoding="utf-8") for path in sorted((DOCS / "api").glob("*.md")))
@@ -80,8 +82,51 @@ def module(name: str, code: str, folder: Path) -> ModuleType:
     return module_object
 
 
+def recipe(title: str) -> str:
+    """A section of CONTRIBUTING."""
+    return CONTRIBUTING.split(f"\n## {title}\n")[1].split("\n## ")[0]
+
+
+def defines(path: str, name: str) -> bool:
+    """Return whether a file defines a function, class or variable, `Class.method` by its method."""
+    text, last = (ROOT / path).read_text(encoding="utf-8"), name.rpartition(".")[2]
+    return bool(re.search(rf"^ *(?:(?:def|class) {last}\b|{last}(?::.*)? = )", text, flags=re.MULTILINE))
+
+
+def names_in_files() -> list[tuple[str, str]]:
+    """Names that CONTRIBUTING says a file has: `name` (`file`), and the first one in `file`: ... in (of) `name`."""
+    path = r"`(cmg_mj/[\w/]+\.py)`"
+    beside = re.findall(rf"`([\w.]+)`\s+\({path}\)", CONTRIBUTING)
+    after = re.findall(rf"{path}:(?:[^.]|\.\d|\. Here)*? (?:in|of) `([\w.]+)`", CONTRIBUTING)
+    return [(file, name) for name, file in beside] + after
+
+
+@pytest.mark.parametrize(("file", "name"), names_in_files())
+def test_a_name_of_contributing_is_in_its_file(file: str, name: str) -> None:
+    assert defines(file, name)
+
+
+def test_names_of_contributing_were_read() -> None:
+    files = {file.rpartition("/")[2] for file, _ in names_in_files()}
+    assert files >= {"design.py", "controller.py", "registry.py", "metrics.py", "summary_keys.py", "variations.py"}
+
+
+def test_the_options_of_contributing_are_there() -> None:
+    text = recipe("Add a command").split("`cmg_mj/cli/arguments.py`: ")[1].split("Output and Ctrl-C")[0]
+    names = set(re.findall(r"`(\w+)(?:\([.]*\))?`", text))
+    assert names >= {"with_json", "settings_option", "number_option", "run_options"}
+    assert [name for name in names if not defines("cmg_mj/cli/arguments.py", name)] == []
+
+
+def test_the_command_of_contributing_is_one(tmp_path: Path) -> None:
+    (code,) = re.findall(r" *```python\n(.*?)```", recipe("Add a command"), flags=re.DOTALL)
+    command = module("a_command_of_contributing", textwrap.dedent(code), tmp_path).poles
+    outcome = CliRunner().invoke(command, ["push_recovery"])
+    assert re.fullmatch(r"tilt: \d\.\d\d 1/s\n", outcome.output), outcome
+
+
 def test_the_observer_of_contributing_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split("\n## Add an observer\n")[1].split("\n## ")[0]
+    text = recipe("Add an observer")
     observer, test = (textwrap.dedent(block) for block in re.findall(r" *```python\n(.*?)```", text, flags=re.DOTALL))
     kind, path = re.findall(r'`"(\w+)": "([\w.:]+)",`', text)[0]
     home, _, name = path.partition(":")
