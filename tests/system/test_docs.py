@@ -114,7 +114,7 @@ def test_names_of_contributing_were_read() -> None:
 def test_the_options_of_contributing_are_there() -> None:
     text = recipe("Add a command").split("`cmg_mj/cli/arguments.py`: ")[1].split("Output and Ctrl-C")[0]
     names = set(re.findall(r"`(\w+)(?:\([.]*\))?`", text))
-    assert names >= {"with_json", "settings_option", "number_option", "run_options"}
+    assert names >= {"json_option", "settings_option", "number_option", "run_options"}
     assert [name for name in names if not defines("cmg_mj/cli/arguments.py", name)] == []
 
 
