@@ -90,9 +90,7 @@ def run_options(command: Command) -> Command:
     ) -> None:
         command(RunArguments(scenario, settings, seed, out, as_json), **others)
 
-    options = all_of(
-        click.argument("scenario"), settings_option(), seed_option(), out_option("a new one in runs/"), json_option()
-    )
+    options = all_of(click.argument("scenario"), settings_option(), seed_option(), out_option(), json_option())
     return options(with_arguments)
 
 
@@ -173,9 +171,9 @@ def seed_option() -> Decorator:
     return number_option("--seed", "Seed of the sensors' noise.", 2**128 - 1)
 
 
-def out_option(default: str = "one in runs/") -> Decorator:
-    """Make the option `--out`, whose help names the default."""
-    return click.option("--out", metavar="FOLDER", help=f"Folder to write to.  [default: {default}]")
+def out_option() -> Decorator:
+    """Make the option `--out`."""
+    return click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: a folder in runs/]")
 
 
 def json_option() -> Decorator:

@@ -153,7 +153,7 @@ def span(text: str, option: str) -> tuple[float, float]:
     metavar="SECONDS",
     help="Seconds to ignore at the start of each part of a log.  [default: 1; 0 for a run's recording]",
 )
-@out_option("a new one in runs/")
+@out_option()
 @markdown_option()
 @json_option()
 @users_code()
