@@ -101,9 +101,6 @@ class Experiment:
             processor: Takes the decisions in the host's place.
             observer: Instead of the scenario's.
 
-        Returns:
-            The controller.
-
         Raises:
             InputError: The plant has several axes.
         """
