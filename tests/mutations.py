@@ -4,7 +4,7 @@ Each parameter of the law, the observers and the reduced model is multiplied by 
 and the tests are run until the first failure: those of the daily tier, and if none of them fails the slow ones. Each
 line that tests/papers/mutants.py changes in the papers' reports must be caught by the test named there.
 
-    python tests/mutations.py              # about twenty minutes on two cores
+    python tests/mutations.py              # half an hour on two cores
     python tests/mutations.py adaptive     # only the parameters with this in their names, printed and not written
     python tests/mutations.py papers       # only the reports, printed and not written
     python tests/mutations.py papers gap   # of these only the ones with this in what is wrong
