@@ -17,8 +17,8 @@ from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
 from cmg_mj.errors import InputError, RunStopped
 
 OBJECTS_A_COLLECTION = 50_000
-"""New objects after which Python looks for cycles. Its default of 700 costs a short run a twentieth of its time, since
-imports make many objects and few cycles."""
+"""New objects after which Python looks for cycles. Imports make many objects and few cycles: Python's default of 700
+makes a short run slower."""
 ExitStatus = str | int | None
 """As `sys.exit` takes it."""
 HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, realistic sensors, velocity observers.

@@ -93,7 +93,7 @@ def sweep(
         from cmg_mj.studies.sweeps.dask_cluster import local_workers
 
         local_workers(cluster)
-    study = _study(arguments, **options)
+    study = _study(arguments, options)
     check_values(study)
     if dry_run:
         cost = estimate_cost(study)
@@ -138,23 +138,15 @@ def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
             yield connected.run
 
 
-def _study(
-    arguments: RunArguments,
-    varied: tuple[str, ...],
-    observers: list[str] | None,
-    worlds: int | None,
-    sample: int | None,
-    sobol: int | None,
-    order: str | None,
-) -> SweepStudy:
+def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
     from cmg_mj.studies.sweeps.study import SweepStudy, sampling
     from cmg_mj.studies.sweeps.study_file import axes_of, design_of, scenario_of, study_file
 
-    design = sampling(sample, sobol, prefix="--")
-    axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
+    design = sampling(options["sample"], options["sobol"], prefix="--")
+    axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in options["varied"]]
     fields = study_file(arguments.name)
     settings: SweepFields = {}
     if fields is None:
@@ -165,9 +157,10 @@ def _study(
             scenario = scenario.model_copy(update={"seed": arguments.seed})
         settings = fields.get("sweep", {})
         axes = axes or axes_of(arguments.name, fields)
-    names = observers or settings.get("observers", [scenario.observer.kind])
+    order = options["order"]
+    names = options["observers"] or settings.get("observers", [scenario.observer.kind])
     expected = settings.get("order", []) if order is None else [name.strip() for name in order.split(",")]
-    worlds_per_cell = worlds or settings.get("worlds", WORLDS)
+    worlds_per_cell = options["worlds"] or settings.get("worlds", WORLDS)
     file_design = design_of(arguments.name, settings)  # refused if wrong, also where an option replaces it
     return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *(design or file_design), tuple(expected))
 
