@@ -25,6 +25,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from tests.command import HANGS_AFTER_S
 from tests.tiers import tier
 
 REFERENCE_S = 0.0125
@@ -89,14 +90,32 @@ ALONE = "CMG_MJ_ALONE"
 """Set in the environment of the second try, which is the last."""
 
 
-def within_limit_alone(item: pytest.Item, limit: float) -> bool:
-    """Run a test that was over the limit again, in a process of its own; it is not over it there."""
-    if ALONE in os.environ:
-        return False
+OVER = "of processor time with its set-up and its children"
+"""Part of the message that a test is over the limit."""
+
+
+def failure_alone(item: pytest.Item, limit: float) -> str:
+    """Run a test that was over the limit again, in a process of its own; return how it failed there, or nothing."""
     command = [sys.executable, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", f"--cpu-limit={limit}", item.nodeid]
     environment = {**os.environ, ALONE: "1", "PYTEST_ADDOPTS": ""}
     environment.pop("PYTEST_XDIST_WORKER", None)
-    return subprocess.run(command, cwd=item.config.rootpath, env=environment, capture_output=True).returncode == 0
+    try:
+        process = subprocess.run(
+            command,
+            cwd=item.config.rootpath,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=HANGS_AFTER_S,
+        )
+    except subprocess.TimeoutExpired:
+        return f"in a process of its own it has not ended after {HANGS_AFTER_S:g} s"
+    if process.returncode == 0:
+        return ""
+    is_over = OVER in process.stdout and "\nFAILED " not in process.stdout
+    reason = "is over the limit again" if is_over else f"fails otherwise, with exit status {process.returncode}"
+    return f"in a process of its own it {reason}:\n{process.stdout[-2000:]}"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -142,11 +161,15 @@ class CpuLimit:
             used = processor_seconds() - self.start
             if used > self.limit:
                 slower = slowness()
-                if used > self.limit * slower and not within_limit_alone(item, self.limit):
+                if used <= self.limit * slower:
+                    return report
+                is_last = ALONE in os.environ
+                failure = "" if is_last else failure_alone(item, self.limit)
+                if is_last or failure:
                     report.outcome = "failed"
                     report.longrepr = (
-                        f"{item.nodeid}: {used:.2f} s of processor time with its set-up and its children, on a machine "
+                        f"{item.nodeid}: {used:.2f} s {OVER}, on a machine "
                         f"{slower:.2f} times slower than the reference's; a test without the mark `slow` may take "
-                        f"{self.limit:g} s: shorten it, share what it makes, or mark it"
+                        f"{self.limit:g} s: shorten it, share what it makes, or mark it\n{failure}"
                     )
         return report

@@ -4,7 +4,7 @@ Each parameter of the law, the observers and the reduced model is multiplied by 
 and the tests are run until the first failure: those of the daily tier, and if none of them fails the slow ones. Each
 line that tests/papers/mutants.py changes in the papers' reports must be caught by the test named there.
 
-    python tests/mutations.py              # about twenty minutes on two cores
+    python tests/mutations.py              # half an hour on two cores
     python tests/mutations.py adaptive     # only the parameters with this in their names, printed and not written
     python tests/mutations.py papers       # only the reports, printed and not written
     python tests/mutations.py papers gap   # of these only the ones with this in what is wrong
@@ -201,22 +201,22 @@ REPORTS_SAY = (
 )
 
 
-def parameter_table(pool: ThreadPoolExecutor, wanted: str) -> tuple[str, list[str]]:
+def parameter_table(pool: ThreadPoolExecutor, part: str) -> tuple[str, list[str]]:
     """The table of parameters, and those that no test caught and that matter."""
-    chosen = [name for name in parameters() if wanted in name]
-    found = {(p, f): pool.submit(caught_by, p, f) for p in chosen for f in FACTORS}
-    rows = [f"| `{p}` | " + " | ".join(found[p, f].result() for f in FACTORS) + " |" for p in chosen]
-    dashes = [(p, f) for (p, f), future in found.items() if future.result() == "-"]
+    chosen = [name for name in parameters() if part in name]
+    futures = {(p, f): pool.submit(caught_by, p, f) for p in chosen for f in FACTORS}
+    rows = [f"| `{p}` | " + " | ".join(futures[p, f].result() for f in FACTORS) + " |" for p in chosen]
+    dashes = [(p, f) for (p, f), future in futures.items() if future.result() == "-"]
     survived = [f"{p} times {f}" for p, f in dashes if p not in HARDLY_MATTER]
     return "\n".join(["| parameter | times 0.8 | times 1.2 |", "|---|---|---|", *rows]), survived
 
 
-def report_table(pool: ThreadPoolExecutor, wanted: str) -> tuple[str, list[str]]:
+def report_table(pool: ThreadPoolExecutor, part: str) -> tuple[str, list[str]]:
     """The table of wrong reports, and those that no test caught."""
-    tried = [mutant for mutant in MUTANTS if wanted in mutant.wrong]
-    found = [pool.submit(report_caught_by, mutant) for mutant in tried]
-    rows = [f"| {m.wrong} | `{m.file}` | {future.result()} |" for m, future in zip(tried, found, strict=True)]
-    survived = [m.wrong for m, future in zip(tried, found, strict=True) if future.result() == "-"]
+    tried = [mutant for mutant in MUTANTS if part in mutant.wrong]
+    futures = [pool.submit(report_caught_by, mutant) for mutant in tried]
+    rows = [f"| {m.wrong} | `{m.file}` | {future.result()} |" for m, future in zip(tried, futures, strict=True)]
+    survived = [m.wrong for m, future in zip(tried, futures, strict=True) if future.result() == "-"]
     return "\n".join(["| what is wrong | where, in cmg_mj/papers | caught by |", "|---|---|---|", *rows]), survived
 
 
@@ -226,16 +226,16 @@ def main() -> None:
         for name in parameters():
             mutated(name, FACTORS[0])
         return
-    wanted = sys.argv[1] if len(sys.argv) > 1 else ""
+    selection = sys.argv[1] if len(sys.argv) > 1 else ""
     parts, survivors = ["# Which test catches what", "Written by `python tests/mutations.py`."], []
     with ThreadPoolExecutor(2) as pool:
-        if wanted != "papers":
+        if selection != "papers":
             if (failed := caught_by(MUTATIONS[0].parameter, 1.0)) != "-":
                 sys.exit(f"{failed} fails without any mutation: mend that first")
-            table, survived = parameter_table(pool, wanted)
+            table, survived = parameter_table(pool, selection)
             parts += ["## Wrong parameters", PARAMETERS_SAY, table]
             survivors += survived
-        if wanted in ("", "papers"):
+        if selection in ("", "papers"):
             part = sys.argv[2] if len(sys.argv) > 2 else ""
             whole = sorted({mutants.TESTS + mutant.test for mutant in MUTANTS if part in mutant.wrong})
             if (failed := first_failure(lambda copy: None, whole, "papers")) != "-":
@@ -244,7 +244,7 @@ def main() -> None:
             parts += ["## Wrong reports", REPORTS_SAY, table]
             survivors += survived
     text = "\n\n".join(parts) + "\n"
-    if not wanted:
+    if not selection:
         (ROOT / "docs" / "mutations.md").write_text(text, encoding="utf-8")
     print(text)
     if survivors:

@@ -159,6 +159,26 @@ def test_a_test_that_is_over_the_limit_has_a_second_try(
     toy.makepyfile(test_c=f"from pathlib import Path\n{BURN}def test_it():\n    {code}\n    Path('first').touch()\n")
     result = toy.runpytest_inprocess("--cpu-limit=0.8", "test_c.py::test_it")
     result.assert_outcomes(passed=1, errors=int(always))
+    assert ("it is over the limit again:" in result.stdout.str()) == always
+
+
+@pytest.mark.slow
+def test_a_second_try_that_fails_otherwise_says_so(toy: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(cpu_limit.ALONE)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    toy.makeconftest("pytest_plugins = ['tests.tiers', 'tests.cpu_limit']")
+    code = "assert not Path('first').exists(), 'another reason'"
+    toy.makepyfile(
+        test_c=f"from pathlib import Path\n{BURN}def test_it():\n    {code}\n    burn()\n    Path('first').touch()\n"
+    )
+    result = toy.runpytest_inprocess("--cpu-limit=0.01", "test_c.py::test_it")
+    result.assert_outcomes(passed=1, errors=1)
+    result.stdout.fnmatch_lines(["*it fails otherwise, with exit status 1:*", "*another reason*"])
+
+
+def test_a_second_try_that_hangs_is_given_up(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cpu_limit, "HANGS_AFTER_S", 0.01)
+    assert cpu_limit.failure_alone(request.node, 1.0) == "in a process of its own it has not ended after 0.01 s"
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import os
 import sys
@@ -15,6 +16,9 @@ from cmg_mj.cli import bench, boards, logs, mount, reproduce, scenarios, studio,
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
 from cmg_mj.errors import InputError, RunStopped, raised
 
+OBJECTS_A_COLLECTION = 50_000
+"""New objects after which Python looks for cycles. Imports make many objects and few cycles: Python's default of 700
+makes a short run slower."""
 ExitStatus = str | int | None
 """As `sys.exit` takes it."""
 HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, realistic sensors, velocity observers.
@@ -97,6 +101,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if "" not in sys.path:
         sys.path.append("")  # a user's own observer in the current folder; last, so that it can hide nothing
     status: ExitStatus = DONE
+    thresholds = gc.get_threshold()
+    gc.set_threshold(OBJECTS_A_COLLECTION)
     try:
         status = _status(sys.argv[1:] if arguments is None else arguments)
         for stream in (sys.stdout, sys.stderr):
@@ -105,6 +111,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not isinstance(error, BrokenPipeError):  # the reader, such as head, has had enough
             status = WRONG_INPUT
         _detach_streams(error)
+    finally:
+        gc.set_threshold(*thresholds)
     if status != DONE:
         sys.exit(status)
 

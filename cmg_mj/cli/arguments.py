@@ -1,4 +1,7 @@
-"""Arguments that several commands take, and their checks."""
+"""Arguments that several commands take, and their checks.
+
+`@..._option()` adds one option to a command, `@..._options` several.
+"""
 
 from __future__ import annotations
 
@@ -67,7 +70,7 @@ class RunArguments:
             *([f"world{world}"] if world else []),
         )
         name = "-".join(parts) + folder_suffix(experiment.differences)
-        return claim_output(self.out, name, names, experiment.as_toml(driver, world))
+        return claim_output(self.out, name, names, request_toml=experiment.as_toml(driver, world))
 
 
 def _as_utf8(argument: str) -> str:
@@ -87,7 +90,8 @@ def run_options(command: Command) -> Command:
     ) -> None:
         command(RunArguments(scenario, settings, seed, out, as_json), **others)
 
-    return all_of(click.argument("scenario"), settings_option(), with_seed, with_out, with_json)(with_arguments)
+    options = all_of(click.argument("scenario"), settings_option(), seed_option(), out_option(), json_option())
+    return options(with_arguments)
 
 
 def all_of(*decorators: Decorator) -> Decorator:
@@ -162,21 +166,42 @@ def observers_option(otherwise: str = "", *, distinct: bool = True) -> Decorator
     )
 
 
-with_seed = number_option("--seed", "Seed of the sensors' noise.", 2**128 - 1)
-with_out = click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: one in runs/]")
-with_json = click.option("--json", "as_json", is_flag=True, help="Print only the figures, as JSON, on standard output.")
-with_markdown = click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
+def seed_option() -> Decorator:
+    """Make the option `--seed`."""
+    return number_option("--seed", "Seed of the sensors' noise.", 2**128 - 1)
 
 
-def claim_output(out: str | None, default: str, names: Sequence[str], *request: str) -> RunFolder:
+def out_option() -> Decorator:
+    """Make the option `--out`."""
+    return click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: a folder in runs/]")
+
+
+def json_option() -> Decorator:
+    """Make the option `--json`, which a command takes as `as_json`."""
+    return click.option("--json", "as_json", is_flag=True, help="Print only the figures, as JSON, on standard output.")
+
+
+def markdown_option() -> Decorator:
+    """Make the option `--markdown`."""
+    return click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
+
+
+def claim_output(
+    out: str | None,
+    default: str,
+    names: Sequence[str],
+    *,
+    request_toml: str | None = None,
+    request_file: str = "scenario.toml",
+) -> RunFolder:
     """Claim the folder that `--out` names, or by default one in runs/, until the command is done.
 
     Args:
         out: `--out`.
         default: Name of the folder in runs/.
         names: The files that the command may write.
-        request: TOML of the request, and the file that holds it. With them a folder in runs/ that another request has
-            written is not taken.
+        request_toml: The request as TOML. With it a folder in runs/ that another request has written is not taken.
+        request_file: The file that holds the request.
 
     Returns:
         The folder, to which no other command may write; a new one without files is removed in the end.
@@ -185,8 +210,8 @@ def claim_output(out: str | None, default: str, names: Sequence[str], *request: 
 
     if out == "":
         raise InputError("--out '': name a folder, . for the current one")
-    if out is None and request:
-        folder = unused_folder(Path("runs"), default, names, *request)
+    if out is None and request_toml is not None:
+        folder = unused_folder(Path("runs"), default, names, request_toml, request_file)
     else:
         folder = RunFolder(Path("runs") / default if out is None else Path(out), names)
     click.get_current_context().call_on_close(folder.release)

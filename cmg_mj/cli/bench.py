@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from cmg_mj.cli.arguments import observers_option, with_json, with_markdown, worlds_option
+from cmg_mj.cli.arguments import json_option, markdown_option, observers_option, worlds_option
 from cmg_mj.cli.terminal import progress, show, users_code
 from cmg_mj.errors import InputError
 
@@ -25,7 +25,7 @@ def bench(context: click.Context) -> None:
 @bench.command(short_help="Time the closed loop against bare MuJoCo.")
 @observers_option()
 @worlds_option("Worlds of the batch.", default=256)
-@with_json
+@json_option()
 @users_code()
 def loop(observers: list[str], worlds: int, as_json: bool) -> None:
     """Time the closed loop against bare MuJoCo doing the same physics, and an update of each observer."""
@@ -38,8 +38,8 @@ def loop(observers: list[str], worlds: int, as_json: bool) -> None:
 
 @bench.command(short_help="Count an update's instructions and memory on an emulated Cortex-M7.")
 @observers_option()
-@with_markdown
-@with_json
+@markdown_option()
+@json_option()
 @users_code()
 def board(observers: list[str], markdown: bool, as_json: bool) -> None:
     """Count the instructions, stack, memory and flash of an update as C on the papers' processor, a Cortex-M7."""
@@ -54,7 +54,7 @@ def board(observers: list[str], markdown: bool, as_json: bool) -> None:
 @bench.command(short_help="Time the trials of sweeps against MuJoCo's batch.")
 @observers_option()
 @worlds_option("Worlds that run together.", default=512)
-@with_json
+@json_option()
 @users_code()
 def sweep(observers: list[str], worlds: int, as_json: bool) -> None:
     """Time the trials of sweeps: processor time of a whole trial against that of MuJoCo's batch alone."""

@@ -6,13 +6,13 @@ from typing import Literal
 
 import click
 
-from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, settings_option, with_json, with_out
+from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
 from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
 
 
 @click.command(short_help="Write an observer and the control law around it as C code.")
 @click.argument("observer", callback=lambda context, parameter, name: check_observer("OBSERVER", name))
-@with_out
+@out_option()
 @click.option(
     "--precision",
     type=click.Choice(["double", "single"]),
@@ -29,7 +29,7 @@ from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
     help="Scenario that gives the plant, the gains and the rates.",
 )
 @settings_option("Set a field of the scenario, such as observer.k1=25 or controller.rate_hz=400.")
-@with_json
+@json_option()
 @users_code()
 def export(
     observer: str,

@@ -10,13 +10,14 @@ import click
 
 from cmg_mj.cli.arguments import (
     Command,
+    Decorator,
     all_of,
     claim_output,
+    json_option,
+    markdown_option,
     observers_option,
+    out_option,
     settings_option,
-    with_json,
-    with_markdown,
-    with_out,
 )
 from cmg_mj.cli.terminal import CtrlC, end_interrupted, final_path, progress, say_written, show, users_code
 from cmg_mj.errors import InputError
@@ -25,7 +26,7 @@ from cmg_mj.results.summary_keys import finite
 if TYPE_CHECKING:
     from cmg_mj.replay.logs import ReadOptions
 
-LOG_OPTIONS = all_of(
+_LOG_OPTIONS = all_of(
     click.option(
         "--columns",
         multiple=True,
@@ -47,22 +48,30 @@ LOG_OPTIONS = all_of(
     click.option("--radii", metavar="INNER,OUTER", help="Distances of two accelerometers from the pivot [m]."),
     click.option("--time-range", metavar="START:END", help="Read only this part, in seconds from the first row on."),
 )
-with_pendulum = click.option(
-    "--model",
-    metavar="MJCF|NUMBERS",
-    help="Your pendulum: an MJCF file, or inertia=,gravity_torque= [kg m^2, N m], with gimbals also momentum=,"
-    "gimbal_inertia= [N m s, kg m^2].",
-)
-with_noise = click.option(
-    "--noise",
-    default="",
-    metavar="NAME=VALUE,...",
-    help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of one "
-    "sample.  [default: accelerometer=400, or tilt=0.1,acceleration=1]",
-)
 
 
-def takes_log_options(command: Command) -> Command:
+def pendulum_option() -> Decorator:
+    """Make the option `--model`, the pendulum of logs."""
+    return click.option(
+        "--model",
+        metavar="MJCF|NUMBERS",
+        help="Your pendulum: an MJCF file, or inertia=,gravity_torque= [kg m^2, N m], with gimbals also momentum=,"
+        "gimbal_inertia= [N m s, kg m^2].",
+    )
+
+
+def noise_option() -> Decorator:
+    """Make the option `--noise`, the sensor noise of logs."""
+    return click.option(
+        "--noise",
+        default="",
+        metavar="NAME=VALUE,...",
+        help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of "
+        "one sample.  [default: accelerometer=400, or tilt=0.1,acceleration=1]",
+    )
+
+
+def log_options(command: Command) -> Command:
     """Add the options of every command that reads logs, which it takes as one `ReadOptions`."""
 
     @functools.wraps(command)
@@ -98,7 +107,7 @@ def takes_log_options(command: Command) -> Command:
         )
         command(options=options, **others)
 
-    return LOG_OPTIONS(with_options)
+    return _LOG_OPTIONS(with_options)
 
 
 def _numbers(texts: dict[str, str], option: str) -> dict[str, float]:
@@ -132,21 +141,21 @@ def span(text: str, option: str) -> tuple[float, float]:
 
 @click.command(short_help="Replay your own log through every observer.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
-@takes_log_options
+@log_options
 @click.option("--window", "windows", multiple=True, metavar="START:END", help="Also score this part separately [s].")
-@with_pendulum
+@pendulum_option()
 @observers_option()
 @settings_option("Set an observer's parameter.", "OBSERVER.NAME=VALUE")
-@with_noise
+@noise_option()
 @click.option(
     "--settle-s",
     type=float,
     metavar="SECONDS",
     help="Seconds to ignore at the start of each part of a log.  [default: 1; 0 for a run's recording]",
 )
-@with_out
-@with_markdown
-@with_json
+@out_option()
+@markdown_option()
+@json_option()
 @users_code()
 def replay(
     options: ReadOptions,
@@ -182,7 +191,9 @@ def replay(
 
     options = replace(options, windows_s=tuple(span(text, "--window") for text in windows))
     replays = LogReplays(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)
-    folder = claim_output(out, replays.folder_name, replays.files, replays.as_toml(), SETTINGS)
+    folder = claim_output(
+        out, replays.folder_name, replays.files, request_toml=replays.as_toml(), request_file=SETTINGS
+    )
     total = len(replays.logs)
     with CtrlC() as ctrl_c:
         try:

@@ -3,16 +3,33 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
-from cmg_mj.cli.arguments import observer_option, with_json
+from cmg_mj.cli.arguments import json_option, observer_option
 from cmg_mj.cli.terminal import CtrlC, note, note_hints, progress, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.plant.mounting.axes import AxisLike
+    from cmg_mj.plant.mounting.held_joints import Hold
+    from cmg_mj.plant.mounting.request import Base
+
+
+class MountOptions(TypedDict):
+    """The options that go to `MountRequest`, by click's names."""
+
+    body: str
+    axis: AxisLike
+    position: list[float] | None
+    modules: int
+    scale: float
+    name: str
+    keyframe: str | None
+    hold: Hold
+    release: tuple[str, ...]
+    base: Base
 
 
 def _hinge_or_direction(context: click.Context, option: click.Parameter, axis: str) -> AxisLike:
@@ -84,10 +101,18 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
 )
 @observer_option(default="gyro_free")
 @click.option("--quick", is_flag=True, help="Print E of the reduced model, and try nothing in MuJoCo (up to a minute).")
-@with_json
+@json_option()
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount; not what has changed since.")
 @users_code()
-def mount(robot: str, out: str, observer: str, quick: bool, as_json: bool, overwrite: bool, **request: Any) -> None:
+def mount(
+    robot: str,
+    out: str,
+    observer: str,
+    quick: bool,
+    as_json: bool,
+    overwrite: bool,
+    **options: Unpack[MountOptions],
+) -> None:
     """Mount control moment gyroscopes on a robot, and print the largest push it stands.
 
     Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario has the
@@ -102,7 +127,7 @@ def mount(robot: str, out: str, observer: str, quick: bool, as_json: bool, overw
     with CtrlC() as ctrl_c, nullcontext() if quick else progress("no push", LONGEST_S, ctrl_c) as on_progress:
         time_limit = None if quick else TimeLimit(on_progress=on_progress)
         result = mount_and_write(
-            robot, MountRequest(**request), out, observer, overwrite=overwrite, time_limit=time_limit
+            robot, MountRequest(**options), out, observer, overwrite=overwrite, time_limit=time_limit
         )
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:

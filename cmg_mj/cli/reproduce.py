@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import click
 
-from cmg_mj.cli.arguments import claim_output, with_json, with_out
+from cmg_mj.cli.arguments import claim_output, json_option, out_option
 from cmg_mj.cli.terminal import CtrlC, end_interrupted, final_path, progress, say_written, show
 from cmg_mj.errors import InputError, nearest
 
 
 @click.command(short_help="Reproduce the four papers, claim by claim, with verdicts.")
 @click.argument("paper")
-@with_out
-@with_json
+@out_option()
+@json_option()
 def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     """Reproduce PAPER (aranovskiy2020, sokolov2019, dao2023, andrieu2009), or all of them.
 

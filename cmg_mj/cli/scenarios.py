@@ -12,11 +12,11 @@ import click
 from cmg_mj.cli.arguments import (
     RunArguments,
     check_observer,
+    markdown_option,
     number_option,
     observer_option,
     observers_option,
     run_options,
-    with_markdown,
     worlds_option,
 )
 from cmg_mj.cli.live import live_options, live_run
@@ -126,7 +126,7 @@ def run(
     "Worlds of each observer, each with its own noise, which is the same for all observers.  "
     "[default: the scenario's [compare], or 20]"
 )
-@with_markdown
+@markdown_option()
 @click.option("--plot", is_flag=True, help="Also write plot.png with the figures of all worlds.")
 @users_code()
 def compare(

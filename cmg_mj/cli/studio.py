@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import RunArguments, observer_option, settings_option, with_seed
+from cmg_mj.cli.arguments import RunArguments, observer_option, seed_option, settings_option
 from cmg_mj.cli.terminal import note_hints, users_code
 from cmg_mj.errors import InputError
 
@@ -21,7 +21,7 @@ VIEWERS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_softw
 @click.argument("scenario")
 @observer_option()
 @settings_option()
-@with_seed
+@seed_option()
 @click.option(
     "--viewer",
     type=click.Choice(VIEWERS),

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
 from cmg_mj.cli.arguments import RunArguments, claim_output, observers_option, run_options, worlds_option
+from cmg_mj.cli.progress_rate import ProgressRate, duration_text
 from cmg_mj.cli.terminal import (
     CtrlC,
-    ProgressRate,
-    duration_text,
     end_interrupted,
     note,
     progress,
@@ -25,9 +24,20 @@ from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.results.summary_keys import SummaryValue
-    from cmg_mj.studies.sweeps.file import SweepFields
     from cmg_mj.studies.sweeps.report import SweepTables
     from cmg_mj.studies.sweeps.study import SweepStudy
+    from cmg_mj.studies.sweeps.study_file import SweepFields
+
+
+class StudyOptions(TypedDict):
+    """The options that make the study, by click's names."""
+
+    varied: tuple[str, ...]
+    observers: list[str] | None
+    worlds: int | None
+    sample: int | None
+    sobol: int | None
+    order: str | None
 
 
 @click.command(short_help="Run a scenario with varied fields, observers and noise.")
@@ -58,7 +68,9 @@ if TYPE_CHECKING:
 )
 @click.option("--yes", is_flag=True, help="Run the sweep even if it is very large.")
 @users_code()
-def sweep(arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool, **design: Any) -> None:
+def sweep(
+    arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool, **options: Unpack[StudyOptions]
+) -> None:
     """Run SCENARIO, or the study file of a sweep, in many worlds with every observer at every varied value.
 
     World i has the same noise for every observer and value. An interrupted sweep resumes when the same command runs
@@ -81,7 +93,7 @@ def sweep(arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool
         from cmg_mj.studies.sweeps.dask_cluster import local_workers
 
         local_workers(cluster)
-    study = _study(arguments, **design)
+    study = _study(arguments, options)
     check_values(study)
     if dry_run:
         cost = estimate_cost(study)
@@ -126,23 +138,15 @@ def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
             yield connected.run
 
 
-def _study(
-    arguments: RunArguments,
-    varied: tuple[str, ...],
-    observers: list[str] | None,
-    worlds: int | None,
-    sample: int | None,
-    sobol: int | None,
-    order: str | None,
-) -> SweepStudy:
+def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
-    from cmg_mj.studies.sweeps.file import axes_of, design_of, scenario_of, study_file
     from cmg_mj.studies.sweeps.study import SweepStudy, sampling
+    from cmg_mj.studies.sweeps.study_file import axes_of, design_of, scenario_of, study_file
 
-    design = sampling(sample, sobol)
-    axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in varied]
+    design = sampling(options["sample"], options["sobol"], prefix="--")
+    axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in options["varied"]]
     fields = study_file(arguments.name)
     settings: SweepFields = {}
     if fields is None:
@@ -153,11 +157,12 @@ def _study(
             scenario = scenario.model_copy(update={"seed": arguments.seed})
         settings = fields.get("sweep", {})
         axes = axes or axes_of(arguments.name, fields)
-    names = observers or settings.get("observers", [scenario.observer.kind])
+    order = options["order"]
+    names = options["observers"] or settings.get("observers", [scenario.observer.kind])
     expected = settings.get("order", []) if order is None else [name.strip() for name in order.split(",")]
-    worlds_per_cell = worlds or settings.get("worlds", WORLDS)
-    design = design or design_of(arguments.name, settings)
-    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *design, tuple(expected))
+    worlds_per_cell = options["worlds"] or settings.get("worlds", WORLDS)
+    file_design = design_of(arguments.name, settings)  # refused if wrong, also where an option replaces it
+    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *(design or file_design), tuple(expected))
 
 
 def _split(setting: str) -> tuple[str, str]:

@@ -12,15 +12,15 @@ from cmg_mj.cli.arguments import (
     RunArguments,
     all_of,
     claim_output,
+    json_option,
     names_in,
     observer_option,
+    out_option,
     run_options,
     settings_option,
-    with_json,
-    with_out,
     worlds_option,
 )
-from cmg_mj.cli.logs import takes_log_options, with_noise, with_pendulum
+from cmg_mj.cli.logs import log_options, noise_option, pendulum_option
 from cmg_mj.cli.terminal import CtrlC, end_interrupted, final_path, progress, say_written, show, users_code
 from cmg_mj.errors import InputError
 
@@ -106,7 +106,7 @@ def tune(
 @click.command("tune-log", short_help="Fit an observer's parameters to the reference of your own logs.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
 @observer_option("to tune", required=True)
-@takes_log_options
+@log_options
 @parameter_options
 @click.option(
     "--split",
@@ -124,11 +124,11 @@ def tune(
     metavar="SECONDS",
     help="Seconds to ignore at the start of each part of a log.",
 )
-@with_pendulum
-@with_noise
+@pendulum_option()
+@noise_option()
 @settings_option("Set a parameter to start from and to compare with.", "observer.NAME=VALUE")
-@with_out
-@with_json
+@out_option()
+@json_option()
 @users_code()
 def tune_log(
     options: ReadOptions,

@@ -75,6 +75,9 @@ class Controller:
     It does not know MuJoCo. `sample` takes the number of the physics step and the ideal readings there. `control`
     decides at a tick. `update` does both.
 
+    Every keyword-only option, a subclass's too, is kept in an attribute of the option's name: the export reads it there
+    and refuses an option that is no attribute.
+
     Args:
         observer: The observer whose estimate the law uses.
         law: The control law; its `dt` is the control period, beyond its `rate_limit` no command goes.

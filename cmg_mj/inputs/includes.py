@@ -9,10 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.sanity import read_text
+from cmg_mj.inputs.text_files import TextFormat, read_text
 
-LARGEST = 50_000_000
-"""Bytes of an XML file."""
+MODEL_FILE = TextFormat("model", 50_000_000, "utf-8", "not UTF-8 text")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _ELEMENT = re.compile(r"<(\w+)\b([^<>]*)>")
 _REFERENCE = re.compile(r"""\b(file\w*|meshdir|texturedir|assetdir)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
@@ -50,7 +49,8 @@ def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[Path]
             f"{root}: is a model that MuJoCo has compiled, whose parts cannot be told apart any more; give the MJCF "
             "that it was made from (.xml)"
         )
-    text = _COMMENT.sub("", read_text(path, f"{root}: {path.name}", LARGEST))
+    name = str(root) if path == root else f"{root}: {path.name}"
+    text = _COMMENT.sub("", read_text(path, name, MODEL_FILE))
     yield path
     for element, name, count in _COUNT.findall(text):
         if math.prod(int(number) for number in re.findall(r"\d{1,20}", count)) > LARGEST_COUNT:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 
-from cmg_mj.errors import LONGEST_SHOWN, InputError, TomlValue, shown
+from cmg_mj.errors import LONGEST_SHOWN, TomlValue, shown
 
 SMALLEST, LARGEST = 1e-30, 1e30
 """Sizes of numbers. Products of a few numbers within them stay finite, and nothing a person can lift needs more."""
@@ -23,30 +22,6 @@ def is_text(text: str) -> bool:
     except UnicodeEncodeError:
         return False
     return True
-
-
-def read_text(path: Path, name: str, largest: int) -> str:
-    """Read a text file that a user names.
-
-    Args:
-        path: The file.
-        name: What to call it in messages.
-        largest: Its largest size [bytes].
-
-    Returns:
-        Its text.
-
-    Raises:
-        InputError: It is larger, is no UTF-8 text, or cannot be read.
-    """
-    try:
-        if path.stat().st_size > largest:
-            raise InputError(f"{name}: larger than {largest // 1000} kB")
-        return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{name}: not UTF-8 text (at byte {error.start})") from error
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read: {error.strerror}") from error
 
 
 def path_of(parts: Iterable[str | int]) -> str:

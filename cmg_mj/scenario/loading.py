@@ -12,11 +12,11 @@ from typing import Any
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import bundled, find, folder
 from cmg_mj.inputs.overrides import override
-from cmg_mj.inputs.sanity import read_text
+from cmg_mj.inputs.text_files import TextFormat, read_text
 from cmg_mj.scenario.schema import ControllerSettings, ObserverSettings, Scenario, parse_scenario
 
-LARGEST_FILE = 1_000_000
-"""Bytes of a scenario file; the longest that a run writes has three thousand."""
+SCENARIO_FILE = TextFormat("scenario", 1_000_000, "utf-8-sig", "not valid TOML: not UTF-8 text")
+"""Format of a scenario file; the longest that a run writes has three thousand bytes."""
 MOST_PARTS = 100
 _PART = r"""(?:"[^"\n]*+"|'[^'\n]*+'|[\w-]++)[ \t]*+\.[ \t]*+"""
 _ENDLESS_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{MOST_PARTS}}}")  # tomllib takes a minute over 50,000 parts
@@ -85,7 +85,7 @@ def _kind_of(fields: Mapping[str, Any], section: str) -> Any:
 
 def _read(path: Path, name: str) -> dict[str, Any]:
     """The content of a TOML file."""
-    text = read_text(path, name, LARGEST_FILE)
+    text = read_text(path, name, SCENARIO_FILE)
     if text.lstrip().startswith("<"):
         raise InputError(f"{name}: is XML, not a scenario; a scenario names its model with plant.model")
     if _ENDLESS_KEY.search(text):

@@ -29,8 +29,8 @@ from cmg_mj.inputs.field_types import (
     Positive,
     Rate,
     WhateverTheLaw,
-    marked_fields,
 )
+from cmg_mj.inputs.marks import marked_fields
 from cmg_mj.inputs.messages import complaint, fields_of
 from cmg_mj.inputs.sanity import out_of_size, unreadable
 from cmg_mj.inputs.user_classes import as_json

@@ -13,7 +13,8 @@ import numpy as np
 from cmg_mj.controllers.controller import PlantInterface
 from cmg_mj.controllers.laws import LAW_CLASSES, Law
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.inputs.field_types import Batched, NoEffect, marked_fields
+from cmg_mj.inputs.field_types import Batched, NoEffect
+from cmg_mj.inputs.marks import marked_fields
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
@@ -61,12 +62,22 @@ class BatchKey:
         return BatchKey(tuple((part, value) for part, value in self.parts if not part.is_of_observer))
 
 
-PlantStructure = tuple[float, int, tuple[str, ...], tuple[str, ...]]
-"""Common properties of the plants of one batch: physics step, integrator, joints and their kinds."""
+class PlantStructure(NamedTuple):
+    """Common properties of the plants of one batch."""
+
+    timestep: float
+    integrator: int
+    joints: tuple[str, ...]
+    joint_kinds: tuple[str, ...]
 
 
-AxisPart = tuple[Scenario, Design, str]
-"""An axis of an experiment: its scenario, its design, its name, which is empty on a plant of one axis."""
+class AxisPart(NamedTuple):
+    """An axis of an experiment."""
+
+    scenario: Scenario
+    design: Design
+    axis: str
+    """Its name; empty on a plant of one axis."""
 
 
 def batch_key(parts: Sequence[AxisPart]) -> BatchKey:
@@ -139,7 +150,7 @@ def varied_settings(vary: Mapping[str, Sequence[Any] | np.ndarray], scenario: Sc
 def plant_structure(plant: Plant) -> PlantStructure:
     """Find what a plant has in common with all that may run with it."""
     options = plant.model.opt
-    return options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds
+    return PlantStructure(options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds)
 
 
 def batched_interface(plant: Plant, plants: Sequence[Plant], axis: int) -> PlantInterface:

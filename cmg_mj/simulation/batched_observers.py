@@ -120,8 +120,12 @@ def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
         yield batch
 
 
-SharedKey = tuple[BatchKey, PlantStructure, tuple[str, ...]]
-"""Key that jobs with different observers share; the last part is their extra signals."""
+class SharedKey(NamedTuple):
+    """Key that jobs with different observers share."""
+
+    key: BatchKey
+    plant: PlantStructure
+    extra_signals: tuple[str, ...]
 
 
 def _shared_key(job: BatchJob) -> SharedKey | None:
@@ -130,7 +134,7 @@ def _shared_key(job: BatchJob) -> SharedKey | None:
     if first.axes or first.scenario.open_loop_names() or len({one.batch_key for one in once(job.experiments)}) > 1:
         return None
     key = first.batch_key.without_observer()
-    return key, plant_structure(first.plant), extra_signals(first.design.observer())
+    return SharedKey(key, plant_structure(first.plant), extra_signals(first.design.observer()))
 
 
 def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[Result]:

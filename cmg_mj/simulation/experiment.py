@@ -30,6 +30,7 @@ from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.stability_check import hints
 from cmg_mj.scenario.time_grid import time_grid
 from cmg_mj.simulation.batch import (
+    AxisPart,
     BatchKey,
     batch_key,
     batched,
@@ -100,13 +101,10 @@ class Experiment:
             processor: Takes the decisions in the host's place.
             observer: Instead of the scenario's.
 
-        Returns:
-            The controller.
-
         Raises:
             InputError: The plant has several axes.
         """
-        part = self.require_single_axis("one controller")
+        part = self.require_single_axis("one controller" if processor is None else "a board or other processor")
         return part.design.controller(part.plant.interface, worlds=worlds, processor=processor, observer=observer)
 
     def of_axes(self, controllers: Sequence[Controller]) -> AnyController:
@@ -172,7 +170,7 @@ class Experiment:
     def batch_key(self) -> BatchKey:
         """Key that its worlds share with all worlds that may run in one batch with them."""
         return batch_key(
-            [(part.scenario, part.design, part.plant.axis.name if self.axes else "") for part in self.parts]
+            [AxisPart(part.scenario, part.design, part.plant.axis.name if self.axes else "") for part in self.parts]
         )
 
     @property

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from types import TracebackType
+from typing import TYPE_CHECKING
 
 from cmg_mj.results.result import Driver
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
 from cmg_mj.simulation.simulate import SimulationOptions
 from cmg_mj.studies.save import RunReport, recording_header
-from cmg_mj.visualization.recording.live import ViewerStream
-from cmg_mj.visualization.recording.streaming import BranchSpec, StreamHeader
+
+if TYPE_CHECKING:
+    from cmg_mj.visualization.recording.streaming import StreamHeader
 
 PIECES_HZ = 20.0
 """The viewer gets new ticks so often: the eye takes it for motion."""
@@ -56,6 +59,8 @@ class RealTimeClock:
 
 def shown_before(experiment: Experiment, driver: Driver = "native", world: int = 0) -> StreamHeader:
     """Collect what a viewer needs before a run's first tick."""
+    from cmg_mj.visualization.recording.streaming import BranchSpec, StreamHeader
+
     several = len(experiment.parts) > 1
     branches = []
     for part in experiment.parts:
@@ -65,11 +70,10 @@ def shown_before(experiment: Experiment, driver: Driver = "native", world: int =
     return StreamHeader(recording_header(experiment, driver, world), branches, experiment.law.dt)
 
 
-class LiveRun(ViewerStream):
+class LiveRun:
     """One run, streamed to a viewer while it runs. Streaming changes no number.
 
-    Use it as a context manager around the run, which takes its `options`, and the writing of the files. Afterwards
-    `failure` is the reason why the viewer has not received every tick, or empty.
+    Use it as a context manager around the run, which takes its `options`, and the writing of the files.
 
     Args:
         experiment: The experiment that runs.
@@ -82,11 +86,27 @@ class LiveRun(ViewerStream):
     def __init__(
         self, experiment: Experiment, url: str, pace: RealTimeClock, *, driver: Driver = "native", world: int = 0
     ) -> None:
-        super().__init__(url, shown_before(experiment, driver, world))
+        from cmg_mj.visualization.recording.live import ViewerStream  # 0.4 s of import, needed only here
+
+        self._view = ViewerStream(url, shown_before(experiment, driver, world))
         self._pace = pace
         self._ticks = 0
         self._shown_at = -math.inf
         self._recorder: TickRecorder | MultiAxisRecorder | None = None
+
+    @property
+    def failure(self) -> str:
+        """The reason why the viewer has not received every tick; empty if it has."""
+        return self._view.failure
+
+    def __enter__(self) -> LiveRun:
+        self._view.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._view.__exit__(kind, error, traceback)
 
     def options(self, on_progress: Callable[[float], None] | None = None) -> SimulationOptions:
         """Make the options of `Experiment.run` that stream the run.
@@ -111,15 +131,15 @@ class LiveRun(ViewerStream):
 
     def _start(self, recorder: TickRecorder | MultiAxisRecorder) -> None:
         self._recorder = recorder
-        self.begin(recorder.since(0))
+        self._view.begin(recorder.since(0))
         self._pace.start()
 
     def ended(self, report: RunReport) -> None:
         """Show how the run ended."""
-        self.end(report.runs)
+        self._view.end(report.runs)
 
     def _show(self) -> None:
         assert self._recorder is not None
         ticks = self._recorder.since(self._ticks)
         self._ticks += len(ticks)
-        self.add(ticks)
+        self._view.add(ticks)

@@ -80,9 +80,7 @@ def recorded(path: Path) -> None:
     """What 256 worlds of `push_recovery` measured and commanded."""
     trajectory = prepare(load_scenario("push_recovery")).run_many(256).trajectory
     assert trajectory is not None
-    np.savez(
-        path, **{name: trajectory[f"{name}_{unit}"] for name, unit in (("y1", "rad"), ("y2", "rad"), ("u", "rad_s"))}
-    )
+    np.savez(path, y1=trajectory["y1_rad"], y2=trajectory["y2_rad"], u=trajectory["u_rad_s"])
 
 
 def largest(a: np.ndarray, b: np.ndarray) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 
 from cmg_mj.results import markdown
 from cmg_mj.results.result import Result
+from cmg_mj.results.summary_keys import section
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.recoverable_states import ceiling
@@ -31,8 +32,8 @@ def two_axes(*settings: str) -> Experiment:
 
 def of_axis(result: Result, axis: str, key: str = ERROR) -> float:
     """The mean over the worlds of an axis' figure."""
-    found = [summary.get("axes", {}).get(axis, summary)[key] for summary in result.summaries]
-    return float(np.mean(found))
+    figures = [section(summary, "axes").get(axis, summary)[key] for summary in result.summaries]
+    return float(np.array(figures, dtype=float).mean())
 
 
 def each_on_the_other(worlds: int) -> str:
@@ -82,7 +83,7 @@ def fastest_turn(rates: Sequence[float] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.
         for rate in rates:
             experiment = two_axes(f"plant.turn_rate_rad_s={rate}", f"controller.compensate_turning={against}")
             derived = experiment.plant.turning
-            experiment.plant.__dict__["turning"] = derived._replace(wheels=sign * derived.flywheels)
+            experiment.plant.__dict__["turning"] = derived._replace(flywheels=sign * derived.flywheels)
             outcome = experiment.run(keep_trajectory=False).outcomes[0]
             row.append(f"fell at {outcome.time_s:.1f} s" if outcome.fell else "stands")
         rows.append(row)
@@ -118,7 +119,7 @@ def gait(worlds: int) -> str:
 
 def main() -> None:
     """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--worlds", type=int, default=20)
     worlds = parser.parse_args().worlds
     for title, table in (

@@ -209,10 +209,18 @@ KEYFRAME_ANGLES = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966
         {"rig": ('width="256"', 'width="100000000"')},
         "<texture width='100000000'>: at most 10000",
     ),
-    ("a model that is no text", {"rig": ("sun", "sun\xff")}, "rig.xml: not UTF-8 text (at byte "),
+    ("a model that is no text", {"rig": ("sun", "sun\xff")}, "not UTF-8 text (at byte "),
+    ("a part that is no text", {"cube": ("<!--", "<!--\xff")}, "cube.xml: not UTF-8 text (at byte "),
 )
 def test_a_model_that_is_set_wrongly(wrong_input: dict[str, Any], fragments: list[str]) -> None:
     assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)
+
+
+def test_a_file_that_is_no_text_or_too_large_is_named_once() -> None:
+    Path("my.xml").write_bytes(b"<mujoco>\xff</mujoco>")
+    assert cmg_mj("check", "my.xml").complaint == "my.xml: not UTF-8 text (at byte 8)"
+    os.truncate("my.xml", 50_000_001)
+    assert cmg_mj("check", "my.xml").complaint == "my.xml: larger than 50 MB, which no model is"
 
 
 def test_all_that_is_missing_and_wrong_is_said_at_once() -> None:

@@ -367,7 +367,7 @@ def test_pushes(wrong_input: str, fragments: list[str]) -> None:
     ("an open bracket", "title = 'a'\n[plant\nmodel = 'x'", "not valid TOML: Expected ']'", "at line 2, column 7"),
     ("a field twice", "seed = 1\nseed = 2", "not valid TOML: Cannot overwrite a value"),
     ("a bare word", "title = a", "not valid TOML: ", "(at line 1, column 9)"),
-    ("another encoding", "title = 'Stoß'".encode("latin-1"), "not UTF-8 text (at byte 12)"),
+    ("another encoding", "title = 'Stoß'".encode("latin-1"), "not valid TOML: not UTF-8 text (at byte 12)"),
 )
 def test_what_is_no_toml(wrong_input: str | bytes, fragments: list[str]) -> None:
     assert_in_order(["my.toml: ", *fragments], check(wrong_input).complaint)

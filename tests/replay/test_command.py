@@ -123,7 +123,7 @@ def test_markdown_and_table_say_the_same() -> None:
         (("--columns", "tilt=tilt_rad"), "no time"),
         (("--columns", PLAIN, "--rate", "0"), "--rate 0: must be from 0.1 to 1e6 Hz"),
         (("--columns", PLAIN, "--max-gap", "-1"), "--max-gap -1"),
-        (("--columns", PLAIN, "--delay", "nan"), "--delay nan: must be a finite number"),
+        (("--columns", PLAIN, "--delay", "nan"), "--delay nan: must be from -1e+06 to 1e+06 s"),
         (("--columns", PLAIN, "--scale", "rate=x"), "--scale rate=x: must be a number"),
         (("--columns", PLAIN, "--radii", "1"), "write INNER,OUTER"),
         (("--columns", PLAIN, "--time-range", "5:1"), "must end after its start"),

@@ -6,11 +6,13 @@ import dataclasses
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
+from cmg_mj.cli.logs import replay
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement, make_observer
 from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import NO_MODEL, replay_log
@@ -276,6 +278,30 @@ def test_runs_with_other_parameters_are_not_tuned_together(run: Path) -> None:
     scenario = dict(run_log.scenario, observer={**run_log.scenario["observer"], "k1": 21.0})
     with pytest.raises(InputError, match="different parameters of homogeneous"):
         tune_on_logs([run_log, dataclasses.replace(run_log, scenario=scenario)], "homogeneous", settle_s=0.2)
+
+
+FIELDS: dict[str, Any] = {
+    "units": {"tilt": "rad"},
+    "scale": {"tilt": 2.0},
+    "offset": {"tilt": 2.0},
+    "rate_hz": 100.0,
+    "max_gap_s": 0.0,
+    "delay_s": 0.1,
+    "radii_m": (0.1, 0.2),
+    "time_range_s": (0.0, 1.0),
+}
+"""Field of `ReadOptions` that a run's own recording cannot have -> a value."""
+
+
+@pytest.mark.parametrize("field", [field.name for field in dataclasses.fields(ReadOptions)])
+def test_an_option_that_a_runs_recording_cannot_have_is_named_as_it_is_typed(run: Path, field: str) -> None:
+    if field in ("columns", "windows_s"):  # which such a recording can have
+        assert field not in FIELDS
+        return
+    with pytest.raises(InputError, match="is a run's own recording; read it with --columns for that") as caught:
+        read_log(run, ReadOptions(**{field: FIELDS[field]}))
+    option = str(caught.value).partition(":")[0]
+    assert option in {name for parameter in replay.params for name in parameter.opts}
 
 
 def test_options_that_change_a_runs_recording_are_refused(run: Path) -> None:

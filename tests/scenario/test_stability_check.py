@@ -52,11 +52,12 @@ def test_an_lqr_keeps_its_distance() -> None:
     assert loop("controller.lqr.state_cost=[1, 1, 1, 1]", "controller.rate_hz=1000").distance > 0.9
 
 
+@pytest.mark.parametrize("h", [5e-4, pytest.param(1e-4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("latency", [0.04, 0.06])
-def test_stable_is_what_the_loop_step_by_step_is(latency: float) -> None:
+def test_stable_is_what_the_loop_step_by_step_is(latency: float, h: float) -> None:
     """The linearisation stepped finely, with the command held and the signals late."""
     outcome = loop(f"sensors.accelerometer.latency_s={latency}")
-    model, K, h = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3]), 5e-4
+    model, K = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3])
     steps, period, late = int(6.0 / h), round(0.005 / h), round(latency / h)
     x = np.zeros((steps + 1, 4))
     x[0, 0], u = 0.01, 0.0

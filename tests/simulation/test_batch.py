@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import tracemalloc
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -140,12 +140,12 @@ def test_when_all_worlds_have_fallen_the_batch_ends() -> None:
 # --- randomness ----------------------------------------------------------------------------------------
 
 
-def columns(result: Result) -> dict[str, np.ndarray]:
+def columns(result: Result) -> Mapping[str, np.ndarray]:
     assert result.trajectory is not None
     return result.trajectory.columns
 
 
-def assert_equal(ours: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> None:
+def assert_equal(ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray]) -> None:
     assert ours.keys() == theirs.keys()
     for name, values in ours.items():
         np.testing.assert_array_equal(values, theirs[name], err_msg=name)

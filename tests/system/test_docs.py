@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import re
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -12,12 +13,15 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from click.testing import CliRunner
 
 import cmg_mj
 from cmg_mj.observers import OBSERVERS
-from tests.command import ROOT, environment
+from cmg_mj.results.trajectory import Trajectory
+from tests.command import COMMAND, HANGS_AFTER_S, ROOT, environment
 from tests.observers import test_contract
 
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 REFERENCE = "\n".join(path.read_text(encoding="utf-8") for path in sorted((DOCS / "api").glob("*.md")))
@@ -78,8 +82,51 @@ def module(name: str, code: str, folder: Path) -> ModuleType:
     return module_object
 
 
+def recipe(title: str) -> str:
+    """A section of CONTRIBUTING."""
+    return CONTRIBUTING.split(f"\n## {title}\n")[1].split("\n## ")[0]
+
+
+def defines(path: str, name: str) -> bool:
+    """Return whether a file defines a function, class or variable, `Class.method` by its method."""
+    text, last = (ROOT / path).read_text(encoding="utf-8"), name.rpartition(".")[2]
+    return bool(re.search(rf"^ *(?:(?:def|class) {last}\b|{last}(?::.*)? = )", text, flags=re.MULTILINE))
+
+
+def names_in_files() -> list[tuple[str, str]]:
+    """Names that CONTRIBUTING says a file has: `name` (`file`), and the first one in `file`: ... in (of) `name`."""
+    path = r"`(cmg_mj/[\w/]+\.py)`"
+    beside = re.findall(rf"`([\w.]+)`\s+\({path}\)", CONTRIBUTING)
+    after = re.findall(rf"{path}:(?:[^.]|\.\d|\. Here)*? (?:in|of) `([\w.]+)`", CONTRIBUTING)
+    return [(file, name) for name, file in beside] + after
+
+
+@pytest.mark.parametrize(("file", "name"), names_in_files())
+def test_a_name_of_contributing_is_in_its_file(file: str, name: str) -> None:
+    assert defines(file, name)
+
+
+def test_names_of_contributing_were_read() -> None:
+    files = {file.rpartition("/")[2] for file, _ in names_in_files()}
+    assert files >= {"design.py", "controller.py", "registry.py", "metrics.py", "summary_keys.py", "variations.py"}
+
+
+def test_the_options_of_contributing_are_there() -> None:
+    text = recipe("Add a command").split("`cmg_mj/cli/arguments.py`: ")[1].split("Output and Ctrl-C")[0]
+    names = set(re.findall(r"`(\w+)(?:\([.]*\))?`", text))
+    assert names >= {"json_option", "settings_option", "number_option", "run_options"}
+    assert [name for name in names if not defines("cmg_mj/cli/arguments.py", name)] == []
+
+
+def test_the_command_of_contributing_is_one(tmp_path: Path) -> None:
+    (code,) = re.findall(r" *```python\n(.*?)```", recipe("Add a command"), flags=re.DOTALL)
+    command = module("a_command_of_contributing", textwrap.dedent(code), tmp_path).poles
+    outcome = CliRunner().invoke(command, ["push_recovery"])
+    assert re.fullmatch(r"tilt: \d\.\d\d 1/s\n", outcome.output), outcome
+
+
 def test_the_observer_of_contributing_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split("\n## Add an observer\n")[1].split("\n## ")[0]
+    text = recipe("Add an observer")
     observer, test = (textwrap.dedent(block) for block in re.findall(r" *```python\n(.*?)```", text, flags=re.DOTALL))
     kind, path = re.findall(r'`"(\w+)": "([\w.:]+)",`', text)[0]
     home, _, name = path.partition(":")
@@ -92,3 +139,52 @@ def test_the_observer_of_contributing_is_one(tmp_path: Path, monkeypatch: pytest
     test_contract.test_step_has_no_memory_but_the_state(kind)
     test_contract.test_arrays_equal_floats_bit_by_bit(kind, 5)
     module("a_test_of_contributing", test, tmp_path).test_equals_the_continuous_observer()
+
+
+@pytest.mark.slow
+def test_the_field_of_contributing_is_one(tmp_path: Path) -> None:
+    """In a copy of the package: it runs, reruns, is switched off again, and the export refuses it."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    recipe = text.split("\n## Add a field of the scenario\n")[1].split("\n## ")[0]
+    field, use, effect = re.findall(r" *```python\n(.*?)```", recipe, flags=re.DOTALL)
+    for name in ("cmg_mj", "models", "scenarios"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+
+    def insert(file: str, block: str, before: str, indent: int) -> None:
+        path = tmp_path / "cmg_mj" / file
+        content = path.read_text(encoding="utf-8")
+        assert content.count(before) == 1, before
+        lines = textwrap.indent(textwrap.dedent(block), indent * " ")
+        path.write_text(content.replace(before, lines + before), encoding="utf-8")
+
+    insert("scenario/schema.py", field, "    feedback: Annotated[Feedback", 4)
+    insert("scenario/schema.py", use, "        return make_law(", 8)
+    (law_field,) = re.findall(r"`(dead_band_rad_s: float = 0\.0)`", recipe)
+    insert("controllers/laws/state_feedback.py", law_field + "\n", "\n    @property\n    def trim_gain", 4)
+    insert("controllers/laws/state_feedback.py", effect, "        if u is not demanded:", 8)
+
+    def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*COMMAND, *arguments],
+            cwd=tmp_path,
+            env=environment() | {"PYTHONPATH": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            timeout=HANGS_AFTER_S,
+            check=False,
+        )
+
+    def commands(folder: str, *arguments: str) -> list[float]:
+        run = command("run", *arguments, "--out", folder)
+        assert run.returncode == 0, run.stderr
+        return Trajectory.load(tmp_path / folder / "trajectory.parquet")["u_rad_s"].tolist()
+
+    short = ("push_recovery", "--set", "duration_s=0.5", "--set", "push=[]")
+    dead_band = ("--set", "controller.dead_band_rad_s=0.05")
+    without, with_it = commands("without", *short), commands("with", *short, *dead_band)
+    assert min(abs(u) for u in with_it if u) >= 0.05 > min(abs(u) for u in without if u)
+    assert commands("again", "with/scenario.toml") == with_it
+    assert commands("off", "with/scenario.toml", "--set", "controller.dead_band_rad_s=0.0") == without
+    export = command("export", "linear", *dead_band)
+    assert export.returncode == 2
+    assert "dead_band_rad_s" in export.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import subprocess
 import sys
@@ -51,6 +52,13 @@ def test_the_tables_of_the_laws() -> None:
     process = subprocess.run(command, capture_output=True, text=True, check=True)
     assert process.stdout.count("| `lqg`  ") == 1
     assert process.stdout.count("| (8), `kalman`") == 2
+
+
+@pytest.mark.slow
+def test_the_table_of_turning_rigs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(STUDIES)
+    table = importlib.import_module("two_axes_loop").fastest_turn([3.0])
+    assert re.findall(r"stands|fell at [\d.]+ s", table) == ["stands", "fell at 2.0 s", "fell at 0.9 s"]
 
 
 @pytest.mark.slow

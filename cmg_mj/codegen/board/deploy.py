@@ -14,7 +14,7 @@ from cmg_mj.codegen.board.tools import require
 from cmg_mj.codegen.export import export
 from cmg_mj.codegen.export.names import name_of
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, shown
 
 
 class ExportedFiles(NamedTuple):
@@ -42,6 +42,11 @@ def exported(controller: Controller) -> Iterator[ExportedFiles]:
     Raises:
         InputError: The controller cannot be exported.
     """
+    if controller.feedback != "observer":
+        raise InputError(
+            f"controller.feedback = {shown(controller.feedback)}: a board has no such sensor; it closes the loop "
+            "on its own estimate, 'observer'"
+        )
     with TemporaryDirectory(prefix="cmg_mj-board-") as folder:
         header = export(controller, Path(folder), precision="single", name=_name_of(controller))[0]
         yield ExportedFiles(header.stem, Path(folder))

@@ -7,8 +7,11 @@ import dataclasses
 import inspect
 import shlex
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple, TypedDict
+
+import numpy as np
 
 from cmg_mj.codegen.export import check
 from cmg_mj.codegen.export.c_code import Precision, operations
@@ -19,8 +22,8 @@ from cmg_mj.codegen.export.names import export_files, name_of
 from cmg_mj.codegen.export.trace import trace
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.dry_run import dry_run_observer
-from cmg_mj.controllers.laws import StateFeedback
-from cmg_mj.errors import InputError, raised
+from cmg_mj.controllers.laws import Law, StateFeedback
+from cmg_mj.errors import InputError, TomlValue, raised, shown
 from cmg_mj.results.run_folder.folder import write_text
 
 EXPORTED_OPTIONS = ("angle_source", "bias_trim_s")
@@ -29,6 +32,8 @@ SIMULATION_OPTIONS = ("seed", "worlds", "axis", "open_loop_observers")
 """Options that concern the simulation around a controller alone."""
 EXPORTED_LAW_FIELDS = ("dt", "gains", "rate_limit")
 """Fields of the law that its C has."""
+REASONS = {"feedback": "what is exported has the observer's rate alone"}
+"""Option of a `Controller` -> why its C has none, where that is known."""
 
 
 class Figures(TypedDict):
@@ -74,23 +79,44 @@ def _refuse_unexported(controller: Controller) -> None:
         raise InputError(
             f"law {type(law).__name__}: cannot be exported: C has the law (8) alone; set controller.kind=state_feedback"
         )
-    options = {
-        option.name: (getattr(controller, option.name), option.default)
+    option_defaults = {
+        option.name: None if option.default is option.empty else option.default
         for cls in type(controller).__mro__
         for option in inspect.signature(cls.__init__).parameters.values()
         if option.kind is option.KEYWORD_ONLY and option.name not in EXPORTED_OPTIONS + SIMULATION_OPTIONS
     }
-    options |= {
-        field.name: (getattr(law, field.name), field.default)
-        for field in dataclasses.fields(law)
-        if field.name not in EXPORTED_LAW_FIELDS
+    field_defaults = {
+        field.name: _default_of(field) for field in dataclasses.fields(law) if field.name not in EXPORTED_LAW_FIELDS
     }
-    for name, (value, default) in options.items():
-        if value != default:
-            setting = f"controller.{name}"
-            raise InputError(
-                f"{setting} = {value!r}: cannot be exported: C has no such option; set {setting}={default}"
-            )
+    _refuse_in_use(controller, option_defaults)
+    _refuse_in_use(law, field_defaults)
+
+
+def _default_of(field: dataclasses.Field[TomlValue]) -> TomlValue:
+    """Return a field's default; None without one."""
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return None if field.default is dataclasses.MISSING else field.default
+
+
+def _refuse_in_use(part: Controller | Law, defaults: Mapping[str, TomlValue]) -> None:
+    """Refuse a name whose value is not its default, and one that is no attribute: its value is not known.
+
+    Args:
+        part: The controller or its law.
+        defaults: Name of an attribute -> its default; None is no default.
+    """
+    for name, default in defaults.items():
+        setting = f"controller.{name}"
+        if not hasattr(part, name):
+            raise InputError(f"{setting}: cannot be exported: {type(part).__qualname__} has no attribute {name!r}")
+        value = getattr(part, name)
+        if not np.any(value != default):
+            continue
+        reason = REASONS.get(name, "C has no such option")
+        if default is not None:
+            reason += f"; set {setting}={default if isinstance(default, str) else shown(default)}"
+        raise InputError(f"{setting} = {shown(value)}: cannot be exported: {reason}")
 
 
 def _generate(controller: Controller, precision: Precision, name: str) -> Code:

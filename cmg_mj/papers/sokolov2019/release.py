@@ -74,10 +74,6 @@ class Sweep(NamedTuple):
     amplitude_deg: np.ndarray
     """Largest tilt over the last two seconds, (n_lags,); NaN where the rig fell."""
 
-    def is_sustained_at(self, lag_s: float) -> bool:
-        """Return true if the loop oscillates by itself at the lag nearest to this one."""
-        return bool(self.sustained[np.argmin(np.abs(self.lags_s - lag_s))])
-
 
 def sweeps(observers: Sequence[str]) -> dict[str, Sweep]:
     """Release the rig with the model's servo and with slower ones, as stiff."""

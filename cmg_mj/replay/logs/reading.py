@@ -91,11 +91,15 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
     log = log_of_trajectory(path)
     for field in options.as_toml():
         if field != "windows_s":
-            option = re.sub("_(hz|s|m)$", "", field).replace("_", "-")  # max_gap_s is --max-gap
-            raise InputError(f"--{option}: {path} is a run's own recording; read it with --columns for that")
+            raise InputError(f"{_option(field)}: {path} is a run's own recording; read it with --columns for that")
     if not options.windows_s:
         return log
     return replace(log, windows=windows_inside(path, options.windows_s, log["time_s"]))
+
+
+def _option(field: str) -> str:
+    """Return the option of `cmg-mj replay` that sets a field: `max_gap_s` is --max-gap."""
+    return "--" + re.sub("_(hz|s|m)$", "", field).replace("_", "-")
 
 
 @dataclass(frozen=True)

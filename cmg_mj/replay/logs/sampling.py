@@ -157,11 +157,11 @@ class Sampler:
         self._say_how(steps[steps <= GAP_PERIODS * period], period, dt, even, resampled, resolution)
         bridged = (steps > GAP_PERIODS * period) & (steps <= max(GAP_PERIODS * period, longest + period))
         if bridged.any():
-            self.notes.append(_gaps("bridged by straight lines", time, steps, bridged, period))
+            self.notes.append(_gaps("bridged by straight lines", time, steps, bridged))
         if len(ends):
             parted = np.zeros(len(steps), dtype=bool)
             parted[ends] = True
-            self.notes.append(_gaps("not bridged: observers start anew after each", time, steps, parted, period))
+            self.notes.append(_gaps("not bridged: observers start anew after each", time, steps, parted))
         total = sum((time[s][-1] - time[s][0]) / dt for s in stretches)
         if total > MOST_ROWS:
             raise InputError(f"{self.where}: {total:,.0f} samples at {1.0 / dt:g} Hz; at most {MOST_ROWS:,}")
@@ -234,7 +234,7 @@ def _missing(present: np.ndarray, time: np.ndarray, measured: Mapping[str, np.nd
     )
 
 
-def _gaps(what: str, time: np.ndarray, steps: np.ndarray, which: np.ndarray, period: float) -> str:
+def _gaps(what: str, time: np.ndarray, steps: np.ndarray, which: np.ndarray) -> str:
     """Describe gaps."""
     longest = int(np.argmax(np.where(which, steps, 0.0)))
     count = int(which.sum())

@@ -184,9 +184,7 @@ def write_text(path: Path, text: str) -> None:
     path.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
 
 
-def unused_folder(
-    parent: Path, name: str, names: Iterable[str], request_toml: str, request_file: str = "scenario.toml"
-) -> RunFolder:
+def unused_folder(parent: Path, name: str, names: Iterable[str], request_toml: str, request_file: str) -> RunFolder:
     """Claim a folder that no other run has written: the name itself, or with a number behind it.
 
     The same run again goes to the same folder.

@@ -21,7 +21,6 @@ from cmg_mj.results.files import is_plain_file, write_bytes, write_parquet
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.axes import FieldValue
 from cmg_mj.studies.sweeps.chunk import compute, part_of_progress
-from cmg_mj.studies.sweeps.file import SECTIONS
 from cmg_mj.studies.sweeps.fingerprint import (
     ChunkFingerprint,
     StudyFields,
@@ -38,6 +37,7 @@ from cmg_mj.studies.sweeps.fingerprint import (
     without_asides,
 )
 from cmg_mj.studies.sweeps.study import SweepStudy
+from cmg_mj.studies.sweeps.study_file import SECTIONS
 from cmg_mj.studies.sweeps.trials import schema_of, table_of, write_tables
 
 STUDY, CHUNKS = "study.toml", "chunks"

@@ -144,9 +144,8 @@ def _series(
         part = rr.escape_entity_path_part(module.of_axis)
         angle = t[f"angle/{module.name}/gimbal_rad"] - module.gimbal_zero
         speed = t[f"rate/{module.name}/flywheel_rad_s"] * np.sign(module.speed)
-        width = (
-            3.0 if i == 0 and len(plant.axis.modules) > 1 else 1.5
-        )  # the modules' speeds agree: one must shine through
+        # the modules' speeds agree: the first one's line is wider, and shines through
+        width = 3.0 if i == 0 and len(plant.axis.modules) > 1 else 1.5
         suffix = "" if module.speed > 0.0 else " (spins backwards)"
         yield Series(f"gimbal/{part}", module.name, time, np.degrees(angle), color)
         yield Series(f"flywheel/{part}", module.name + suffix, time, speed, color, width)

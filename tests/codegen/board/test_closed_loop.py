@@ -169,7 +169,7 @@ def test_open_loop_observers_run_on_the_host() -> None:
 
 
 def test_what_the_board_cannot_do_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^controller\.feedback = 'truth': cannot be exported: C has no such option"):
+    with pytest.raises(InputError, match=r"^controller\.feedback = 'truth': a board has no such sensor"):
         short("linear", "controller.feedback=truth").run(driver="board")
 
 

@@ -95,6 +95,15 @@ def test_in_a_study_file(sweep: str, complaint: str) -> None:
     assert not Path("out").exists()
 
 
+@pytest.mark.parametrize("options", [[], ["--sample", "2"], ["--sobol", "2"]])
+@pytest.mark.usefixtures("elsewhere")
+def test_a_design_that_there_is_not(options: list[str]) -> None:
+    """An option that replaces the design does not make the study file right."""
+    Path("s.toml").write_text(f'scenario = "push_recovery"\n[sweep]\ndesign = "nope"\n[vary]\n"{BIAS}" = "0:1"\n')
+    complaint = cmg_mj("sweep", "s.toml", *options, "--dry-run").complaint
+    assert_in("s.toml: sweep.design = 'nope': must be one of grid, sample, sobol", complaint)
+
+
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
@@ -103,6 +112,7 @@ def test_in_a_study_file(sweep: str, complaint: str) -> None:
         ({"worlds": True}, "worlds = true: must be"),
         ({"sample": 0}, "n = 0: must be a whole number of points"),
         ({"sample": -2}, "n = -2: must be"),
+        ({"sample": 2, "sobol": 2}, "sample and sobol: one of them"),
         ({"sobol": 0}, "--sobol 0: must be a power of two"),
         ({"sobol": 2.0}, "--sobol 2.0: must be a power of two"),
         ({"observers": [1]}, "observers: 1: must be an observer's name"),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from cmg_mj.cli.terminal import ProgressRate, progress
+from cmg_mj.cli.progress_rate import ProgressRate
+from cmg_mj.cli.terminal import progress
 
 
 class Clock:
