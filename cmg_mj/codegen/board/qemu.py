@@ -32,6 +32,9 @@ STATUSES = {
 }
 """Exit status -> the reason, as firmware/machine.h numbers them."""
 
+NOT_FINITE = {1: "a reading was not finite", 2: "its state, estimate or command was not finite"}
+"""Status of an update -> the reason why the controller has stopped, as the exported header numbers them."""
+
 NANOSECONDS_AN_INSTRUCTION = 1024
 """Emulated time of an instruction where instructions are counted: many ticks of the 25 MHz timer, so that none is
 missed. Only the timer sees this clock [ns]."""
@@ -134,11 +137,16 @@ class Board:
 
         Returns:
             The decision.
+
+        Raises:
+            RunStopped: A number was not finite; u is 0 on the board until `start`.
         """
         numbers = 2 + self.sizes.estimates
         payload = self._packed(*accelerations, *encoders)
-        counts, stack, u, x_e, *estimate = self._ask("u", payload, f"<2I{numbers}{self._reals}")
+        counts, stack, status, u, x_e, *estimate = self._ask("u", payload, f"<3I{numbers}{self._reals}")
         self.costs.append(self._cost("u", counts, stack))
+        if status:
+            raise RunStopped(f"the controller on the board has stopped: {NOT_FINITE.get(status, f'status {status}')}")
         return Decision(u, x_e, tuple(estimate))
 
     def init(self, y1: float, y2: float, acceleration: float) -> Cost:

@@ -20,6 +20,18 @@ WIDEST = 110
 
 TYPES = {"double": "double", "single": "float"}
 
+REQUIRED_FORMATS = {
+    "double": (
+        "DBL_MANT_DIG != 53 || DBL_MAX_EXP != 1024",
+        "double has fewer than 53 bits for this compiler, or is not IEEE 754's: export with --precision single",
+    ),
+    "single": ("FLT_MANT_DIG != 24 || FLT_MAX_EXP != 128", "float is not IEEE 754's for this compiler"),
+}
+"""Precision -> the preprocessor's condition under which a type is not of this precision, and its complaint."""
+
+BITS = {"double": ("uint64_t", "UINT64_C(0x7ff0000000000000)"), "single": ("uint32_t", "UINT32_C(0x7f800000)")}
+"""Precision -> an integer as wide as a number, and the bits of the number's exponent."""
+
 
 @dataclass(frozen=True)
 class CodePrinter:
@@ -50,9 +62,16 @@ class CodePrinter:
         members = "".join(f"    {real} {member};\n" for member in self.traced.state or ("unused",))
         places = "".join(f"    {N}_{place},\n" for place in self.places)
         count = "    long updates; /* so far, while the integrator is trimmed */\n" if self.constants.trimmed else ""
+        wrong_format, complaint = REQUIRED_FORMATS[self.precision]
         return f"""{format_header_comment(n, self.controller, self.precision)}
 #ifndef {N}_H
 #define {N}_H
+
+#include <float.h>
+
+#if {wrong_format}
+#error "{n}.h: {complaint}"
+#endif
 
 typedef {TYPES[self.precision]} {real};
 
@@ -62,6 +81,13 @@ typedef {TYPES[self.precision]} {real};
 enum {{
 {places}    {N}_ESTIMATES
 }};
+
+/* What an update returns. */
+typedef enum {{
+    {N}_OK = 0,
+    {N}_INPUT_NOT_FINITE = 1, /* a reading was NaN or infinite: u is 0 until start */
+    {N}_RESULT_NOT_FINITE = 2 /* state, estimate or command became so: u is 0 until start */
+}} {n}_status;
 
 /* The observer's state. */
 typedef struct {{
@@ -73,6 +99,7 @@ typedef struct {{
     {real} x_e; /* integrator [rad s] */
     {real} u; /* last command [rad/s] */
     int started;
+    {n}_status status; /* of the last update */
 {count}}} {n}_controller;
 
 #ifdef __cplusplus
@@ -84,7 +111,9 @@ extern "C" {{
  *     x along the tilt's motion, z outward
  * encoders: the gimbals' angles [rad]
  * estimate: what the observer makes of it
- * u: gimbal rate to hold until the next update, each gimbal with its direction's sign [rad/s] */
+ * u: gimbal rate to hold until the next update, each gimbal with its direction's sign [rad/s]
+ * update returns {N}_OK; or, once a number was not finite, in or out, and until start is called again, which:
+ *     then u and the estimate are 0 */
 {self._declaration("start")};
 {self._declaration("update")};
 
@@ -105,24 +134,41 @@ extern "C" {{
 
     def source(self) -> str:
         """Print NAME.c."""
-        n, real, traced = self.name, f"{self.name}_real", self.traced
+        n, N, real, traced = self.name, self.name.upper(), f"{self.name}_real", self.traced
         constants, measured = self.constants, list(MEASURED)
         raw = [f"accelerations[{i}]" for i in range(4)] + [f"encoders[{i}]" for i in range(constants.gimbals)]
         state = [f"state->{member}" for member in traced.state]
         estimate = [f"estimate[{i}]" for i in range(len(self.places))]
         x1, x3 = ("y1", "y2") if self.controller.angle_source == "measured" else (estimate[0], estimate[2])
         start = ["0", "y2", *["0"] * (len(estimate) - 3)]
-        first = "".join(f"        {place} = {x};\n" for place, x in zip(estimate, ["y1", *start], strict=True))
-        trim = f"""    if (controller->updates < {constants.trimmed}) {{ /* while the bias is still being found */
-        controller->x_e = trim_gain * {estimate[constants.trim_part]};
-        ++controller->updates;
-    }}
+        first = "".join(f"            {place} = {x};\n" for place, x in zip(estimate, ["y1", *start], strict=True))
+        trim = f"""        if (controller->updates < {constants.trimmed}) {{ /* while the bias is still being found */
+            controller->x_e = trim_gain * {estimate[constants.trim_part]};
+            ++controller->updates;
+        }}
 """
+        bits, exponent = BITS[self.precision]
         return f"""#include "{n}.h"
 
 #include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
 
 {self._numbers()}
+/* Whether so many numbers in a row are finite. It looks at the bits of their exponents: compilers that are told that all
+ * numbers are finite, as by -ffast-math, drop every comparison of the numbers themselves. */
+static int all_finite(const void *numbers, size_t count)
+{{
+    const unsigned char *number = (const unsigned char *)numbers;
+    {bits} bits;
+    for (; count > 0; --count, number += sizeof bits) {{
+        memcpy(&bits, number, sizeof bits);
+        if ((bits & {exponent}) == {exponent}) return 0;
+    }}
+    return 1;
+}}
+
 /* Tilt, gimbal angle and the tilt's acceleration from what the sensors show. */
 {self._declaration("measure")}
 {{
@@ -148,20 +194,38 @@ extern "C" {{
     controller->x_e = 0;
     controller->u = 0;
     controller->started = 0;
-{"    controller->updates = 0;" + chr(10) if constants.trimmed else ""}}}
+    controller->status = {N}_OK;
+{"    controller->updates = 0;" + chr(10) if constants.trimmed else ""}\
+{"" if traced.state else "    controller->observer.unused = 0;" + chr(10)}}}
 
 {self._declaration("update")}
 {{
     {real} y1, y2, acceleration;
-    measure(accelerations, encoders, &y1, &y2, &acceleration);
-    if (controller->started) {{
-        {n}_step(&controller->observer, y1, y2, acceleration, controller->u, estimate);
-    }} else {{
-        {n}_init(&controller->observer, y1, y2, acceleration);
-{first}        controller->started = 1;
+    int i;
+
+    if (controller->status == {N}_OK) {{
+        if (!(all_finite(accelerations, 4) && all_finite(encoders, {N}_ENCODERS)))
+            controller->status = {N}_INPUT_NOT_FINITE;
     }}
-{trim if constants.trimmed else ""}    law({x1}, {estimate[1]}, {x3}, &controller->x_e, &controller->u);
+    if (controller->status == {N}_OK) {{
+        measure(accelerations, encoders, &y1, &y2, &acceleration);
+        if (controller->started) {{
+            {n}_step(&controller->observer, y1, y2, acceleration, controller->u, estimate);
+        }} else {{
+            {n}_init(&controller->observer, y1, y2, acceleration);
+{first}            controller->started = 1;
+        }}
+{trim if constants.trimmed else ""}        law({x1}, {estimate[1]}, {x3}, &controller->x_e, &controller->u);
+        /* The controller begins with the observer's state, x_e and u. */
+        if (!(all_finite(controller, {max(len(traced.state), 1) + 2}) && all_finite(estimate, {N}_ESTIMATES)))
+            controller->status = {N}_RESULT_NOT_FINITE;
+    }}
+    if (controller->status != {N}_OK) {{
+        for (i = 0; i < {N}_ESTIMATES; ++i) estimate[i] = 0;
+        controller->u = 0;
+    }}
     *u = controller->u;
+    return controller->status;
 }}
 """
 
@@ -177,7 +241,7 @@ extern "C" {{
         y = tuple(f"{real} {name}" for name in MEASURED)
         head, parameters = {
             "start": (f"void {n}_start", (controller,)),
-            "update": (f"void {n}_update", (controller, *raw, estimate, f"{real} *u")),
+            "update": (f"{n}_status {n}_update", (controller, *raw, estimate, f"{real} *u")),
             "init": (f"void {n}_init", (state, *y)),
             "step": (f"void {n}_step", (state, *y, f"{real} u", estimate)),
             "measure": ("static void measure", (*raw, *(f"{real} *{name}" for name in MEASURED))),

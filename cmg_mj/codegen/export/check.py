@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import os
 import re
 import shlex
@@ -77,7 +78,11 @@ def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
 
 
 def in_casadi(controller: Controller, traced: Traced, constants: Constants, samples: np.ndarray) -> np.ndarray:
-    """Compute the estimates and u by the traced formulas, in the order of the C, (n, 4 + extra signals)."""
+    """Compute the estimates and u by the traced formulas, in the order of the C, (n, 4 + extra signals).
+
+    Raises:
+        InputError: A number of the state is not finite.
+    """
 
     def values(function: casadi.Function, *arguments: float) -> list[float]:
         return [float(value) for value in function.call(arguments)]
@@ -96,6 +101,11 @@ def in_casadi(controller: Controller, traced: Traced, constants: Constants, samp
         else:
             result = values(traced.step, *state, *y, u)
             state, estimate = result[: len(state)], result[len(state) :]
+        for place, value in zip(traced.state, state, strict=True):
+            if not math.isfinite(value):  # and the estimate is: Python has gone on
+                raise InputError(
+                    f"its state holds {value} ({place}) at sample {k}, where the C stops: hold numbers that are finite"
+                )
         if k < constants.trimmed:
             x_e = constants.trim_gain.value * estimate[constants.trim_part]
         x1, x3 = (y[0], y[1]) if controller.angle_source == "measured" else (estimate[0], estimate[2])
@@ -133,7 +143,7 @@ def check_trace(controller: Controller, traced: Traced, constants: Constants, se
         The largest difference.
 
     Raises:
-        InputError: The formulas and Python differ by more than is allowed.
+        InputError: The formulas and Python differ by more than is allowed, or the state does not stay finite.
     """
     largest = 0.0
     for seed in seeds:

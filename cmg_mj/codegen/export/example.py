@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from cmg_mj.codegen.export.c_code import Precision, literal
@@ -48,11 +49,12 @@ static const {real} {n}_allowed[{N}_ESTIMATES + 1] = {_row(allowed, precision)};
 """
 
 
-def format_example(name: str, parts: Sequence[str]) -> str:
+def format_example(name: str, precision: Precision, parts: Sequence[str]) -> str:
     """Format NAME_example.c.
 
     Args:
         name: Name of the export.
+        precision: Precision of its numbers.
         parts: Names of the compared columns: the parts of an estimate, and u.
 
     Returns:
@@ -65,6 +67,7 @@ def format_example(name: str, parts: Sequence[str]) -> str:
  *     cc -std=c99 -O2 {n}.c {n}_example.c -lm -o {n}_example && ./{n}_example */
 #include "{n}_test_vector.h"
 
+#include <math.h>
 #include <stdio.h>
 
 int main(void)
@@ -72,19 +75,28 @@ int main(void)
     static const char *const names[{N}_ESTIMATES + 1] = {{{listed}}};
     {real} largest[{N}_ESTIMATES + 1] = {{0}};
     {n}_controller controller;
+    {real} broken[4 + {N}_ENCODERS] = {{0}}, estimate[{N}_ESTIMATES], u;
     int tick, i, wrong = 0;
 
     {n}_start(&controller);
     for (tick = 0; tick < {N}_TICKS; ++tick) {{
         /* On a board: read the sensors here, and give u to the gimbals. */
-        {real} estimate[{N}_ESTIMATES], u, difference;
-        {n}_update(&controller, {n}_inputs[tick], {n}_inputs[tick] + 4, estimate, &u);
+        {real} difference;
+        if ({n}_update(&controller, {n}_inputs[tick], {n}_inputs[tick] + 4, estimate, &u) != {N}_OK) {{
+            printf("update %d: a number is not finite\\n", tick);
+            return 1; /* On a board: u is 0 until {n}_start is called. */
+        }}
 
         for (i = 0; i <= {N}_ESTIMATES; ++i) {{
             difference = (i < {N}_ESTIMATES ? estimate[i] : u) - {n}_expected[tick][i];
             if (difference < 0) difference = -difference;
             if (!(difference <= largest[i])) largest[i] = difference; /* what is NaN as well */
         }}
+    }}
+    broken[0] = {literal(math.inf, precision)}; /* a sensor that is broken */
+    if ({n}_update(&controller, broken, broken + 4, estimate, &u) != {N}_INPUT_NOT_FINITE || u < 0 || u > 0) {{
+        puts("u is NOT held at 0 after a reading that is not finite");
+        wrong = 1;
     }}
     for (i = 0; i <= {N}_ESTIMATES; ++i) {{
         printf("%s: off by at most %g, allowed %g\\n", names[i], (double)largest[i], (double){n}_allowed[i]);

@@ -9,7 +9,7 @@ from cmg_mj.errors import InputError, shown
 from cmg_mj.observers.protocol import Observer
 from cmg_mj.observers.registry import OBSERVERS
 
-MACROS = ("H", "ENCODERS", "ESTIMATES", "TEST_VECTOR_H", "TICKS")
+MACROS = ("H", "ENCODERS", "ESTIMATES", "TEST_VECTOR_H", "TICKS", "OK", "INPUT_NOT_FINITE", "RESULT_NOT_FINITE")
 """Words that follow NAME_ in macros, besides the parts of an estimate."""
 
 LONGEST = 40

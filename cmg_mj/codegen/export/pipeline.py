@@ -136,7 +136,7 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
     expected = check.in_python(controller, samples)
     allowed = check.allowed(controller, samples, expected, precision)
     other_files = (
-        format_example(name, check.columns(controller)),
+        format_example(name, precision, check.columns(controller)),
         format_test_vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist()),
     )
     files = dict(zip(export_files(name), (printer.header(), printer.source(), *other_files), strict=True))

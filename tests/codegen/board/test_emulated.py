@@ -143,4 +143,4 @@ def test_c_that_is_refused(tmp_path: Path) -> None:
 
 def test_arithmetic_in_double_precision_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="double-promotion"):
-        toy(tmp_path, update="if (e[0] * 0.1 > e[1]) return;")
+        toy(tmp_path, update="if (e[0] * 0.1 > e[1]) return TOY_OK;")

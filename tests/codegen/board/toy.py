@@ -25,13 +25,14 @@ HEADER = """
 #define TOY_ESTIMATES 4
 #define TOY_ENCODERS 2
 typedef float toy_real;
+typedef enum { TOY_OK, TOY_INPUT_NOT_FINITE, TOY_RESULT_NOT_FINITE } toy_status;
 typedef struct { toy_real steps; } toy_state;
 typedef struct { toy_state observer; toy_real x_e; toy_real u; int started; } toy_controller;
 void toy_init(toy_state *state, toy_real y1, toy_real y2, toy_real acceleration);
 void toy_step(toy_state *state, toy_real y1, toy_real y2, toy_real acceleration, toy_real u, toy_real estimate[4]);
 void toy_start(toy_controller *controller);
-void toy_update(toy_controller *controller, const toy_real accelerations[4], const toy_real encoders[2],
-                toy_real estimate[4], toy_real *u);
+toy_status toy_update(toy_controller *controller, const toy_real accelerations[4], const toy_real encoders[2],
+                      toy_real estimate[4], toy_real *u);
 """
 SOURCE = """
 #include "toy.h"
@@ -55,12 +56,13 @@ void toy_start(toy_controller *c)
     c->x_e = 0;
 }
 
-void toy_update(toy_controller *c, const toy_real a[4], const toy_real e[2], toy_real estimate[4], toy_real *u)
+toy_status toy_update(toy_controller *c, const toy_real a[4], const toy_real e[2], toy_real estimate[4], toy_real *u)
 {
     %(update)s
     toy_step(&c->observer, a[0], a[1], a[2], a[3], estimate);
     c->x_e += e[1];
     *u = e[0] + 10 * e[1] + 100 * c->observer.steps;
+    return TOY_OK;
 }
 """
 

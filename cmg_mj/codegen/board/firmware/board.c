@@ -9,8 +9,8 @@
  *   'i'   -                                                  sizes in bytes: a real, the observer, the controller;
  *                                                            parts of an estimate (4 uint32)
  *   's'   -                                                  - (the controller is at its start)
- *   'u'   inner x, z, outer x, z [m/s^2], encoders [rad]     cost, u [rad/s], the integrator before that
- *                                                            [rad s], the estimate
+ *   'u'   inner x, z, outer x, z [m/s^2], encoders [rad]     cost, the status (uint32), u [rad/s], the integrator
+ *                                                            before that [rad s], the estimate
  *   'n'   y1, y2 [rad], acceleration [rad/s^2]               cost (the observer is at its start)
  *   'o'   the same and u [rad/s]                             cost, the estimate
  *   'e'   -                                                  costs of empty functions called as 'u', 'n', 'o' are
@@ -32,7 +32,7 @@ static uint8_t message[LONGEST];
 static uint8_t answer[LONGEST];
 static uint32_t answered; /* bytes of it */
 
-enum { IT_FITS = 1 / (2 * sizeof(uint32_t) + (2 + ESTIMATES) * sizeof(real) <= LONGEST) };
+enum { IT_FITS = 1 / (3 * sizeof(uint32_t) + (2 + ESTIMATES) * sizeof(real) <= LONGEST) };
 
 /* ---- What a piece of work takes ---- */
 
@@ -84,9 +84,13 @@ static void put(const void *from, uint32_t bytes)
 
 #define EMPTY __attribute__((noipa)) static void
 
-EMPTY empty_update(ITS(_controller) *c, const real *a, const real *e, real *estimate, real *u)
+__attribute__((noipa)) static ITS(_status) empty_update(ITS(_controller) *c, const real *a, const real *e,
+                                                        real *estimate, real *u)
 {
-    __asm volatile("" ::"r"(c), "r"(a), "r"(e), "r"(estimate), "r"(u) : "memory");
+    ITS(_status) status;
+
+    __asm volatile("" : "=r"(status) : "r"(c), "r"(a), "r"(e), "r"(estimate), "r"(u) : "memory");
+    return status;
 }
 
 EMPTY empty_init(ITS(_state) *s, real y1, real y2, real acceleration)
@@ -105,9 +109,13 @@ static void update(void)
 {
     const real x_e = controller.x_e;
     real shown[4 + ENCODERS], estimate[ESTIMATES], u;
+    ITS(_status) status;
+    uint32_t word;
 
     memcpy(shown, message, sizeof shown);
-    COST(ITS(_update)(&controller, shown, shown + 4, estimate, &u));
+    COST(status = ITS(_update)(&controller, shown, shown + 4, estimate, &u));
+    word = (uint32_t)status;
+    put(&word, sizeof word);
     put(&u, sizeof u);
     put(&x_e, sizeof x_e);
     put(estimate, sizeof estimate);
@@ -133,8 +141,10 @@ static void step(void)
 static void empty(void)
 {
     real y[4 + ENCODERS] = {0}, estimate[ESTIMATES], u;
+    ITS(_status) status;
 
-    COST(empty_update(&controller, y, y + 4, estimate, &u));
+    COST(status = empty_update(&controller, y, y + 4, estimate, &u));
+    __asm volatile("" ::"r"(status)); /* it is kept, as in update */
     COST(empty_init(&observer, y[0], y[1], y[2]));
     COST(empty_step(&observer, y[0], y[1], y[2], y[3], estimate));
 }

@@ -16,8 +16,9 @@ void ITS(_start)(ITS(_controller) *controller)
     (void)controller;
 }
 
-void ITS(_update)(ITS(_controller) *controller, const real accelerations[4], const real encoders[ENCODERS],
-                  real estimate[ESTIMATES], real *u)
+ITS(_status) ITS(_update)(ITS(_controller) *controller, const real accelerations[4], const real encoders[ENCODERS],
+                          real estimate[ESTIMATES], real *u)
 {
     (void)controller, (void)accelerations, (void)encoders, (void)estimate, (void)u;
+    return (ITS(_status))0;
 }
