@@ -53,12 +53,16 @@ def export(
     from cmg_mj.codegen.export import check_installed, generate_code, write_code
     from cmg_mj.codegen.export.names import export_files, name_of
     from cmg_mj.codegen.export.pipeline import export_table
+    from cmg_mj.controllers.laws import StateFeedback
+    from cmg_mj.scenario.stability_check import require_stable_period
     from cmg_mj.simulation.experiment import prepare
 
     check_installed()
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
-    note_hints(experiment.hints)
     experiment.require_single_axis("export")
+    if isinstance(experiment.law, StateFeedback):
+        require_stable_period(experiment.law, experiment.plant.reduced)
+    note_hints(experiment.hints)
     controller = experiment.axis_controller()
     name = name_of(controller.observer, name)
     with claim_output(out, f"export-{name}-{precision}", export_files(name)) as folder:

@@ -155,6 +155,42 @@ def hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]
     return [*(f"{rig.path}: {hint}" for hint in rig.hints), *([loop] if loop else [])]
 
 
+def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:
+    """Refuse a control period so long that the loop is unstable, where a shorter one would do.
+
+    Gains that suit no period are not its business: `hints` names them.
+
+    Args:
+        law: The law, fed by the true state without delay.
+        model: The rig's reduced model.
+
+    Raises:
+        InputError: The loop sampled so seldom is unstable; the message has the lowest stable rate.
+    """
+    pole = _sampled_pole(law, model, law.dt)
+    if pole < MARGIN or not is_hurwitz(closed_loop_poles(model, law.gains)):
+        return
+    stable, unstable = law.dt, law.dt
+    while _sampled_pole(law, model, stable) >= MARGIN:
+        stable, unstable = 0.5 * stable, stable
+    for _ in range(20):
+        middle = math.sqrt(stable * unstable)
+        stable, unstable = (middle, unstable) if _sampled_pole(law, model, middle) < MARGIN else (stable, middle)
+    raise InputError(
+        f"controller.rate_hz = {1.0 / law.dt:g}: the closed loop is unstable on this rig's reduced model, sampled "
+        f"every {law.dt:g} s (pole at {pole:.3g} 1/s); more than {1.0 / stable:.3g} Hz are needed"
+    )
+
+
+def _sampled_pole(law: StateFeedback, model: ReducedModel, period: float) -> float:
+    """Return the slowest pole of the loop sampled so often, as a continuous one's [1/s]."""
+    A, B = _held(model, period)
+    closed = A - B @ np.array([law.gains])
+    if not np.all(np.isfinite(closed)):
+        return math.inf
+    return math.log(max(float(np.abs(np.linalg.eigvals(closed)).max()), np.finfo(float).tiny)) / period
+
+
 def _held(model: ReducedModel, time: float) -> tuple[np.ndarray, np.ndarray]:
     """The linearisation (6) with the integrator after a time with the command held: x+ = A x + B u."""
     from scipy.linalg import expm

@@ -156,8 +156,8 @@ extern "C" {{
 #include <string.h>
 
 {self._numbers()}
-/* Whether so many numbers in a row are finite. It looks at the bits of their exponents: compilers that are told that all
- * numbers are finite, as by -ffast-math, drop every comparison of the numbers themselves. */
+/* Whether so many numbers in a row are finite. It looks at the bits of their exponents: -ffast-math makes a compiler
+ * drop comparisons of the numbers themselves, as in x == x. */
 static int all_finite(const void *numbers, size_t count)
 {{
     const unsigned char *number = (const unsigned char *)numbers;

@@ -58,16 +58,32 @@ class Compiled:
         compile_c(self.source, self.example, "-o", folder / "example", "-lm")
         self.output = subprocess.run([folder / "example"], capture_output=True, text=True, check=False).stdout
         self._loaded = ctypes.CDLL(str(self.library))
+        self._controller = ctypes.create_string_buffer(8192)
 
     def run(self, samples: np.ndarray) -> np.ndarray:
         """Call `update` with raw samples, (n, 4 + gimbals); return the estimates and u, (n, 4 + extra signals)."""
-        controller = ctypes.create_string_buffer(8192)
+        statuses, results = self.statuses(samples)
+        assert not statuses.any()
+        return results
+
+    def statuses(self, samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`start`, then `update` with raw samples, (n, 4 + gimbals); what it returns (n,), and the results as `run`."""
+        self._call("start", self._controller)
+        return self.go_on(samples)
+
+    def go_on(self, samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Call `update` with raw samples; as `statuses` without `start`."""
         samples = np.ascontiguousarray(samples, self.type)
         results = np.full((len(samples), self.width + 1), np.nan, self.type)
-        self._call("start", controller)
-        for sample, result in zip(samples, results, strict=True):
-            self._call("update", controller, sample[:4], sample[4:], result, result[-1:])
-        return results.astype(float)
+        statuses = [
+            self._call("update", self._controller, sample[:4], sample[4:], result, result[-1:])
+            for sample, result in zip(samples, results, strict=True)
+        ]
+        return np.array(statuses), results.astype(float)
+
+    def numbers(self, count: int) -> np.ndarray:
+        """The controller's first numbers: the observer's state, x_e, u. Writing to them changes the controller."""
+        return np.frombuffer(self._controller, self.type, count)
 
     def step(self, state: np.ndarray, *arguments: float) -> tuple[np.ndarray, np.ndarray]:
         """One step of the observer alone: the state and the estimate."""
@@ -76,9 +92,9 @@ class Compiled:
         self._call("step", state, *map(number, arguments), estimate)
         return state.astype(float), estimate.astype(float)
 
-    def _call(self, function: str, *arguments: Any) -> None:
+    def _call(self, function: str, *arguments: Any) -> int:
         pointers = [x.ctypes.data_as(ctypes.c_void_p) if isinstance(x, np.ndarray) else x for x in arguments]
-        getattr(self._loaded, f"{self.name}_{function}")(*pointers)
+        return getattr(self._loaded, f"{self.name}_{function}")(*pointers)
 
 
 class Recording:

@@ -221,6 +221,28 @@ class Blows(Plain):
         return (1e3 * state[0] + 1.0, 0.0), (state[0] * state[0], 0.0, y.y2)
 
 
+class BeginsAtInfinity(Plain):
+    """The least error so far."""
+
+    def init(self, y: Measurement) -> Any:
+        return {"x": super().init(y), "least": math.inf}
+
+    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
+        x, estimate = super().step(state["x"], y, u)
+        least = where(state["least"] < 1e-3, state["least"], np.inf)
+        return {"x": x, "least": least}, (estimate[0], estimate[1] + where(least < 1e-3, least, 0.0), estimate[2])
+
+
+class Stateless(Plain):
+    """The accelerometers' tilt and nothing else."""
+
+    def init(self, y: Measurement) -> Any:
+        return ()
+
+    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
+        return (), (y.y1, 0.01 * y.acceleration, y.y2)
+
+
 class Uncopied(Plain):
     def __deepcopy__(self, memo: Any) -> Any:
         raise RuntimeError("there is only one of me")

@@ -95,7 +95,7 @@ def test_a_class_with_any_name(cls: str, arguments: list[str], name: str) -> Non
     assert cmg_mj("export", f"called_{name}:{cls}", *arguments, "--out", "board").status == 0
     assert f"{name}.h" in files("board")
     code = Path(f"board/{name}.h").read_text() + Path(f"board/{name}.c").read_text()
-    assert f"void {name}_update(" in code
+    assert f"{name}_status {name}_update(" in code
     assert all(f" {member};" in code for member in ("abs_", "omega", "value", "this_", "NAN_"))
     assert re.sub(r"/\*.*?\*/", "", code, flags=re.DOTALL).isascii()
     compile_c("-Iboard", f"board/{name}.c", f"board/{name}_example.c", "-lm", "-o", "example")

@@ -56,6 +56,10 @@ def test_what_has_no_place_in_a_formula_is_named_with_its_place(name: str, words
         ("HoldsItself", "deeper than 50 parts within parts, or holds itself"),
         ("HoldsTooMuch", "its state holds 1600 numbers; at most 1000 can be exported"),
         ("Blows", "cannot be compared on random signals: observer Blows returned"),
+        (
+            "BeginsAtInfinity",
+            "its state holds inf (least) at sample 0, where the C stops: hold numbers that are finite",
+        ),
         ("Uncopied", "cannot be copied: RuntimeError: there is only one of me"),
     ],
 )
