@@ -139,6 +139,9 @@ extern "C" {{
         raw = [f"accelerations[{i}]" for i in range(4)] + [f"encoders[{i}]" for i in range(constants.gimbals)]
         state = [f"state->{member}" for member in traced.state]
         estimate = [f"estimate[{i}]" for i in range(len(self.places))]
+        results = [
+            f"controller->{x}" for x in (*(f"observer.{member}" for member in traced.state), "x_e", "u")
+        ] + estimate
         x1, x3 = ("y1", "y2") if self.controller.angle_source == "measured" else (estimate[0], estimate[2])
         start = ["0", "y2", *["0"] * (len(estimate) - 3)]
         first = "".join(f"            {place} = {x};\n" for place, x in zip(estimate, ["y1", *start], strict=True))
@@ -151,22 +154,16 @@ extern "C" {{
         return f"""#include "{n}.h"
 
 #include <math.h>
-#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
 {self._numbers()}
-/* Whether so many numbers in a row are finite. It looks at the bits of their exponents: -ffast-math makes a compiler
- * drop comparisons of the numbers themselves, as in x == x. */
-static int all_finite(const void *numbers, size_t count)
+/* Whether a number is finite, by the bits of its exponent: -ffast-math drops what looks at the number itself. */
+static int is_finite({real} x)
 {{
-    const unsigned char *number = (const unsigned char *)numbers;
     {bits} bits;
-    for (; count > 0; --count, number += sizeof bits) {{
-        memcpy(&bits, number, sizeof bits);
-        if ((bits & {exponent}) == {exponent}) return 0;
-    }}
-    return 1;
+    memcpy(&bits, &x, sizeof bits);
+    return (~bits & {exponent}) != 0;
 }}
 
 /* Tilt, gimbal angle and the tilt's acceleration from what the sensors show. */
@@ -195,8 +192,7 @@ static int all_finite(const void *numbers, size_t count)
     controller->u = 0;
     controller->started = 0;
     controller->status = {N}_OK;
-{"    controller->updates = 0;" + chr(10) if constants.trimmed else ""}\
-{"" if traced.state else "    controller->observer.unused = 0;" + chr(10)}}}
+{"    controller->updates = 0;" + chr(10) if constants.trimmed else ""}}}
 
 {self._declaration("update")}
 {{
@@ -204,7 +200,7 @@ static int all_finite(const void *numbers, size_t count)
     int i;
 
     if (controller->status == {N}_OK) {{
-        if (!(all_finite(accelerations, 4) && all_finite(encoders, {N}_ENCODERS)))
+        if (!({_are_finite(raw)}))
             controller->status = {N}_INPUT_NOT_FINITE;
     }}
     if (controller->status == {N}_OK) {{
@@ -216,8 +212,7 @@ static int all_finite(const void *numbers, size_t count)
 {first}            controller->started = 1;
         }}
 {trim if constants.trimmed else ""}        law({x1}, {estimate[1]}, {x3}, &controller->x_e, &controller->u);
-        /* The controller begins with the observer's state, x_e and u. */
-        if (!(all_finite(controller, {max(len(traced.state), 1) + 2}) && all_finite(estimate, {N}_ESTIMATES)))
+        if (!({_are_finite(results)}))
             controller->status = {N}_RESULT_NOT_FINITE;
     }}
     if (controller->status != {N}_OK) {{
@@ -266,3 +261,8 @@ static int all_finite(const void *numbers, size_t count)
 
 def _names(constants: Sequence[Constant]) -> list[str]:
     return [constant.name for constant in constants]
+
+
+def _are_finite(places: Sequence[str]) -> str:
+    """Print the condition that all these numbers are finite."""
+    return " &&\n              ".join(f"is_finite({place})" for place in places)

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.codegen.board import Board
+from cmg_mj.codegen.board import Board, on_a_board
 from cmg_mj.codegen.board.deploy import exported
 from cmg_mj.codegen.board.image import build
 from cmg_mj.codegen.board.tools import available
 from cmg_mj.controllers.processor import Decision
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers import OBSERVERS, Measurement
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
@@ -166,6 +166,20 @@ def test_open_loop_observers_run_on_the_host() -> None:
     key = "velocity_rms_error_rad_s"
     assert board.values(key, "ltv") == pytest.approx(host.values(key, "ltv"), rel=1e-3)
     assert host.values(key, "ltv") != host.values(key)
+
+
+def test_a_reading_that_is_not_finite_stops_the_board_until_start() -> None:
+    good = ((0.0, 9.81, 0.0, 9.81), (math.pi / 2.0, math.pi / 2.0))
+    broken = ((math.inf, *good[0][1:]), good[1])
+    with on_a_board(prepare(load_scenario("push_recovery", SHORT, "linear")).axis_controller()) as board:
+        before = [board.update(*good) for _ in range(3)]
+        for readings in (broken, good):
+            with pytest.raises(
+                RunStopped, match=r"^the controller on the board has stopped: a reading was not finite$"
+            ):
+                board.update(*readings)
+        board.start()
+        assert [board.update(*good) for _ in range(3)] == before
 
 
 def test_what_the_board_cannot_do_is_refused() -> None:

@@ -65,7 +65,7 @@ def test_single_precision_is_close_and_nothing_else(kind: str, tmp_path: Path) -
     assert export.output.splitlines()[-1] == "as in cmg_mj"
 
     code = re.sub(r"/\*.*?\*/", "", export.header.read_text() + export.source.read_text(), flags=re.DOTALL)
-    assert not re.search(r"\bdouble\b|malloc|static (?!const|void|int all_finite\()", code)
+    assert not re.search(r"\bdouble\b|malloc|static (?!const|void|int is_finite\()", code)
     floats = re.findall(r"(?<![\w.])(?:\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)\w?", code)
     assert floats
     assert all(literal.endswith("f") for literal in floats)
