@@ -26,8 +26,8 @@ def test_what_they_cost() -> None:
         assert row["update_us_at_216_mhz"] == pytest.approx(row["update_instructions"] / 216.0)
         assert 40 <= row["stack_bytes"] <= 1000
         assert 100 <= row["flash_bytes"] <= 20_000
-    # Of the observer tilt, rate and last sample; integrator, last command, and whether it has started.
-    assert linear["state_bytes"] == 6 * 4
+    # Of the observer tilt, rate and last sample; integrator, last command, whether it has started, status.
+    assert linear["state_bytes"] == 7 * 4
     rows: list[ObserverCost] = [{"observer": "linear", **linear}]
     figures: CostFigures = {"processor": "", "clock_mhz": 216.0, "cycles_an_instruction": 1.0, "figures": rows}
     assert cost_markdown(figures).splitlines()[2].startswith("| linear")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -46,10 +45,13 @@ def test_a_controller_that_has_stopped_ends_the_run(tmp_path: Path) -> None:
     with Board(
         toy(tmp_path, update="if (e[0] > 8.0f) { *u = 0; return e[0] > 9.0f ? 7 : (toy_status)e[1]; }")
     ) as board:
-        for status, reason in ((1.0, "a reading was not finite"), (2.0, "its state, estimate or command was not")):
-            with pytest.raises(RunStopped, match=f"^the controller on the board has stopped: {reason}"):
+        for status, reason in (
+            (1.0, "a reading was not finite"),
+            (2.0, "its state, estimate or command was not finite"),
+        ):
+            with pytest.raises(RunStopped, match=rf"{reason}$"):
                 board.update(ACCELERATIONS, (8.5, status))
-        with pytest.raises(RunStopped, match="status 7$"):
+        with pytest.raises(RunStopped, match=r"status 7$"):
             board.update(ACCELERATIONS, (9.5, 0.0))
         assert board.update(ACCELERATIONS, (0.0, 0.0)).u == 100.0
 
