@@ -58,7 +58,7 @@ class Compiled:
         compile_c(self.source, self.example, "-o", folder / "example", "-lm")
         self.output = subprocess.run([folder / "example"], capture_output=True, text=True, check=False).stdout
         self._loaded = ctypes.CDLL(str(self.library))
-        self._controller = ctypes.create_string_buffer(8192)
+        self._controller = np.full(1024, np.nan, self.type)  # memory that nobody has cleared
 
     def run(self, samples: np.ndarray) -> np.ndarray:
         """Call `update` with raw samples, (n, 4 + gimbals); return the estimates and u, (n, 4 + extra signals)."""
@@ -83,7 +83,7 @@ class Compiled:
 
     def numbers(self, count: int) -> np.ndarray:
         """The controller's first numbers: the observer's state, x_e, u. Writing to them changes the controller."""
-        return np.frombuffer(self._controller, self.type, count)
+        return self._controller[:count]
 
     def step(self, state: np.ndarray, *arguments: float) -> tuple[np.ndarray, np.ndarray]:
         """One step of the observer alone: the state and the estimate."""
