@@ -125,10 +125,10 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> Rig:
     return rig
 
 
-def compile_drawn(
+def parse_drawn(
     path: Path, *, lock: bool, locked_axes: Sequence[str], axes: Mapping[str, Sequence[str]]
-) -> mujoco.MjModel:
-    """Compile a rig that `load_rig` has read with all that is only seen.
+) -> mujoco.MjSpec:
+    """Read a rig that `load_rig` has read with all that is only seen.
 
     Args:
         path: The model's file.
@@ -137,7 +137,7 @@ def compile_drawn(
         axes: All axes of the rig.
 
     Returns:
-        The compiled model.
+        The parsed model.
 
     Raises:
         InputError: MuJoCo's compiler refuses it, because of a mesh that cannot be read.
@@ -145,11 +145,9 @@ def compile_drawn(
     spec = parse(path)
     if lock:
         lock_thrust_bearing(spec, path)
-    model = compile_model(spec, path)
     if locked_axes:
-        lock_axes(spec, model, locked_axes, axes, path)
-        model = compile_model(spec, path)
-    return model
+        lock_axes(spec, compile_model(spec, path), locked_axes, axes, path)
+    return spec
 
 
 def check_rig(path: Path, name: Path) -> None:

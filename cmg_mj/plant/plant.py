@@ -29,7 +29,7 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
 from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
-from cmg_mj.plant.mjcf import compile_drawn, load_rig
+from cmg_mj.plant.mjcf import compile_model, load_rig, parse_drawn
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
 from cmg_mj.plant.parts import EQUILIBRIUM_KEY, element_id
 from cmg_mj.plant.step_limit import largest_step
@@ -170,11 +170,15 @@ class Plant:
     def drawn_model(self) -> mujoco.MjModel:
         """The model with all that is only seen: the same bodies and joints, and geoms that physics does without."""
         with set_control_callback(None), quiet():  # compiling a model runs it
-            lock, locked_axes = self.settings.lock_thrust_bearing, self.settings.locked_axes
-            model = compile_drawn(self.path, lock=lock, locked_axes=locked_axes, axes=self._module_names)
+            model = compile_model(self.drawn_spec(), self.path)
         for axis in self._axes_as_filed:
             place_accelerometers(model, self._of_axes.get(axis.name, self.settings), axis, self.path)
         return model
+
+    def drawn_spec(self) -> mujoco.MjSpec:
+        """Parse the model's file, with all that is only seen, and lock what the settings lock."""
+        lock, locked_axes = self.settings.lock_thrust_bearing, self.settings.locked_axes
+        return parse_drawn(self.path, lock=lock, locked_axes=locked_axes, axes=self._module_names)
 
     def single_axis(self, axis: str) -> Plant:
         """The rig as one of its axes sees it: with that axis alone.

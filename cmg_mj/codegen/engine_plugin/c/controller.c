@@ -1,0 +1,63 @@
+#include "controller.h"
+
+#include <math.h>
+#include <string.h>
+
+int controller_place(const controller_type *controller, int at, controller_places *places)
+{
+    memset(places, 0, sizeof *places);
+    places->decisions = at++;
+    places->u = at++;
+    places->law = at;
+    at += controller->law;
+    places->observer = at;
+    at += controller->observer;
+    if (controller->has_backlash) {
+        places->motor = at++;
+        places->gimbal = at++;
+    }
+    return at;
+}
+
+int controller_decide(
+    const controller_type *controller, const controller_places *places, double *memory, const double *forces,
+    const double *encoders, decision *result)
+{
+    const double *y = result->y;
+    double *estimate = result->estimate, *law = memory + places->law;
+    const double held = memory[places->u];
+    int is_finite = 1;
+
+    controller->measure(forces, encoders, result->y);
+    if (memory[places->decisions] == 0.0) {
+        controller->observer_init(memory + places->observer, y);
+        for (int i = 0; i < controller->estimates; ++i) estimate[i] = 0.0;
+        estimate[0] = y[0];
+        estimate[2] = y[1];
+    } else {
+        controller->observer_step(memory + places->observer, y, held, estimate);
+    }
+    for (int i = 0; i < controller->estimates; ++i) is_finite = is_finite && isfinite(estimate[i]);
+    if (memory[places->decisions] < controller->trimmed) law[0] = controller->trim_gain * estimate[controller->trim_part];
+    const double x[3] = {
+        controller->angles_are_estimated ? estimate[0] : y[0], estimate[1],
+        controller->angles_are_estimated ? estimate[2] : y[1]};
+    result->x_e = law[0];
+    controller->law_step(law, y, x, held, &result->u);
+    memory[places->u] = result->u;
+    memory[places->decisions] += 1.0;
+    return is_finite && isfinite(result->u);
+}
+
+double controller_gimbal_rate(
+    const controller_type *controller, const controller_places *places, double *memory, double u)
+{
+    if (!controller->has_backlash) return u;
+    const double half = controller->half_gap, before = memory[places->gimbal];
+    const double motor = memory[places->motor] + u * controller->period;
+    const double low = motor - half, high = motor + half;
+    const double gimbal = before < low ? low : before > high ? high : before;
+    memory[places->motor] = motor;
+    memory[places->gimbal] = gimbal;
+    return (gimbal - before) / controller->period;
+}

@@ -1,0 +1,51 @@
+/* One axis' controller: measurement, observer, trim and law, as cmg_mj/controllers/controller.py decides. */
+#ifndef CMG_MJ_CONTROLLER_H
+#define CMG_MJ_CONTROLLER_H
+
+enum { MOST_ESTIMATES = 64 };
+
+/* What is exported of a controller, and its numbers; the functions are those of the exported C. */
+typedef struct {
+    int estimates;    /* parts of an estimate */
+    int observer;     /* numbers in the observer's state */
+    int law;          /* numbers in the law's state; the first is its integrator [rad s] */
+    int trimmed;      /* decisions during which the integrator is trimmed */
+    int trim_part;    /* part of the estimate that it is trimmed with */
+    double trim_gain; /* [s] */
+    int angles_are_estimated;
+    int has_backlash;
+    double half_gap; /* [rad] */
+    double period;   /* from one decision to the next [s] */
+    void (*measure)(const double *forces, const double *encoders, double y[3]);
+    void (*observer_init)(double *state, const double y[3]);
+    void (*observer_step)(double *state, const double y[3], double u, double *estimate);
+    void (*law_step)(double *state, const double y[3], const double x[3], double held, double *u);
+} controller_type;
+
+typedef struct {
+    int decisions; /* so far */
+    int u;         /* last command [rad/s] */
+    int law, observer;
+    int motor, gimbal; /* of the play between them, if there is some [rad] */
+} controller_places;
+
+typedef struct {
+    double y[3]; /* tilt, gimbal angle, acceleration of the tilt */
+    double u;    /* command [rad/s] */
+    double x_e;  /* integrator that went into it [rad s] */
+    double estimate[MOST_ESTIMATES];
+} decision;
+
+/* Returns the first place behind the controller's memory. */
+int controller_place(const controller_type *controller, int at, controller_places *places);
+
+/* Decide on one sample; 0 if the observer or the law gave no finite number. */
+int controller_decide(
+    const controller_type *controller, const controller_places *places, double *memory, const double *forces,
+    const double *encoders, decision *result);
+
+/* Rate at which the gimbals turn under a command [rad/s]. */
+double controller_gimbal_rate(
+    const controller_type *controller, const controller_places *places, double *memory, double u);
+
+#endif

@@ -1,0 +1,236 @@
+/* The callbacks of MuJoCo's engine plugin.
+ *
+ * A decision is taken in the sensors' pass, before the actuators' of the same step, and counts once `advance` is
+ * called: a program may call mj_forward as often as it likes. Whatever d->ctrl says of the pair's drives is ignored. */
+#include "setup.h"
+
+#include <math.h>
+#include <string.h>
+
+static double *state_of(const mjModel *m, mjData *d, int instance)
+{
+    return d->plugin_state + m->plugin_stateadr[instance];
+}
+
+static int nstate(const mjModel *m, int instance)
+{
+    (void)m, (void)instance;
+    return state_size(&rig);
+}
+
+static int nsensordata(const mjModel *m, int instance, int sensor)
+{
+    return shown_size(&rig, m, instance, sensor);
+}
+
+static int init(const mjModel *m, mjData *d, int instance)
+{
+    char message[MESSAGE] = "";
+    d->plugin_data[instance] = 0;
+    if (setup(&rig, m, instance, state_of(m, d, instance), message)) return 0;
+    mju_warning("%s: %s", rig.plugin, message);
+    return -1;
+}
+
+static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
+{
+    char message[MESSAGE] = "";
+    (void)data;
+    if (!setup(&rig, m, instance, state, message)) state[STATUS] = UNREADY;
+}
+
+/* u = 0 from now on, until a reset. */
+static void fail(double *state, const char *why)
+{
+    axis_places places;
+    int at = HEAD;
+    mju_warning("%s: %s; u = 0 from now on", rig.plugin, why);
+    state[STATUS] = FAILED;
+    state[IS_PENDING] = 0;
+    for (int i = 0; i < rig.axes; ++i) {
+        at = axis_place(rig.axis[i], at, &places);
+        state[places.held] = state[places.rate] = 0;
+    }
+}
+
+/* The number of an element in the state, whatever a program has written there; -1 if there is none. */
+static int element(double number, int n)
+{
+    return number >= 0.0 && number < n ? (int)number : -1;
+}
+
+static double limited(const mjModel *m, int actuator, double control)
+{
+    const int i = m->actuator_ctrladr[actuator];
+    const double *range = m->actuator_ctrlrange + 2 * i;
+    if (!m->actuator_ctrllimited[i] || (m->opt.disableflags & mjDSBL_CLAMPCTRL)) return control;
+    return control < range[0] ? range[0] : control > range[1] ? range[1] : control;
+}
+
+/* The gimbals' servos: the rate at which their setpoints move. */
+static void actuator_act_dot(const mjModel *m, mjData *d, int instance)
+{
+    const double *state = state_of(m, d, instance);
+    axis_places places;
+    int at = HEAD;
+    if (state[STATUS] == UNREADY) return;
+    for (int i = 0; i < rig.axes; ++i) {
+        const axis_type *axis = rig.axis[i];
+        at = axis_place(axis, at, &places);
+        for (int j = 0; j < axis->gimbals; ++j) {
+            const int servo = element(state[places.servos + j], (int)m->nactuator);
+            const int act = servo < 0 ? -1 : m->actuator_actadr[servo];
+            if (act >= 0) d->act_dot[act] = limited(m, servo, axis->modules[j].direction * state[places.rate]);
+        }
+    }
+}
+
+/* The flywheels' motors: their force at the nominal speed. */
+static void drive_flywheels(const mjModel *m, mjData *d, const double *state)
+{
+    axis_places places;
+    int at = HEAD;
+    for (int i = 0; i < rig.axes; ++i) {
+        const axis_type *axis = rig.axis[i];
+        at = axis_place(axis, at, &places);
+        for (int j = 0; j < axis->gimbals; ++j) {
+            const int motor = element(state[places.motors + j], (int)m->nactuator);
+            if (motor < 0) continue;
+            const int out = m->actuator_outadr[motor];
+            const double *bias = m->actuator_biasprm + mjNBIAS * motor;
+            double force = m->actuator_gainprm[mjNGAIN * motor] * limited(m, motor, axis->modules[j].speed);
+            if (m->actuator_biastype[motor] == mjBIAS_AFFINE)
+                force += bias[0] + bias[1] * d->actuator_length[out] + bias[2] * d->actuator_velocity[out];
+            d->actuator_force[out] = force;
+        }
+    }
+}
+
+/* Show the accelerometers the present state under the command that still holds: MuJoCo computes them later. */
+static void sense(const mjModel *m, mjData *d)
+{
+    mj_markStack(d);
+    double *qacc = mj_stackAllocNum(d, (size_t)m->nv);
+    memcpy(qacc, d->qacc, (size_t)m->nv * sizeof *qacc); /* mj_inverse has it as an input */
+    mj_fwdActuation(m, d);
+    mj_fwdAcceleration(m, d);
+    mj_fwdConstraint(m, d);
+    d->flg_rnepost = 0; /* the accelerations of the step before */
+    mj_sensorAcc(m, d);
+    memcpy(d->qacc, qacc, (size_t)m->nv * sizeof *qacc);
+    d->flg_rnepost = 0; /* all of it comes again */
+    mj_freeStack(d);
+}
+
+static int read_inputs(const mjModel *m, const mjData *d, double *state)
+{
+    axis_places places;
+    int at = HEAD, is_finite = 1;
+    for (int i = 0; i < rig.axes; ++i) {
+        const axis_type *axis = rig.axis[i];
+        at = axis_place(axis, at, &places);
+        for (int j = 0; j < FORCES + axis->gimbals; ++j) {
+            const int from = element(state[places.forces + j], (int)m->nsensordata);
+            const double input = from < 0 ? (double)NAN : d->sensordata[from];
+            is_finite = is_finite && isfinite(input);
+            state[places.inputs + j] = input;
+        }
+    }
+    return is_finite;
+}
+
+/* Decide on the inputs without counting the decision: everything but what is shown and commanded is put back. */
+static int try_decision(mjData *d, double *state)
+{
+    const size_t size = (size_t)state_size(&rig);
+    axis_places places;
+    int at = HEAD;
+    mj_markStack(d);
+    double *copy = mj_stackAllocNum(d, size);
+    memcpy(copy, state, size * sizeof *copy);
+    const int is_good = state_advance(&rig, copy);
+    for (int i = 0; i < rig.axes; ++i) {
+        at = axis_place(rig.axis[i], at, &places);
+        state[places.rate] = copy[places.rate];
+        memcpy(state + places.shown, copy + places.shown,
+            (size_t)(SHOWN_ESTIMATE + rig.axis[i]->controller->estimates) * sizeof *copy);
+    }
+    mj_freeStack(d);
+    return is_good;
+}
+
+static void take_instant(const mjModel *m, mjData *d, double *state)
+{
+    axis_places places;
+    int at = HEAD;
+    state[IS_PENDING] = 0;
+    for (int i = 0; i < rig.axes; ++i) {
+        at = axis_place(rig.axis[i], at, &places);
+        state[places.rate] = state[places.held];
+    }
+    if (m->opt.timestep != state[TIMESTEP]) {
+        fail(state, "the physics step was changed");
+        return;
+    }
+    if (fmod(state[STEPS], state[PER_INSTANT]) != 0.0) return;
+    sense(m, d);
+    if (!read_inputs(m, d, state)) fail(state, "what the sensors show is no number");
+    else if (!try_decision(d, state)) fail(state, "the observer or the law gave no finite number");
+    else state[IS_PENDING] = 1;
+}
+
+static void compute(const mjModel *m, mjData *d, int instance, int capability)
+{
+    double *state = state_of(m, d, instance);
+    if (state[STATUS] == UNREADY) return;
+    if (capability == mjPLUGIN_ACTUATOR) {
+        drive_flywheels(m, d, state);
+        return;
+    }
+    if (state[STATUS] == READY) take_instant(m, d, state);
+    show(&rig, m, instance, state, d->sensordata);
+}
+
+/* A step has been taken: the decision counts. */
+static void advance(const mjModel *m, mjData *d, int instance)
+{
+    double *state = state_of(m, d, instance);
+    axis_places places;
+    int at = HEAD;
+    if (state[STATUS] != READY) return;
+    if (state[IS_PENDING] != 0.0) {
+        (void)state_advance(&rig, state);
+        for (int i = 0; i < rig.axes; ++i) {
+            at = axis_place(rig.axis[i], at, &places);
+            state[places.held] = state[places.rate];
+        }
+        state[IS_PENDING] = 0;
+    } else if (fmod(state[STEPS], state[PER_INSTANT]) == 0.0) {
+        fail(state, "a step without its sensors (are they switched off?)");
+        return;
+    }
+    state[STEPS] += 1.0;
+}
+
+mjPLUGIN_LIB_INIT(cmg_mj)
+{
+    mjpPlugin plugin;
+    if (mj_version() != mjVERSION_HEADER) {
+        mju_warning("%s: made for MuJoCo %d, and this is %d: not loaded", rig.plugin, mjVERSION_HEADER, mj_version());
+        return;
+    }
+    mjp_defaultPlugin(&plugin);
+    plugin.name = rig.plugin;
+    plugin.nattribute = SETUP_KEYS;
+    plugin.attributes = setup_keys;
+    plugin.capabilityflags = mjPLUGIN_SENSOR | mjPLUGIN_ACTUATOR;
+    plugin.needstage = mjSTAGE_VEL;
+    plugin.nstate = nstate;
+    plugin.nsensordata = nsensordata;
+    plugin.init = init;
+    plugin.reset = reset;
+    plugin.compute = compute;
+    plugin.advance = advance;
+    plugin.actuator_act_dot = actuator_act_dot;
+    (void)mjp_registerPlugin(&plugin);
+}

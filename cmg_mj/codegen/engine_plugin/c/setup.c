@@ -1,0 +1,210 @@
+#include "setup.h"
+
+#include "noise.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { LONGEST_NAME = 300 };
+static const char INSTANCE[] = "balance"; /* what stands before it in an instance's name is the rig's prefix */
+static const double STANDARD_GRAVITY = 9.80665;
+static const double TURN = 2.0 * 3.141592653589793;
+
+enum { KEY_SEED, KEY_WORLD, KEY_NOISE, KEY_FORCE_COUNTS, KEY_ANGLE_COUNTS };
+const char *const setup_keys[SETUP_KEYS] = {
+    "seed", "world", "noise_density_ug_rthz", "counts_per_g", "counts_per_revolution"};
+
+typedef struct {
+    const mjModel *m;
+    const char *prefix;
+    int prefix_length;
+    char *message;
+} search;
+
+static int refuse(const search *in, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(in->message, MESSAGE, format, arguments);
+    va_end(arguments);
+    return 0;
+}
+
+static const char *instance_name(const mjModel *m, int instance)
+{
+    return m->names + m->name_pluginadr[instance];
+}
+
+static int prefix_length(const char *name)
+{
+    const size_t length = strlen(name), last = sizeof INSTANCE - 1;
+    return length >= last && !strcmp(name + length - last, INSTANCE) ? (int)(length - last) : -1;
+}
+
+/* Number of an element by its name behind the prefix, or -1 and a message. */
+static int find(const search *in, int type, const char *kind, const char *first, const char *last)
+{
+    char name[LONGEST_NAME];
+    const int length = snprintf(name, sizeof name, "%.*s%s%s", in->prefix_length, in->prefix, first, last);
+    const int id = length < LONGEST_NAME ? mj_name2id(in->m, type, name) : -1;
+    if (id < 0) (void)refuse(in, "the model has no %s '%s'", kind, name);
+    return id;
+}
+
+static int find_sensor(const search *in, const char *first, const char *last, int kind, double *place)
+{
+    const int id = find(in, mjOBJ_SENSOR, "sensor", first, last);
+    if (id < 0) return 0;
+    if (in->m->sensor_type[id] != kind) return refuse(in, "sensor '%s%s' is of another kind than it must be", first, last);
+    if (in->m->sensor_delay[id] != 0.0 || in->m->sensor_historyadr[id] >= 0)
+        return refuse(in, "sensor '%s%s' has a delay or a history", first, last);
+    *place = in->m->sensor_adr[id];
+    return 1;
+}
+
+static int find_actuator(const search *in, const char *first, const char *last, int dynamics, double *number)
+{
+    const mjModel *m = in->m;
+    const int id = find(in, mjOBJ_ACTUATOR, "actuator", first, last);
+    if (id < 0) return 0;
+    if (m->actuator_dyntype[id] != dynamics || m->actuator_gaintype[id] != mjGAIN_FIXED ||
+        (m->actuator_biastype[id] != mjBIAS_AFFINE && m->actuator_biastype[id] != mjBIAS_NONE) ||
+        m->actuator_outnum[id] != 1 || m->actuator_ctrlnum[id] != 1 ||
+        m->actuator_actnum[id] != (dynamics == mjDYN_INTEGRATOR ? 1 : 0))
+        return refuse(in, "actuator '%s%s' must be %s", first, last,
+            dynamics == mjDYN_INTEGRATOR ? "an <intvelocity>" : "a <velocity>");
+    if (m->actuator_actearly[id] || m->actuator_delay[id] != 0.0 || m->actuator_historyadr[id] >= 0)
+        return refuse(in, "actuator '%s%s' has actearly, a delay or a history", first, last);
+    *number = id;
+    return 1;
+}
+
+static int find_axis(const search *in, const axis_type *axis, const axis_places *places, double *state)
+{
+    double inner, outer;
+    if (!find_sensor(in, axis->prefix, "accelerometer_inner", mjSENS_ACCELEROMETER, &inner)) return 0;
+    if (!find_sensor(in, axis->prefix, "accelerometer_outer", mjSENS_ACCELEROMETER, &outer)) return 0;
+    const double forces[FORCES] = {inner, inner + 2, outer, outer + 2};
+    memcpy(state + places->forces, forces, sizeof forces);
+    for (int i = 0; i < axis->gimbals; ++i) {
+        const char *name = axis->modules[i].name;
+        if (!find_sensor(in, name, "/gimbal_encoder", mjSENS_JOINTPOS, &state[places->encoders + i])) return 0;
+        if (!find_actuator(in, name, "/gimbal_servo", mjDYN_INTEGRATOR, &state[places->servos + i])) return 0;
+        if (!find_actuator(in, name, "/flywheel_motor", mjDYN_NONE, &state[places->motors + i])) return 0;
+    }
+    return 1;
+}
+
+/* A number of <config>, or what it is without one. */
+static int configured(const search *in, int instance, int key, double otherwise, double most, int is_integer, double *value)
+{
+    const char *text = mj_getPluginConfig(in->m, instance, setup_keys[key]);
+    char *end = NULL;
+    *value = otherwise;
+    if (!text || !*text) return 1;
+    const double number = strtod(text, &end);
+    while (*end == ' ') ++end;
+    if (*end || end == text || !(number >= 0.0 && number <= most) || (is_integer && number != floor(number)))
+        return refuse(in, "<config key=\"%s\" value=\"%.40s\">: must be %s from 0 to %.16g", setup_keys[key], text,
+            is_integer ? "a whole number" : "a number", most);
+    *value = number;
+    return 1;
+}
+
+static int configure(const search *in, int instance, const rig_type *type, double *state)
+{
+    const double unset = -1.0, most = 1e9;
+    double density, force_counts, angle_counts;
+    axis_places places;
+    int at = HEAD;
+    if (!configured(in, instance, KEY_SEED, type->seed, NOISE_LARGEST, 1, &state[SEED])) return 0;
+    if (!configured(in, instance, KEY_WORLD, type->world, NOISE_LARGEST, 1, &state[WORLD])) return 0;
+    if (!configured(in, instance, KEY_NOISE, unset, most, 0, &density)) return 0;
+    if (!configured(in, instance, KEY_FORCE_COUNTS, unset, most, 0, &force_counts)) return 0;
+    if (!configured(in, instance, KEY_ANGLE_COUNTS, unset, most, 0, &angle_counts)) return 0;
+    for (int i = 0; i < type->axes; ++i) {
+        const axis_type *axis = type->axis[i];
+        at = axis_place(axis, at, &places);
+        double *settings = state + places.settings;
+        settings[0] = axis->settings.force_sigma;
+        settings[1] = axis->settings.force_step;
+        settings[2] = axis->settings.angle_step;
+        if (density >= 0.0) settings[0] = density * 1e-6 * STANDARD_GRAVITY * sqrt(axis->raw_rate / 2.0);
+        if (force_counts >= 0.0) settings[1] = force_counts > 0.0 ? STANDARD_GRAVITY / force_counts : 0.0;
+        if (angle_counts >= 0.0) settings[2] = angle_counts > 0.0 ? TURN / angle_counts : 0.0;
+    }
+    return 1;
+}
+
+int setup(const rig_type *type, const mjModel *m, int instance, double *state, char message[MESSAGE])
+{
+    const char *name = instance_name(m, instance);
+    const search in = {m, name, prefix_length(name), message};
+    const double step = m->opt.timestep, steps = floor(type->instant / step + 0.5);
+    axis_places places;
+    int at = HEAD;
+    memset(state, 0, (size_t)state_size(type) * sizeof *state);
+    if (in.prefix_length < 0) return refuse(&in, "the instance must be named '%s', or PREFIX%s", INSTANCE, INSTANCE);
+    if (m->opt.disableflags & mjDSBL_SENSOR) return refuse(&in, "<flag sensor=\"disable\"/> leaves the controller blind");
+    if (!(steps >= 1.0 && fabs(steps * step - type->instant) <= 1e-9 * type->instant))
+        return refuse(&in, "a physics step of %g s: must divide %g s", step, type->instant);
+    for (int i = 0; i < type->axes; ++i) {
+        at = axis_place(type->axis[i], at, &places);
+        if (!find_axis(&in, type->axis[i], &places, state)) return 0;
+    }
+    if (!configure(&in, instance, type, state)) return 0;
+    state[STATUS] = READY;
+    state[PER_INSTANT] = steps;
+    state[TIMESTEP] = step;
+    return 1;
+}
+
+/* What a plugin sensor shows, by its name: INSTANCE/AXIS/estimate, ... */
+
+enum { NOTHING, ESTIMATE, COMMAND, TILT, GIMBAL, ACCELERATION, INTEGRATOR, SAMPLE };
+static const char *const QUANTITIES[] = {
+    "", "estimate", "command", "tilt", "gimbal_angle", "acceleration", "integrator", "sample"};
+
+static int quantity_of(const rig_type *type, const mjModel *m, int instance, int sensor, int *which)
+{
+    const char *owner = instance_name(m, instance), *name = m->names + m->name_sensoradr[sensor];
+    const size_t length = strlen(owner);
+    if (strncmp(name, owner, length) || name[length] != '/') return NOTHING;
+    name += length + 1;
+    for (int i = 0; i < type->axes; ++i) {
+        const char *prefix = type->axis[i]->prefix;
+        if (strncmp(name, prefix, strlen(prefix))) continue;
+        for (int quantity = ESTIMATE; quantity <= SAMPLE; ++quantity)
+            if (!strcmp(name + strlen(prefix), QUANTITIES[quantity])) {
+                *which = i;
+                return quantity;
+            }
+    }
+    return NOTHING;
+}
+
+int shown_size(const rig_type *type, const mjModel *m, int instance, int sensor)
+{
+    int which = 0;
+    const int quantity = quantity_of(type, m, instance, sensor, &which);
+    return quantity == NOTHING ? 0 : quantity == ESTIMATE ? type->axis[which]->controller->estimates : 1;
+}
+
+void show(const rig_type *type, const mjModel *m, int instance, const double *state, double *sensordata)
+{
+    static const int PLACE[] = {0, SHOWN_ESTIMATE, SHOWN_U, SHOWN_Y1, SHOWN_Y2, SHOWN_ACCELERATION, SHOWN_X_E, 0};
+    for (int sensor = 0; sensor < m->nsensor; ++sensor) {
+        if (m->sensor_type[sensor] != mjSENS_PLUGIN || m->sensor_plugin[sensor] != instance) continue;
+        int which = 0, at = HEAD;
+        axis_places places;
+        const int quantity = quantity_of(type, m, instance, sensor, &which);
+        double *result = sensordata + m->sensor_adr[sensor];
+        for (int i = 0; i <= which; ++i) at = axis_place(type->axis[i], at, &places);
+        if (quantity == NOTHING) continue;
+        if (quantity == SAMPLE) *result = floor(state[STEPS] / state[PER_INSTANT] / type->period);
+        else memcpy(result, state + places.shown + PLACE[quantity], (size_t)m->sensor_dim[sensor] * sizeof *result);
+    }
+}

@@ -1,0 +1,22 @@
+/* Finds the rig in a MuJoCo model, and reads the instance's <config>. */
+#ifndef CMG_MJ_SETUP_H
+#define CMG_MJ_SETUP_H
+
+#include "state.h"
+
+#include <mujoco/mujoco.h>
+
+enum { MESSAGE = 400 };
+
+/* Keys that <config> may have. */
+extern const char *const setup_keys[];
+enum { SETUP_KEYS = 5 };
+
+/* Fill a state for its first step; 0 if the model does not fit, and why. */
+int setup(const rig_type *type, const mjModel *m, int instance, double *state, char message[MESSAGE]);
+
+/* Places in sensordata, and what is shown there of a state. */
+int shown_size(const rig_type *type, const mjModel *m, int instance, int sensor);
+void show(const rig_type *type, const mjModel *m, int instance, const double *state, double *sensordata);
+
+#endif

@@ -1,0 +1,45 @@
+/* The layout of an instance's plugin_state: the head, then a block an axis. Every memory lies there. */
+#ifndef CMG_MJ_STATE_H
+#define CMG_MJ_STATE_H
+
+#include "rig.h"
+
+/* The head. A program may write SEED and WORLD before the first step. */
+enum {
+    SEED,
+    WORLD,
+    STATUS,      /* one of the states below */
+    STEPS,       /* physics steps since the reset */
+    PER_INSTANT, /* physics steps from one instant to the next */
+    TIMESTEP,    /* physics step that the others are counted in [s] */
+    IS_PENDING,  /* whether the inputs of this instant have been read and not yet been counted */
+    HEAD
+};
+enum { UNREADY, READY, FAILED };
+
+/* Places of one axis. */
+typedef struct {
+    int forces;              /* places in sensordata of inner x, inner z, outer x, outer z */
+    int encoders;            /* places in sensordata, one a gimbal */
+    int servos, motors;      /* numbers of the actuators, one a gimbal */
+    int settings;            /* force sigma, force step, angle step */
+    int held, rate;          /* rate of the gimbals until this instant, and from it on [rad/s] */
+    int inputs;              /* of this instant: ideal forces, then ideal gimbal angles */
+    int shown;               /* y1, y2, acceleration, u, x_e, then the estimate, at the last decision */
+    pair_places pair;
+    delivery_places encoder;
+    controller_places controller;
+} axis_places;
+
+enum { SHOWN_Y1, SHOWN_Y2, SHOWN_ACCELERATION, SHOWN_U, SHOWN_X_E, SHOWN_ESTIMATE };
+
+/* Returns the first place behind the block. */
+int axis_place(const axis_type *axis, int at, axis_places *places);
+
+/* Numbers in the state. */
+int state_size(const rig_type *type);
+
+/* Take the samples, and the decision if it is time for one, from the inputs in the state; 0 if that failed. */
+int state_advance(const rig_type *type, double *state);
+
+#endif

@@ -1,0 +1,49 @@
+"""Generates all C of a plugin: the exported controllers, the rig's numbers, and what all plugins have in common."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from cmg_mj.codegen.engine_plugin.build import COMMON_SOURCES, common_files
+from cmg_mj.codegen.engine_plugin.rig import PluginRig
+from cmg_mj.codegen.engine_plugin.tables import format_controller, format_rig
+from cmg_mj.codegen.export import generate_code
+
+
+class PluginCode(NamedTuple):
+    """The C of a plugin.
+
+    Attributes:
+        files: Name -> text.
+        sources: The files that are compiled.
+    """
+
+    files: dict[str, str]
+    sources: tuple[str, ...]
+
+
+def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
+    """Generate a plugin's C.
+
+    Args:
+        rig: The rig with its controllers.
+        name: Prefix of the exported controllers in C; of several axes AXIS follows.
+
+    Returns:
+        The code.
+
+    Raises:
+        InputError: Something in use cannot be exported.
+    """
+    rig.refuse_unsupported()
+    files, sources, names = common_files(), list(COMMON_SOURCES), []
+    for axis in rig.axes:
+        axis_name = axis.prefix.rstrip("/").replace("/", "_")
+        own = f"{name}_{axis_name}" if axis_name else name
+        code = generate_code(axis.controller, "double", own)
+        files |= {file: text for file, text in code.files.items() if file in (f"{own}.h", f"{own}.c")}
+        files[f"{own}_controller.c"] = format_controller(own, axis, code.figures["numbers_in_state"])
+        sources.append(f"{own}_controller.c")
+        names.append(own)
+    files["rig.c"] = format_rig(rig, names)
+    return PluginCode(files, (*sources, "rig.c"))

@@ -1,0 +1,171 @@
+"""Prints the plugin's own C: rig.c with the rig's numbers, and a file a controller that joins the exported code to it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+from cmg_mj.codegen.engine_plugin.rig import (
+    Delivery,
+    Encoders,
+    Pair,
+    PluginAxis,
+    PluginRig,
+    Settings,
+    describe_encoders,
+    describe_pair,
+    describe_settings,
+    make_clock,
+)
+from cmg_mj.codegen.export.constants import constants_of
+
+Number = int | float
+Value = Number | str | Sequence[Number] | Delivery | Pair | Encoders | Settings
+
+
+def format_controller(name: str, axis: PluginAxis, observer_numbers: int) -> str:
+    """Print NAME_controller.c, which joins an exported controller to the plugin.
+
+    Args:
+        name: Name of the export.
+        axis: The axis.
+        observer_numbers: Numbers in the exported observer's state.
+
+    Returns:
+        The text.
+    """
+    controller, constants = axis.controller, constants_of(axis.controller)
+    n = name
+    gap = float(controller.backlash)
+    fields = {
+        "estimates": 3 + len(controller.extra_signals[0]),
+        "observer": max(1, observer_numbers),
+        "law": 1,
+        "trimmed": constants.trimmed,
+        "trim_part": constants.trim_part if constants.trimmed else 0,
+        "trim_gain": constants.trim_gain.value if constants.trimmed else 0.0,
+        "angles_are_estimated": int(controller.angle_source == "estimated"),
+        "has_backlash": int(gap > 0.0),
+        "half_gap": gap / 2.0,
+        "period": controller.law.dt,
+    }
+    numbers = "".join(f"    .{field} = {_value(value)},\n" for field, value in fields.items())
+    return f"""/* {n} as the plugin calls it. The exported code is included, since its measurement and law are its own. */
+#include "{n}.c"
+
+#include "controller.h"
+
+#include <string.h>
+
+static void controller_measure(const double *forces, const double *encoders, double y[3])
+{{
+    measure(forces, encoders, &y[0], &y[1], &y[2]);
+}}
+
+static void observer_init(double *memory, const double y[3])
+{{
+    {n}_state state = {{0}};
+    {n}_init(&state, y[0], y[1], y[2]);
+    memcpy(memory, &state, sizeof state);
+}}
+
+static void observer_step(double *memory, const double y[3], double u, double *estimate)
+{{
+    {n}_state state;
+    memcpy(&state, memory, sizeof state);
+    {n}_step(&state, y[0], y[1], y[2], u, estimate);
+    memcpy(memory, &state, sizeof state);
+}}
+
+static void law_step(double *memory, const double y[3], const double x[3], double held, double *u)
+{{
+    (void)y, (void)held;
+    law(x[0], x[1], x[2], memory, u);
+}}
+
+extern const controller_type {n}_controller_type;
+const controller_type {n}_controller_type = {{
+{numbers}    .measure = controller_measure,
+    .observer_init = observer_init,
+    .observer_step = observer_step,
+    .law_step = law_step,
+}};
+"""
+
+
+def format_rig(rig: PluginRig, names: Sequence[str]) -> str:
+    """Print rig.c.
+
+    Args:
+        rig: The rig.
+        names: Name of the export of each axis' controller.
+
+    Returns:
+        The text.
+    """
+    clock, first = make_clock(rig), rig.axes[0].controller
+    axes = "".join(_axis(rig, i, name) for i, name in enumerate(names))
+    declarations = "".join(f"extern const controller_type {name}_controller_type;\n" for name in dict.fromkeys(names))
+    return f"""/* The rig's numbers. */
+#include "rig.h"
+
+{declarations}
+{axes}static const axis_type *const axes[] = {{{", ".join(f"&axis_{i}" for i in range(len(names)))}}};
+
+const rig_type rig = {{
+    .plugin = {_value(rig.plugin)},
+    .seed = {_value(float(first.seed))},
+    .world = {_value(float(first.worlds if isinstance(first.worlds, int) else 0))},
+    .instant = {_value(rig.instant)},
+    .period = {clock.period // clock.steps},
+    .axes = {len(rig.axes)},
+    .axis = axes,
+}};
+"""
+
+
+def _axis(rig: PluginRig, number: int, name: str) -> str:
+    """Print the numbers of one axis."""
+    axis, clock = rig.axes[number], make_clock(rig)
+    sensors = axis.controller.sensors
+    pair, encoder = sensors.accelerometer, sensors.encoder
+    modules = "".join(f"        {{{', '.join(map(_value, module))}}},\n" for module in axis.modules)
+    parts = {
+        "pair": describe_pair(pair, axis.controller.axis, clock),
+        "encoder": describe_encoders(encoder, len(axis.modules), clock),
+        "settings": describe_settings(pair, encoder),
+    }
+    structs = "".join(f"    .{field} = {_struct(value, 4)},\n" for field, value in parts.items())
+    return f"""static const axis_type axis_{number} = {{
+    .prefix = {_value(axis.prefix)},
+    .gimbals = {len(axis.modules)},
+    .modules = {{
+{modules}    }},
+{structs}    .raw_rate = {_value(pair.raw_rate_hz)},
+    .controller = &{name}_controller_type,
+}};
+
+"""
+
+
+def _struct(value: Delivery | Pair | Encoders | Settings, indent: int) -> str:
+    space = " " * indent
+    fields = vars(value).items()
+    lines = [
+        f"{space}    .{name} = {_struct(part, indent + 4) if isinstance(part, Delivery) else _value(part)},\n"
+        for name, part in fields
+    ]
+    return f"{{\n{''.join(lines)}{space}}}"
+
+
+def _value(value: Value) -> str:
+    """Print a number, a text or a row of numbers; every number as C reads it exactly."""
+    if isinstance(value, str):
+        return json.dumps(value)
+    if isinstance(value, int):
+        return str(int(value))
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, (Delivery, Pair, Encoders, Settings)):
+        return _struct(value, 4)
+    return f"{{{', '.join(_value(part) for part in value)}}}"
