@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import mujoco
+import numpy as np
+
 from cmg_mj.codegen.engine_plugin.build import check_platform, compile_plugin
 from cmg_mj.codegen.engine_plugin.generate import PluginCode, generate_plugin
-from cmg_mj.codegen.engine_plugin.rig import PluginAxis, PluginModule, PluginRig
+from cmg_mj.codegen.engine_plugin.rig import LARGEST_SEED, PluginAxis, PluginModule, PluginRig
 from cmg_mj.codegen.export.check import find_compiler
 from cmg_mj.codegen.export.names import name_of
 from cmg_mj.errors import InputError
-from cmg_mj.plant.plugin_model import load_library, write_model
+from cmg_mj.plant.plugin_model import INSTANCE, load_library, write_model
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
+
+SEED, WORLD, STEPS = 0, 1, 3
+"""Places in an instance's state, as state.h numbers them."""
 
 
 class Plugin(NamedTuple):
@@ -80,3 +87,55 @@ def _write_sources(code: PluginCode, folder: Path) -> list[Path]:
     for name, text in code.files.items():
         (folder / name).write_text(text, encoding="utf-8")
     return [folder / name for name in code.files]
+
+
+def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int) -> None:
+    """Choose the noise of the plugins in a simulation that has not yet been stepped since its reset.
+
+    Args:
+        model: A model with plugins of this package.
+        data: Its data.
+        seed: Seed of the noise.
+        world: Number of the world.
+
+    Raises:
+        InputError: The model has no such plugin, a number is none that a plugin takes, or the noise has begun.
+    """
+    for name, number in (("seed", seed), ("world", world)):
+        if not 0 <= number <= LARGEST_SEED:
+            raise InputError(f"{name} = {number}: a plugin takes {name}s from 0 to 2^53")
+    names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i) or "" for i in range(model.nplugin)]
+    instances = [i for i, instance in enumerate(names) if instance.endswith(INSTANCE)]
+    if not instances:
+        raise InputError(f"the model has no plugin instance named {INSTANCE!r}")
+    for instance in instances:
+        state = data.plugin_state[int(model.plugin_stateadr[instance]) :]
+        if state[STEPS]:
+            raise InputError("the plugin's noise has begun: choose seed and world right after a reset")
+        state[SEED], state[WORLD] = seed, world
+
+
+def initial_states(
+    model: mujoco.MjModel, data: mujoco.MjData, seed: int, worlds: int | Sequence[int]
+) -> np.ndarray:
+    """Make the initial states of many worlds, as `mujoco.rollout` takes them.
+
+    Args:
+        model: A model with plugins of this package.
+        data: Its data in the state that all worlds start from, not yet stepped since its reset.
+        seed: Seed of the noise.
+        worlds: How many, or their numbers.
+
+    Returns:
+        Full physics states, (n_worlds, n_numbers).
+
+    Raises:
+        InputError: See `set_world`.
+    """
+    kind = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    numbers = range(worlds) if isinstance(worlds, int) else worlds
+    states = np.empty((len(numbers), mujoco.mj_stateSize(model, kind)))
+    for state, world in zip(states, numbers, strict=True):
+        set_world(model, data, seed, world)
+        mujoco.mj_getState(model, data, state, kind)
+    return states

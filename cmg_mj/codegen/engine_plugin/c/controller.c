@@ -3,6 +3,13 @@
 #include <math.h>
 #include <string.h>
 
+static int are_finite(const double *numbers, int n)
+{
+    int result = 1;
+    for (int i = 0; i < n; ++i) result = result && isfinite(numbers[i]);
+    return result;
+}
+
 int controller_place(const controller_type *controller, int at, controller_places *places)
 {
     memset(places, 0, sizeof *places);
@@ -26,7 +33,6 @@ int controller_decide(
     const double *y = result->y;
     double *estimate = result->estimate, *law = memory + places->law;
     const double held = memory[places->u];
-    int is_finite = 1;
 
     controller->measure(forces, encoders, result->y);
     if (memory[places->decisions] == 0.0) {
@@ -37,7 +43,6 @@ int controller_decide(
     } else {
         controller->observer_step(memory + places->observer, y, held, estimate);
     }
-    for (int i = 0; i < controller->estimates; ++i) is_finite = is_finite && isfinite(estimate[i]);
     if (memory[places->decisions] < controller->trimmed) law[0] = controller->trim_gain * estimate[controller->trim_part];
     const double x[3] = {
         controller->angles_are_estimated ? estimate[0] : y[0], estimate[1],
@@ -46,7 +51,8 @@ int controller_decide(
     controller->law_step(law, y, x, held, &result->u);
     memory[places->u] = result->u;
     memory[places->decisions] += 1.0;
-    return is_finite && isfinite(result->u);
+    return are_finite(estimate, controller->estimates) && are_finite(law, controller->law) && isfinite(result->u) &&
+           are_finite(memory + places->observer, controller->observer);
 }
 
 double controller_gimbal_rate(
