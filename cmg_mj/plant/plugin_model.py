@@ -23,54 +23,45 @@ START_KEY = "start"
 QUANTITIES = ("estimate", "command", "tilt", "gimbal_angle", "acceleration", "integrator", "sample")
 """What the plugin shows as sensors, of each axis."""
 EXACT_DIGITS = 17
-PHYSICS = ("body_", "jnt_", "dof_", "site_pos", "site_quat", "actuator_", "sensor_", "eq_", "tendon_", "key_")
+PHYSICS = ("body_", "jnt_", "dof_", "site_pos", "site_quat", "actuator_", "eq_", "tendon_", "pair_", "exclude_")
 """Beginnings of the names of what the written model must have in common with the plant."""
-DERIVED = ("bvh", "_plugin", "name", "geom", "sensor_", "mocapid", "sameframe", "key_", "dof_length")
+SEEN_OR_DERIVED = ("bvh", "_plugin", "name", "geom", "mocapid", "sameframe", "length0", "dof_length", "_user")
+"""Parts of the names of what geoms that are only seen change, or that no physics of a rig takes."""
 
 
-def load_library(library: Path, plugin: str) -> None:
-    """Load a plugin's library into MuJoCo, unless it has been loaded.
-
-    Raises:
-        InputError: It registers no plugin of that name.
-    """
-    mujoco.mj_loadPluginLibrary(str(library.resolve()))
-
-
-def write_model(plant: Plant, plugin: str, path: Path, sensors: bool = True) -> mujoco.MjModel:
-    """Write a plant's model with an instance of a plugin, whose library has been loaded.
+def plugin_mjcf(plant: Plant, plugin: str, build: str, sensors: bool = True) -> str:
+    """Print a plant's model with an instance of a plugin.
 
     Args:
         plant: The plant.
         plugin: Name of the plugin.
-        path: File to write.
+        build: Fingerprint of its library.
         sensors: Whether the plugin's sensors are in the model.
 
     Returns:
-        The compiled model.
+        The MJCF, with a keyframe `start` of the scenario's initial state.
 
     Raises:
-        InputError: MuJoCo does not write or read the model, or what it reads is not the plant.
+        InputError: MuJoCo does not write the model, or what it reads of it is not the plant.
     """
     with set_control_callback(None), quiet(), _exact_numbers():
         drawn = plant.drawn_spec()
         compile_model(drawn, plant.path)
         spec = mujoco.MjSpec.from_string(as_mjcf(drawn, plant.path))
+        _locate_files(spec, plant.path.parent)
         _take_over(spec, compile_model(spec, plant.path), plant)
-        _add_instance(spec, plugin, plant.axis_names if sensors else ())
-        model = compile_model(spec, path)
-        text = as_mjcf(spec, path)
-    path.write_text(text, encoding="utf-8")
-    with set_control_callback(None):
-        model = mujoco.MjModel.from_xml_path(str(path))
-    if different := differences(plant.model, model):
-        raise InputError(f"{path}: MuJoCo does not read what it has written: {', '.join(different)} differ")
-    return model
+        compile_model(spec, plant.path)
+        text = as_mjcf(spec, plant.path)
+        different = differences(plant.model, mujoco.MjModel.from_xml_string(text))
+    if different:
+        raise InputError(f"{plant.path}: MuJoCo does not read what it has written: {', '.join(different)} differ")
+    return _with_instance(text, plugin, build, plant.axis_names if sensors else ())
 
 
 def differences(plant: mujoco.MjModel, written: mujoco.MjModel) -> list[str]:
     """List the arrays of physics in which two models differ."""
-    names = [name for name in dir(plant) if name.startswith(PHYSICS) and not any(part in name for part in DERIVED)]
+    names = [name for name in dir(plant) if name.startswith(PHYSICS)]
+    names = [name for name in names if not any(part in name for part in SEEN_OR_DERIVED)]
     arrays = [(name, getattr(plant, name), getattr(written, name)) for name in names]
     return [name for name, a, b in arrays if isinstance(a, np.ndarray) and not np.array_equal(a, b)]
 
@@ -87,15 +78,20 @@ def _exact_numbers() -> Iterator[None]:
         library._mjPRIVATE__set_xml_precision(before)
 
 
+def _locate_files(spec: mujoco.MjSpec, folder: Path) -> None:
+    """Let the model find its meshes and textures wherever it is written."""
+    if any(getattr(asset, "file", "") for asset in (*spec.meshes, *spec.textures, *spec.hfields)):
+        spec.meshdir, spec.texturedir = (str((folder / part).resolve()) for part in (spec.meshdir, spec.texturedir))
+
+
 def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None:
     """Give a parsed model, as its file has it, what the plant's settings change: see `plant.variations`."""
     model = plant.model
     spec.option.timestep, spec.option.integrator = model.opt.timestep, model.opt.integrator
     spec.option.disableflags = model.opt.disableflags
     for body in spec.bodies:
-        i = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body.name)
-        if i >= 0 and not np.array_equal(filed.body(body.name).ipos, model.body_ipos[i]):
-            body.ipos = model.body_ipos[i]
+        if not np.array_equal(filed.body(body.name).ipos, model.body(body.name).ipos):
+            body.ipos = model.body(body.name).ipos
     for joint in spec.joints:
         dof = int(model.jnt_dofadr[model.joint(joint.name).id])
         joint.armature, joint.frictionloss = model.dof_armature[dof], model.dof_frictionloss[dof]
@@ -105,8 +101,7 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None
             site.pos = model.site(site.name).pos
     for actuator in spec.actuators:
         i = model.actuator(actuator.name).id
-        actuator.gainprm[:] = model.actuator_gainprm[i]
-        actuator.biasprm[:] = model.actuator_biasprm[i]
+        actuator.gainprm[:], actuator.biasprm[:] = model.actuator_gainprm[i], model.actuator_biasprm[i]
     start = plant.new_data()
     for key in spec.keys:
         if key.name == EQUILIBRIUM_KEY:
@@ -114,12 +109,20 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None
     spec.add_key(name=START_KEY, qpos=start.qpos, qvel=start.qvel, act=start.act, ctrl=start.ctrl)
 
 
-def _add_instance(spec: mujoco.MjSpec, plugin: str, axes: Sequence[str]) -> None:
-    """Add an instance of the plugin, and the sensors that it shows for some axes."""
-    spec.activate_plugin(plugin)
-    instance = spec.add_plugin(name=INSTANCE, plugin_name=plugin, active=True)
-    for axis in axes:
-        for quantity in QUANTITIES:
-            name = "/".join(filter(None, (INSTANCE, axis, quantity)))
-            sensor = spec.add_sensor(name=name, type=mujoco.mjtSensor.mjSENS_PLUGIN, needstage=mujoco.mjtStage.mjSTAGE_VEL)
-            sensor.plugin = instance
+def _with_instance(text: str, plugin: str, build: str, axes: Sequence[str]) -> str:
+    """Add an instance of the plugin to an MJCF that MuJoCo has written, and the sensors that it shows for some axes."""
+    names = ["/".join(filter(None, (INSTANCE, axis, quantity))) for axis in axes for quantity in QUANTITIES]
+    sensors = "".join(f'  <plugin name="{name}" plugin="{plugin}" instance="{INSTANCE}"/>\n  ' for name in names)
+    head = text.index("<mujoco")
+    head = text.index(">", head) + 1
+    extension = f"""
+  <extension>
+    <plugin plugin="{plugin}">
+      <instance name="{INSTANCE}">
+        <config key="build" value="{build}"/>
+      </instance>
+    </plugin>
+  </extension>
+"""
+    end = text.rindex("</sensor>")
+    return f"{text[:head]}{extension}{text[head:end]}{sensors}{text[end:]}"

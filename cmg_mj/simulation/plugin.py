@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,12 +13,16 @@ import mujoco
 import numpy as np
 
 from cmg_mj.codegen.engine_plugin.build import check_platform, compile_plugin
-from cmg_mj.codegen.engine_plugin.generate import PluginCode, generate_plugin
+from cmg_mj.codegen.engine_plugin.files import extra_files, library_name
+from cmg_mj.codegen.engine_plugin.generate import generate_plugin
 from cmg_mj.codegen.engine_plugin.rig import LARGEST_SEED, PluginAxis, PluginModule, PluginRig
+from cmg_mj.codegen.export import check_installed
 from cmg_mj.codegen.export.check import find_compiler
 from cmg_mj.codegen.export.names import name_of
 from cmg_mj.errors import InputError
-from cmg_mj.plant.plugin_model import INSTANCE, load_library, write_model
+from cmg_mj.plant.plugin_model import INSTANCE, plugin_mjcf
+from cmg_mj.results.run_folder import RunFolder
+from cmg_mj.results.run_folder.folder import claimed, write_text
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 
@@ -50,12 +57,14 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
     return PluginRig(tuple(axes), f"cmg_mj.{name}")
 
 
-def plugin(scenario: Scenario | Experiment, out: Path, *, name: str | None = None, sensors: bool = True) -> Plugin:
+def plugin(
+    scenario: Scenario | Experiment, out: Path | RunFolder, *, name: str | None = None, sensors: bool = True
+) -> Plugin:
     """Make an engine plugin of MuJoCo: wherever MuJoCo loads its model, the robot balances.
 
     Args:
         scenario: The scenario, or one that has been prepared.
-        out: Folder to write to.
+        out: Folder to write to; made if need be.
         name: The plugin's name behind `cmg_mj.`; by default the observer's.
         sensors: Whether the model has sensors that show estimate, command and the rest.
 
@@ -63,30 +72,28 @@ def plugin(scenario: Scenario | Experiment, out: Path, *, name: str | None = Non
         What was written.
 
     Raises:
-        InputError: Something in use cannot be exported, or there is no compiler.
+        InputError: Something in use cannot be exported, there is no compiler, CasADi is missing, or the folder holds
+            files of the user's that would be overwritten.
     """
     check_platform()
-    experiment = scenario if isinstance(scenario, Experiment) else prepare(scenario)
-    c_name = name_of(experiment.parts[0].design.observer(), name)
-    rig = describe_rig(experiment, c_name)
-    code = generate_plugin(rig, c_name)
+    check_installed()
     compiler = find_compiler()
     if compiler is None:
         raise InputError("plugin: there is no C compiler: install gcc or clang, or name one in CC")
-    out.mkdir(parents=True, exist_ok=True)
-    sources = _write_sources(code, out / "source")
-    library, model = out / f"libcmg_mj_{c_name}.so", out / f"{c_name}.xml"
-    compile_plugin(out / "source", compiler, code.sources, f"../{library.name}")
-    load_library(library, rig.plugin)
-    write_model(experiment.plant, rig.plugin, model, sensors)
-    return Plugin(rig.plugin, library, model, [library, model, *sources])
-
-
-def _write_sources(code: PluginCode, folder: Path) -> list[Path]:
-    folder.mkdir(exist_ok=True)
-    for name, text in code.files.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    return [folder / name for name in code.files]
+    experiment = scenario if isinstance(scenario, Experiment) else prepare(scenario)
+    name = name_of(experiment.parts[0].design.observer(), name)
+    rig = describe_rig(experiment, name)
+    code = generate_plugin(rig, name)
+    texts = code.files | extra_files(name, code.sources, experiment.plant.axis_names[0])
+    texts[f"{name}.xml"] = plugin_mjcf(experiment.plant, rig.plugin, code.build, sensors)
+    library = library_name(name)
+    writers = {file: partial(write_text, text=text) for file, text in texts.items()}
+    with tempfile.TemporaryDirectory() as temporary, claimed(out, [*writers, library]) as folder:
+        for file in texts:
+            writers[file](Path(temporary) / file)
+        compile_plugin(Path(temporary), compiler, code.sources, library)
+        place = folder.write(writers | {library: partial(shutil.copy, Path(temporary) / library)}, all_or_none=True)
+    return Plugin(rig.plugin, place / library, place / f"{name}.xml", [place / file for file in (*texts, library)])
 
 
 def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import NamedTuple
 
 from cmg_mj.codegen.engine_plugin.build import COMMON_SOURCES, common_files
@@ -16,10 +17,12 @@ class PluginCode(NamedTuple):
     Attributes:
         files: Name -> text.
         sources: The files that are compiled.
+        build: Fingerprint of the code, by which a model knows its library.
     """
 
     files: dict[str, str]
     sources: tuple[str, ...]
+    build: str
 
 
 def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
@@ -45,5 +48,7 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
         files[f"{own}_controller.c"] = format_controller(own, axis, code.figures["numbers_in_state"])
         sources.append(f"{own}_controller.c")
         names.append(own)
-    files["rig.c"] = format_rig(rig, names)
-    return PluginCode(files, (*sources, "rig.c"))
+    files["rig.c"] = format_rig(rig, names, "")
+    build = hashlib.sha256("".join(files.values()).encode()).hexdigest()[:16]
+    files["rig.c"] = format_rig(rig, names, build)
+    return PluginCode(files, (*sources, "rig.c"), build)

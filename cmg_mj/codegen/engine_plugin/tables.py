@@ -93,12 +93,13 @@ const controller_type {n}_controller_type = {{
 """
 
 
-def format_rig(rig: PluginRig, names: Sequence[str]) -> str:
+def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
     """Print rig.c.
 
     Args:
         rig: The rig.
         names: Name of the export of each axis' controller.
+        build: Fingerprint of the code.
 
     Returns:
         The text.
@@ -114,6 +115,7 @@ def format_rig(rig: PluginRig, names: Sequence[str]) -> str:
 
 const rig_type rig = {{
     .plugin = {_value(rig.plugin)},
+    .build = {_value(build)},
     .seed = {_value(float(first.seed))},
     .world = {_value(float(first.worlds if isinstance(first.worlds, int) else 0))},
     .instant = {_value(rig.instant)},

@@ -219,6 +219,10 @@ mjPLUGIN_LIB_INIT(cmg_mj)
         mju_warning("%s: made for MuJoCo %d, and this is %d: not loaded", rig.plugin, mjVERSION_HEADER, mj_version());
         return;
     }
+    if (mjp_getPlugin(rig.plugin, NULL)) {
+        mju_warning("%s: has been loaded already, from another library, which stays in force", rig.plugin);
+        return;
+    }
     mjp_defaultPlugin(&plugin);
     plugin.name = rig.plugin;
     plugin.nattribute = SETUP_KEYS;

@@ -24,6 +24,7 @@ typedef struct {
 
 typedef struct {
     const char *plugin; /* name under which MuJoCo knows it */
+    const char *build;  /* by which a model knows the library that it was written with */
     double seed, world; /* unless the model says otherwise */
     double instant;     /* [s] */
     int period;         /* instants from one decision to the next */

@@ -13,9 +13,9 @@ static const char INSTANCE[] = "balance"; /* what stands before it in an instanc
 static const double STANDARD_GRAVITY = 9.80665;
 static const double TURN = 2.0 * 3.141592653589793;
 
-enum { KEY_SEED, KEY_WORLD, KEY_NOISE, KEY_FORCE_COUNTS, KEY_ANGLE_COUNTS };
+enum { KEY_SEED, KEY_WORLD, KEY_NOISE, KEY_FORCE_COUNTS, KEY_ANGLE_COUNTS, KEY_BUILD };
 const char *const setup_keys[SETUP_KEYS] = {
-    "seed", "world", "noise_density_ug_rthz", "counts_per_g", "counts_per_revolution"};
+    "seed", "world", "noise_density_ug_rthz", "counts_per_g", "counts_per_revolution", "build"};
 
 typedef struct {
     const mjModel *m;
@@ -118,8 +118,11 @@ static int configure(const search *in, int instance, const rig_type *type, doubl
 {
     const double unset = -1.0, most = 1e9;
     double density, force_counts, angle_counts;
+    const char *build = mj_getPluginConfig(in->m, instance, setup_keys[KEY_BUILD]);
     axis_places places;
     int at = HEAD;
+    if (build && *build && strcmp(build, type->build))
+        return refuse(in, "the model was written with another library (build %.40s, and this is %s)", build, type->build);
     if (!configured(in, instance, KEY_SEED, type->seed, NOISE_LARGEST, 1, &state[SEED])) return 0;
     if (!configured(in, instance, KEY_WORLD, type->world, NOISE_LARGEST, 1, &state[WORLD])) return 0;
     if (!configured(in, instance, KEY_NOISE, unset, most, 0, &density)) return 0;

@@ -10,7 +10,7 @@ enum { MESSAGE = 400 };
 
 /* Keys that <config> may have. */
 extern const char *const setup_keys[];
-enum { SETUP_KEYS = 5 };
+enum { SETUP_KEYS = 6 };
 
 /* Fill a state for its first step; 0 if the model does not fit, and why. */
 int setup(const rig_type *type, const mjModel *m, int instance, double *state, char message[MESSAGE]);

@@ -1,0 +1,45 @@
+"""Prints what stands beside a plugin's C: a Makefile, and an example in C and in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.resources import files
+
+from cmg_mj.codegen.engine_plugin.build import FLAGS, find_mujoco
+
+
+def library_name(name: str) -> str:
+    """Name the library of a plugin."""
+    return f"libcmg_mj_{name}.so"
+
+
+def extra_files(name: str, sources: Sequence[str], axis: str) -> dict[str, str]:
+    """Print the Makefile and the examples.
+
+    Args:
+        name: The plugin's name behind `cmg_mj.`.
+        sources: The files that are compiled.
+        axis: The first axis' name, or nothing.
+
+    Returns:
+        Name -> text.
+    """
+    mujoco = find_mujoco()
+    words = {
+        "NAME": name,
+        "LIBRARY": library_name(name),
+        "TILT": "/".join(filter(None, ("balance", axis, "tilt"))),
+        "MUJOCO": str(mujoco.library.parent),
+        "LIBMUJOCO": mujoco.library.name,
+        "SOURCES": " ".join(sources),
+        "FLAGS": " ".join(FLAGS),
+    }
+    templates = {f"{name}_example.c": "example.c", f"{name}_example.py": "example.py.txt", "Makefile": "Makefile"}
+    return {file: _filled(template, words) for file, template in templates.items()}
+
+
+def _filled(template: str, words: dict[str, str]) -> str:
+    text = (files("cmg_mj.codegen.engine_plugin") / "templates" / template).read_text(encoding="utf-8")
+    for word, value in words.items():
+        text = text.replace(f"@{word}@", value)
+    return text
