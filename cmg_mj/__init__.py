@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from cmg_mj.simulation.callback import control_callback as control_callback
     from cmg_mj.simulation.experiment import Experiment as Experiment
     from cmg_mj.simulation.experiment import prepare as prepare
+    from cmg_mj.simulation.plugin import plugin as plugin
     from cmg_mj.studies.sweeps.api import SweepResult as SweepResult
     from cmg_mj.studies.sweeps.api import sweep as sweep
 
@@ -77,6 +78,7 @@ NAMES_OF_MODULES = {
     "sensors.tilt": ("RadialTilt",),
     "simulation.callback": ("control", "control_callback"),
     "simulation.experiment": ("Experiment", "prepare"),
+    "simulation.plugin": ("plugin",),
     "studies.sweeps.api": ("SweepResult", "sweep"),
 }
 """The public names, by the module that defines them."""

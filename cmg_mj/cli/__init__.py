@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from cmg_mj.cli import bench, boards, logs, mount, reproduce, scenarios, studio, sweeps, tune
+from cmg_mj.cli import bench, boards, logs, mount, plugin, reproduce, scenarios, studio, sweeps, tune
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
 from cmg_mj.errors import InputError, RunStopped, raised
 
@@ -87,6 +87,7 @@ for command in (
     tune.tune_log,
     logs.replay,
     boards.export,
+    plugin.plugin,
     mount.mount,
 ):
     cli.add_command(command)

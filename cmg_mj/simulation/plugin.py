@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -14,10 +13,9 @@ import numpy as np
 
 from cmg_mj.codegen.engine_plugin.build import check_platform, compile_plugin
 from cmg_mj.codegen.engine_plugin.files import extra_files, library_name
-from cmg_mj.codegen.engine_plugin.generate import generate_plugin
+from cmg_mj.codegen.engine_plugin.generate import PluginCode, generate_plugin
 from cmg_mj.codegen.engine_plugin.rig import LARGEST_SEED, PluginAxis, PluginModule, PluginRig
 from cmg_mj.codegen.export import check_installed
-from cmg_mj.codegen.export.check import find_compiler
 from cmg_mj.codegen.export.names import name_of
 from cmg_mj.errors import InputError
 from cmg_mj.plant.plugin_model import INSTANCE, plugin_mjcf
@@ -28,6 +26,8 @@ from cmg_mj.simulation.experiment import Experiment, prepare
 
 SEED, WORLD, STEPS = 0, 1, 3
 """Places in an instance's state, as state.h numbers them."""
+
+LIBRARY_MODE = 0o755
 
 
 class Plugin(NamedTuple):
@@ -46,6 +46,20 @@ class Plugin(NamedTuple):
     files: list[Path]
 
 
+class PluginTexts(NamedTuple):
+    """A plugin before it is compiled.
+
+    Attributes:
+        name: The plugin's name behind `cmg_mj.`.
+        code: Its C.
+        texts: All files but the library: name -> text.
+    """
+
+    name: str
+    code: PluginCode
+    texts: dict[str, str]
+
+
 def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig:
     """Describe an experiment's rig and its controllers."""
     axes = []
@@ -55,6 +69,63 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
         controller = part.design.controller(part.plant.interface, worlds=world, axis=i)
         axes.append(PluginAxis(axis.prefix, modules, controller))
     return PluginRig(tuple(axes), f"cmg_mj.{name}")
+
+
+def find_tools() -> list[str]:
+    """Find what a plugin is made with, before anything is computed.
+
+    Returns:
+        Command of the compiler.
+
+    Raises:
+        InputError: CasADi or a compiler is missing, or the platform is not supported.
+    """
+    check_platform()
+    check_installed()
+    from cmg_mj.codegen.export.check import find_compiler  # imports CasADi
+
+    compiler = find_compiler()
+    if compiler is None:
+        raise InputError("plugin: there is no C compiler: install gcc or clang, or name one in CC")
+    return compiler
+
+
+def make_plugin(experiment: Experiment, name: str | None = None, *, sensors: bool = True) -> PluginTexts:
+    """Generate a plugin's C and its model: see `plugin`."""
+    name = name_of(experiment.parts[0].design.observer(), name)
+    rig = describe_rig(experiment, name)
+    code = generate_plugin(rig, name)
+    texts = code.files | extra_files(name, code.sources, experiment.plant.axis_names[0])
+    texts[f"{name}.xml"] = plugin_mjcf(experiment.plant, rig.plugin, code.build, sensors)
+    return PluginTexts(name, code, texts)
+
+
+def plugin_files(made: PluginTexts) -> list[str]:
+    """Name the files of a plugin."""
+    return [*made.texts, library_name(made.name)]
+
+
+def write_plugin(made: PluginTexts, out: Path | RunFolder) -> Plugin:
+    """Compile a plugin and write it to a folder: see `plugin`."""
+    name, library = made.name, library_name(made.name)
+    compiler = find_tools()
+    writers: dict[str, Callable[[Path], None]] = {
+        file: partial(write_text, text=text) for file, text in made.texts.items()
+    }
+    with tempfile.TemporaryDirectory() as temporary, claimed(out, plugin_files(made)) as folder:
+        compiled = Path(temporary) / library
+        for file in made.code.files:
+            writers[file](Path(temporary) / file)
+        compile_plugin(Path(temporary), compiler, made.code.sources, library)
+        writers[library] = partial(_copy, compiled)
+        place = folder.write(writers, all_or_none=True)
+    files = [place / file for file in plugin_files(made)]
+    return Plugin(f"cmg_mj.{name}", place / library, place / f"{name}.xml", files)
+
+
+def _copy(source: Path, target: Path) -> None:
+    target.write_bytes(source.read_bytes())
+    target.chmod(LIBRARY_MODE)
 
 
 def plugin(
@@ -75,25 +146,9 @@ def plugin(
         InputError: Something in use cannot be exported, there is no compiler, CasADi is missing, or the folder holds
             files of the user's that would be overwritten.
     """
-    check_platform()
-    check_installed()
-    compiler = find_compiler()
-    if compiler is None:
-        raise InputError("plugin: there is no C compiler: install gcc or clang, or name one in CC")
+    find_tools()
     experiment = scenario if isinstance(scenario, Experiment) else prepare(scenario)
-    name = name_of(experiment.parts[0].design.observer(), name)
-    rig = describe_rig(experiment, name)
-    code = generate_plugin(rig, name)
-    texts = code.files | extra_files(name, code.sources, experiment.plant.axis_names[0])
-    texts[f"{name}.xml"] = plugin_mjcf(experiment.plant, rig.plugin, code.build, sensors)
-    library = library_name(name)
-    writers = {file: partial(write_text, text=text) for file, text in texts.items()}
-    with tempfile.TemporaryDirectory() as temporary, claimed(out, [*writers, library]) as folder:
-        for file in texts:
-            writers[file](Path(temporary) / file)
-        compile_plugin(Path(temporary), compiler, code.sources, library)
-        place = folder.write(writers | {library: partial(shutil.copy, Path(temporary) / library)}, all_or_none=True)
-    return Plugin(rig.plugin, place / library, place / f"{name}.xml", [place / file for file in (*texts, library)])
+    return write_plugin(make_plugin(experiment, name, sensors=sensors), out)
 
 
 def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int) -> None:
@@ -122,9 +177,7 @@ def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int)
         state[SEED], state[WORLD] = seed, world
 
 
-def initial_states(
-    model: mujoco.MjModel, data: mujoco.MjData, seed: int, worlds: int | Sequence[int]
-) -> np.ndarray:
+def initial_states(model: mujoco.MjModel, data: mujoco.MjData, seed: int, worlds: int | Sequence[int]) -> np.ndarray:
     """Make the initial states of many worlds, as `mujoco.rollout` takes them.
 
     Args:

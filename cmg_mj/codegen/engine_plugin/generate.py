@@ -39,7 +39,8 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
         InputError: Something in use cannot be exported.
     """
     rig.refuse_unsupported()
-    files, sources, names = common_files(), list(COMMON_SOURCES), []
+    files, names = common_files(), []
+    sources: list[str] = [*COMMON_SOURCES]
     for axis in rig.axes:
         axis_name = axis.prefix.rstrip("/").replace("/", "_")
         own = f"{name}_{axis_name}" if axis_name else name

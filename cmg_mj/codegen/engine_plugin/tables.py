@@ -1,4 +1,4 @@
-"""Prints the plugin's own C: rig.c with the rig's numbers, and a file a controller that joins the exported code to it."""
+"""Prints a plugin's own C: rig.c with its numbers, and a file a controller that joins the exported code to it."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def format_controller(name: str, axis: PluginAxis, observer_numbers: int) -> str
         "period": controller.law.dt,
     }
     numbers = "".join(f"    .{field} = {_value(value)},\n" for field, value in fields.items())
-    return f"""/* {n} as the plugin calls it. The exported code is included, since its measurement and law are its own. */
+    return f"""/* {n} as the plugin calls it. The exported code is included: its measurement and law are static. */
 #include "{n}.c"
 
 #include "controller.h"

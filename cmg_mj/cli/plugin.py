@@ -1,0 +1,60 @@
+"""The command that makes an engine plugin of MuJoCo."""
+
+from __future__ import annotations
+
+import click
+
+from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
+from cmg_mj.cli.terminal import note_hints, say_written, show, users_code
+
+
+@click.command(short_help="Make a library and a model with which the robot balances in any MuJoCo program.")
+@click.argument("observer", callback=lambda context, parameter, name: check_observer("OBSERVER", name))
+@out_option()
+@click.option("--name", metavar="NAME", help="The plugin's name behind cmg_mj.  [default: OBSERVER's name]")
+@click.option(
+    "--scenario",
+    default="push_recovery",
+    show_default=True,
+    metavar="NAME",
+    help="Scenario that gives the plant, the sensors, the gains and the rates.",
+)
+@settings_option("Set a field of the scenario, such as observer.k1=25 or controller.rate_hz=400.")
+@click.option("--no-sensors", is_flag=True, help="Leave the plugin's own sensors out of the model.")
+@json_option()
+@users_code()
+def plugin(
+    observer: str,
+    out: str | None,
+    name: str | None,
+    scenario: str,
+    settings: tuple[str, ...],
+    no_sensors: bool,
+    as_json: bool,
+) -> None:
+    """Compile OBSERVER, a name or your own as package.module:Class, with sensors and law as a plugin of MuJoCo.
+
+    \b
+    Writes a folder:
+      libcmg_mj_NAME.so   the library
+      NAME.xml            the scenario's model, which names it; keyframe "start" is the scenario's start
+      NAME_example.py, NAME_example.c, Makefile, and the C of the library
+    """  # noqa: D301  (click wants the character itself)
+    from cmg_mj.simulation.experiment import prepare
+    from cmg_mj.simulation.plugin import find_tools, make_plugin, plugin_files, write_plugin
+
+    find_tools()
+    experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
+    note_hints(experiment.hints)
+    made = make_plugin(experiment, name, sensors=not no_sensors)
+    with claim_output(out, f"plugin-{made.name}", plugin_files(made)) as folder:
+        result = write_plugin(made, folder)
+    figures = {
+        "plugin": result.name,
+        "library": result.library.name,
+        "model": result.model.name,
+        "build": made.code.build,
+    }
+    show(figures, "\n".join(f"{key:<8} {value}" for key, value in figures.items()), as_json)
+    place = result.library.parent
+    say_written(folder, place, f"Try it: python {place / made.name}_example.py", as_json)

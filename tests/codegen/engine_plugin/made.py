@@ -1,0 +1,122 @@
+"""Plugins made for tests, each under a name of its own: a process registers a name once."""
+
+from __future__ import annotations
+
+import itertools
+import tempfile
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import pytest
+
+from cmg_mj import load_scenario, prepare
+from cmg_mj.plant.tilt_line import apply_torques
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.simulation.plugin import Plugin, plugin
+from tests.codegen.export.compiled import COMPILER
+
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")
+
+_numbers = itertools.count()
+_folder = tempfile.TemporaryDirectory()
+
+ALL_IMPERFECTIONS = (
+    "sensors.accelerometer.scale_error=[0.02, -0.01]",
+    "sensors.accelerometer.misalignment_deg=[0.5, -0.3]",
+    "sensors.accelerometer.cross_axis=[0.02, 0.01]",
+    "sensors.accelerometer.bias_mg=[3, -4]",
+    "sensors.accelerometer.skew_s=0.003",
+    "sensors.accelerometer.bandwidth_hz=94",
+    "sensors.accelerometer.bias_instability_ug=200",
+    "sensors.accelerometer.latency_s=0.0031",
+    "sensors.accelerometer.range_g=1.01",
+    "sensors.encoder.latency_s=0.004",
+    "plant.gimbal_backlash_arcmin=10",
+)
+EXACT = (
+    "sensors.accelerometer.noise_density_ug_rthz=0",
+    "sensors.accelerometer.counts_per_g=0",
+    "sensors.encoder.counts_per_revolution=0",
+)
+
+
+class Made(NamedTuple):
+    """A plugin with its experiment, loaded."""
+
+    experiment: Experiment
+    plugin: Plugin
+    model: mujoco.MjModel
+
+    def start(self) -> mujoco.MjData:
+        data = mujoco.MjData(self.model)
+        mujoco.mj_resetDataKeyframe(self.model, data, self.model.key("start").id)
+        return data
+
+
+@cache
+def make(kind: str, *settings: str, scenario: str = "push_recovery") -> Made:
+    experiment = prepare(load_scenario(scenario, settings, kind))
+    number = next(_numbers)
+    made = plugin(experiment, Path(_folder.name) / str(number), name=f"test_{number}")
+    mujoco.mj_loadPluginLibrary(str(made.library))
+    return Made(experiment, made, mujoco.MjModel.from_xml_path(str(made.model)))
+
+
+def torques_at(experiment: Experiment, step: int) -> list[float]:
+    """The pushes' torques about the axes during a physics step."""
+    h, names = experiment.plant.timestep, experiment.plant.axis_names
+    torques = [0.0] * len(names)
+    for push in experiment.scenario.push:
+        if round(push.start_s / h) <= step < round(push.end_s / h):
+            torques[names.index(push.axis or names[0])] += push.torque_n_m
+    return torques
+
+
+def run(made: Made, data: mujoco.MjData, ticks: int, first_step: int = 0) -> dict[str, np.ndarray]:
+    """Step MuJoCo alone; at each control tick: qpos and qvel before it, and what the plugin's sensors show."""
+    model, lines = made.model, [axis.line for axis in made.experiment.plant.axes]
+    steps = made.experiment.controller().period
+    sensors = [model.sensor(i) for i in range(model.nsensor)]
+    shown = {s.name: slice(int(s.adr[0]), int(s.adr[0] + s.dim[0])) for s in sensors if s.name.startswith("balance/")}
+    rows: dict[str, list[np.ndarray]] = {name: [] for name in ("qpos", "qvel", *shown)}
+    for step in range(first_step, first_step + ticks * steps):
+        is_tick = step % steps == 0
+        if is_tick:
+            rows["qpos"].append(data.qpos.copy())
+            rows["qvel"].append(data.qvel.copy())
+        apply_torques(data.qfrc_applied, lines, torques_at(made.experiment, step))
+        mujoco.mj_step(model, data)
+        if is_tick:
+            for name, place in shown.items():
+                rows[name].append(data.sensordata[place].copy())
+    return {name: np.array(values) for name, values in rows.items()}
+
+
+def columns(trajectory: Trajectory, names: Sequence[str]) -> np.ndarray:
+    return np.stack([trajectory[name] for name in names], axis=1)
+
+
+def check_against_runner(made: Made, rows: dict[str, np.ndarray], trajectory: Trajectory, observer: str) -> None:
+    """Every number at every control tick is the runner's, bit for bit."""
+    np.testing.assert_array_equal(rows["qpos"], columns(trajectory, trajectory.layout.positions()))
+    np.testing.assert_array_equal(rows["qvel"], columns(trajectory, trajectory.layout.rates()))
+    for axis in trajectory.axes or ("",):
+        own = trajectory.along(axis) if axis else trajectory
+        prefix = f"balance/{axis}/" if axis else "balance/"
+        parts = ["x1_rad", "x2_rad_s", "x3_rad", *own.extra_signals(observer)]
+        estimate = columns(own, [f"estimate/{observer}/{part}" for part in parts])
+        np.testing.assert_array_equal(rows[f"{prefix}estimate"], estimate)
+        for quantity, column in {
+            "tilt": "y1_rad",
+            "gimbal_angle": "y2_rad",
+            "acceleration": "acceleration_rad_s2",
+            "command": "u_rad_s",
+            "integrator": "x_e_rad_times_s",
+        }.items():
+            np.testing.assert_array_equal(rows[prefix + quantity][:, 0], own[column], err_msg=prefix + quantity)
+        np.testing.assert_array_equal(rows[f"{prefix}sample"][:, 0], range(len(estimate)))

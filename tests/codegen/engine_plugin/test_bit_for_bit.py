@@ -1,0 +1,78 @@
+"""The plugin in MuJoCo's own loop against the runner: every number is the same, bit for bit."""
+
+from __future__ import annotations
+
+import pytest
+
+from cmg_mj.codegen.engine_plugin.build import FLAGS
+from cmg_mj.observers import OBSERVERS
+from tests.codegen.engine_plugin.made import ALL_IMPERFECTIONS, EXACT, check_against_runner, make, needs_compiler, run
+
+pytestmark = needs_compiler
+
+SENSORS = {"exact": EXACT, "default": (), "all imperfections": ALL_IMPERFECTIONS}
+SHORT = ("duration_s=0.5", "push.0.start_s=0.2")
+
+
+def check(kind: str, *settings: str, scenario: str = "push_recovery") -> None:
+    made = make(kind, *settings, scenario=scenario)
+    trajectory = made.experiment.run().trajectory
+    check_against_runner(made, run(made, made.start(), len(trajectory)), trajectory, kind)
+
+
+def test_half_a_second_is_bit_for_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Besides, the export itself compares on few signals here, and the compiler does not optimise, which takes time."""
+    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
+    monkeypatch.setattr("cmg_mj.codegen.engine_plugin.build.FLAGS", (*FLAGS, "-O0"))
+    check("gyro_free", *SHORT)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", SENSORS)
+@pytest.mark.parametrize("kind", OBSERVERS)
+def test_every_observer(kind: str, sensors: str) -> None:
+    check(kind, *SENSORS[sensors])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", SENSORS)
+@pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
+def test_every_integrator(integrator: str, sensors: str) -> None:
+    check("gyro_free", f"plant.integrator={integrator}", *SENSORS[sensors])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "settings",
+    [
+        pytest.param(("plant.timestep_s=0.001",), id="small steps"),
+        pytest.param(("sensors.accelerometer.rate_hz=500", "sensors.encoder.rate_hz=100"), id="other rates"),
+        pytest.param(("sensors.accelerometer.latency_s=0.0231", "sensors.encoder.latency_s=0.007"), id="latency"),
+        pytest.param(("controller.rate_hz=400", "controller.angle_source=estimated"), id="estimated angles"),
+        pytest.param(("controller.gains=scaled", "controller.rate_limit_rad_s=0.6"), id="limited"),
+        pytest.param(("controller.lqr.state_cost=[1, 1, 1, 1]", "controller.lqr.input_cost=1.0"), id="lqr"),
+        pytest.param(("seed=12345678901",), id="a long seed"),
+        pytest.param(("plant.tilt_friction_n_m=0.01", "plant.gimbal_friction_n_m=0.01"), id="friction"),
+        pytest.param(("plant.flywheel_speed_rad_s=250", "plant.flywheel_imbalance_kg_m=1e-6"), id="other wheels"),
+        pytest.param(("plant.accelerometer_inner_m=0.1", "plant.accelerometer_outer_m=0.2"), id="other places"),
+        pytest.param(("sensors.accelerometer.noise_density_ug_rthz=800",), id="noise"),
+    ],
+)
+def test_settings(settings: tuple[str, ...]) -> None:
+    check("gyro_free", *settings)
+
+
+@pytest.mark.slow
+def test_trimmed_integrator() -> None:
+    check("adaptive", "controller.bias_trim_s=0.52")
+
+
+@pytest.mark.slow
+def test_single_gimbal() -> None:
+    check("homogeneous", scenario="single_gimbal")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["Plain", "Elaborate"])
+def test_a_users_own_observer(name: str) -> None:
+    check(f"tests.codegen.export.own:{name}")
