@@ -90,6 +90,8 @@ class MemsGyro:
 
         resting = round(self.calibration_s / dt)
         pieces = [min(PIECE, resting - start) for start in range(0, resting, PIECE)]
-        offset = math.radians(self.bias_deg_s) - sum((errors(n).sum(axis=0) / resting for n in pieces), 0.0)
+        # Added one after the other: NumPy's sum takes another order for one world than for many.
+        sums = (np.add.accumulate(errors(n))[-1] for n in pieces)
+        offset = math.radians(self.bias_deg_s) - sum((total / resting for total in sums), 0.0)
         scale = 1.0 + self.scale_error
         return lambda rate: digitise(scale * rate + (errors(len(rate)) + offset), limit, step)

@@ -67,8 +67,11 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
         axis = part.plant.axis
         modules = tuple(PluginModule(module.name, module.direction, module.speed) for module in axis.modules)
         controller = part.design.controller(part.plant.interface, worlds=world, axis=i)
-        axes.append(PluginAxis(axis.prefix, modules, controller))
-    return PluginRig(tuple(axes), f"cmg_mj.{name}")
+        joint = mujoco.mj_id2name(part.plant.model, mujoco.mjtObj.mjOBJ_JOINT, axis.line.joint)
+        axes.append(PluginAxis(axis.prefix, modules, joint, tuple(axis.line.push[1]), controller))
+    compensates = len(axes) > 1 and experiment.scenario.controller.compensate_turning
+    turning = (experiment.plant.turning, experiment.scenario.sensors.mems_gyro) if compensates else None
+    return PluginRig(tuple(axes), f"cmg_mj.{name}", turning)
 
 
 def find_tools() -> list[str]:

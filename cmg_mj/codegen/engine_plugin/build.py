@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 from cmg_mj.errors import InputError
 
-COMMON_SOURCES = ("noise.c", "sensors.c", "controller.c", "state.c", "setup.c", "plugin.c")
-COMMON_HEADERS = ("ziggurat.h", "noise.h", "sensors.h", "controller.h", "rig.h", "state.h", "setup.h")
+COMMON_SOURCES = ("noise.c", "sensors.c", "gyros.c", "controller.c", "state.c", "setup.c", "plugin.c")
+COMMON_HEADERS = ("ziggurat.h", "noise.h", "sensors.h", "gyros.h", "controller.h", "rig.h", "state.h", "setup.h")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 TESTED_PLATFORM = ("Linux", "glibc")
 

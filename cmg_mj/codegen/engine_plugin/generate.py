@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 from typing import NamedTuple
 
@@ -9,6 +10,7 @@ from cmg_mj.codegen.engine_plugin.build import COMMON_SOURCES, common_files
 from cmg_mj.codegen.engine_plugin.rig import PluginRig
 from cmg_mj.codegen.engine_plugin.tables import format_controller, format_rig
 from cmg_mj.codegen.export import generate_code
+from cmg_mj.controllers.controller import Controller
 
 
 class PluginCode(NamedTuple):
@@ -44,7 +46,7 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
     for axis in rig.axes:
         axis_name = axis.prefix.rstrip("/").replace("/", "_")
         own = f"{name}_{axis_name}" if axis_name else name
-        code = generate_code(axis.controller, "double", own)
+        code = generate_code(_on_its_observer(axis.controller), "double", own)
         files |= {file: text for file, text in code.files.items() if file in (f"{own}.h", f"{own}.c")}
         files[f"{own}_controller.c"] = format_controller(own, axis, code.figures["numbers_in_state"])
         sources.append(f"{own}_controller.c")
@@ -53,3 +55,10 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
     build = hashlib.sha256("".join(files.values()).encode()).hexdigest()[:16]
     files["rig.c"] = format_rig(rig, names, build)
     return PluginCode(files, (*sources, "rig.c"), build)
+
+
+def _on_its_observer(controller: Controller) -> Controller:
+    """Copy a controller as one that is fed back its observer's rate, which alone is exported."""
+    result = copy.copy(controller)
+    result.feedback = "observer"
+    return result

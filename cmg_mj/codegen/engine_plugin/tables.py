@@ -5,22 +5,27 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from cmg_mj.codegen.engine_plugin.rig import (
+from cmg_mj.codegen.engine_plugin.rig import PluginAxis, PluginRig
+from cmg_mj.codegen.engine_plugin.sensor_numbers import (
     Delivery,
     Encoders,
+    FogNumbers,
     Pair,
-    PluginAxis,
-    PluginRig,
     Settings,
+    TurnGyro,
     describe_encoders,
+    describe_fog,
     describe_pair,
     describe_settings,
-    make_clock,
+    describe_turn_gyro,
 )
 from cmg_mj.codegen.export.constants import constants_of
 
 Number = int | float
-Value = Number | str | Sequence[Number] | Delivery | Pair | Encoders | Settings
+Struct = Delivery | Pair | Encoders | FogNumbers | TurnGyro | Settings
+Value = Number | str | Sequence[Number]
+
+FEEDBACK = {"observer": "FEEDBACK_OBSERVER", "fog": "FEEDBACK_FOG", "truth": "FEEDBACK_TRUTH"}
 
 
 def format_controller(name: str, axis: PluginAxis, observer_numbers: int) -> str:
@@ -45,11 +50,13 @@ def format_controller(name: str, axis: PluginAxis, observer_numbers: int) -> str
         "trim_part": constants.trim_part if constants.trimmed else 0,
         "trim_gain": constants.trim_gain.value if constants.trimmed else 0.0,
         "angles_are_estimated": int(controller.angle_source == "estimated"),
+        "rate_limit": controller.law.rate_limit,
         "has_backlash": int(gap > 0.0),
         "half_gap": gap / 2.0,
         "period": controller.law.dt,
     }
     numbers = "".join(f"    .{field} = {_value(value)},\n" for field, value in fields.items())
+    numbers += f"    .feedback = {FEEDBACK[controller.feedback]},\n"
     return f"""/* {n} as the plugin calls it. The exported code is included: its measurement and law are static. */
 #include "{n}.c"
 
@@ -104,14 +111,14 @@ def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
     Returns:
         The text.
     """
-    clock, first = make_clock(rig), rig.axes[0].controller
+    clock, first = rig.clock, rig.axes[0].controller
     axes = "".join(_axis(rig, i, name) for i, name in enumerate(names))
     declarations = "".join(f"extern const controller_type {name}_controller_type;\n" for name in dict.fromkeys(names))
     return f"""/* The rig's numbers. */
 #include "rig.h"
 
 {declarations}
-{axes}static const axis_type *const axes[] = {{{", ".join(f"&axis_{i}" for i in range(len(names)))}}};
+{axes}{_turning(rig)}static const axis_type *const axes[] = {{{", ".join(f"&axis_{i}" for i in range(len(names)))}}};
 
 const rig_type rig = {{
     .plugin = {_value(rig.plugin)},
@@ -122,21 +129,36 @@ const rig_type rig = {{
     .period = {clock.period // clock.steps},
     .axes = {len(rig.axes)},
     .axis = axes,
+    .turning = {"&turning" if rig.turning else "0"},
 }};
 """
 
 
+def _turning(rig: PluginRig) -> str:
+    """Print how the axes couple in a turn, if that is compensated."""
+    if rig.turning is None:
+        return ""
+    coupling, gyro = rig.turning
+    described = describe_turn_gyro(gyro, rig.axes[0].controller.law.dt)
+    matrices = "".join(
+        f"    .{name} = {{{', '.join(map(_value, matrix.tolist()))}}},\n" for name, matrix in coupling._asdict().items()
+    )
+    return f"static const turning_type turning = {{\n    .gyro = {_struct(described, 4)},\n{matrices}}};\n\n"
+
+
 def _axis(rig: PluginRig, number: int, name: str) -> str:
     """Print the numbers of one axis."""
-    axis, clock = rig.axes[number], make_clock(rig)
+    axis, clock = rig.axes[number], rig.clock
     sensors = axis.controller.sensors
     pair, encoder = sensors.accelerometer, sensors.encoder
     modules = "".join(f"        {{{', '.join(map(_value, module))}}},\n" for module in axis.modules)
-    parts = {
+    parts: dict[str, Struct] = {
         "pair": describe_pair(pair, axis.controller.axis, clock),
         "encoder": describe_encoders(encoder, len(axis.modules), clock),
         "settings": describe_settings(pair, encoder),
     }
+    if axis.controller.feedback == "fog":
+        parts["fog"] = describe_fog(sensors.fog, axis.controller.axis, clock)
     structs = "".join(f"    .{field} = {_struct(value, 4)},\n" for field, value in parts.items())
     return f"""static const axis_type axis_{number} = {{
     .prefix = {_value(axis.prefix)},
@@ -144,13 +166,16 @@ def _axis(rig: PluginRig, number: int, name: str) -> str:
     .modules = {{
 {modules}    }},
 {structs}    .raw_rate = {_value(pair.raw_rate_hz)},
+    .joint = {_value(axis.joint)},
+    .dofs = {len(axis.shares)},
+    .shares = {_value(axis.shares)},
     .controller = &{name}_controller_type,
 }};
 
 """
 
 
-def _struct(value: Delivery | Pair | Encoders | Settings, indent: int) -> str:
+def _struct(value: Struct, indent: int) -> str:
     space = " " * indent
     fields = vars(value).items()
     lines = [
@@ -168,6 +193,4 @@ def _value(value: Value) -> str:
         return str(int(value))
     if isinstance(value, float):
         return repr(float(value))
-    if isinstance(value, (Delivery, Pair, Encoders, Settings)):
-        return _struct(value, 4)
     return f"{{{', '.join(_value(part) for part in value)}}}"

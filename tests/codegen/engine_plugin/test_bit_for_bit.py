@@ -17,6 +17,7 @@ SHORT = ("duration_s=0.5", "push.0.start_s=0.2")
 def check(kind: str, *settings: str, scenario: str = "push_recovery") -> None:
     made = make(kind, *settings, scenario=scenario)
     trajectory = made.experiment.run().trajectory
+    assert trajectory is not None
     check_against_runner(made, run(made, made.start(), len(trajectory)), trajectory, kind)
 
 

@@ -27,14 +27,15 @@ int controller_place(const controller_type *controller, int at, controller_place
 }
 
 int controller_decide(
-    const controller_type *controller, const controller_places *places, double *memory, const double *forces,
-    const double *encoders, decision *result)
+    const controller_type *controller, const controller_places *places, double *memory, const controller_inputs *inputs,
+    decision *result)
 {
     const double *y = result->y;
     double *estimate = result->estimate, *law = memory + places->law;
     const double held = memory[places->u];
 
-    controller->measure(forces, encoders, result->y);
+    controller->measure(inputs->forces, inputs->encoders, result->y);
+    result->y[2] -= inputs->coriolis;
     if (memory[places->decisions] == 0.0) {
         controller->observer_init(memory + places->observer, y);
         for (int i = 0; i < controller->estimates; ++i) estimate[i] = 0.0;
@@ -44,8 +45,9 @@ int controller_decide(
         controller->observer_step(memory + places->observer, y, held, estimate);
     }
     if (memory[places->decisions] < controller->trimmed) law[0] = controller->trim_gain * estimate[controller->trim_part];
+    result->rate = controller->feedback == FEEDBACK_OBSERVER ? estimate[1] : inputs->rate;
     const double x[3] = {
-        controller->angles_are_estimated ? estimate[0] : y[0], estimate[1],
+        controller->angles_are_estimated ? estimate[0] : y[0], result->rate,
         controller->angles_are_estimated ? estimate[2] : y[1]};
     result->x_e = law[0];
     controller->law_step(law, y, x, held, &result->u);

@@ -4,6 +4,9 @@
 
 enum { MOST_ESTIMATES = 64 };
 
+/* Which rate the law uses: the observer's, the gyro's or the true one. */
+enum { FEEDBACK_OBSERVER, FEEDBACK_FOG, FEEDBACK_TRUTH };
+
 /* What is exported of a controller, and its numbers; the functions are those of the exported C. */
 typedef struct {
     int estimates;    /* parts of an estimate */
@@ -13,6 +16,8 @@ typedef struct {
     int trim_part;    /* part of the estimate that it is trimmed with */
     double trim_gain; /* [s] */
     int angles_are_estimated;
+    int feedback; /* one of the above */
+    double rate_limit; /* [rad/s] */
     int has_backlash;
     double half_gap; /* [rad] */
     double period;   /* from one decision to the next [s] */
@@ -32,6 +37,7 @@ typedef struct {
 typedef struct {
     double y[3]; /* tilt, gimbal angle, acceleration of the tilt */
     double u;    /* command [rad/s] */
+    double rate; /* tilt rate that was fed back [rad/s] */
     double x_e;  /* integrator that went into it [rad s] */
     double estimate[MOST_ESTIMATES];
 } decision;
@@ -39,10 +45,17 @@ typedef struct {
 /* Returns the first place behind the controller's memory. */
 int controller_place(const controller_type *controller, int at, controller_places *places);
 
+/* What the sensors have delivered. */
+typedef struct {
+    const double *forces, *encoders;
+    double rate;     /* of the gyro, or the true one, if that is fed back [rad/s] */
+    double coriolis; /* part of the measured acceleration that is none [rad/s^2] */
+} controller_inputs;
+
 /* Decide on one sample; 0 if the observer or the law gave no finite number. */
 int controller_decide(
-    const controller_type *controller, const controller_places *places, double *memory, const double *forces,
-    const double *encoders, decision *result);
+    const controller_type *controller, const controller_places *places, double *memory, const controller_inputs *inputs,
+    decision *result);
 
 /* Rate at which the gimbals turn under a command [rad/s]. */
 double controller_gimbal_rate(

@@ -122,19 +122,36 @@ static void sense(const mjModel *m, mjData *d)
     mj_freeStack(d);
 }
 
+/* Take numbers at places that the state names; 0 if one is missing or no number. */
+static int take(const double *places, int n, const double *from, int size, double *inputs)
+{
+    int is_finite = 1;
+    for (int i = 0; i < n; ++i) {
+        const int place = element(places[i], size);
+        inputs[i] = place < 0 ? (double)NAN : from[place];
+        is_finite = is_finite && isfinite(inputs[i]);
+    }
+    return is_finite;
+}
+
 static int read_inputs(const mjModel *m, const mjData *d, double *state)
 {
+    const int n = (int)m->nsensordata;
     axis_places places;
+    turning_places turning;
     int at = HEAD, is_finite = 1;
     for (int i = 0; i < rig.axes; ++i) {
         const axis_type *axis = rig.axis[i];
         at = axis_place(axis, at, &places);
-        for (int j = 0; j < FORCES + axis->gimbals; ++j) {
-            const int from = element(state[places.forces + j], (int)m->nsensordata);
-            const double input = from < 0 ? (double)NAN : d->sensordata[from];
-            is_finite = is_finite && isfinite(input);
-            state[places.inputs + j] = input;
-        }
+        is_finite &= take(state + places.forces, FORCES + axis->gimbals, d->sensordata, n, state + places.inputs);
+        if (axis->controller->feedback == FEEDBACK_FOG)
+            is_finite &= take(state + places.gyro_from, 1, d->sensordata, n, state + places.gyro);
+        if (axis->controller->feedback == FEEDBACK_TRUTH)
+            is_finite &= take(state + places.rates_from, axis->dofs, d->qvel, (int)m->nv, state + places.rates);
+    }
+    if (rig.turning) {
+        (void)turning_place(rig.turning, at, &turning);
+        is_finite &= take(state + turning.rate_from, 1, d->sensordata, n, state + turning.rate);
     }
     return is_finite;
 }

@@ -3,7 +3,10 @@
 #define CMG_MJ_RIG_H
 
 #include "controller.h"
+#include "gyros.h"
 #include "sensors.h"
+
+enum { MOST_AXES = 4, MOST_DOFS = 3 };
 
 typedef struct {
     const char *name;  /* MODULE, before /gimbal_servo and the others */
@@ -19,8 +22,18 @@ typedef struct {
     encoder_type encoder;
     double raw_rate; /* samples a second inside the accelerometers */
     sensor_settings settings;
+    fog_type fog;
+    const char *joint;        /* of the tilt; free, or a hinge */
+    int dofs;                 /* of it that the tilt rate is made of */
+    double shares[MOST_DOFS]; /* of them in it */
     const controller_type *controller;
 } axis_type;
+
+/* Coupling of the axes in a turn about the vertical: see YawCoupling in cmg_mj/controllers/multi_axis.py. */
+typedef struct {
+    turn_gyro_type gyro;
+    double flywheels[MOST_AXES][MOST_AXES], inertia[MOST_AXES][MOST_AXES], coriolis[MOST_AXES][MOST_AXES];
+} turning_type;
 
 typedef struct {
     const char *plugin; /* name under which MuJoCo knows it */
@@ -30,6 +43,7 @@ typedef struct {
     int period;         /* instants from one decision to the next */
     int axes;
     const axis_type *const *axis;
+    const turning_type *turning; /* NULL if turns are not compensated */
 } rig_type;
 
 extern const rig_type rig;

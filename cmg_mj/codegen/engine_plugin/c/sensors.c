@@ -18,7 +18,7 @@ static double digitised(double x, double limit, double step)
     return step != 0.0 ? (rint(x / step) + 0.0) * step : x; /* the sum makes -0 to 0, as an integer is */
 }
 
-static int is_due(double instant, int period)
+int is_due(double instant, int period)
 {
     return fmod(instant, period) == 0.0;
 }
@@ -31,7 +31,7 @@ static int integer(double number, int largest)
 
 /* Delivery: `newest`, and with latency a queue of (instant of delivery, sample). */
 
-static int delivery_place(const delivery_type *delivery, int at, delivery_places *places)
+int delivery_place(const delivery_type *delivery, int at, delivery_places *places)
 {
     memset(places, 0, sizeof *places);
     places->newest = at;
@@ -46,7 +46,7 @@ static int delivery_place(const delivery_type *delivery, int at, delivery_places
     return at;
 }
 
-static void deliver(
+void deliver(
     const delivery_type *delivery, const delivery_places *places, double *memory, double instant, const double *reading)
 {
     const size_t width = (size_t)delivery->width;

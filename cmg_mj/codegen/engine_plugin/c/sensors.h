@@ -72,7 +72,11 @@ void encoder_sample(
     const encoder_type *encoder, const delivery_places *places, double *memory, const sensor_settings *settings,
     double instant, const double *angles);
 
-/* The newest sample that has been delivered. */
+/* What all sensors have in common: whether one is due, and delivery; the newest sample that has been delivered. */
+int is_due(double instant, int period);
+int delivery_place(const delivery_type *delivery, int at, delivery_places *places);
+void deliver(
+    const delivery_type *delivery, const delivery_places *places, double *memory, double instant, const double *reading);
 void delivery_read(
     const delivery_type *delivery, const delivery_places *places, double *memory, double instant, double *reading);
 

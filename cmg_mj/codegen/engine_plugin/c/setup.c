@@ -89,6 +89,17 @@ static int find_axis(const search *in, const axis_type *axis, const axis_places 
     if (!find_sensor(in, axis->prefix, "accelerometer_outer", mjSENS_ACCELEROMETER, &outer)) return 0;
     const double forces[FORCES] = {inner, inner + 2, outer, outer + 2};
     memcpy(state + places->forces, forces, sizeof forces);
+    if (axis->controller->feedback == FEEDBACK_FOG) {
+        double *from = state + places->gyro_from;
+        if (!find_sensor(in, axis->prefix, "fog", mjSENS_GYRO, from)) return 0;
+        *from += 1; /* its y axis */
+    }
+    if (axis->controller->feedback == FEEDBACK_TRUTH) {
+        const int joint = find(in, mjOBJ_JOINT, "joint", axis->joint, "");
+        if (joint < 0) return 0;
+        const int first = in->m->jnt_dofadr[joint] + (in->m->jnt_type[joint] == mjJNT_FREE ? 3 : 0);
+        for (int i = 0; i < axis->dofs; ++i) state[places->rates_from + i] = first + i;
+    }
     for (int i = 0; i < axis->gimbals; ++i) {
         const char *name = axis->modules[i].name;
         if (!find_sensor(in, name, "/gimbal_encoder", mjSENS_JOINTPOS, &state[places->encoders + i])) return 0;
@@ -157,6 +168,12 @@ int setup(const rig_type *type, const mjModel *m, int instance, double *state, c
     for (int i = 0; i < type->axes; ++i) {
         at = axis_place(type->axis[i], at, &places);
         if (!find_axis(&in, type->axis[i], &places, state)) return 0;
+    }
+    if (type->turning) {
+        turning_places turning;
+        (void)turning_place(type->turning, at, &turning);
+        if (!find_sensor(&in, type->axis[0]->prefix, "fog", mjSENS_GYRO, &state[turning.rate_from])) return 0;
+        state[turning.rate_from] += 2; /* its z axis, upward */
     }
     if (!configure(&in, instance, type, state)) return 0;
     state[STATUS] = READY;

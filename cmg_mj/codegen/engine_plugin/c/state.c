@@ -14,50 +14,144 @@ int axis_place(const axis_type *axis, int at, axis_places *places)
     places->held = places->settings + 3;
     places->rate = places->held + 1;
     places->inputs = places->rate + 1;
-    places->shown = places->inputs + FORCES + gimbals;
-    at = places->shown + SHOWN_ESTIMATE + axis->controller->estimates;
+    at = places->inputs + FORCES + gimbals;
+    if (axis->controller->feedback == FEEDBACK_FOG) {
+        places->gyro_from = at++;
+        places->gyro = at++;
+        at = fog_place(&axis->fog, at, &places->fog);
+    }
+    if (axis->controller->feedback == FEEDBACK_TRUTH) {
+        places->rates_from = at;
+        places->rates = at + axis->dofs;
+        at = places->rates + axis->dofs;
+    }
+    places->coriolis = at++;
+    places->shown = at;
+    at += SHOWN_ESTIMATE + axis->controller->estimates;
     at = pair_place(&axis->pair, at, &places->pair);
     at = encoder_place(&axis->encoder, at, &places->encoder);
     return controller_place(axis->controller, at, &places->controller);
 }
 
+int turning_place(const turning_type *turning, int at, turning_places *places)
+{
+    if (!turning) return at;
+    places->rate_from = at++;
+    places->rate = at++;
+    return turn_gyro_place(at, &places->gyro);
+}
+
 int state_size(const rig_type *type)
 {
     axis_places places;
+    turning_places turning;
     int at = HEAD;
     for (int i = 0; i < type->axes; ++i) at = axis_place(type->axis[i], at, &places);
-    return at;
+    return turning_place(type->turning, at, &turning);
 }
 
-static int axis_decide(const axis_type *axis, const axis_places *places, double *state, double instant)
+/* The tilt rate that is not the observer's, if one is fed back. */
+static double other_rate(const axis_type *axis, const axis_places *places, double *state, double instant)
 {
-    double forces[FORCES], angles[MOST_GIMBALS], *shown = state + places->shown;
-    decision result;
+    double rate = 0.0;
+    if (axis->controller->feedback == FEEDBACK_FOG) {
+        delivery_read(&axis->fog.delivery, &places->fog.delivery, state, instant, &rate);
+    } else if (axis->controller->feedback == FEEDBACK_TRUTH) {
+        for (int i = 0; i < axis->dofs; ++i) {
+            const double part = state[places->rates + i] * axis->shares[i];
+            rate = i ? rate + part : part;
+        }
+    }
+    return rate;
+}
+
+static int axis_decide(
+    const axis_type *axis, const axis_places *places, double *state, double instant, decision *result)
+{
+    double forces[FORCES], angles[MOST_GIMBALS];
     delivery_read(&axis->pair.delivery, &places->pair.delivery, state, instant, forces);
     delivery_read(&axis->encoder.delivery, &places->encoder, state, instant, angles);
-    const int is_good = controller_decide(axis->controller, &places->controller, state, forces, angles, &result);
-    memcpy(shown, result.y, sizeof result.y);
-    shown[SHOWN_U] = result.u;
-    shown[SHOWN_X_E] = result.x_e;
-    memcpy(shown + SHOWN_ESTIMATE, result.estimate, (size_t)axis->controller->estimates * sizeof *shown);
-    state[places->rate] = controller_gimbal_rate(axis->controller, &places->controller, state, result.u);
-    return is_good;
+    const double rate = other_rate(axis, places, state, instant);
+    const controller_inputs inputs = {forces, angles, rate, state[places->coriolis]};
+    return controller_decide(axis->controller, &places->controller, state, &inputs, result);
+}
+
+static void axis_sample(const axis_type *axis, const axis_places *places, double *state, double instant)
+{
+    const double *inputs = state + places->inputs, *numbers = state + places->settings;
+    const sensor_settings settings = {numbers[0], numbers[1], numbers[2]};
+    const double seed = state[SEED], world = state[WORLD];
+    pair_sample(&axis->pair, &places->pair, state, &settings, seed, world, instant, inputs);
+    encoder_sample(&axis->encoder, &places->encoder, state, &settings, instant, inputs + FORCES);
+    if (axis->controller->feedback == FEEDBACK_FOG)
+        fog_sample(&axis->fog, &places->fog, state, seed, world, instant, state[places->gyro]);
+}
+
+static double dot(const double *a, const double *b, int n)
+{
+    double sum = a[0] * b[0];
+    for (int i = 1; i < n; ++i) sum = sum + a[i] * b[i];
+    return sum;
+}
+
+/* Add to each axis' command what cancels the torque of momenta that are swept round; gives the gimbals' commands. */
+static void compensate(
+    const rig_type *type, const axis_places *places, double *state, int at, decision *results, double *totals)
+{
+    const turning_type *turning = type->turning;
+    const int n = type->axes;
+    double turned[MOST_AXES], rates[MOST_AXES];
+    turning_places own;
+    (void)turning_place(turning, at, &own);
+    const double w = turn_gyro_read(&turning->gyro, &own.gyro, state, state[SEED], state[WORLD], state[own.rate]);
+    for (int i = 0; i < n; ++i) {
+        turned[i] = sin(results[i].y[1]);
+        rates[i] = results[i].rate;
+    }
+    for (int i = 0; i < n; ++i) {
+        const double limit = type->axis[i]->controller->rate_limit, u = results[i].u;
+        const double added = w * (dot(turning->flywheels[i], turned, n) + dot(turning->inertia[i], rates, n)) /
+                             cos(results[i].y[1]);
+        const double wanted = u + added, total = wanted < -limit ? -limit : wanted > limit ? limit : wanted;
+        totals[i] = total;
+        results[i].u = wanted == total ? u : total - added; /* the law's, as far as it was not limited */
+        state[places[i].controller.u] = results[i].u;
+        state[places[i].coriolis] = w * dot(turning->coriolis[i], rates, n);
+    }
+}
+
+static void axis_show(const axis_type *axis, const axis_places *places, double *state, const decision *result)
+{
+    double *shown = state + places->shown;
+    memcpy(shown, result->y, sizeof result->y);
+    shown[SHOWN_U] = result->u;
+    shown[SHOWN_X_E] = result->x_e;
+    memcpy(shown + SHOWN_ESTIMATE, result->estimate, (size_t)axis->controller->estimates * sizeof *shown);
 }
 
 int state_advance(const rig_type *type, double *state)
 {
     const double instant = state[STEPS] / state[PER_INSTANT];
-    const int is_decision = fmod(instant, type->period) == 0.0;
+    const int is_decision = is_due(instant, type->period);
+    axis_places places[MOST_AXES];
+    decision results[MOST_AXES];
+    double totals[MOST_AXES];
     int at = HEAD, is_good = 1;
     for (int i = 0; i < type->axes; ++i) {
+        at = axis_place(type->axis[i], at, &places[i]);
+        axis_sample(type->axis[i], &places[i], state, instant);
+    }
+    if (!is_decision) return 1;
+    for (int i = 0; i < type->axes; ++i) {
+        is_good = axis_decide(type->axis[i], &places[i], state, instant, &results[i]) && is_good;
+        totals[i] = results[i].u;
+    }
+    if (type->turning) compensate(type, places, state, at, results, totals);
+    for (int i = 0; i < type->axes; ++i) {
         const axis_type *axis = type->axis[i];
-        axis_places places;
-        at = axis_place(axis, at, &places);
-        const double *inputs = state + places.inputs, *numbers = state + places.settings;
-        const sensor_settings settings = {numbers[0], numbers[1], numbers[2]};
-        pair_sample(&axis->pair, &places.pair, state, &settings, state[SEED], state[WORLD], instant, inputs);
-        encoder_sample(&axis->encoder, &places.encoder, state, &settings, instant, inputs + FORCES);
-        if (is_decision) is_good = axis_decide(axis, &places, state, instant) && is_good;
+        axis_show(axis, &places[i], state, &results[i]);
+        state[places[i].rate] = controller_gimbal_rate(axis->controller, &places[i].controller, state, totals[i]);
+        is_good = is_good && isfinite(totals[i]);
     }
     return is_good;
 }

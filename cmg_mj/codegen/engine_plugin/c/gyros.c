@@ -1,0 +1,77 @@
+#include "gyros.h"
+
+#include "noise.h"
+
+#include <math.h>
+
+static double clip(double x, double low, double high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+int fog_place(const fog_type *fog, int at, fog_places *places)
+{
+    places->noise = at;
+    at += NOISE_WORDS;
+    places->has_sampled = at++;
+    places->passed = at++;
+    return delivery_place(&fog->delivery, at, &places->delivery);
+}
+
+void fog_sample(
+    const fog_type *fog, const fog_places *places, double *memory, double seed, double world, double instant, double rate)
+{
+    double normal, reading, *passed = memory + places->passed;
+    if (!is_due(instant, fog->period)) return;
+    if (!noise_is_started(memory + places->noise)) noise_start(memory + places->noise, seed, world, fog->stream);
+    noise_normals(memory + places->noise, &normal, 1);
+    *passed = memory[places->has_sampled] == 0.0 ? rate : *passed + fog->share * (rate - *passed);
+    memory[places->has_sampled] = 1.0;
+    reading = clip(*passed + fog->bias + fog->sigma * normal, -fog->limit, fog->limit);
+    deliver(&fog->delivery, &places->delivery, memory, instant, &reading);
+}
+
+int turn_gyro_place(int at, turn_gyro_places *places)
+{
+    places->noise = at;
+    places->offset = at + NOISE_WORDS;
+    places->wander = places->offset + 1;
+    return places->wander + CORNERS;
+}
+
+/* Error of the next sample: white noise, then 1/f noise. */
+static double next_error(const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory)
+{
+    double normals[1 + CORNERS], sum = 0.0, *processes = memory + places->wander;
+    noise_normals(memory + places->noise, normals, 1 + CORNERS);
+    for (int corner = 0; corner < CORNERS; ++corner) {
+        processes[corner] = gyro->spread[corner] * normals[1 + corner] + gyro->decay[corner] * processes[corner];
+        sum = corner ? sum + processes[corner] : processes[corner];
+    }
+    return gyro->sigma * normals[0] + sum;
+}
+
+/* Begin, with a mean at rest that is taken off. */
+static void calibrate(
+    const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory, double seed, double world)
+{
+    double normals[1 + CORNERS], mean = 0.0;
+    noise_start(memory + places->noise, seed, world, gyro->stream);
+    noise_normals(memory + places->noise, normals, 1 + CORNERS);
+    for (int i = 0; i < CORNERS; ++i) memory[places->wander + i] = gyro->flicker_sigma * normals[1 + i];
+    for (int start = 0; start < gyro->resting; start += gyro->piece) {
+        double sum = next_error(gyro, places, memory);
+        for (int i = 1; i < gyro->piece && start + i < gyro->resting; ++i) sum += next_error(gyro, places, memory);
+        mean = mean + sum / gyro->resting;
+    }
+    memory[places->offset] = gyro->bias - mean;
+}
+
+double turn_gyro_read(
+    const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory, double seed, double world, double rate)
+{
+    if (!noise_is_started(memory + places->noise)) calibrate(gyro, places, memory, seed, world);
+    const double error = next_error(gyro, places, memory) + memory[places->offset];
+    const double x = clip(gyro->scale * rate + error, -gyro->limit, gyro->limit);
+    return gyro->step != 0.0 ? rint(x / gyro->step) * gyro->step : x;
+}
