@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from cmg_mj.codegen.engine_plugin.build import FLAGS
 from cmg_mj.observers import OBSERVERS
 from tests.codegen.engine_plugin.made import ALL_IMPERFECTIONS, EXACT, check_against_runner, make, needs_compiler, run
 
-pytestmark = needs_compiler
+pytestmark = [needs_compiler, pytest.mark.slow]
 
 SENSORS = {"exact": EXACT, "default": (), "all imperfections": ALL_IMPERFECTIONS}
-SHORT = ("duration_s=0.5", "push.0.start_s=0.2")
 
 
 def check(kind: str, *settings: str, scenario: str = "push_recovery") -> None:
@@ -21,28 +19,18 @@ def check(kind: str, *settings: str, scenario: str = "push_recovery") -> None:
     check_against_runner(made, run(made, made.start(), len(trajectory)), trajectory, kind)
 
 
-def test_half_a_second_is_bit_for_bit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Besides, the export itself compares on few signals here, and the compiler does not optimise, which takes time."""
-    monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
-    monkeypatch.setattr("cmg_mj.codegen.engine_plugin.build.FLAGS", (*FLAGS, "-O0"))
-    check("gyro_free", *SHORT)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("sensors", SENSORS)
 @pytest.mark.parametrize("kind", OBSERVERS)
 def test_every_observer(kind: str, sensors: str) -> None:
     check(kind, *SENSORS[sensors])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("sensors", SENSORS)
 @pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
 def test_every_integrator(integrator: str, sensors: str) -> None:
     check("gyro_free", f"plant.integrator={integrator}", *SENSORS[sensors])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [
@@ -63,17 +51,31 @@ def test_settings(settings: tuple[str, ...]) -> None:
     check("gyro_free", *settings)
 
 
-@pytest.mark.slow
 def test_trimmed_integrator() -> None:
     check("adaptive", "controller.bias_trim_s=0.52")
 
 
-@pytest.mark.slow
 def test_single_gimbal() -> None:
     check("homogeneous", scenario="single_gimbal")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Plain", "Elaborate"])
 def test_a_users_own_observer(name: str) -> None:
     check(f"tests.codegen.export.own:{name}")
+
+
+@pytest.mark.parametrize("sensors", SENSORS)
+def test_two_axes_that_turn(sensors: str) -> None:
+    check("gyro_free", *SENSORS[sensors], scenario="two_axes")
+
+
+@pytest.mark.parametrize("settings", [("controller.compensate_turning=false",), ('plant.locked_axes=["roll"]',)])
+def test_two_axes_otherwise(settings: tuple[str, ...]) -> None:
+    check("homogeneous", *settings, scenario="two_axes")
+
+
+@pytest.mark.parametrize("feedback", ["fog", "truth"])
+@pytest.mark.parametrize("scenario", ["push_recovery", "two_axes"])
+def test_another_rate_fed_back(feedback: str, scenario: str) -> None:
+    fog = ("sensors.fog.rate_hz=1000", "sensors.fog.latency_s=0.002", "sensors.fog.bias_deg_h=20")
+    check("kalman", f"controller.feedback={feedback}", *fog, scenario=scenario)

@@ -49,7 +49,7 @@ static void fail(double *state, const char *why)
     state[IS_PENDING] = 0;
     for (int i = 0; i < rig.axes; ++i) {
         at = axis_place(rig.axis[i], at, &places);
-        state[places.held] = state[places.rate] = 0;
+        state[places.held] = state[places.rate] = state[places.shown + SHOWN_U] = 0;
     }
 }
 

@@ -153,35 +153,6 @@ static int configure(const search *in, int instance, const rig_type *type, doubl
     return 1;
 }
 
-int setup(const rig_type *type, const mjModel *m, int instance, double *state, char message[MESSAGE])
-{
-    const char *name = instance_name(m, instance);
-    const search in = {m, name, prefix_length(name), message};
-    const double step = m->opt.timestep, steps = floor(type->instant / step + 0.5);
-    axis_places places;
-    int at = HEAD;
-    memset(state, 0, (size_t)state_size(type) * sizeof *state);
-    if (in.prefix_length < 0) return refuse(&in, "the instance must be named '%s', or PREFIX%s", INSTANCE, INSTANCE);
-    if (m->opt.disableflags & mjDSBL_SENSOR) return refuse(&in, "<flag sensor=\"disable\"/> leaves the controller blind");
-    if (!(steps >= 1.0 && fabs(steps * step - type->instant) <= 1e-9 * type->instant))
-        return refuse(&in, "a physics step of %g s: must divide %g s", step, type->instant);
-    for (int i = 0; i < type->axes; ++i) {
-        at = axis_place(type->axis[i], at, &places);
-        if (!find_axis(&in, type->axis[i], &places, state)) return 0;
-    }
-    if (type->turning) {
-        turning_places turning;
-        (void)turning_place(type->turning, at, &turning);
-        if (!find_sensor(&in, type->axis[0]->prefix, "fog", mjSENS_GYRO, &state[turning.rate_from])) return 0;
-        state[turning.rate_from] += 2; /* its z axis, upward */
-    }
-    if (!configure(&in, instance, type, state)) return 0;
-    state[STATUS] = READY;
-    state[PER_INSTANT] = steps;
-    state[TIMESTEP] = step;
-    return 1;
-}
-
 /* What a plugin sensor shows, by its name: INSTANCE/AXIS/estimate, ... */
 
 enum { NOTHING, ESTIMATE, COMMAND, TILT, GIMBAL, ACCELERATION, INTEGRATOR, SAMPLE };
@@ -204,6 +175,48 @@ static int quantity_of(const rig_type *type, const mjModel *m, int instance, int
             }
     }
     return NOTHING;
+}
+
+static int check_sensors(const search *in, const rig_type *type, int instance)
+{
+    const mjModel *m = in->m;
+    int which = 0;
+    for (int i = 0; i < m->nsensor; ++i)
+        if (m->sensor_type[i] == mjSENS_PLUGIN && m->sensor_plugin[i] == instance &&
+            quantity_of(type, m, instance, i, &which) == NOTHING)
+            return refuse(in, "sensor '%s': must be named '%s/' and, of several axes, 'AXIS/', and then estimate, "
+                "command, tilt, gimbal_angle, acceleration, integrator or sample", m->names + m->name_sensoradr[i],
+                instance_name(m, instance));
+    return 1;
+}
+
+int setup(const rig_type *type, const mjModel *m, int instance, double *state, char message[MESSAGE])
+{
+    const char *name = instance_name(m, instance);
+    const search in = {m, name, prefix_length(name), message};
+    const double step = m->opt.timestep, steps = floor(type->instant / step + 0.5);
+    axis_places places;
+    int at = HEAD;
+    memset(state, 0, (size_t)state_size(type) * sizeof *state);
+    if (in.prefix_length < 0) return refuse(&in, "the instance must be named '%s', or PREFIX%s", INSTANCE, INSTANCE);
+    if (m->opt.disableflags & mjDSBL_SENSOR) return refuse(&in, "<flag sensor=\"disable\"/> leaves the controller blind");
+    if (!(steps >= 1.0 && fabs(steps * step - type->instant) <= 1e-9 * type->instant))
+        return refuse(&in, "a physics step of %g s: must divide %g s", step, type->instant);
+    for (int i = 0; i < type->axes; ++i) {
+        at = axis_place(type->axis[i], at, &places);
+        if (!find_axis(&in, type->axis[i], &places, state)) return 0;
+    }
+    if (type->turning) {
+        turning_places turning;
+        (void)turning_place(type->turning, at, &turning);
+        if (!find_sensor(&in, type->axis[0]->prefix, "fog", mjSENS_GYRO, &state[turning.rate_from])) return 0;
+        state[turning.rate_from] += 2; /* its z axis, upward */
+    }
+    if (!check_sensors(&in, type, instance) || !configure(&in, instance, type, state)) return 0;
+    state[STATUS] = READY;
+    state[PER_INSTANT] = steps;
+    state[TIMESTEP] = step;
+    return 1;
 }
 
 int shown_size(const rig_type *type, const mjModel *m, int instance, int sensor)

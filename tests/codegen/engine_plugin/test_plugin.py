@@ -1,0 +1,193 @@
+"""A plugin in MuJoCo's own loop, over half a second: the runner's numbers, its state, wrong models."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import re
+from collections.abc import Callable, Iterator
+from functools import cache
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco import rollout
+
+from cmg_mj import InputError
+from cmg_mj.codegen.engine_plugin.build import FLAGS
+from cmg_mj.plant.mujoco_state import quiet
+from cmg_mj.simulation.plugin import initial_states, set_world
+from tests.codegen.engine_plugin.made import Made, check_against_runner, make, needs_compiler, run
+
+pytestmark = needs_compiler
+
+SHORT = ("duration_s=0.5", "push.0.start_s=0.2")
+STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+
+@pytest.fixture(autouse=True)
+def _no_log() -> Iterator[None]:
+    with quiet():
+        yield
+
+
+@cache
+def quick() -> Made:
+    """Made as fast as can be: the export compares on few signals, the compiler does not optimise."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
+        patch.setattr("cmg_mj.codegen.engine_plugin.build.FLAGS", (*FLAGS, "-O0"))
+        return make("gyro_free", *SHORT)
+
+
+def test_half_a_second_is_bit_for_bit() -> None:
+    made = quick()
+    trajectory = made.experiment.run().trajectory
+    assert trajectory is not None
+    check_against_runner(made, run(made, made.start(), len(trajectory)), trajectory, "gyro_free")
+
+
+def again(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
+    """The same state in data that stood elsewhere."""
+    state = np.empty(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    other = mujoco.MjData(model)
+    mujoco.mj_step(model, other, 7)
+    mujoco.mj_setState(model, other, state, STATE)
+    return other
+
+
+COPIES: dict[str, Callable[[mujoco.MjModel, mujoco.MjData], mujoco.MjData]] = {
+    "copy": lambda model, data: copy.copy(data),
+    "pickle": lambda model, data: pickle.loads(pickle.dumps(data)),
+    "state": again,
+}
+
+
+@pytest.mark.parametrize("way", COPIES)
+def test_what_is_copied_goes_on_as_the_original(way: str) -> None:
+    made = quick()
+    data = made.start()
+    run(made, data, 13)
+    for _ in range(3):  # a pass more changes nothing
+        mujoco.mj_forward(made.model, data)
+        mujoco.mj_inverse(made.model, data)
+    other = COPIES[way](made.model, data)
+    for name, rows in run(made, data, 20).items():
+        np.testing.assert_array_equal(run(made, COPIES[way](made.model, other), 20)[name], rows, err_msg=name)
+
+
+def test_passes_and_halves_of_steps_change_nothing() -> None:
+    """With an integrator other than RK4, which mj_step1 and mj_step2 do not have."""
+    made = quick()
+    model = copy.copy(made.model)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    whole, halves = (mujoco.MjData(model) for _ in range(2))
+    for data in (whole, halves):
+        mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+    for _ in range(50):
+        mujoco.mj_step(model, whole)
+        mujoco.mj_forward(model, halves)
+        mujoco.mj_step1(model, halves)
+        halves.ctrl[:] = 1e3  # of the pair's drives, which are the plugin's
+        mujoco.mj_step2(model, halves)
+    np.testing.assert_array_equal(halves.qpos, whole.qpos)
+    np.testing.assert_array_equal(halves.plugin_state, whole.plugin_state)
+
+
+def test_worlds_by_rollout_are_those_of_run_many() -> None:
+    made = quick()
+    trajectory = made.experiment.run_many([0, 3, 7], pushes=()).trajectory
+    assert trajectory is not None
+    states = initial_states(made.model, made.start(), made.experiment.scenario.seed, [0, 3, 7])
+    ways = [mujoco.MjData(made.model) for _ in range(2)]
+    _, sensors = rollout.rollout(made.model, ways, states, nstep=100)
+    command = sensors[:, :, made.model.sensor("balance/command").adr[0]]
+    np.testing.assert_array_equal(command.T, trajectory["u_rad_s"])
+    assert len(set(command[:, -1])) == 3
+
+
+@pytest.mark.parametrize(("seed", "world"), [(2**53 + 1, 0), (0, -1)])
+def test_numbers_that_no_state_holds(seed: int, world: int) -> None:
+    with pytest.raises(InputError, match=r"takes \w+ from 0 to 2\^53"):
+        set_world(quick().model, quick().start(), seed, world)
+
+
+def test_noise_that_has_begun() -> None:
+    data = quick().start()
+    mujoco.mj_step(quick().model, data)
+    with pytest.raises(InputError, match="right after a reset"):
+        set_world(quick().model, data, 1, 0)
+    mujoco.mj_resetData(quick().model, data)
+    set_world(quick().model, data, 1, 0)
+
+
+CONFIG = "<config key="
+REFUSED = {
+    "a negative seed": (CONFIG, '<config key="seed" value="-1"/><config key=', 'key="seed" value="-1">: must be'),
+    "a broken world": (CONFIG, '<config key="world" value="1.5"/><config key=', "must be a whole number"),
+    "no number": (CONFIG, '<config key="seed" value="1 2"/><config key=', "must be a whole number"),
+    "nan": (CONFIG, '<config key="counts_per_g" value="nan"/><config key=', "must be a number from 0"),
+    "an unknown key": (CONFIG, '<config key="sead" value="1"/><config key=', "unrecognized attribute 'plugin:sead'"),
+    "another library": (r'value="[0-9a-f]{16}"', 'value="0123456789abcdef"', "another library"),
+    "another name": ("balance", "balanced", "must be named 'balance'"),
+    "a step that does not fit": (r'timestep="[^"]*"', 'timestep="0.003"', "a physics step of 0.003 s"),
+    "no sensor": ('name="accelerometer_inner"/>', 'name="inner"/>', "no sensor 'accelerometer_inner'"),
+    "a sensor of nothing": ("balance/tilt", "balance/tilted", "sensor 'balance/tilted': must be named"),
+    "sensors off": ("<flag ", '<flag sensor="disable" ', "leaves the controller blind"),
+    "another servo": ('dyntype="integrator"', 'dyntype="integrator" actearly="true"', "has actearly, a delay"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_wrong_model_does_not_compile(case: str) -> None:
+    pattern, replacement, message = REFUSED[case]
+    text, n = re.subn(pattern, replacement, quick().plugin.model.read_text(encoding="utf-8"))
+    assert n
+    with pytest.raises(ValueError, match=re.escape(message)):
+        mujoco.MjModel.from_xml_string(text)
+
+
+def test_a_step_that_is_changed_stops_the_gimbals() -> None:
+    model, data = copy.copy(quick().model), quick().start()
+    mujoco.mj_step(model, data, 50)
+    model.opt.timestep = 0.001
+    mujoco.mj_step(model, data, 50)
+    assert data.sensor("balance/command").data == 0.0
+    np.testing.assert_array_equal(data.act_dot, 0.0)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+    mujoco.mj_step(model, data)
+    assert data.sensor("balance/command").data != 0.0
+
+
+@pytest.mark.parametrize("written", [np.nan, -1.0, 1e300, np.inf, 0.5])
+def test_whatever_a_program_writes_into_the_state(written: float) -> None:
+    """No crash; what it does then is its own affair."""
+    model = quick().model
+    for place in range(model.npluginstate):
+        data = quick().start()
+        mujoco.mj_step(model, data, 2)
+        data.plugin_state[place] = written
+        mujoco.mj_step(model, data, 2)
+
+
+@pytest.mark.filterwarnings("ignore:Attach conflict")
+def test_two_rigs_in_one_model() -> None:
+    """Each is attached with a prefix and has an instance: both are the one that stands alone."""
+    made = quick()
+    spec, prefixes = mujoco.MjSpec(), ("a/", "b_")
+    spec.option.timestep, spec.option.integrator = made.model.opt.timestep, made.model.opt.integrator
+    spec.option.disableflags = made.model.opt.disableflags
+    for prefix in prefixes:
+        rig = mujoco.MjSpec.from_file(str(made.plugin.model))
+        spec.attach(rig, prefix=prefix, frame=spec.worldbody.add_frame())
+    model = spec.compile()
+    data, alone = mujoco.MjData(model), made.start()
+    for start, target in ((alone.qpos, data.qpos), (alone.qvel, data.qvel), (alone.act, data.act)):
+        target[:] = [*start, *start]
+    for _ in range(100):
+        mujoco.mj_step(model, data)
+        mujoco.mj_step(made.model, alone)
+    for prefix in prefixes:
+        shown = data.sensor(f"{prefix}balance/estimate").data
+        np.testing.assert_array_equal(shown, alone.sensor("balance/estimate").data)
