@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from cmg_mj.codegen.engine_plugin.rig import PluginAxis, PluginRig
+from cmg_mj.codegen.engine_plugin.rig import PluginRig
 from cmg_mj.codegen.engine_plugin.sensor_numbers import (
     Delivery,
     Encoders,
@@ -19,7 +20,10 @@ from cmg_mj.codegen.engine_plugin.sensor_numbers import (
     describe_settings,
     describe_turn_gyro,
 )
-from cmg_mj.codegen.export.constants import constants_of
+from cmg_mj.controllers.controller import Controller
+
+if TYPE_CHECKING:
+    from cmg_mj.codegen.export.traced_law import TracedLaw
 
 Number = int | float
 Struct = Delivery | Pair | Encoders | FogNumbers | TurnGyro | Settings
@@ -28,27 +32,28 @@ Value = Number | str | Sequence[Number]
 FEEDBACK = {"observer": "FEEDBACK_OBSERVER", "fog": "FEEDBACK_FOG", "truth": "FEEDBACK_TRUTH"}
 
 
-def format_controller(name: str, axis: PluginAxis, observer_numbers: int) -> str:
+def format_controller(name: str, controller: Controller, observer_numbers: int, law: TracedLaw | None) -> str:
     """Print NAME_controller.c, which joins an exported controller to the plugin.
 
     Args:
         name: Name of the export.
-        axis: The axis.
+        controller: The controller.
         observer_numbers: Numbers in the exported observer's state.
+        law: Its law, if that is not (8), which the export has.
 
     Returns:
         The text.
     """
-    controller, constants = axis.controller, constants_of(axis.controller)
-    n = name
-    gap = float(controller.backlash)
+    n, gap = name, float(controller.backlash)
+    trimmed = -(-controller.trimmed_until // controller.period)
     fields = {
         "estimates": 3 + len(controller.extra_signals[0]),
         "observer": max(1, observer_numbers),
-        "law": 1,
-        "trimmed": constants.trimmed,
-        "trim_part": constants.trim_part if constants.trimmed else 0,
-        "trim_gain": constants.trim_gain.value if constants.trimmed else 0.0,
+        "law": 1 if law is None else max(1, len(law.paths)),
+        "integrator": 0 if law is None else law.integrator,
+        "trimmed": trimmed,
+        "trim_part": controller.trim_part if trimmed else 0,
+        "trim_gain": controller.trim_gain if trimmed else 0.0,
         "angles_are_estimated": int(controller.angle_source == "estimated"),
         "rate_limit": controller.law.rate_limit,
         "has_backlash": int(gap > 0.0),
@@ -84,19 +89,33 @@ static void observer_step(double *memory, const double y[3], double u, double *e
     memcpy(memory, &state, sizeof state);
 }}
 
-static void law_step(double *memory, const double y[3], const double x[3], double held, double *u)
-{{
-    (void)y, (void)held;
-    law(x[0], x[1], x[2], memory, u);
-}}
-
+{_law_functions(law)}
 extern const controller_type {n}_controller_type;
 const controller_type {n}_controller_type = {{
 {numbers}    .measure = controller_measure,
     .observer_init = observer_init,
     .observer_step = observer_step,
+    .law_init = law_init,
     .law_step = law_step,
 }};
+"""
+
+
+def _law_functions(law: TracedLaw | None) -> str:
+    """Print law_init and law_step; None: of the exported law (8)."""
+    note = "" if law is None else "/* The law; that of the exported code is another one and not used. */\n"
+    init = ["memory[0] = 0.0 * y[0];"] if law is None else law.c_init()
+    step = ["law(x[0], x[1], x[2], memory, u);"] if law is None else law.c_step()
+    first, second = ("".join(f"    {line}\n" for line in lines) for lines in (init, step))
+    return f"""{note}static void law_init(double *memory, const double y[3])
+{{
+    (void)memory, (void)y;
+{first}}}
+
+static void law_step(double *memory, const double y[3], const double *x, double held, double *u)
+{{
+    (void)memory, (void)y, (void)x, (void)held;
+{second}}}
 """
 
 

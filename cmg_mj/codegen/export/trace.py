@@ -59,12 +59,12 @@ def trace(observer: Observer, constants: Constants) -> Traced:
     Raises:
         NotExportable: A formula cannot express what the observer does.
     """
-    with _as_written():
+    with as_written():
         return Traced(*_trace_observer(observer, _measure(constants)), _law(constants))
 
 
 @contextmanager
-def _as_written() -> Iterator[None]:
+def as_written() -> Iterator[None]:
     """Turn CasADi's simplifications off: a simplified formula may round otherwise."""
     before = casadi.GlobalOptions.getSimplificationOnTheFly()
     casadi.GlobalOptions.setSimplificationOnTheFly(False)
@@ -78,27 +78,29 @@ def _trace_observer(
     observer: Observer, measure: casadi.Function
 ) -> tuple[tuple[str, ...], casadi.Function, casadi.Function, casadi.Function]:
     """Return the first four parts of `Traced`."""
-    first = _symbols(MEASURED)
-    state = _call("init(y)", lambda: observer.init(Measurement(*first)))
+    first = symbols_named(MEASURED)
+    state = call_traced("init(y)", lambda: observer.init(Measurement(*first)))
     leaves = list(numbers(state))
     if len(leaves) > MOST_NUMBERS:
         raise NotExportable(f"its state holds {len(leaves)} numbers; at most {MOST_NUMBERS} can be exported")
-    symbols = _symbols([f"state {i}" for i in range(len(leaves))])
-    before, y, (u,) = rebuild(state, iter(symbols)), _symbols(MEASURED), _symbols(["u"])
-    after, estimate = _call("step(state, y, u)", lambda: observer.step(before, Measurement(*y), u))
+    symbols = symbols_named([f"state {i}" for i in range(len(leaves))])
+    before, y, (u,) = rebuild(state, iter(symbols)), symbols_named(MEASURED), symbols_named(["u"])
+    after, estimate = call_traced("step(state, y, u)", lambda: observer.step(before, Measurement(*y), u))
     next_state = [expression(leaf.value) for leaf in numbers(after)]
     if form(after) != form(state):
         raise NotExportable("its step returns a state that is made otherwise than the one of init")
     outputs = [expression(part) for part in estimate]
 
-    needed = _needed(symbols, next_state, outputs)
+    needed = needed_numbers(symbols, next_state, outputs)
     names = identifiers([leaves[i].path for i in needed])
-    init = _function("init", first, [expression(leaves[i].value) for i in needed])
-    step = _function("step", [*(symbols[i] for i in needed), *y, u], [*(next_state[i] for i in needed), *outputs])
+    init = function_of("init", first, [expression(leaves[i].value) for i in needed])
+    step = function_of("step", [*(symbols[i] for i in needed), *y, u], [*(next_state[i] for i in needed), *outputs])
     return tuple(names), measure, init, step
 
 
-def _needed(symbols: Sequence[Symbol], next_state: Sequence[casadi.SX], outputs: Sequence[casadi.SX]) -> list[int]:
+def needed_numbers(
+    symbols: Sequence[Symbol], next_state: Sequence[casadi.SX], outputs: Sequence[casadi.SX]
+) -> list[int]:
     """Find the numbers of a state that an estimate depends on, now or later; a state may hold unused measurements."""
     place = {symbol.sx.name(): i for i, symbol in enumerate(symbols)}
     needed: set[int] = set()
@@ -112,11 +114,17 @@ def _needed(symbols: Sequence[Symbol], next_state: Sequence[casadi.SX], outputs:
     return sorted(needed)
 
 
-def _symbols(names: Sequence[str]) -> list[Symbol]:
+def symbols_named(names: Sequence[str]) -> list[Symbol]:
+    """Make a symbol for each name."""
     return [Symbol(casadi.SX.sym(name)) for name in names]
 
 
-def _function(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX]) -> casadi.Function:
+def function_of(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX]) -> casadi.Function:
+    """Make a function of symbols.
+
+    Raises:
+        NotExportable: The outputs depend on other symbols.
+    """
     arguments = [symbol.sx for symbol in inputs]
     function = casadi.Function(name, arguments, casadi.cse(list(outputs)) if outputs else [], {"allow_free": True})
     if function.has_free():
@@ -127,7 +135,7 @@ def _function(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX])
     return function
 
 
-def _call(name: str, function: Callable[[], Result]) -> Result:
+def call_traced(name: str, function: Callable[[], Result]) -> Result:
     """Call a user's code with symbols."""
     try:
         return function()
@@ -141,20 +149,20 @@ def _call(name: str, function: Callable[[], Result]) -> Result:
 
 def _measure(constants: Constants) -> casadi.Function:
     """Trace the measurement by the controller's formulas."""
-    forces = _symbols(["inner_x", "inner_z", "outer_x", "outer_z"])
-    encoders = _symbols([f"encoder {i}" for i in range(constants.gimbals)])
-    parameters = _symbols([constant.name for constant in constants.of_measure])
+    forces = symbols_named(["inner_x", "inner_z", "outer_x", "outer_z"])
+    encoders = symbols_named([f"encoder {i}" for i in range(constants.gimbals)])
+    parameters = symbols_named([constant.name for constant in constants.of_measure])
     inner, outer, *rest = parameters
     directions, zeros = tuple(rest[: constants.gimbals]), tuple(rest[constants.gimbals :])
     tilt, gimbal_angle = RadialTilt(inner, outer), GimbalAngle(directions, zeros)  # type: ignore[arg-type]
     y = (tilt(*forces), gimbal_angle(encoders), tilt.acceleration(forces[0], forces[2]))
-    return _function("measure", [*forces, *encoders, *parameters], [expression(part) for part in y])
+    return function_of("measure", [*forces, *encoders, *parameters], [expression(part) for part in y])
 
 
 def _law(constants: Constants) -> casadi.Function:
     """Trace the law by the controller's formula."""
-    parameters = _symbols([constant.name for constant in constants.of_law])
+    parameters = symbols_named([constant.name for constant in constants.of_law])
     dt, k1, k2, k3, k4, limit = parameters
-    inputs = _symbols(["x1", "x2", "x3", "x_e"])
+    inputs = symbols_named(["x1", "x2", "x3", "x_e"])
     law = StateFeedback(dt, (k1, k2, k3, k4), limit)  # type: ignore[arg-type]
-    return _function("law", [*inputs, *parameters], [expression(part) for part in law(*inputs)])
+    return function_of("law", [*inputs, *parameters], [expression(part) for part in law(*inputs)])

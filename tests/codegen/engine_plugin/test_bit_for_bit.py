@@ -74,6 +74,11 @@ def test_two_axes_otherwise(settings: tuple[str, ...]) -> None:
     check("homogeneous", *settings, scenario="two_axes")
 
 
+@pytest.mark.parametrize("kind", ["lqg", "examples.own_law:Leaning"])
+def test_other_laws(kind: str) -> None:
+    check("kalman", f"controller.kind={kind}")
+
+
 @pytest.mark.parametrize("feedback", ["fog", "truth"])
 @pytest.mark.parametrize("scenario", ["push_recovery", "two_axes"])
 def test_another_rate_fed_back(feedback: str, scenario: str) -> None:

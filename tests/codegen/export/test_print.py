@@ -18,7 +18,7 @@ import casadi  # isort: skip  (skipped above where it is missing)
 
 from cmg_mj.codegen.export.c_code import body, literal  # isort: skip
 from cmg_mj.codegen.export.symbol import OPERATIONS, Symbol  # isort: skip
-from cmg_mj.codegen.export.trace import _as_written  # isort: skip
+from cmg_mj.codegen.export.trace import as_written  # isort: skip
 
 
 @pytest.mark.parametrize("value", [0.1, -1.0 / 3.0, 1e-200, 5e-324, 1.7976931348623157e308, 35.0, 0.0, -0.0, 1e22])
@@ -52,7 +52,7 @@ def test_what_is_nearly_zero_or_very_large_stays_so() -> None:
 @needs_compiler
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_every_operation_does_what_numpy_does(precision: Any, tmp_path: Path) -> None:
-    with _as_written():
+    with as_written():
         a, b = symbols()
         binary = [f for f in OPERATIONS if f.nin == 2]
         unary = [f for f in OPERATIONS if f.nin == 1]
@@ -93,7 +93,7 @@ def test_every_operation_does_what_numpy_does(precision: Any, tmp_path: Path) ->
 @needs_compiler
 def test_what_is_nan_does_not_become_a_limit(tmp_path: Path) -> None:
     """As fmax would have it: a board would go on with the largest rate."""
-    with _as_written():
+    with as_written():
         a, b = symbols()
         results = np.clip(a, -4.7, 4.7), np.maximum(0.0, a), np.minimum(a, 1.0)
         function = casadi.Function("f", [a.sx, b.sx], [x.sx for x in results])
@@ -102,7 +102,7 @@ def test_what_is_nan_does_not_become_a_limit(tmp_path: Path) -> None:
 
 @needs_compiler
 def test_an_output_may_take_the_place_of_an_input(tmp_path: Path) -> None:
-    with _as_written():
+    with as_written():
         a, b = casadi.SX.sym("a"), casadi.SX.sym("b")
         lines = body(casadi.Function("f", [a, b], [b, a]), ["x[0]", "x[1]"], ["x[0]", "x[1]"], "double", "double")
     source = tmp_path / "swap.c"

@@ -19,7 +19,7 @@ from tests.test_elementwise import FUNCTIONS, SPECIAL
 import casadi  # isort: skip  (skipped above where it is missing)
 
 from cmg_mj.codegen.export.symbol import Symbol  # isort: skip
-from cmg_mj.codegen.export.trace import _as_written  # isort: skip
+from cmg_mj.codegen.export.trace import as_written  # isort: skip
 from cmg_mj.codegen.export.names import name_of  # isort: skip
 from cmg_mj.codegen.export.c_identifiers import identifiers  # isort: skip
 from cmg_mj.codegen.export.pipeline import generate_code  # isort: skip
@@ -37,7 +37,7 @@ TRACEABLE = [function for function in FUNCTIONS if function.id not in ("round", 
 def test_a_symbol_equals_floats_bit_by_bit(function: Callable) -> None:
     """But for the sign of a zero, as with arrays."""
     x = symbol()
-    with _as_written():
+    with as_written():
         graph = casadi.Function("f", [x.sx], [function(x).sx])
     values = [*SPECIAL, *np.random.default_rng(3).normal(0.0, 1.0, 200).tolist()]
     assert [float(graph(value)) for value in values] == [function(value) for value in values]  # type: ignore[arg-type]

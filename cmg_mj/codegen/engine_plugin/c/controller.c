@@ -3,6 +3,11 @@
 #include <math.h>
 #include <string.h>
 
+static double clip(double x, double low, double high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
 static int are_finite(const double *numbers, int n)
 {
     int result = 1;
@@ -32,25 +37,30 @@ int controller_decide(
 {
     const double *y = result->y;
     double *estimate = result->estimate, *law = memory + places->law;
-    const double held = memory[places->u];
+    const double held = memory[places->decisions] == 0.0 ? 0.0 : memory[places->u];
+    double x[MOST_ESTIMATES];
 
     controller->measure(inputs->forces, inputs->encoders, result->y);
     result->y[2] -= inputs->coriolis;
     if (memory[places->decisions] == 0.0) {
         controller->observer_init(memory + places->observer, y);
+        controller->law_init(law, y);
         for (int i = 0; i < controller->estimates; ++i) estimate[i] = 0.0;
         estimate[0] = y[0];
         estimate[2] = y[1];
     } else {
         controller->observer_step(memory + places->observer, y, held, estimate);
     }
-    if (memory[places->decisions] < controller->trimmed) law[0] = controller->trim_gain * estimate[controller->trim_part];
+    if (memory[places->decisions] < controller->trimmed)
+        law[controller->integrator] = controller->trim_gain * estimate[controller->trim_part];
     result->rate = controller->feedback == FEEDBACK_OBSERVER ? estimate[1] : inputs->rate;
-    const double x[3] = {
-        controller->angles_are_estimated ? estimate[0] : y[0], result->rate,
-        controller->angles_are_estimated ? estimate[2] : y[1]};
-    result->x_e = law[0];
+    x[0] = controller->angles_are_estimated ? estimate[0] : y[0];
+    x[1] = result->rate;
+    x[2] = controller->angles_are_estimated ? estimate[2] : y[1];
+    for (int i = 3; i < controller->estimates; ++i) x[i] = estimate[i];
+    result->x_e = controller->integrator < 0 ? (double)NAN : law[controller->integrator];
     controller->law_step(law, y, x, held, &result->u);
+    result->u = clip(result->u, -controller->rate_limit, controller->rate_limit);
     memory[places->u] = result->u;
     memory[places->decisions] += 1.0;
     return are_finite(estimate, controller->estimates) && are_finite(law, controller->law) && isfinite(result->u) &&
@@ -63,8 +73,7 @@ double controller_gimbal_rate(
     if (!controller->has_backlash) return u;
     const double half = controller->half_gap, before = memory[places->gimbal];
     const double motor = memory[places->motor] + u * controller->period;
-    const double low = motor - half, high = motor + half;
-    const double gimbal = before < low ? low : before > high ? high : before;
+    const double gimbal = clip(before, motor - half, motor + half);
     memory[places->motor] = motor;
     memory[places->gimbal] = gimbal;
     return (gimbal - before) / controller->period;

@@ -11,7 +11,8 @@ enum { FEEDBACK_OBSERVER, FEEDBACK_FOG, FEEDBACK_TRUTH };
 typedef struct {
     int estimates;    /* parts of an estimate */
     int observer;     /* numbers in the observer's state */
-    int law;          /* numbers in the law's state; the first is its integrator [rad s] */
+    int law;          /* numbers in the law's state */
+    int integrator;   /* which of them is the integrator [rad s]; -1: it has none */
     int trimmed;      /* decisions during which the integrator is trimmed */
     int trim_part;    /* part of the estimate that it is trimmed with */
     double trim_gain; /* [s] */
@@ -24,7 +25,8 @@ typedef struct {
     void (*measure)(const double *forces, const double *encoders, double y[3]);
     void (*observer_init)(double *state, const double y[3]);
     void (*observer_step)(double *state, const double y[3], double u, double *estimate);
-    void (*law_step)(double *state, const double y[3], const double x[3], double held, double *u);
+    void (*law_init)(double *state, const double y[3]);
+    void (*law_step)(double *state, const double y[3], const double *x, double held, double *u);
 } controller_type;
 
 typedef struct {
