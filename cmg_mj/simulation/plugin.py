@@ -65,7 +65,9 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
     axes = []
     for i, part in enumerate(experiment.parts):
         axis = part.plant.axis
-        modules = tuple(PluginModule(module.name, module.direction, module.speed) for module in axis.modules)
+        modules = tuple(
+            PluginModule(module.name, module.direction, module.speed, module.gimbal_zero) for module in axis.modules
+        )
         controller = part.design.controller(part.plant.interface, worlds=world, axis=i)
         joint = mujoco.mj_id2name(part.plant.model, mujoco.mjtObj.mjOBJ_JOINT, axis.line.joint)
         axes.append(PluginAxis(axis.prefix, modules, joint, tuple(axis.line.push[1]), controller))

@@ -29,6 +29,8 @@ class PluginModule(NamedTuple):
     """Sign of u that its gimbal is given."""
     speed: float
     """Of its flywheel [rad/s]."""
+    zero: float
+    """Angle of its gimbal at which the flywheel's axis is upright [rad]."""
 
 
 @dataclass(frozen=True)

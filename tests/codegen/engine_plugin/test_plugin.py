@@ -130,6 +130,7 @@ REFUSED = {
     "no number": (CONFIG, '<config key="seed" value="1 2"/><config key=', "must be a whole number"),
     "nan": (CONFIG, '<config key="counts_per_g" value="nan"/><config key=', "must be a number from 0"),
     "an unknown key": (CONFIG, '<config key="sead" value="1"/><config key=', "unrecognized attribute 'plugin:sead'"),
+    "another start": (CONFIG, '<config key="start" value="rest"/><config key=', "must be keyframe or spinning"),
     "another library": (r'value="[0-9a-f]{16}"', 'value="0123456789abcdef"', "another library"),
     "another name": ("balance", "balanced", "must be named 'balance'"),
     "a step that does not fit": (r'timestep="[^"]*"', 'timestep="0.003"', "a physics step of 0.003 s"),
@@ -147,6 +148,23 @@ def test_a_wrong_model_does_not_compile(case: str) -> None:
     assert n
     with pytest.raises(ValueError, match=re.escape(message)):
         mujoco.MjModel.from_xml_string(text)
+
+
+def test_flywheels_that_a_program_has_left_at_rest() -> None:
+    """With start="spinning" the first pass sets them going: all is as if they had turned before."""
+    made = quick()
+    text = made.plugin.model.read_text(encoding="utf-8")
+    model = mujoco.MjModel.from_xml_string(text.replace(CONFIG, '<config key="start" value="spinning"/><config key='))
+    data, ready = mujoco.MjData(model), made.start()
+    for _ in range(2):  # as a Gymnasium environment's reset sets the state, and looks at it
+        data.qpos[:2], data.qpos[2:] = ready.qpos[:2], 0.1
+        data.qvel[:] = 0.0
+        mujoco.mj_forward(model, data)
+    mujoco.mj_step(model, data, 50)
+    ready.qpos[3:6:2] = 0.1  # nobody sets the flywheels' angles
+    mujoco.mj_step(made.model, ready, 50)
+    np.testing.assert_array_equal(data.qpos, ready.qpos)
+    np.testing.assert_array_equal(data.sensordata, ready.sensordata)
 
 
 def test_a_step_that_is_changed_stops_the_gimbals() -> None:

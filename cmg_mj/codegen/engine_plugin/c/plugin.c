@@ -196,12 +196,28 @@ static void take_instant(const mjModel *m, mjData *d, double *state)
     else state[IS_PENDING] = 1;
 }
 
+/* Set the flywheels going, and come to this stage again: MuJoCo has computed it with what the program had set. */
+static void start_spinning(const mjModel *m, mjData *d, int instance, double *state)
+{
+    state[IS_SPINNING_UP] = 1;
+    spin(&rig, m, d, instance);
+    mj_fwdPosition(m, d);
+    mj_sensorPos(m, d);
+    mj_fwdVelocity(m, d);
+    mj_sensorVel(m, d); /* calls `compute` */
+    state[IS_SPINNING_UP] = 0;
+}
+
 static void compute(const mjModel *m, mjData *d, int instance, int capability)
 {
     double *state = state_of(m, d, instance);
     if (state[STATUS] == UNREADY) return;
     if (capability == mjPLUGIN_ACTUATOR) {
         drive_flywheels(m, d, state);
+        return;
+    }
+    if (state[STARTS_SPINNING] != 0.0 && state[STEPS] == 0.0 && state[IS_SPINNING_UP] == 0.0) {
+        start_spinning(m, d, instance, state);
         return;
     }
     if (state[STATUS] == READY) take_instant(m, d, state);

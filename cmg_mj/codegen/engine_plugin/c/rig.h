@@ -12,6 +12,7 @@ typedef struct {
     const char *name;  /* MODULE, before /gimbal_servo and the others */
     double direction;  /* sign of u that the gimbal is given */
     double speed;      /* of the flywheel [rad/s] */
+    double zero;       /* gimbal angle at which the flywheel's axis is upright [rad] */
 } module_type;
 
 typedef struct {

@@ -13,9 +13,9 @@ static const char INSTANCE[] = "balance"; /* what stands before it in an instanc
 static const double STANDARD_GRAVITY = 9.80665;
 static const double TURN = 2.0 * 3.141592653589793;
 
-enum { KEY_SEED, KEY_WORLD, KEY_NOISE, KEY_FORCE_COUNTS, KEY_ANGLE_COUNTS, KEY_BUILD };
+enum { KEY_SEED, KEY_WORLD, KEY_NOISE, KEY_FORCE_COUNTS, KEY_ANGLE_COUNTS, KEY_START, KEY_BUILD };
 const char *const setup_keys[SETUP_KEYS] = {
-    "seed", "world", "noise_density_ug_rthz", "counts_per_g", "counts_per_revolution", "build"};
+    "seed", "world", "noise_density_ug_rthz", "counts_per_g", "counts_per_revolution", "start", "build"};
 
 typedef struct {
     const mjModel *m;
@@ -104,6 +104,8 @@ static int find_axis(const search *in, const axis_type *axis, const axis_places 
         const char *name = axis->modules[i].name;
         if (!find_sensor(in, name, "/gimbal_encoder", mjSENS_JOINTPOS, &state[places->encoders + i])) return 0;
         if (!find_actuator(in, name, "/gimbal_servo", mjDYN_INTEGRATOR, &state[places->servos + i])) return 0;
+        if (find(in, mjOBJ_JOINT, "joint", name, "/gimbal") < 0) return 0;
+        if (find(in, mjOBJ_JOINT, "joint", name, "/flywheel") < 0) return 0;
         if (!find_actuator(in, name, "/flywheel_motor", mjDYN_NONE, &state[places->motors + i])) return 0;
     }
     return 1;
@@ -130,8 +132,12 @@ static int configure(const search *in, int instance, const rig_type *type, doubl
     const double unset = -1.0, most = 1e9;
     double density, force_counts, angle_counts;
     const char *build = mj_getPluginConfig(in->m, instance, setup_keys[KEY_BUILD]);
+    const char *start = mj_getPluginConfig(in->m, instance, setup_keys[KEY_START]);
     axis_places places;
     int at = HEAD;
+    state[STARTS_SPINNING] = start && !strcmp(start, "spinning");
+    if (start && *start && state[STARTS_SPINNING] == 0.0 && strcmp(start, "keyframe"))
+        return refuse(in, "<config key=\"start\" value=\"%.40s\">: must be keyframe or spinning", start);
     if (build && *build && strcmp(build, type->build))
         return refuse(in, "the model was written with another library (build %.40s, and this is %s)", build, type->build);
     if (!configured(in, instance, KEY_SEED, type->seed, NOISE_LARGEST, 1, &state[SEED])) return 0;
@@ -217,6 +223,26 @@ int setup(const rig_type *type, const mjModel *m, int instance, double *state, c
     state[PER_INSTANT] = steps;
     state[TIMESTEP] = step;
     return 1;
+}
+
+void spin(const rig_type *type, const mjModel *m, mjData *d, int instance)
+{
+    char message[MESSAGE];
+    const char *name = instance_name(m, instance);
+    const search in = {m, name, prefix_length(name), message};
+    for (int i = 0; i < type->axes; ++i) {
+        const axis_type *axis = type->axis[i];
+        for (int j = 0; j < axis->gimbals; ++j) {
+            const module_type *module = &axis->modules[j];
+            const int gimbal = find(&in, mjOBJ_JOINT, "joint", module->name, "/gimbal");
+            const int flywheel = find(&in, mjOBJ_JOINT, "joint", module->name, "/flywheel");
+            const int servo = find(&in, mjOBJ_ACTUATOR, "actuator", module->name, "/gimbal_servo");
+            if (gimbal < 0 || flywheel < 0 || servo < 0) continue; /* cannot be: `setup` has looked */
+            d->qpos[m->jnt_qposadr[gimbal]] = d->act[m->actuator_actadr[servo]] = module->zero;
+            d->qvel[m->jnt_dofadr[gimbal]] = 0.0;
+            d->qvel[m->jnt_dofadr[flywheel]] = module->speed;
+        }
+    }
 }
 
 int shown_size(const rig_type *type, const mjModel *m, int instance, int sensor)

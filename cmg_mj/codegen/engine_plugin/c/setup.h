@@ -10,10 +10,13 @@ enum { MESSAGE = 400 };
 
 /* Keys that <config> may have. */
 extern const char *const setup_keys[];
-enum { SETUP_KEYS = 6 };
+enum { SETUP_KEYS = 7 };
 
 /* Fill a state for its first step; 0 if the model does not fit, and why. */
 int setup(const rig_type *type, const mjModel *m, int instance, double *state, char message[MESSAGE]);
+
+/* Let the flywheels turn at their speed and the gimbals stand upright, whatever the program has set. */
+void spin(const rig_type *type, const mjModel *m, mjData *d, int instance);
 
 /* Places in sensordata, and what is shown there of a state. */
 int shown_size(const rig_type *type, const mjModel *m, int instance, int sensor);

@@ -13,6 +13,8 @@ enum {
     PER_INSTANT, /* physics steps from one instant to the next */
     TIMESTEP,    /* physics step that the others are counted in [s] */
     IS_PENDING,  /* whether the inputs of this instant have been read and not yet been counted */
+    STARTS_SPINNING, /* whether the flywheels are set going at the start */
+    IS_SPINNING_UP,  /* while this is being done */
     HEAD
 };
 enum { UNREADY, READY, FAILED };
