@@ -90,18 +90,18 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None
     spec.option.timestep, spec.option.integrator = model.opt.timestep, model.opt.integrator
     spec.option.disableflags = model.opt.disableflags
     for body in spec.bodies:
-        if not np.array_equal(filed.body(body.name).ipos, model.body(body.name).ipos):
-            body.ipos = model.body(body.name).ipos
+        if not np.array_equal(filed.body_ipos[body.id], model.body_ipos[body.id]):
+            body.ipos = model.body_ipos[body.id]
     for joint in spec.joints:
-        dof = int(model.jnt_dofadr[model.joint(joint.name).id])
+        dof = int(model.jnt_dofadr[joint.id])
         joint.armature, joint.frictionloss = model.dof_armature[dof], model.dof_frictionloss[dof]
         joint.damping[0] = model.dof_damping[dof]
     for site in spec.sites:
-        if not np.array_equal(filed.site(site.name).pos, model.site(site.name).pos):
-            site.pos = model.site(site.name).pos
+        if not np.array_equal(filed.site_pos[site.id], model.site_pos[site.id]):
+            site.pos = model.site_pos[site.id]
     for actuator in spec.actuators:
-        i = model.actuator(actuator.name).id
-        actuator.gainprm[:], actuator.biasprm[:] = model.actuator_gainprm[i], model.actuator_biasprm[i]
+        actuator.gainprm[:] = model.actuator_gainprm[actuator.id]
+        actuator.biasprm[:] = model.actuator_biasprm[actuator.id]
     start = plant.new_data()
     for key in spec.keys:
         if key.name == EQUILIBRIUM_KEY:
