@@ -91,7 +91,10 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None
     spec.option.disableflags = model.opt.disableflags
     for body in spec.bodies:
         if not np.array_equal(filed.body_ipos[body.id], model.body_ipos[body.id]):
-            body.ipos = model.body_ipos[body.id]
+            body.explicitinertial = True  # else MuJoCo takes it from the geoms
+            body.mass, body.inertia = model.body_mass[body.id], model.body_inertia[body.id]
+            body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
+            body.fullinertia = np.full(6, np.nan)
     for joint in spec.joints:
         dof = int(model.jnt_dofadr[joint.id])
         joint.armature, joint.frictionloss = model.dof_armature[dof], model.dof_frictionloss[dof]

@@ -72,8 +72,9 @@ def torques_at(experiment: Experiment, step: int) -> list[float]:
     h, names = experiment.plant.timestep, experiment.plant.axis_names
     torques = [0.0] * len(names)
     for push in experiment.scenario.push:
-        if round(push.start_s / h) <= step < round(push.end_s / h):
-            torques[names.index(push.axis or names[0])] += push.torque_n_m
+        about = push.axis or names[0]
+        if about in names and round(push.start_s / h) <= step < round(push.end_s / h):
+            torques[names.index(about)] += push.torque_n_m
     return torques
 
 
@@ -105,8 +106,8 @@ def check_against_runner(made: Made, rows: dict[str, np.ndarray], trajectory: Tr
     """Every number at every control tick is the runner's, bit for bit."""
     np.testing.assert_array_equal(rows["qpos"], columns(trajectory, trajectory.layout.positions()))
     np.testing.assert_array_equal(rows["qvel"], columns(trajectory, trajectory.layout.rates()))
-    for axis in trajectory.axes or ("",):
-        own = trajectory.along(axis) if axis else trajectory
+    for axis in made.experiment.plant.axis_names:
+        own = trajectory.along(axis) if trajectory.axes else trajectory
         prefix = f"balance/{axis}/" if axis else "balance/"
         parts = ["x1_rad", "x2_rad_s", "x3_rad", *own.extra_signals(observer)]
         estimate = columns(own, [f"estimate/{observer}/{part}" for part in parts])
