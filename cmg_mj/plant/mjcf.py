@@ -15,6 +15,7 @@ from cmg_mj.inputs.includes import check_files
 from cmg_mj.plant.checks import RigChecker, invalid_numbers
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
 from cmg_mj.plant.parts import REQUIRED_PARTS, axes_of, missing_parts
+from cmg_mj.plant.without_plugins import plugins_in, strip_plugins
 
 
 def _one_line(error: Exception) -> str:
@@ -27,14 +28,19 @@ def _one_line(error: Exception) -> str:
 
 
 def parse(path: Path) -> mujoco.MjSpec:
-    """Read a model file.
+    """Read a model file, without this package's plugins.
 
     Raises:
         InputError: It is no MJCF.
     """
     check_files(path)
+    stripped = strip_plugins(path)
     try:
-        return mujoco.MjSpec.from_file(str(path))
+        if stripped is None:
+            return mujoco.MjSpec.from_file(str(path))
+        spec = mujoco.MjSpec.from_string(stripped.text)
+        spec.modelfiledir = str(path.resolve().parent)
+        return spec
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise InputError(f"{path}: not a model MuJoCo can read: {_one_line(error)}") from error
 
@@ -67,6 +73,9 @@ def as_mjcf(spec: mujoco.MjSpec, path: Path) -> str:
         return spec.to_xml()
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise InputError(f"{path}: MuJoCo cannot write it: {_one_line(error)}") from error
+
+
+_HAS_PLUGIN = "the model has the plugin {}, which is left out here: the scenario's own controller takes its place"
 
 
 class Rig(NamedTuple):
@@ -116,7 +125,8 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> Rig:
         numbers = invalid_numbers(model)
         placement = None if numbers else RigChecker(model, axes)
         wrong += numbers if placement is None else placement.wrong
-        rig = Rig(model, axes, () if placement is None else tuple(placement.hints))
+        hints = () if placement is None else tuple(placement.hints)
+        rig = Rig(model, axes, (*hints, *(_HAS_PLUGIN.format(name) for name in plugins_in(path))))
     if wrong or rig is None:
         raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([REQUIRED_PARTS] if missing else [])]))
     if locked_axes:
