@@ -16,6 +16,7 @@ from cmg_mj.plant.checks import RigChecker, invalid_numbers
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
 from cmg_mj.plant.parts import REQUIRED_PARTS, axes_of, missing_parts
 from cmg_mj.plant.without_plugins import plugins_in, strip_plugins
+from cmg_mj.scenario.plant_settings import PlantSettings
 
 
 def _one_line(error: Exception) -> str:
@@ -135,15 +136,12 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> Rig:
     return rig
 
 
-def parse_drawn(
-    path: Path, *, lock: bool, locked_axes: Sequence[str], axes: Mapping[str, Sequence[str]]
-) -> mujoco.MjSpec:
+def parse_drawn(path: Path, settings: PlantSettings, axes: Mapping[str, Sequence[str]]) -> mujoco.MjSpec:
     """Read a rig that `load_rig` has read with all that is only seen.
 
     Args:
         path: The model's file.
-        lock: Whether to take the yaw joint out.
-        locked_axes: Axes whose hinges to take out.
+        settings: Which hinges to take out.
         axes: All axes of the rig.
 
     Returns:
@@ -153,10 +151,10 @@ def parse_drawn(
         InputError: MuJoCo's compiler refuses it, because of a mesh that cannot be read.
     """
     spec = parse(path)
-    if lock:
+    if settings.lock_thrust_bearing:
         lock_thrust_bearing(spec, path)
-    if locked_axes:
-        lock_axes(spec, compile_model(spec, path), locked_axes, axes, path)
+    if settings.locked_axes:
+        lock_axes(spec, compile_model(spec, path), settings.locked_axes, axes, path)
     return spec
 
 

@@ -72,8 +72,8 @@ class Plant:
         of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
     ) -> None:
         self.path = path
-        locked = settings.locked_axes
-        self.model, modules, self.hints = load_rig(path, lock=settings.lock_thrust_bearing, locked_axes=locked)
+        locked, lock = settings.locked_axes, settings.lock_thrust_bearing
+        self.model, modules, self.hints = load_rig(path, lock=lock, locked_axes=locked)
         self._as_filed = self.model
         self.key = element_id(self.model, "key", EQUILIBRIUM_KEY)
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in self.joint_names else None
@@ -141,11 +141,10 @@ class Plant:
         held = self._held if speed is None else with_flywheel_speed(self.model, self.key, self._held, speed, self.path)
         if settings.turn_rate_rad_s:
             set_turn_rate(self.model, self.key, settings.turn_rate_rad_s, self.path)
-        filed = float(self.model.opt.timestep)
         vary(self.model, settings, self.path, self.axes, held)
         speeds = [abs(module.speed) for axis in self.axes for module in axis.modules]
         shaken = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
-        self.largest_step = largest_step(self.model, self.key, filed, shaken)
+        self.largest_step = largest_step(self.model, self.key, float(self.model.opt.timestep), shaken)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
@@ -177,8 +176,7 @@ class Plant:
 
     def drawn_spec(self) -> mujoco.MjSpec:
         """Parse the model's file, with all that is only seen, and lock what the settings lock."""
-        lock, locked_axes = self.settings.lock_thrust_bearing, self.settings.locked_axes
-        return parse_drawn(self.path, lock=lock, locked_axes=locked_axes, axes=self._module_names)
+        return parse_drawn(self.path, self.settings, self._module_names)
 
     def single_axis(self, axis: str) -> Plant:
         """The rig as one of its axes sees it: with that axis alone.
@@ -192,11 +190,10 @@ class Plant:
         Raises:
             InputError: There is no such axis.
         """
-        matches = [candidate for candidate in self.axes if candidate.name == axis]
-        if not matches:
-            raise InputError(f"{self.path}: no axis {axis!r}; {nearest(axis, self.axis_names)}")
         other = copy.copy(self)
-        other.axes = tuple(matches)
+        other.axes = tuple(candidate for candidate in self.axes if candidate.name == axis)
+        if not other.axes:
+            raise InputError(f"{self.path}: no axis {axis!r}; {nearest(axis, self.axis_names)}")
         return other
 
     @property
@@ -301,10 +298,8 @@ class Plant:
             raise InputError(f"{self.path}: tilts about several axes; use multi_axis_controller")
         law = law or StateFeedback(dt=0.005)
         sensors = sensors or Sensors()
-        if isinstance(observer, str):
-            observer = {"kind": observer}
-        if isinstance(observer, Mapping):
-            settings = ObserverSettings(**observer)
+        if isinstance(observer, (str, Mapping)):
+            settings = ObserverSettings(**({"kind": observer} if isinstance(observer, str) else observer))
             observer = settings.make(law.dt, self.reduced, self.parameters.noise(sensors))
         return make_controller(observer, law, sensors, self.interface, **options)
 
