@@ -44,11 +44,11 @@ if TYPE_CHECKING:
 @run_options
 @click.option(
     "--driver",
-    type=click.Choice(["native", "callback", "board"]),
+    type=click.Choice(["native", "callback", "board", "plugin"]),
     default="native",
     show_default=True,
-    help="Run the controller in the simulation loop (native), in MuJoCo's control callback, or as C on an emulated "
-    "Cortex-M7 (board; see docs/board.md).",
+    help="Run the controller in the simulation loop (native), in MuJoCo's control callback, as C on an emulated "
+    "Cortex-M7 (board; see docs/board.md), or as C inside MuJoCo (plugin; see docs/plugin.md).",
 )
 @number_option(
     "--world",

@@ -18,7 +18,7 @@ from cmg_mj.results.trajectory import Trajectory
 if TYPE_CHECKING:
     import pyarrow as pa
 
-Driver = Literal["native", "callback", "board"]
+Driver = Literal["native", "callback", "board", "plugin"]
 """Who calls the controller, or is it. `simulate` knows the first two: a board is the controller's processor."""
 
 

@@ -122,7 +122,12 @@ class Experiment:
             self.require_single_axis("the board")
             with on_a_board(self.axis_controller()) as board:
                 return self.run_on(board, world, **options)
-        return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
+        plant = self.plant
+        if driver == "plugin":
+            from cmg_mj.simulation.plugin import plant_with_plugin
+
+            plant = plant_with_plugin(self, int(world))
+        return self.simulate(plant, self.controller(int(world)), driver=driver, **options)
 
     def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
@@ -335,13 +340,10 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
         plant = plant or plant_on_grid(scenario, grid, like)
         check_axes(scenario, plant)
     if len(plant.axes) == 1 and not scenario.axes:
-        return _experiment_of_axis(scenario, plant)
-    axes = tuple(_experiment_of_axis(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names)
+        return Experiment(scenario, plant, design(scenario, plant.parameters))
+    parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
+    axes = tuple(Experiment(part, rig, design(part, rig.parameters)) for part, rig in parts)
     return Experiment(scenario, plant, axes[0].design, axes)
-
-
-def _experiment_of_axis(scenario: Scenario, plant: Plant) -> Experiment:
-    return Experiment(scenario, plant, design(scenario, plant.parameters))
 
 
 def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:

@@ -90,6 +90,7 @@ class OneWorld:
         self.advance = partial(mujoco.mj_step, self.model, self.data)  # no method: a call less in every tick
         self._servos = [list(zip(axis.servos, axis.directions, strict=True)) for axis in plant.axes]
         self._lines = [axis.line for axis in plant.axes]
+        self.axis_names = plant.axis_names
         # Those of the only axis without a detour: they are asked for at every sampling instant.
         single = len(plant.axes) == 1
         self.tilt = plant.axis.line.lean if single else plant.largest_tilt

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
+import copy
+import itertools
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
-import numpy as np
 
 from cmg_mj.codegen.engine_plugin.build import check_platform, compile_plugin
 from cmg_mj.codegen.engine_plugin.files import extra_files, library_name
 from cmg_mj.codegen.engine_plugin.generate import PluginCode, generate_plugin
-from cmg_mj.codegen.engine_plugin.rig import LARGEST_SEED, PluginAxis, PluginModule, PluginRig
+from cmg_mj.codegen.engine_plugin.rig import PluginAxis, PluginModule, PluginRig
 from cmg_mj.codegen.export import check_installed
 from cmg_mj.codegen.export.names import name_of
 from cmg_mj.errors import InputError
-from cmg_mj.plant.plugin_model import INSTANCE, plugin_mjcf
+from cmg_mj.plant.mujoco_state import set_control_callback
+from cmg_mj.plant.plant import Plant
+from cmg_mj.plant.plugin_model import plugin_mjcf
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.run_folder.folder import claimed, write_text
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
-
-SEED, WORLD, STEPS = 0, 1, 3
-"""Places in an instance's state, as state.h numbers them."""
 
 LIBRARY_MODE = 0o755
 
@@ -95,10 +95,12 @@ def find_tools() -> list[str]:
     return compiler
 
 
-def make_plugin(experiment: Experiment, name: str | None = None, *, sensors: bool = True) -> PluginTexts:
-    """Generate a plugin's C and its model: see `plugin`."""
+def make_plugin(
+    experiment: Experiment, name: str | None = None, *, sensors: bool = True, world: int = 0
+) -> PluginTexts:
+    """Generate a plugin's C and its model: see `plugin`. Its noise is that of a world, unless the model says other."""
     name = name_of(experiment.parts[0].design.observer(), name)
-    rig = describe_rig(experiment, name)
+    rig = describe_rig(experiment, name, world)
     code = generate_plugin(rig, name)
     texts = code.files | extra_files(name, code.sources, experiment.plant.axis_names[0])
     texts[f"{name}.xml"] = plugin_mjcf(experiment.plant, rig.plugin, code.build, sensors)
@@ -156,51 +158,20 @@ def plugin(
     return write_plugin(make_plugin(experiment, name, sensors=sensors), out)
 
 
-def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int) -> None:
-    """Choose the noise of the plugins in a simulation that has not yet been stepped since its reset.
+_numbers = itertools.count()
+"""A process registers a plugin's name once."""
 
-    Args:
-        model: A model with plugins of this package.
-        data: Its data.
-        seed: Seed of the noise.
-        world: Number of the world.
+
+def plant_with_plugin(experiment: Experiment, world: int = 0) -> Plant:
+    """Make the plant of an experiment with a plugin in its model, whose library is compiled and loaded.
 
     Raises:
-        InputError: The model has no such plugin, a number is none that a plugin takes, or the noise has begun.
+        InputError: Something in use cannot be exported, or there is no compiler.
     """
-    for name, number in (("seed", seed), ("world", world)):
-        if not 0 <= number <= LARGEST_SEED:
-            raise InputError(f"{name} = {number}: a plugin takes {name}s from 0 to 2^53")
-    names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i) or "" for i in range(model.nplugin)]
-    instances = [i for i, instance in enumerate(names) if instance.endswith(INSTANCE)]
-    if not instances:
-        raise InputError(f"the model has no plugin instance named {INSTANCE!r}")
-    for instance in instances:
-        state = data.plugin_state[int(model.plugin_stateadr[instance]) :]
-        if state[STEPS]:
-            raise InputError("the plugin's noise has begun: choose seed and world right after a reset")
-        state[SEED], state[WORLD] = seed, world
-
-
-def initial_states(model: mujoco.MjModel, data: mujoco.MjData, seed: int, worlds: int | Sequence[int]) -> np.ndarray:
-    """Make the initial states of many worlds, as `mujoco.rollout` takes them.
-
-    Args:
-        model: A model with plugins of this package.
-        data: Its data in the state that all worlds start from, not yet stepped since its reset.
-        seed: Seed of the noise.
-        worlds: How many, or their numbers.
-
-    Returns:
-        Full physics states, (n_worlds, n_numbers).
-
-    Raises:
-        InputError: See `set_world`.
-    """
-    kind = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
-    numbers = range(worlds) if isinstance(worlds, int) else worlds
-    states = np.empty((len(numbers), mujoco.mj_stateSize(model, kind)))
-    for state, world in zip(states, numbers, strict=True):
-        set_world(model, data, seed, world)
-        mujoco.mj_getState(model, data, state, kind)
-    return states
+    made = make_plugin(experiment, f"run_{next(_numbers)}", world=world)
+    with tempfile.TemporaryDirectory() as temporary, set_control_callback(None):
+        written = write_plugin(made, Path(temporary))
+        mujoco.mj_loadPluginLibrary(str(written.library))
+        plant = copy.copy(experiment.plant)
+        plant.model = mujoco.MjModel.from_xml_path(str(written.model))
+    return plant

@@ -28,6 +28,7 @@ from cmg_mj.simulation.batch_values import split_values
 from cmg_mj.simulation.callback import CallbackLoop, control_callback
 from cmg_mj.simulation.control_loop import ControlLoop, Ending
 from cmg_mj.simulation.physics import ManyWorlds, OneWorld, Physics
+from cmg_mj.simulation.plugin_loop import PluginLoop
 from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
 from cmg_mj.simulation.schedule import sampling_instants, with_swing_torques
 
@@ -75,7 +76,8 @@ def simulate(
         pushes: Torques from outside; of many worlds a torque may be an array (n_worlds,).
         swings: Others that swing.
         settings: What counts as settled and fallen.
-        driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only).
+        driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only). `plugin`: the model
+            has a plugin that decides (likewise): see `plant_with_plugin`.
         **options: See `SimulationOptions`.
 
     Returns:
@@ -86,8 +88,8 @@ def simulate(
     """
     single = isinstance(plant, Plant)
     plants = [plant] if single else list(plant)
-    if driver == "callback" and not single:
-        raise InputError("driver = 'callback': MuJoCo's control callback drives one world, not a batch")
+    if driver in ("callback", "plugin") and not single:
+        raise InputError(f"driver = {driver!r}: drives one world, not a batch")
     names = plants[0].axis_names
     of_axis = observers if isinstance(observers, Mapping) else dict.fromkeys(names, observers)
     run = _Simulation(plants, controller, duration_s, of_axis, pushes, swings, settings or MetricsSettings(), options)
@@ -141,10 +143,12 @@ class _Simulation:
 
     def advance(self, physics: Physics, driver: Driver) -> None:
         """Run to the end, whatever that is."""
-        native = driver == "native"
-        loop_class = ControlLoop if native else CallbackLoop
+        called_back = driver == "callback"
+        loop_class = CallbackLoop if called_back else PluginLoop if driver == "plugin" else ControlLoop
         loop = loop_class(physics, self.controller, self.instants, self.fall_angle)
-        driving: AbstractContextManager = nullcontext() if native else control_callback(self.plants[0], self.controller)
+        driving: AbstractContextManager = nullcontext()
+        if called_back:
+            driving = control_callback(self.plants[0], self.controller)
         rest = Outcome("done", self.duration_s)
         try:
             with driving:

@@ -16,7 +16,7 @@ from mujoco import rollout
 from cmg_mj import InputError, load_scenario, prepare
 from cmg_mj.codegen.engine_plugin.build import FLAGS
 from cmg_mj.plant.mujoco_state import quiet
-from cmg_mj.simulation.plugin import initial_states, set_world
+from cmg_mj.plant.plugin_state import initial_states, set_world
 from tests.codegen.engine_plugin.made import Made, check_against_runner, make, needs_compiler, run
 
 pytestmark = needs_compiler
