@@ -8,7 +8,7 @@ from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, jso
 from cmg_mj.cli.terminal import note_hints, say_written, show, users_code
 
 
-@click.command(short_help="Make a library and a model with which the robot balances in any MuJoCo program.")
+@click.command(short_help="Compile the controller into MuJoCo: a library, and a model.")
 @click.argument("observer", callback=lambda context, parameter, name: check_observer("OBSERVER", name))
 @out_option()
 @click.option("--name", metavar="NAME", help="The plugin's name behind cmg_mj.  [default: OBSERVER's name]")
@@ -37,7 +37,7 @@ def plugin(
     \b
     Writes a folder:
       libcmg_mj_NAME.so   the library
-      NAME.xml            the scenario's model, which names it; keyframe "start" is the scenario's start
+      NAME.xml            the scenario's model, which names it; its keyframe is "start"
       NAME_example.py, NAME_example.c, Makefile, and the C of the library
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.simulation.experiment import prepare
