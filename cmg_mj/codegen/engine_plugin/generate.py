@@ -12,9 +12,41 @@ from cmg_mj.codegen.engine_plugin.tables import format_controller, format_rig
 from cmg_mj.codegen.export import generate_code
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import StateFeedback
+from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.codegen.export.traced_law import TracedLaw
+
+
+NAMES_IN_USE = frozenset(
+    [
+        "axis",
+        "controller",
+        "decision",
+        "delivery",
+        "encoder",
+        "fog",
+        "gyros",
+        "law",
+        "measure",
+        "module",
+        "noise",
+        "observer",
+        "pair",
+        "plugin",
+        "rig",
+        "sensor",
+        "sensors",
+        "setup",
+        "show",
+        "spin",
+        "state",
+        "turn_gyro",
+        "turning",
+        "ziggurat",
+    ]
+)
+"""Names that would clash with the C that all plugins have in common."""
 
 
 class PluginCode(NamedTuple):
@@ -42,9 +74,11 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
         The code.
 
     Raises:
-        InputError: Something in use cannot be exported.
+        InputError: Something in use cannot be exported, or the name is none for a plugin.
     """
     rig.refuse_unsupported()
+    if name in NAMES_IN_USE:
+        raise InputError(f"--name {name}: is a name in every plugin's C; take another, such as {name}_of_mine")
     files, names = common_files(), []
     sources: list[str] = [*COMMON_SOURCES]
     for axis in rig.axes:

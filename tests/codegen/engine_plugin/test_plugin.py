@@ -14,9 +14,11 @@ import pytest
 from mujoco import rollout
 
 from cmg_mj import InputError, load_scenario, prepare
-from cmg_mj.codegen.engine_plugin.build import FLAGS
+from cmg_mj.codegen.engine_plugin.build import FLAGS, common_files
+from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE, generate_plugin
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.plugin_state import initial_states, set_world
+from cmg_mj.simulation.plugin import describe_rig
 from tests.codegen.engine_plugin.made import Made, check_against_runner, make, needs_compiler, run
 
 pytestmark = needs_compiler
@@ -124,26 +126,61 @@ def test_noise_that_has_begun() -> None:
 
 
 CONFIG = "<config key="
-REFUSED = {
-    "a negative seed": (CONFIG, '<config key="seed" value="-1"/><config key=', 'key="seed" value="-1">: must be'),
-    "a broken world": (CONFIG, '<config key="world" value="1.5"/><config key=', "must be a whole number"),
-    "no number": (CONFIG, '<config key="seed" value="1 2"/><config key=', "must be a whole number"),
-    "nan": (CONFIG, '<config key="counts_per_g" value="nan"/><config key=', "must be a number from 0"),
-    "an unknown key": (CONFIG, '<config key="sead" value="1"/><config key=', "unrecognized attribute 'plugin:sead'"),
-    "another start": (CONFIG, '<config key="start" value="rest"/><config key=', "must be keyframe or spinning"),
-    "another library": (r'value="[0-9a-f]{16}"', 'value="0123456789abcdef"', "another library"),
+WRONG_CONFIGS = {
+    "seed": ("-1", "1.5", "1 2", "one", "nan", "inf", "1e400", "9007199254740994", "0,5", "1;", "--1"),
+    "world": ("-1", "0.5", "x", "1e17", "nan", "1 0"),
+    "noise_density_ug_rthz": ("-400", "much", "nan", "inf", "4e2x", "1e10"),
+    "counts_per_g": ("-1", "none", "nan", "-inf", "1e300"),
+    "counts_per_revolution": ("-4096", "12 bit", "nan", "1e300", "4096%"),
+    "start": ("rest", "Spinning", "keyframe ", "0"),
+    "build": ("0123456789abcdef", "?"),
+    "sead": ("1",),
+    "seed ": ("1",),
+}
+WRONG_MODELS = {
     "another name": ("balance", "balanced", "must be named 'balance'"),
+    "a name behind": ('(name|instance)="balance"', r'\1="balance/rig"', "must be named 'balance'"),
+    "another plugin": ('plugin="cmg_mj[.]', 'plugin="cmg_mj.other_', "not found"),
     "a step that does not fit": (r'timestep="[^"]*"', 'timestep="0.003"', "a physics step of 0.003 s"),
-    "no sensor": ('name="accelerometer_inner"/>', 'name="inner"/>', "no sensor 'accelerometer_inner'"),
-    "a sensor of nothing": ("balance/tilt", "balance/tilted", "sensor 'balance/tilted': must be named"),
+    "a step that is too long": (r'timestep="[^"]*"', 'timestep="0.01"', "a physics step of 0.01 s"),
+    "a step that nearly fits": (r'timestep="[^"]*"', 'timestep="0.0025001"', "a physics step of 0.0025001 s"),
     "sensors off": ("<flag ", '<flag sensor="disable" ', "leaves the controller blind"),
-    "another servo": ('dyntype="integrator"', 'dyntype="integrator" actearly="true"', "has actearly, a delay"),
+    "no inner accelerometer": ('name="accelerometer_inner"/>', 'name="inner"/>', "no sensor 'accelerometer_inner'"),
+    "no outer accelerometer": ('name="accelerometer_outer"/>', 'name="outer"/>', "no sensor 'accelerometer_outer'"),
+    "no encoder": ('name="cube2/gimbal_encoder"', 'name="encoder"', "no sensor 'cube2/gimbal_encoder'"),
+    "no servo": ('name="cube1/gimbal_servo"', 'name="servo"', "no actuator 'cube1/gimbal_servo'"),
+    "no motor": ('name="cube2/flywheel_motor"', 'name="motor"', "no actuator 'cube2/flywheel_motor'"),
+    "another gimbal": ('"cube1/gimbal"', '"cube1/fork"', "no joint 'cube1/gimbal'"),
+    "another flywheel": ('"cube2/flywheel"', '"cube2/disc"', "no joint 'cube2/flywheel'"),
+    "another encoder": ("<jointpos ", "<jointvel ", "sensor 'cube1/gimbal_encoder' is of another kind"),
+    "another accelerometer": ("<accelerometer ", "<velocimeter ", "sensor 'accelerometer_inner' is of another kind"),
+    "a late accelerometer": ("<accelerometer ", '<accelerometer delay="0.01" nsample="3" ', "has a delay or a history"),
+    "a servo that steps first": ('dyntype="integrator"', 'dyntype="integrator" actearly="true"', "has actearly"),
+    "a sensor of nothing": ("balance/tilt", "balance/tilted", "sensor 'balance/tilted': must be named"),
+    "a sensor of nobody": ('"balance/command"', '"command"', "sensor 'command': must be named 'balance/'"),
 }
 
 
-@pytest.mark.parametrize("case", REFUSED)
+@pytest.mark.parametrize("key", WRONG_CONFIGS)
+def test_a_wrong_config_does_not_compile(key: str) -> None:
+    text = quick().plugin.model.read_text(encoding="utf-8")
+    if key == "build":
+        text = re.sub(r'<config key="build".*?/>', "", text)
+    for value in WRONG_CONFIGS[key]:
+        with pytest.raises(ValueError, match=re.escape(key)) as error:
+            mujoco.MjModel.from_xml_string(
+                text.replace("</instance>", f'<config key="{key}" value="{value}"/></instance>')
+            )
+        assert f"{made_name()}: " in str(error.value) or "unrecognized attribute" in str(error.value)
+
+
+def made_name() -> str:
+    return quick().plugin.name
+
+
+@pytest.mark.parametrize("case", WRONG_MODELS)
 def test_a_wrong_model_does_not_compile(case: str) -> None:
-    pattern, replacement, message = REFUSED[case]
+    pattern, replacement, message = WRONG_MODELS[case]
     text, n = re.subn(pattern, replacement, quick().plugin.model.read_text(encoding="utf-8"))
     assert n
     with pytest.raises(ValueError, match=re.escape(message)):
@@ -210,3 +247,13 @@ def test_two_rigs_in_one_model() -> None:
     for prefix in prefixes:
         shown = data.sensor(f"{prefix}balance/estimate").data
         np.testing.assert_array_equal(shown, alone.sensor("balance/estimate").data)
+
+
+@pytest.mark.parametrize("name", sorted(NAMES_IN_USE))
+def test_a_name_that_the_c_has_already(name: str) -> None:
+    with pytest.raises(InputError, match=rf"--name {name}: is a name in every plugin's C"):
+        generate_plugin(describe_rig(quick().experiment, name), name)
+
+
+def test_every_file_of_the_c_is_a_name_in_use() -> None:
+    assert {name.partition(".")[0] for name in common_files()} | {"rig"} <= NAMES_IN_USE
