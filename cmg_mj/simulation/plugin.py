@@ -162,13 +162,18 @@ _numbers = itertools.count()
 """A process registers a plugin's name once."""
 
 
+def unused_name() -> str:
+    """Name a plugin as none in this process has been named."""
+    return f"run_{next(_numbers)}"
+
+
 def plant_with_plugin(experiment: Experiment, world: int = 0) -> Plant:
     """Make the plant of an experiment with a plugin in its model, whose library is compiled and loaded.
 
     Raises:
         InputError: Something in use cannot be exported, or there is no compiler.
     """
-    made = make_plugin(experiment, f"run_{next(_numbers)}", world=world)
+    made = make_plugin(experiment, unused_name(), world=world)
     with tempfile.TemporaryDirectory() as temporary, set_control_callback(None):
         written = write_plugin(made, Path(temporary))
         mujoco.mj_loadPluginLibrary(str(written.library))
