@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
 from cmg_mj.cli.terminal import note_hints, say_written, show, users_code
+
+if TYPE_CHECKING:
+    from cmg_mj.simulation.plugin import Start
 
 
 @click.command(short_help="Compile the controller into MuJoCo: a library, and a model.")
@@ -20,6 +25,13 @@ from cmg_mj.cli.terminal import note_hints, say_written, show, users_code
     help="Scenario that gives the plant, the sensors, the gains and the rates.",
 )
 @settings_option("Set a field of the scenario, such as observer.k1=25 or controller.rate_hz=400.")
+@click.option(
+    "--start",
+    type=click.Choice(["keyframe", "spinning"]),
+    default="keyframe",
+    show_default=True,
+    help="What sets the flywheels going: the program, with the model's keyframe, or the plugin.",
+)
 @click.option("--no-sensors", is_flag=True, help="Leave the plugin's own sensors out of the model.")
 @json_option()
 @users_code()
@@ -29,6 +41,7 @@ def plugin(
     name: str | None,
     scenario: str,
     settings: tuple[str, ...],
+    start: Start,
     no_sensors: bool,
     as_json: bool,
 ) -> None:
@@ -46,7 +59,7 @@ def plugin(
     find_tools()
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
     note_hints(experiment.hints)
-    made = make_plugin(experiment, name, sensors=not no_sensors)
+    made = make_plugin(experiment, name, sensors=not no_sensors, start=start)
     with claim_output(out, f"plugin-{made.name}", plugin_files(made)) as folder:
         result = write_plugin(made, folder)
     figures = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -29,13 +29,13 @@ SEEN_OR_DERIVED = ("bvh", "_plugin", "name", "geom", "mocapid", "sameframe", "le
 """Parts of the names of what geoms that are only seen change, or that no physics of a rig takes."""
 
 
-def plugin_mjcf(plant: Plant, plugin: str, build: str, sensors: bool = True) -> str:
+def plugin_mjcf(plant: Plant, plugin: str, config: Mapping[str, str], sensors: bool = True) -> str:
     """Print a plant's model with an instance of a plugin.
 
     Args:
         plant: The plant.
         plugin: Name of the plugin.
-        build: Fingerprint of its library.
+        config: What the instance's <config> says: key -> value.
         sensors: Whether the plugin's sensors are in the model.
 
     Returns:
@@ -55,7 +55,7 @@ def plugin_mjcf(plant: Plant, plugin: str, build: str, sensors: bool = True) -> 
         different = differences(plant.model, mujoco.MjModel.from_xml_string(text))
     if different:
         raise InputError(f"{plant.path}: MuJoCo does not read what it has written: {', '.join(different)} differ")
-    return _with_instance(text, plugin, build, plant.axis_names if sensors else ())
+    return _with_instance(text, plugin, config, plant.axis_names if sensors else ())
 
 
 def differences(plant: mujoco.MjModel, written: mujoco.MjModel) -> list[str]:
@@ -112,18 +112,18 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None
     spec.add_key(name=START_KEY, qpos=start.qpos, qvel=start.qvel, act=start.act, ctrl=start.ctrl)
 
 
-def _with_instance(text: str, plugin: str, build: str, axes: Sequence[str]) -> str:
+def _with_instance(text: str, plugin: str, config: Mapping[str, str], axes: Sequence[str]) -> str:
     """Add an instance of the plugin to an MJCF that MuJoCo has written, and the sensors that it shows for some axes."""
     names = ["/".join(filter(None, (INSTANCE, axis, quantity))) for axis in axes for quantity in QUANTITIES]
     sensors = "".join(f'  <plugin name="{name}" plugin="{plugin}" instance="{INSTANCE}"/>\n  ' for name in names)
+    lines = "".join(f'        <config key="{key}" value="{value}"/>\n' for key, value in config.items())
     head = text.index("<mujoco")
     head = text.index(">", head) + 1
     extension = f"""
   <extension>
     <plugin plugin="{plugin}">
       <instance name="{INSTANCE}">
-        <config key="build" value="{build}"/>
-      </instance>
+{lines}      </instance>
     </plugin>
   </extension>
 """

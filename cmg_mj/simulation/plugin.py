@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import mujoco
 
@@ -28,6 +28,8 @@ from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 
 LIBRARY_MODE = 0o755
+
+Start = Literal["keyframe", "spinning"]
 
 
 class Plugin(NamedTuple):
@@ -96,14 +98,19 @@ def find_tools() -> list[str]:
 
 
 def make_plugin(
-    experiment: Experiment, name: str | None = None, *, sensors: bool = True, world: int = 0
+    experiment: Experiment,
+    name: str | None = None,
+    *,
+    sensors: bool = True,
+    start: Start = "keyframe",
+    world: int = 0,
 ) -> PluginTexts:
     """Generate a plugin's C and its model: see `plugin`. Its noise is that of a world, unless the model says other."""
     name = name_of(experiment.parts[0].design.observer(), name)
     rig = describe_rig(experiment, name, world)
     code = generate_plugin(rig, name)
     texts = code.files | extra_files(name, code.sources, experiment.plant.axis_names[0])
-    texts[f"{name}.xml"] = plugin_mjcf(experiment.plant, rig.plugin, code.build, sensors)
+    texts[f"{name}.xml"] = plugin_mjcf(experiment.plant, rig.plugin, {"start": start, "build": code.build}, sensors)
     return PluginTexts(name, code, texts)
 
 
@@ -136,7 +143,12 @@ def _copy(source: Path, target: Path) -> None:
 
 
 def plugin(
-    scenario: Scenario | Experiment, out: Path | RunFolder, *, name: str | None = None, sensors: bool = True
+    scenario: Scenario | Experiment,
+    out: Path | RunFolder,
+    *,
+    name: str | None = None,
+    sensors: bool = True,
+    start: Start = "keyframe",
 ) -> Plugin:
     """Make an engine plugin of MuJoCo: wherever MuJoCo loads its model, the robot balances.
 
@@ -145,6 +157,8 @@ def plugin(
         out: Folder to write to; made if need be.
         name: The plugin's name behind `cmg_mj.`; by default the observer's.
         sensors: Whether the model has sensors that show estimate, command and the rest.
+        start: `keyframe`: a program sets the flywheels' rates, as the keyframe `start` does; `spinning`: the plugin
+            does, for programs that reset to qpos0.
 
     Returns:
         What was written.
@@ -155,7 +169,7 @@ def plugin(
     """
     find_tools()
     experiment = scenario if isinstance(scenario, Experiment) else prepare(scenario)
-    return write_plugin(make_plugin(experiment, name, sensors=sensors), out)
+    return write_plugin(make_plugin(experiment, name, sensors=sensors, start=start), out)
 
 
 _numbers = itertools.count()
