@@ -12,7 +12,7 @@ from scipy.signal import welch
 from cmg_mj.results.baselines import References
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.mems_gyro import MemsGyro
-from cmg_mj.sensors.noise_streams import normals
+from cmg_mj.sensors.noise_streams import NoiseStream, normals
 from cmg_mj.simulation.experiment import prepare
 from tests.sensors.test_sampled import assert_mean, assert_sigma
 
@@ -112,3 +112,18 @@ def test_it_is_open_loop_and_changes_nothing() -> None:
     assert plain_fit is not None
     assert plain_fit > 0.9
     assert noisy_fit == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("calibration_s", [0.3, 1.0, 10.0])
+def test_a_world_of_many_reads_what_it_reads_alone(calibration_s: float) -> None:
+    """To the last bit: the gyro about the vertical turns the gimbals of a rig of several axes."""
+    gyro, rate = MemsGyro(calibration_s=calibration_s, counts_per_deg_s=0.0), np.linspace(-1.0, 1.0, 50)
+
+    def read(worlds: int | list[int]) -> np.ndarray:
+        reading = gyro.make_reading_function(0.005, normals(0, worlds, NoiseStream.TURN_GYRO, gyro.channels))
+        shape = (50, 1 if isinstance(worlds, int) else len(worlds))
+        return reading(np.broadcast_to(rate[:, None], shape))
+
+    together = read([0, 1, 2, 3])
+    for world in range(4):
+        np.testing.assert_array_equal(read(world)[:, 0], together[:, world])
