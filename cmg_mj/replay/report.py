@@ -16,16 +16,16 @@ from cmg_mj.replay.reference import remarks_on
 from cmg_mj.replay.scores import RECONSTRUCTED_S, Figures
 from cmg_mj.results import markdown
 from cmg_mj.results.baselines import ZERO
-from cmg_mj.results.intervals import known_interval
+from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.summary_keys import Key, SummaryValue
 from cmg_mj.visualization.plots.readability import observers_to_draw
 
 FIGURES = {
     "velocity_rms_error_rad_s": Key("RMS error", "rad/s", "{:.4f}"),
-    "velocity_fit": Key("fit", "", "{:.3f}", better="more"),
+    "velocity_fit": Key("fit", "", "{:.3f}", better="more", positive=False),
     "velocity_rms_error_push_rad_s": Key("error in windows", "rad/s", "{:.4f}"),
-    "velocity_fit_push": Key("fit in windows", "", "{:.3f}", better="more"),
-    "lag_s": Key("lag", "s", "{:.5f}"),
+    "velocity_fit_push": Key("fit in windows", "", "{:.3f}", better="more", positive=False),
+    "lag_s": Key("lag", "s", "{:.5f}", positive=False),
     "reconstruction_rms_deg": Key("reconstruction error", "deg", "{:.4f}"),
     "roughness_rad_s": Key("roughness", "rad/s", "{:.4f}"),
     "noise_gain_1_s": Key("noise gain", "1/s", "{:.1f}"),
@@ -100,7 +100,7 @@ def _means(replays: Sequence[ReplayResult]) -> dict[str, _ObserverMeans]:
 
 def _mean_of(summaries: Sequence[Figures], key: str) -> _Mean:
     values = [value for summary in summaries if (value := summary.get(key)) is not None]
-    interval = known_interval(values)
+    interval = known_interval(values, FIGURES[key].positive)
     ends = [interval.low, interval.high] if interval and math.isfinite(interval.low) else None
     return _Mean(sum(values) / len(values) if values else None, ends, len(values))
 
@@ -175,6 +175,9 @@ def _mean_text(key: str, figure: _Mean) -> str:
     if figure.interval is None:
         return text
     low, high = figure.interval
+    assert figure.mean is not None
+    if Interval(figure.mean, low, high).is_lopsided:
+        return f"{text}\n{figure_text(key, low)}\nto {figure_text(key, high)}"
     return f"{text}\n±{figure_text(key, (high - low) / 2.0)}"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from itertools import islice
+from itertools import chain, islice
 from typing import Annotated
 
 import numpy as np
@@ -129,7 +129,10 @@ class MemsGyro:
 
         def drawn(n: int) -> np.ndarray:
             """(n, channels, n_worlds)."""
-            return np.array(list(islice(noise, n))).reshape(n, self.channels, -1)
+            samples = list(islice(noise, n))
+            if isinstance(samples[0], list):  # of floats: np.array takes three times as long over nested ones
+                return np.fromiter(chain.from_iterable(samples), float).reshape(n, self.channels, 1)
+            return np.array(samples)
 
         flicker = Flicker(self.flicker_floor, dt, drawn(1)[0, 1:])
 

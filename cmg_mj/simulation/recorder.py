@@ -100,7 +100,7 @@ class TickRecorder:
         q, v = self._columns(qs), self._columns(vs)
         *signals, estimates = zip(*ticks, strict=True)
         y1, y2, acceleration, fog, u, x_e = self._columns(list(zip(*signals, strict=True)))
-        body_rate = self._columns([(rate,) for rate in body_rates])[0]
+        body_rate = np.array(body_rates).reshape(u.shape)
         push = np.broadcast_to(self._columns([(torque,) for torque in torques])[0], u.shape)
         estimated = [self._columns(estimate) for estimate in zip(*estimates, strict=True)]
         x1 = self._axis.line.lean(q) + self._bias

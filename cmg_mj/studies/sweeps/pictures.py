@@ -87,7 +87,7 @@ def _error_lines(observers: Sequence[str], x: np.ndarray, values: np.ndarray) ->
     lines, marks = [], []
     for place, name in enumerate(observers):
         worlds = values[:, place]
-        intervals = [known_interval(point) or _without_interval(point) for point in worlds]
+        intervals = [known_interval(point, positive=True) or _without_interval(point) for point in worlds]
         mean = np.array([interval.mean for interval in intervals])
         lines.append(Line(x, mean, color=name, spread=_heights(intervals)))
         whole = np.isfinite(worlds).all(axis=1)
