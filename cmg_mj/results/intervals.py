@@ -101,6 +101,19 @@ def finite_mean(values: Sequence[float] | np.ndarray) -> float | None:
     return float(known.mean()) if len(known) else None
 
 
+def format_interval(pattern: str, interval: Interval) -> list[str]:
+    """Format a mean's interval for a table, a line each: half its width, or both ends if it is lop-sided."""
+    if interval.is_lopsided:
+        return [pattern.format(interval.low), "to " + pattern.format(interval.high)]
+    return ["±" + pattern.format(interval.half)]
+
+
+def in_line(lines: Sequence[str]) -> str:
+    """Write a figure and the lines of its interval on one line, both ends in brackets."""
+    figure, *interval = lines
+    return f"{figure} ({' '.join(interval)})" if len(interval) > 1 else " ".join(lines)
+
+
 def ratio_interval(numerator: np.ndarray, denominator: np.ndarray) -> Interval:
     """Compute the geometric mean of the worlds' ratios of two positive quantities.
 

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
-from cmg_mj.results.intervals import Interval
-
 Figures = dict[str, float | None]
 """Numbers of one estimator by their names; None where there is no such number."""
 SummaryValue: TypeAlias = "float | str | Sequence[SummaryValue] | Mapping[str, SummaryValue] | None"
@@ -81,13 +79,6 @@ def heading(key: str) -> str:
 def format_figure(key: str, value: SummaryValue) -> str:
     """Format a summary's number for a table; a dash where there is none."""
     return "-" if value is None else KEYS[key].pattern.format(value)
-
-
-def format_interval(pattern: str, interval: Interval) -> list[str]:
-    """Format a mean's interval for a table, a line each: half its width, or both ends if it is lop-sided."""
-    if interval.is_lopsided:
-        return [pattern.format(interval.low), "to " + pattern.format(interval.high)]
-    return ["±" + pattern.format(interval.half)]
 
 
 def format_difference(key: str, value: SummaryValue) -> str:

@@ -14,7 +14,7 @@ from rich.text import Text
 from cmg_mj.inputs.bundled import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.results import markdown
-from cmg_mj.results.intervals import Interval
+from cmg_mj.results.intervals import Interval, format_interval, in_line
 from cmg_mj.results.summary_keys import (
     AXES,
     KEYS,
@@ -23,7 +23,6 @@ from cmg_mj.results.summary_keys import (
     capitalised,
     format_difference,
     format_figure,
-    format_interval,
     heading,
     open_loop_figures,
     section,
@@ -84,12 +83,6 @@ def comparison_markdown(summaries: Comparison) -> str:
 def _markdown(summaries: Comparison, columns: Sequence[str], cell: Cell) -> str:
     rows = [(f"`{s['observer']}`", *(in_line(cell(s, key)) for key in columns)) for s in summaries]
     return markdown.table(["observer", *map(heading, columns)], rows)
-
-
-def in_line(lines: Sequence[str]) -> str:
-    """Write a figure and its interval on one line, both ends in brackets."""
-    figure, *interval = lines
-    return f"{figure} ({' '.join(interval)})" if len(interval) > 1 else " ".join(lines)
 
 
 def _columns_with_best(summaries: Comparison) -> list[str]:

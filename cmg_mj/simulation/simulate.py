@@ -135,7 +135,7 @@ class _Simulation:
         noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
         y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
         floors = Floors(noises, y1_period)
-        # A sample of y1 that the controller sees at n ticks counts n times: as one of sqrt(n) times the noise each time.
+        # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
         tilt_sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
         references = References(
             sensors.mems_gyro, dt, controller.seed, controller.worlds, tilt_sigmas, axis=controller.axis

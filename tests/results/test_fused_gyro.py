@@ -73,7 +73,7 @@ def test_no_offset_matters() -> None:
 @pytest.mark.parametrize("offset_deg_s", [-20.0, 0.0, 20.0])
 def test_the_offset_is_found_without_a_rest(offset_deg_s: float) -> None:
     """Told nothing of the rate at the start, while the rig turns at 0.3 rad/s, as little is left after 5 s."""
-    reading, y1, rate, bias = signals(2000, 3)
+    reading, y1, rate, _ = signals(2000, 3)
     offset, turn = math.radians(offset_deg_s), 0.3
     time = DT * np.arange(len(y1))[:, None]
     fused = filter_of(rate_start=math.radians(20.0))

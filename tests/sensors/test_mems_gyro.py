@@ -100,7 +100,7 @@ def test_as_bought_it_is_offset_and_drifts_to_either_side() -> None:
     np.testing.assert_allclose(offset, 20.0 * np.sign(part[0]))
     np.testing.assert_allclose(drift, 0.33 * np.sign(part[1]), rtol=1e-9)
     assert {*np.sign(offset), *np.sign(offset * drift)} == {-1.0, 1.0}
-    assert 20.0 / (85.0 - 25.0) == pytest.approx(gyro.as_bought_drift_deg_s_k, rel=0.02)
+    assert gyro.as_bought_drift_deg_s_k == pytest.approx(20.0 / (85.0 - 25.0), rel=0.02)
 
 
 def test_calibrated_it_is_what_it_was() -> None:

@@ -16,10 +16,9 @@ import pytest
 from scipy import stats
 
 from cmg_mj.results.baselines import REFERENCES
-from cmg_mj.results.intervals import Interval
+from cmg_mj.results.intervals import Interval, format_interval, in_line
 from cmg_mj.results.result import Outcome, Result
-from cmg_mj.results.summary_keys import format_interval
-from cmg_mj.results.terminal_tables import comparison_markdown, in_line
+from cmg_mj.results.terminal_tables import comparison_markdown
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.compare.comparison import ComparedObserver, compare, prepare_comparison
 from cmg_mj.studies.compare.plot import _Panel
