@@ -32,6 +32,7 @@ class FusedGyro:
         tilt_sigmas: Standard deviation of a sample of y1 in each world [rad].
         dt: Sample period [s].
         rate_start: Standard deviation of the rate at the start [rad/s].
+        bias: First estimate of the bias; None for the first reading [rad/s].
     """
 
     def __init__(
@@ -41,8 +42,9 @@ class FusedGyro:
         tilt_sigmas: Sequence[float],
         dt: float,
         rate_start: float = RATE_START,
+        bias: float | None = None,
     ) -> None:
-        self._dt = dt
+        self._dt, self._bias = dt, bias
         sigmas = np.maximum(tilt_sigmas, LEAST_TILT_SIGMA)
         alike = bool((sigmas == sigmas[0]).all())
         self._R: Scalar = float(sigmas[0]) ** 2 if alike else sigmas * sigmas
@@ -68,7 +70,7 @@ class FusedGyro:
         start = not self._has_started
         if start:
             self._has_started, self._reading = True, reading[0]
-            self._turn = self._dt * reading[0]
+            self._turn = self._dt * (reading[0] if self._bias is None else np.full_like(reading[0], self._bias))
         n = len(reading)
         before = np.vstack([self._reading[None], reading[:-1]])
         turns = 0.5 * self._dt * (before + reading)
