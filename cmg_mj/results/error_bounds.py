@@ -17,6 +17,8 @@ from cmg_mj.sensors.tilt import TiltNoise
 FLOOR_Y1, FLOOR_ACCELERATION = "floor_y1", "floor_accel"
 FLOORS = (FLOOR_Y1, FLOOR_ACCELERATION)
 """Names of the floors, in the order of every table."""
+NOISE_ALONE = "Floors are for the sensors' noise alone: no other error of theirs, and a pivot at rest."
+"""Said wherever they are printed."""
 
 MEMORY_S = 0.5
 """Memory of the filters of y1 that are tried for its floor [s]."""

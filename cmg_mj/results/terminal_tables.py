@@ -14,6 +14,7 @@ from rich.text import Text
 from cmg_mj.inputs.bundled import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.results import markdown
+from cmg_mj.results.error_bounds import FLOORS, NOISE_ALONE
 from cmg_mj.results.intervals import Interval, format_interval, in_line
 from cmg_mj.results.summary_keys import (
     AXES,
@@ -132,7 +133,7 @@ def comparison_note(summaries: Comparison) -> str:
             "after a second at rest, at constant temperature; mems_fused, as bought, in a Kalman filter with y1;\n"
             "floor_y1, the best time-invariant filter of y1 alone (its last 0.5 s, 16 taps) for this very world,\n"
             "found afterwards; floor_accel, the least error that y1 with its acceleration allow for whatever\n"
-            "motion. Floors are for the sensors' noise alone: no other error of theirs, and a pivot at rest."
+            f"motion. {NOISE_ALONE}"
         )
     return "\n".join(lines)
 
@@ -163,7 +164,8 @@ def summary_table(summary: Mapping[str, SummaryValue]) -> Group:
             figures = (format_figure(key, axis_summary.get(key)) for axis_summary in axes.values())
             table.add_row(capitalised(heading(key)), *figures)
     open_loop = [_open_loop_table(name, axis_summary) for name, axis_summary in axes.items()]
-    return Group(table, *(rows for rows in open_loop if rows.row_count))
+    has_floors = any(name in open_loop_figures(axis_summary) for axis_summary in axes.values() for name in FLOORS)
+    return Group(table, *(rows for rows in open_loop if rows.row_count), *([NOISE_ALONE] if has_floors else []))
 
 
 def _open_loop_table(axis: str, summary: Mapping[str, SummaryValue]) -> Table:
