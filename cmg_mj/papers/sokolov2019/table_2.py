@@ -104,9 +104,15 @@ def claim(results: Levels) -> Claim:
             f"printed values are not beaten, by noise in ug/rtHz: {text}."
         ),
         table=_table(results),
+        assumes={
+            "push": join_with_and(list(results)),
+            "noise": f"{', '.join(f'{noise:g}' for noise in sorted({noise for *_, noise in settings}))} ug/rtHz",
+        },
+        missing_data="The paper gives neither the recording that its estimators were tuned on, nor its push, e and "
+        "noise.",
         holds=bool(best),
         conditions=(
-            f"For a push of {'; '.join(best)}. The paper gives neither push nor noise."
+            f"For a push of {'; '.join(best)}."
             + (f" The best {' and '.join(losers)} are farther from the gyro than zero is." if losers else "")
         ),
         otherwise=(
