@@ -96,9 +96,7 @@ class Claim:
             raise ValueError(f"{self.place}: conditions: say on which systems a general statement was tried")
         unknown_names = sorted(set(self.assumes) - set(get_args(Assumption)))
         if unknown_names:
-            raise ValueError(
-                f"{self.place}: assumes: {', '.join(unknown_names)}: no `Assumption`"
-            )
+            raise ValueError(f"{self.place}: assumes: {', '.join(unknown_names)}: no `Assumption`")
         measures = self.holds if isinstance(self.holds, Mapping) else {}
         if isinstance(self.holds, Mapping) and not measures:
             raise ValueError(f"{self.place}: holds: name a measure")

@@ -71,7 +71,9 @@ def increments() -> Claim:
         result=f"Over both signs and sizes from 1e-4 to 1e4 the left side is at most {largest_inside:.6f} of the "
         f"right side for p = 0.1, 0.5, 0.9. The check can fail: for p = 1.5 and 2 the quotient is {quotients[1.5]:.3f} "
         f"and {quotients[2.0]:.3f}.",
+        is_general=True,
         holds=largest_inside <= 1.0 + 1e-9,
+        conditions="For all p in (0, 1), of which three were tried.",
         figures={"worst_quotient_by_p": {str(p): quotient for p, quotient in quotients.items()}},
     )
 

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.papers.aranovskiy2020.rig import LOOP
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval, known_interval
@@ -106,7 +106,7 @@ def _order(measure: Measure, pictures: list[Picture]) -> Claim:
             f"Means over {worlds} seeds of (11), (10), (9); an order is one if both steps of it are beyond chance, "
             f"world by world. {_in_words(measure)}"
         ),
-        assumes=LOOP,
+        assumes=PUSH_RECOVERY,
         holds={f"{angles} angles": order == "holds" for angles, order in measure.orders.items()},
         conditions=f"The paper names no measure.{turns if measure.key == JUDGED else ''}",
         otherwise=f"{_in_which_order(measure)} The paper names no measure.{turns if measure.key == JUDGED else ''}",

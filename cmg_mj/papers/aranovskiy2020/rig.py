@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
 from cmg_mj.observers import Estimate, Observer
-from cmg_mj.papers.claim import Assumption
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.plant.plant import Plant
 from cmg_mj.replay import replay
@@ -21,8 +20,6 @@ DT = 0.005
 """The bench's control period [s]; the paper does not give its own."""
 DURATION_S = 10.0
 """Duration of the runs that Figs 5 to 7 and their variations are made of [s]."""
-LOOP: Mapping[Assumption, str] = {"push": "1 N m for 0.1 s", "e": "0.5 deg", "noise": "400 ug/rtHz"}
-"""What the paper does not give of the experiments of Section V: the scenarios push_recovery and observer_tuning."""
 SEED_OF_10 = 71_000
 """Seed of the run with (10) in the loop that several sections replay."""
 

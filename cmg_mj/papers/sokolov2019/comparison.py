@@ -53,7 +53,9 @@ def _best(loops: Loops, key: str) -> Claim:
         name: [s for s, by_name in loops.all_settings.items() if is_better(by_name[name], by_name["homogeneous"], key)]
         for name in ("linear", "luenberger")
     }
-    others = [f"{OBSERVERS[name]} is better at {'; '.join(places)}" for name, places in better_settings.items() if places]
+    others = [
+        f"{OBSERVERS[name]} is better at {'; '.join(places)}" for name, places in better_settings.items() if places
+    ]
     return Claim(
         place=f"Section V, the comparison: {_label(key)}",
         statement=f"The nonlinear differentiator (10) offers the best behaviour of the three; by the {_label(key)}.",

@@ -169,7 +169,11 @@ def figure_6(loops: Loops, cycles: Cycles) -> Claim:
             f"{', '.join(falls)}. {_describe_tilt(loops, 'homogeneous')} The velocity RMS error is "
             f"{format_interval(error)} rad/s."
         ),
-        assumes={**PUSH_AND_NOISE, "e": f"up to {max(loops.by_bias):g} deg", "backlash": f"0 and {GAP_ARCMIN:g} arcmin"},
+        assumes={
+            **PUSH_AND_NOISE,
+            "e": f"up to {max(loops.by_bias):g} deg",
+            "backlash": f"0 and {GAP_ARCMIN:g} arcmin",
+        },
         holds=max(falls.values()) == 0.0,
         otherwise="It falls.",
         figures=_figures(loops, "homogeneous", cycles) | {"largest_fell_fraction": max(falls.values())},

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.results import markdown
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.studies.tuning import NoiseLevelResult, Recorded, halves, recorder, tune
