@@ -134,7 +134,7 @@ def bias_of_constant_gain(study: Study) -> Claim:
         place="Section 3.1, bias of the constant gain",
         statement="The bias of the observer with constant gain in Fig. 2 is due to the error in hbar.",
         result=f"With hbar exact {shares_left.min():.0%} to {shares_left.max():.0%} of it remain in the four windows.",
-        assumes={**ASSUMED, "threshold": "less than half is left"},
+        assumes={**ASSUMED, "threshold": "due to it if less than half is left"},
         holds=dict(zip(WINDOW_NAMES, (shares_left < HALF).tolist(), strict=True)),
         otherwise="It is made by the noise, which sends the estimate from end to end of the domain, where the limits "
         "cut off one side more than the other.",
@@ -157,7 +157,7 @@ def bias_of_updated_gains(study: Study) -> Claim:
             for kind, row in zip(KINDS[1:], shares_left, strict=True)
         )
         + ".",
-        assumes={**ASSUMED, "threshold": "less than half is left"},
+        assumes={**ASSUMED, "threshold": "due to it if less than half is left"},
         holds=dict(zip(WINDOW_NAMES, due, strict=True)),
         otherwise=f"Less than half remains for both in {', '.join(windows)}; not in {', '.join(other_windows)}, where "
         "the bias itself is small."

@@ -95,21 +95,21 @@ def _order(measure: Measure, pictures: list[Picture]) -> Claim:
     worlds = len(next(iter(measure.numbers.values()))["linear"])
     label = KEYS[measure.key].label
     turns = (
-        " At low noise or large bias the order turns round, because (11) mistakes the bias for a rate most: the map "
+        "At low noise or large bias the order turns round, because (11) mistakes the bias for a rate most: the map "
         "over noise and bias is in docs/results.md."
     )
     return Claim(
         place=f"Section V, the comparison: {label}",
         statement="The homogeneous differentiator performs best, the time-varying observer second, the linear one "
-        f"last; by the {label}.",
+        f"last; judged by the {label}.",
         result=(
             f"Means over {worlds} seeds of (11), (10), (9); an order is one if both steps of it are beyond chance, "
-            f"world by world. {_in_words(measure)}"
+            f"world by world. The paper names no measure. {_in_words(measure)}"
         ),
         assumes=PUSH_RECOVERY,
         holds={f"{angles} angles": order == "holds" for angles, order in measure.orders.items()},
-        conditions=f"The paper names no measure.{turns if measure.key == JUDGED else ''}",
-        otherwise=f"{_in_which_order(measure)} The paper names no measure.{turns if measure.key == JUDGED else ''}",
+        conditions=turns if measure.key == JUDGED else "",
+        otherwise=_in_which_order(measure) + (f" {turns}" if measure.key == JUDGED else ""),
         figures={
             f"{worse}_less_{better}_{angles}_angles_{measure.key}": step
             for angles, numbers in measure.numbers.items()

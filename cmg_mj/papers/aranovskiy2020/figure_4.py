@@ -82,7 +82,7 @@ def _comparable(span: str, rms_errors: Mapping[str, np.ndarray], suffix: str, pi
             f"RMS of the estimated rate less the gyro's {span}, {len(rms_errors['zero'])} seeds, with 95 % intervals "
             f"[rad/s]: {_list_errors(errors)}. The largest is {spread:.2f} times the smallest."
         ),
-        assumes={**PUSH_RECOVERY, "threshold": f"comparable: within a factor of {COMPARABLE:g}"},
+        assumes={**PUSH_RECOVERY, "threshold": f"comparable is within a factor of {COMPARABLE:g}"},
         missing_data="The paper gives neither this recording, with its push, e and noise, nor what is comparable.",
         holds=spread < COMPARABLE,
         conditions=_zero_sentence(errors),

@@ -86,7 +86,7 @@ def speed_claim(study: Study) -> Claim:
         result=f"At Sigma = 10 the state's error stays below {SETTLED} from {words_of_time(middle)} on (median of "
         f"{len(learning_times)} motions); with all of xm known, L takes {yardstick:.1f} s. It is "
         f"{middle / yardstick:.0f} times as slow: what takes long is to learn the parameters.",
-        assumes={**ASSUMED, "threshold": f"soon: at most {QUICK:g} times as slow as knowing all"},
+        assumes={**ASSUMED, "threshold": f"soon is at most {QUICK:g} times as slow as knowing all"},
         missing_data="The paper gives no time within which it counts as quick.",
         holds=middle <= QUICK * yardstick,
         conditions=meaning,

@@ -53,7 +53,7 @@ def settling_order(study: Study) -> Claim:
         statement="Against Sigma = 10, parameters and disturbance are found sooner with 1000 and later with 0.1.",
         result=f"In {int(in_order.sum())} of {n} motions the settling order is 1000 < 10 <= 0.1. Medians: "
         f"{words_of_time(medians[1])} at 1000, {words_of_time(medians[0])} at 10, {words_of_time(medians[2])} at 0.1.",
-        assumes={**ASSUMED, "threshold": f"settled: below {SETTLED:g}"},
+        assumes={**ASSUMED, "threshold": f"settled is below {SETTLED:g}"},
         holds=in_order.sum() >= 0.9 * n,
         conditions=meaning,
         otherwise=meaning,
@@ -122,7 +122,7 @@ def larger_gains(study: Study) -> Claim:
         + ", ".join(f"{words_of_time(medians[SIGMAS[i]])} at {SIGMAS[i]:g}" for i in order)
         + ".",
         is_general=True,
-        assumes={**ASSUMED, "threshold": f"settled: below {SETTLED:g}"},
+        assumes={**ASSUMED, "threshold": f"settled is below {SETTLED:g}"},
         holds={
             "from 0.1 to 10 to 1000, the paper's three weights": in_order,
             "from 1000 to 10000": order_goes_on,
