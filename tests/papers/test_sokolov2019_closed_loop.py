@@ -235,9 +235,10 @@ def test_by_the_tilt_the_comparison_follows_the_tilt(runs: Loops) -> None:
     """Tilts made up: the least of (10), then of (9), whatever the errors are."""
 
     def still(by_name: Mapping[str, Result]) -> dict[str, Result]:
-        sizes = {"linear": 3.0, "luenberger": 2.0, "homogeneous": 1.0}
         errors = by_name["linear"].values(VELOCITY).tolist()
-        return {name: make_result(errors, tilts=[size, size + 0.1, size, size]) for name, size in sizes.items()}
+        sizes = {"linear": 3.0, "luenberger": 2.0, "homogeneous": 1.0}
+        made_up = {name: make_result(errors, tilts=[size, size + 0.1, size, size]) for name, size in sizes.items()}
+        return {name: Result(r.outcomes, r.summaries, by_name[name].trajectory) for name, r in made_up.items()}
 
     calm = runs._replace(by_bias={e: still(runs.by_bias[e]) for e in runs.by_bias}, gap=still(runs.gap))
     assert [claim.verdict for claim in comparison.best_claims(calm)] == ["not reproduced", WITHIN]

@@ -58,7 +58,8 @@ def _best(loops: Loops, key: str) -> Claim:
     ]
     return Claim(
         place=f"Section V, the comparison: {_label(key)}",
-        statement=f"The nonlinear differentiator (10) offers the best behaviour of the three; judged by the {_label(key)}.",
+        statement="The nonlinear differentiator (10) offers the best behaviour of the three; judged by the "
+        f"{_label(key)}.",
         result=(
             f"{loops.worlds} seeds, world by world, 95 % intervals. (10) has the smallest {_label(key)}, or stands "
             f"where another falls, in {sum(wins.values())} of {len(wins)} settings. The paper names no measure."
