@@ -138,8 +138,8 @@ def upsilon() -> Claim:
     matrix_gap, estimate_gap = upsilon_gaps(10.0, 0.005, 15.0)
     correction = (
         "For any system, of which the pendulum robot was tried. Upsilon's equation must have "
-        "(B0 + L D20) Cm exp(Am t), not (B0 + L D20), unless Am = 0. So read, the proposed observer is the conventional "
-        "one of the constant xm(0): its estimate of x is the same."
+        "(B0 + L D20) Cm exp(Am t), not (B0 + L D20), unless Am = 0. So read, the proposed observer is the "
+        "conventional one of the constant xm(0): its estimate of x is the same."
     )
     return Claim(
         place="Section 2.2, last equation",
