@@ -136,7 +136,7 @@ def _mount_and_write(
         if time_limit is not None:
             simulated = simulated_push(experiment, limits, request.name, time_limit)
             if math.degrees(limits.limit.tilt) < LOW_LIMIT_DEG or simulated.falls:
-                trial = model.with_name(f".{file.stem}.trial.xml")
+                trial = model.with_suffix(".trial.xml")
                 sufficient = _sufficient_scale(robot, request, trial, observer, time_limit)
         text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated)
         model.with_suffix(".toml").write_bytes(signed(text, ".toml"))
