@@ -14,7 +14,7 @@ from cmg_mj.results.run_folder.lock import Busy, Lock
 from cmg_mj.results.signed_text import is_as_written, is_begun
 
 _PARTIAL = re.compile(r"\.+(?P<stem>.+?)\.(?P<process>\d+)\.partial(\.trial)?\.(xml|toml)(\.\d+\.partial(\.xml)?)?")
-"""Names under which a mount writes before it renames: see `mounted.with_scenario`. Larger scales are tried as `trial`."""
+"""Names under which a mount writes before it renames (`mounted.with_scenario`); `trial` is a larger scale."""
 
 
 @contextmanager
@@ -30,8 +30,8 @@ def claimed_target(target: Path, *, overwrite: bool) -> Iterator[None]:
             written.
     """
     try:
-        check_replaceable(target, overwrite=overwrite)
         _clear_left_over(target.parent)
+        check_replaceable(target, overwrite=overwrite)
         lock = Lock(_lock_file(target.parent, target.stem))
     except Busy:
         raise InputError(f"-o {target}: another mount is writing it") from None

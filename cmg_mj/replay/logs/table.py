@@ -136,31 +136,24 @@ def _of_csv(
         spelled = {name.strip(): name for name in names}
         headings = [spelled[name.strip()] for name in headings]
         time = spelled.get(time.strip()) if time else None
-        table: pa.Table | None = None
-        columns: Mapping[str, np.ndarray] = {}
+        names = list(dict.fromkeys(headings))
         try:
             torn.clear()
-            names = list(dict.fromkeys(headings))
             columns = _in_pieces(path, names, _batches(path, read, parse, convert(pa.float64())))
-            n_rows = columns.n_rows
         except pa.ArrowInvalid as error:
             if "onversion error" not in str(error):
                 raise
             torn.clear()
-            texts = pa.Table.from_batches(list(_batches(path, read, parse, convert(pa.string()))))
-            table, n_rows = texts, texts.num_rows
-    if torn and not n_rows:
+            texts = _batches(path, read, parse, convert(pa.string()))
+            clock = _Clock(path, time, dated, comma=comma) if time else None
+            columns = _in_pieces(path, names, texts, clock, comma=comma)
+    if torn and not columns.n_rows:
         raise InputError(f"{path}: no line has as many cells as the heading; the first, {torn[0]}")
     if torn:
         one = len(torn) == 1
         lines = f"{len(torn)} {'line has' if one else 'lines have'} another number of cells"
         notes.append(f"{lines} and {'was' if one else 'were'} discarded; {'' if one else 'the first, '}{torn[0]}")
-    if table is None:
-        return columns
-    return {
-        name.strip(): _numbers(path, name, table[name], dated if name == time else None, comma=comma)
-        for name in headings
-    }
+    return columns
 
 
 def _batches(
@@ -180,17 +173,82 @@ def _batches(
             yield batch
 
 
-def _in_pieces(path: Path, names: Sequence[str], batches: Iterable[pa.RecordBatch]) -> StoredColumns:
+def _in_pieces(
+    path: Path,
+    names: Sequence[str],
+    batches: Iterable[pa.RecordBatch],
+    clock: _Clock | None = None,
+    *,
+    comma: bool = False,
+) -> StoredColumns:
     """Keep columns of numbers, a batch at a time: a long log's go to a file."""
     import pyarrow as pa
 
     store = ColumnStore(len(names), Path(tempfile.gettempdir()))
+
+    def values(name: str, column: pa.ChunkedArray) -> np.ndarray:
+        if clock is not None and clock.name == name:
+            return clock.seconds(column, len(store))
+        return _numbers(path, name, column, None, comma=comma, first=len(store))
+
     for batch in batches:
         if len(batch):
-            chunks = (pa.chunked_array([batch.column(name)]) for name in names)
-            store.append([_numbers(path, name, c, None)[:, None] for name, c in zip(names, chunks, strict=True)])
+            store.append([values(name, pa.chunked_array([batch.column(name)]))[:, None] for name in names])
     readers = {name.strip(): partial(_column, store, i) for i, name in enumerate(names)}
     return StoredColumns(readers, 0, len(store))
+
+
+class _Clock:
+    """Converts a column of text, piece by piece: dates to seconds from the first, numbers as they are.
+
+    Args:
+        path: The file, for messages.
+        name: The column's heading.
+        dated: Gets the heading if the first piece with a cell holds dates.
+        comma: Whether numbers have a decimal comma.
+    """
+
+    def __init__(self, path: Path, name: str, dated: list[str], *, comma: bool) -> None:
+        self.name = name
+        self._path, self._dated, self._comma = path, dated, comma
+        self._are_dates: bool | None = None
+        self._start: int | None = None
+
+    def seconds(self, column: pa.ChunkedArray, first: int) -> np.ndarray:
+        """Convert a piece whose first row is given."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        if column.null_count == len(column):
+            return np.full(len(column), np.nan)
+        if self._are_dates is not False:
+            text = pc.call_function("utf8_trim_whitespace", [column])
+            try:
+                stamps = text.cast(pa.timestamp("ns"))
+            except pa.ArrowInvalid:
+                if self._are_dates:
+                    raise _mixed(self._path, self.name, text, first) from None
+            else:
+                if self._are_dates is None:
+                    self._dated.append(self.name)
+                self._are_dates = True
+                values, self._start = _seconds(stamps, self._start)
+                return values
+        self._are_dates = False
+        return _numbers(self._path, self.name, column, [], comma=self._comma, first=first)
+
+
+def _mixed(path: Path, name: str, text: pa.ChunkedArray, first: int) -> InputError:
+    """Name the first cell that is no date, in a column of dates."""
+    import pyarrow as pa
+
+    for i in range(len(text)):
+        try:
+            text.slice(i, 1).cast(pa.timestamp("ns"))
+        except pa.ArrowInvalid:
+            break
+    cell = shown(str(text[i].as_py()))
+    return InputError(f"{path}: row {first + i + 1}, column {name!r}: {cell} is not a date, as the rows before")
 
 
 def _column(store: ColumnStore, column: int, start: int, end: int) -> np.ndarray:
@@ -245,9 +303,12 @@ def _is_number(kind: pa.DataType) -> bool:
 
 
 def _numbers(
-    path: Path, name: str, column: pa.ChunkedArray, dated: list[str] | None, *, comma: bool = False
+    path: Path, name: str, column: pa.ChunkedArray, dated: list[str] | None, *, comma: bool = False, first: int = 0
 ) -> np.ndarray:
-    """Convert a column to floats; `dated`, of the time alone, gets its name if it holds dates."""
+    """Convert a column to floats; `dated`, of the time alone, gets its name if it holds dates.
+
+    The column's first row has a number, `first`, for messages.
+    """
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -256,7 +317,7 @@ def _numbers(
         if dated is None:
             raise InputError(f"{path}: column {name!r} holds times, not numbers")
         dated.append(name)
-        return _seconds(column)
+        return _seconds(column)[0]
     if _is_number(kind):
         values = column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False).astype(float)
         return np.where(np.isfinite(values), values, np.nan)
@@ -267,7 +328,7 @@ def _numbers(
     text = pc.call_function("utf8_trim_whitespace", [column])
     if dated is not None:
         try:
-            seconds = _seconds(text.cast(pa.timestamp("ns")))
+            seconds, _ = _seconds(text.cast(pa.timestamp("ns")))
             dated.append(name)
             return seconds
         except pa.ArrowInvalid:
@@ -278,12 +339,22 @@ def _numbers(
             values[i] = np.nan if cell is None or cell in MISSING else float(cell.replace(",", ".") if comma else cell)
         except ValueError:
             expected = "a number or a date" if dated is not None else "a number"
-            raise InputError(f"{path}: row {i + 1}, column {name!r}: {shown(str(cell))} is not {expected}") from None
+            raise InputError(
+                f"{path}: row {first + i + 1}, column {name!r}: {shown(str(cell))} is not {expected}"
+            ) from None
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _seconds(column: pa.ChunkedArray) -> np.ndarray:
-    """Convert dates, or spans of time, to seconds from the first; nanoseconds are subtracted as integers."""
+def _seconds(column: pa.ChunkedArray, start: int | None = None) -> tuple[np.ndarray, int | None]:
+    """Convert dates, or spans of time, to seconds from the first; nanoseconds are subtracted as integers.
+
+    Args:
+        column: The dates.
+        start: The first one, if it is in a piece before [ns].
+
+    Returns:
+        The seconds, and the first one.
+    """
     import pyarrow as pa
 
     kind = pa.duration("ns") if pa.types.is_duration(column.type) else pa.timestamp("ns")
@@ -292,8 +363,9 @@ def _seconds(column: pa.ChunkedArray) -> np.ndarray:
     column = column.cast(kind).combine_chunks()
     known = np.asarray(column.is_valid())
     counts = column.cast(pa.int64()).fill_null(0).to_numpy(zero_copy_only=False)
-    start = counts[known][0] if known.any() else 0
-    return np.where(known, (counts - start) * 1e-9, np.nan)
+    if start is None and known.any():
+        start = int(counts[known][0])
+    return np.where(known, (counts - (start or 0)) * 1e-9, np.nan), start
 
 
 def _too_long(path: Path, rows: int | None) -> InputError:

@@ -165,6 +165,13 @@ def test_what_a_killed_mount_left_is_cleared() -> None:
     assert there() == []
 
 
+def test_a_mount_that_is_refused_clears_too() -> None:
+    Path("b.xml").write_bytes(MODEL)
+    Path(partial("b", ENDED)[0]).write_bytes(MODEL)
+    assert "b.xml exists" in cmg_mj(*GIVEN).complaint
+    assert there() == ["b.xml"]
+
+
 def test_what_may_be_anybody_elses_stays() -> None:
     alive = partial("b", os.getpid())
     theirs = {
