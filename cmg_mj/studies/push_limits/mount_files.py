@@ -76,7 +76,8 @@ class MountResult:
         simulated = self.simulated
         return {
             **self.prospects.figures(),
-            "stand_unpushed_of_10": simulated and simulated.standing,
+            "stand_unpushed": simulated and simulated.standing,
+            "stand_unpushed_of": simulated and simulated.worlds,
             "stands_push_impulse_n_m_s": simulated and simulated.impulse,
             "stands_push_torque_n_m": simulated and simulated.impulse / PUSH_S,
             "stands_push_complete": simulated and simulated.complete,
