@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
+from cmg_mj.replay.logs.cells import MISSING, Clock, is_number, numbers
 from cmg_mj.results.stored_columns import ColumnStore, StoredColumns, stored
 
 if TYPE_CHECKING:
@@ -27,9 +28,6 @@ HEAD = 1 << 16
 """Size of the part of a CSV that is searched for its heading, which must end in it [bytes]."""
 PARQUET = b"PAR1"
 """First bytes of a Parquet file."""
-NOT_FINITE = ["nan", "NaN", "NAN", "-nan", "inf", "-inf", "Inf", "-Inf"]
-MISSING = ["", "NA", "N/A", "#N/A", "null", "NULL", "None", "none", *NOT_FINITE]
-"""Cells that hold no number."""
 COMMENTS = ("#", "%", "//")
 
 
@@ -93,11 +91,11 @@ def _of_parquet(path: Path, headings: Sequence[str], time: str | None, dated: li
         if file.metadata.num_rows > MOST_ROWS:
             raise _too_long(path, file.metadata.num_rows)
         names = list(dict.fromkeys(spelled[name.strip()] for name in headings))
-        if all(_is_number(file.schema_arrow.field(name).type) for name in names):
+        if all(is_number(file.schema_arrow.field(name).type) for name in names):
             return _in_pieces(path, names, file.iter_batches(columns=names))
         table = file.read(columns=names)
     return {
-        name.strip(): _numbers(path, name, table[spelled[name.strip()]], dated if name == time else None)
+        name.strip(): numbers(path, name, table[spelled[name.strip()]], dated if name == time else None)
         for name in headings
     }
 
@@ -145,7 +143,7 @@ def _of_csv(
                 raise
             torn.clear()
             texts = _batches(path, read, parse, convert(pa.string()))
-            clock = _Clock(path, time, dated, comma=comma) if time else None
+            clock = Clock(path, time, dated, comma=comma) if time else None
             columns = _in_pieces(path, names, texts, clock, comma=comma)
     if torn and not columns.n_rows:
         raise InputError(f"{path}: no line has as many cells as the heading; the first, {torn[0]}")
@@ -177,7 +175,7 @@ def _in_pieces(
     path: Path,
     names: Sequence[str],
     batches: Iterable[pa.RecordBatch],
-    clock: _Clock | None = None,
+    clock: Clock | None = None,
     *,
     comma: bool = False,
 ) -> StoredColumns:
@@ -189,66 +187,13 @@ def _in_pieces(
     def values(name: str, column: pa.ChunkedArray) -> np.ndarray:
         if clock is not None and clock.name == name:
             return clock.seconds(column, len(store))
-        return _numbers(path, name, column, None, comma=comma, first=len(store))
+        return numbers(path, name, column, None, comma=comma, first=len(store))
 
     for batch in batches:
         if len(batch):
             store.append([values(name, pa.chunked_array([batch.column(name)]))[:, None] for name in names])
     readers = {name.strip(): partial(_column, store, i) for i, name in enumerate(names)}
     return StoredColumns(readers, 0, len(store))
-
-
-class _Clock:
-    """Converts a column of text, piece by piece: dates to seconds from the first, numbers as they are.
-
-    Args:
-        path: The file, for messages.
-        name: The column's heading.
-        dated: Gets the heading if the first piece with a cell holds dates.
-        comma: Whether numbers have a decimal comma.
-    """
-
-    def __init__(self, path: Path, name: str, dated: list[str], *, comma: bool) -> None:
-        self.name = name
-        self._path, self._dated, self._comma = path, dated, comma
-        self._are_dates: bool | None = None
-        self._start: int | None = None
-
-    def seconds(self, column: pa.ChunkedArray, first: int) -> np.ndarray:
-        """Convert a piece whose first row is given."""
-        import pyarrow as pa
-        import pyarrow.compute as pc
-
-        if column.null_count == len(column):
-            return np.full(len(column), np.nan)
-        if self._are_dates is not False:
-            text = pc.call_function("utf8_trim_whitespace", [column])
-            try:
-                stamps = text.cast(pa.timestamp("ns"))
-            except pa.ArrowInvalid:
-                if self._are_dates:
-                    raise _mixed(self._path, self.name, text, first) from None
-            else:
-                if self._are_dates is None:
-                    self._dated.append(self.name)
-                self._are_dates = True
-                values, self._start = _seconds(stamps, self._start)
-                return values
-        self._are_dates = False
-        return _numbers(self._path, self.name, column, [], comma=self._comma, first=first)
-
-
-def _mixed(path: Path, name: str, text: pa.ChunkedArray, first: int) -> InputError:
-    """Name the first cell that is no date, in a column of dates."""
-    import pyarrow as pa
-
-    for i in range(len(text)):
-        try:
-            text.slice(i, 1).cast(pa.timestamp("ns"))
-        except pa.ArrowInvalid:
-            break
-    cell = shown(str(text[i].as_py()))
-    return InputError(f"{path}: row {first + i + 1}, column {name!r}: {cell} is not a date, as the rows before")
 
 
 def _column(store: ColumnStore, column: int, start: int, end: int) -> np.ndarray:
@@ -294,78 +239,6 @@ def _check_columns(path: Path, headings: Sequence[str], names: Sequence[str]) ->
             raise InputError(f"{path}: has no column {name!r}; {nearest(name, few, 'it has')}")
         if list(names).count(name) > 1:
             raise InputError(f"{path}: has the column {name!r} {list(names).count(name)} times: rename all but one")
-
-
-def _is_number(kind: pa.DataType) -> bool:
-    import pyarrow as pa
-
-    return pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
-
-
-def _numbers(
-    path: Path, name: str, column: pa.ChunkedArray, dated: list[str] | None, *, comma: bool = False, first: int = 0
-) -> np.ndarray:
-    """Convert a column to floats; `dated`, of the time alone, gets its name if it holds dates.
-
-    The column's first row has a number, `first`, for messages.
-    """
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    kind = column.type
-    if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-        if dated is None:
-            raise InputError(f"{path}: column {name!r} holds times, not numbers")
-        dated.append(name)
-        return _seconds(column)[0]
-    if _is_number(kind):
-        values = column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False).astype(float)
-        return np.where(np.isfinite(values), values, np.nan)
-    if pa.types.is_null(kind):
-        raise InputError(f"{path}: column {name!r} has no number at all")
-    if not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
-        raise InputError(f"{path}: column {name!r} holds {kind}, not numbers")
-    text = pc.call_function("utf8_trim_whitespace", [column])
-    if dated is not None:
-        try:
-            seconds, _ = _seconds(text.cast(pa.timestamp("ns")))
-            dated.append(name)
-            return seconds
-        except pa.ArrowInvalid:
-            pass  # numbers, or neither
-    values = np.empty(len(text))
-    for i, cell in enumerate(text.to_pylist()):
-        try:
-            values[i] = np.nan if cell is None or cell in MISSING else float(cell.replace(",", ".") if comma else cell)
-        except ValueError:
-            expected = "a number or a date" if dated is not None else "a number"
-            raise InputError(
-                f"{path}: row {first + i + 1}, column {name!r}: {shown(str(cell))} is not {expected}"
-            ) from None
-    return np.where(np.isfinite(values), values, np.nan)
-
-
-def _seconds(column: pa.ChunkedArray, start: int | None = None) -> tuple[np.ndarray, int | None]:
-    """Convert dates, or spans of time, to seconds from the first; nanoseconds are subtracted as integers.
-
-    Args:
-        column: The dates.
-        start: The first one, if it is in a piece before [ns].
-
-    Returns:
-        The seconds, and the first one.
-    """
-    import pyarrow as pa
-
-    kind = pa.duration("ns") if pa.types.is_duration(column.type) else pa.timestamp("ns")
-    if pa.types.is_timestamp(column.type) and column.type.tz:
-        column = column.cast(pa.timestamp(column.type.unit))
-    column = column.cast(kind).combine_chunks()
-    known = np.asarray(column.is_valid())
-    counts = column.cast(pa.int64()).fill_null(0).to_numpy(zero_copy_only=False)
-    if start is None and known.any():
-        start = int(counts[known][0])
-    return np.where(known, (counts - (start or 0)) * 1e-9, np.nan), start
 
 
 def _too_long(path: Path, rows: int | None) -> InputError:

@@ -31,9 +31,6 @@ OTHER_WORLDS = 20
 AFTER_LONGER = 3.0
 """What was found is tried on so many other worlds, each way, and so many times longer: where the ceiling is low some
 worlds stand the push and fall of the noise while the gimbals come back."""
-NOISY = 0.75
-"""Where the worst world of the reduced model recovers from less than this share of E, the sensors' noise alone may fell
-a robot: the other worlds must stand without a push too."""
 RESOLUTION = 0.05
 """The search ends where a push that all worlds stand and one that not all stand differ by such a share."""
 LEAST = 0.02
@@ -99,7 +96,7 @@ class SimulatedPush(NamedTuple):
     servo_rate: float | None = None
     """Largest rate of a gimbal that it takes [rad/s]."""
     worlds: int = WORLDS
-    """Worlds that were tried without a push: ten, and twenty others where the noise may fell a robot (`NOISY`)."""
+    """Worlds that were tried without a push: ten, and twenty others where it is `Prospects.noisy`."""
 
     @property
     def falls(self) -> bool:
@@ -129,7 +126,7 @@ def simulated_push(
     if standing < WORLDS:
         return SimulatedPush(standing)
     worlds = WORLDS
-    if limits.push_margin.worst_impulse < NOISY * limits.push_margin.median_impulse:
+    if limits.noisy:
         worlds += OTHER_WORLDS
         try:
             standing += standing_unpushed(experiment, limits, axis, time_limit, range(WORLDS, worlds))

@@ -118,6 +118,7 @@ def test_where_the_noise_may_fell_it_others_must_stand_too(monkeypatch: pytest.M
     assert fallen == (SimulatedPush(10, worlds=30) if worst < 0.75 else SimulatedPush(10))
     assert fallen.falls == (worst < 0.75)
     assert stub.tried[-1] == 0.0 or worst > 0.75
+    assert any(f"worst world recovers from {worst:.0%} of E" in hint for hint in noisy.hints) == (worst < 0.75)
 
 
 def test_it_ends_after_a_minute_with_what_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
