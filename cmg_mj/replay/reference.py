@@ -62,9 +62,7 @@ def _reference_remarks(log: Log, aligned: Alignment) -> list[str]:
         ]
     late = None if lag is None or abs(lag) <= LATE * max(log.dt, log.row_period_s or 0.0) else lag
     resized = abs(scale - 1.0) > OFF
-    reference = log[REFERENCE]
-    known = reference[np.isfinite(reference)]
-    del reference  # of a long log, a column takes much memory
+    known = log[REFERENCE][np.isfinite(log[REFERENCE])]
     motion = math.sqrt(float(np.mean(known**2)))
     if correlation > 0.0 and lag is not None and late is None and not resized and abs(offset) <= OFF * motion:
         return []
