@@ -176,12 +176,19 @@ class ColumnStore:
         first = max(0, bisect_right(self._starts, start) - 1)
         last = bisect_left(self._starts, end)
         ends = [*self._starts[first + 1 : last + 1], self._end]
-        parts = [
+        parts = (
             piece.read(column, max(0, start - begin), min(end, until) - begin)
             for piece, begin, until in zip(self._pieces[first:last], self._starts[first:last], ends, strict=False)
             if start < until
-        ]
-        return np.concatenate(parts) if parts else np.zeros((0, 1))
+        )
+        if self.in_memory:
+            known = list(parts)
+            return np.concatenate(known) if known else np.zeros((0, 1))
+        values, n_rows = np.empty((max(0, min(end, self._end) - start), 1)), 0
+        for part in parts:  # one by one: of a long column, twice the values take much memory
+            values[n_rows : n_rows + len(part)] = part
+            n_rows += len(part)
+        return values
 
 
 def stored(columns: Mapping[str, np.ndarray]) -> StoredColumns:

@@ -76,7 +76,8 @@ class MountResult:
         simulated = self.simulated
         return {
             **self.prospects.figures(),
-            "stand_unpushed_of_10": simulated and simulated.standing,
+            "stand_unpushed": simulated and simulated.standing,
+            "stand_unpushed_of": simulated and simulated.worlds,
             "stands_push_impulse_n_m_s": simulated and simulated.impulse,
             "stands_push_torque_n_m": simulated and simulated.impulse / PUSH_S,
             "stands_push_complete": simulated and simulated.complete,
@@ -136,7 +137,7 @@ def _mount_and_write(
         if time_limit is not None:
             simulated = simulated_push(experiment, limits, request.name, time_limit)
             if math.degrees(limits.limit.tilt) < LOW_LIMIT_DEG or simulated.falls:
-                trial = model.with_name(f".{file.stem}.trial.xml")
+                trial = model.with_suffix(".trial.xml")
                 sufficient = _sufficient_scale(robot, request, trial, observer, time_limit)
         text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated)
         model.with_suffix(".toml").write_bytes(signed(text, ".toml"))

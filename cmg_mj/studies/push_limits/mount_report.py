@@ -56,8 +56,10 @@ def _simulated(simulated: SimulatedPush | None) -> str:
     if simulated.standing is None:
         return f"in MuJoCo nothing found within {LONGEST_S:g} s; "
     if simulated.falls:
-        fallen = WORLDS - simulated.standing
-        return f"does not stand: in MuJoCo {fallen} of {WORLDS} worlds fall within {UNPUSHED_S:g} s, unpushed; "
+        fallen = simulated.worlds - simulated.standing
+        return (
+            f"does not stand: in MuJoCo {fallen} of {simulated.worlds} worlds fall within {UNPUSHED_S:g} s, unpushed; "
+        )
     if not simulated.impulse:
         reason = f"not even {LEAST:.0%} of that" if simulated.complete else f"none found within {LONGEST_S:g} s"
         return f"stands in MuJoCo only unpushed ({reason}); "

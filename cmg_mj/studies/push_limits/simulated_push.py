@@ -84,8 +84,8 @@ class SimulatedPush(NamedTuple):
     """The push that a robot stands in MuJoCo."""
 
     standing: int | None
-    """Worlds of ten that stand 20 s without a push, from the tilt that the scenario starts with; None if the time did
-    not suffice to see it."""
+    """Worlds that stand 20 s without a push, from the tilt that the scenario starts with; None if the time did not
+    suffice to see it."""
     impulse: float = 0.0
     """Largest impulse about the line, as a push of 0.1 s either way, that all worlds stand, less a tenth, and that
     twenty others stand too [N m s]. 0 if it does not stand, or not the smallest push tried."""
@@ -95,11 +95,13 @@ class SimulatedPush(NamedTuple):
     """Largest torque of a gimbal servo that this push takes [N m]; None if that was not seen."""
     servo_rate: float | None = None
     """Largest rate of a gimbal that it takes [rad/s]."""
+    worlds: int = WORLDS
+    """Worlds that were tried without a push: ten, and twenty others where it is `Prospects.noisy`."""
 
     @property
     def falls(self) -> bool:
         """Whether a world falls without a push."""
-        return self.standing is not None and self.standing < WORLDS
+        return self.standing is not None and self.standing < self.worlds
 
 
 def simulated_push(
@@ -123,6 +125,15 @@ def simulated_push(
         return SimulatedPush(None, complete=False)
     if standing < WORLDS:
         return SimulatedPush(standing)
+    worlds = WORLDS
+    if limits.noisy:
+        worlds += OTHER_WORLDS
+        try:
+            standing += standing_unpushed(experiment, limits, axis, time_limit, range(WORLDS, worlds))
+        except OutOfTimeError:
+            return SimulatedPush(None, complete=False)
+        if standing < worlds:
+            return SimulatedPush(standing, worlds=worlds)
     upright = _tilted(experiment, 0.0, axis)
     poles = [pole for pole in (limits.pole, limits.limit.pole) if pole > 0.0]
     after = min(AFTER_TIME_CONSTANTS / min(poles), LONGEST_AFTER_S)
@@ -150,20 +161,23 @@ def simulated_push(
             longer = min(AFTER_LONGER * after, LONGEST_AFTER_S)
             result = attempt(low, range(WORLDS, WORLDS + OTHER_WORLDS), longer)
             if result.all_stand:
-                return SimulatedPush(standing, low, True, result.servo_torque, result.servo_rate)
+                return SimulatedPush(standing, low, True, result.servo_torque, result.servo_rate, worlds)
     except OutOfTimeError:
-        return SimulatedPush(standing, (1.0 - MARGIN) * low, complete=False)
-    return SimulatedPush(standing)
+        return SimulatedPush(standing, (1.0 - MARGIN) * low, complete=False, worlds=worlds)
+    return SimulatedPush(standing, worlds=worlds)
 
 
-def standing_unpushed(experiment: Experiment, limits: Prospects, axis: str, time_limit: TimeLimit) -> int:
-    """Count the worlds of ten that stand without a push, from the tilt that a scenario starts with.
+def standing_unpushed(
+    experiment: Experiment, limits: Prospects, axis: str, time_limit: TimeLimit, numbers: Sequence[int] = range(WORLDS)
+) -> int:
+    """Count the worlds that stand without a push, from the tilt that a scenario starts with.
 
     Args:
         experiment: The robot and its controller.
         limits: The limits by the reduced model.
         axis: Name of the axis, if there are several.
         time_limit: The time that the search may take.
+        numbers: The worlds, ten by default.
 
     Returns:
         The number of worlds.
@@ -172,7 +186,7 @@ def standing_unpushed(experiment: Experiment, limits: Prospects, axis: str, time
         OutOfTimeError: The time is over.
     """
     start = _tilted(experiment, limits.start_tilt_deg, axis)
-    worlds = [(world, 0.0) for world in range(WORLDS)]
+    worlds = [(world, 0.0) for world in numbers]
     return _attempt(start, worlds, UNPUSHED_S, axis, time_limit, "no push", early=False).standing
 
 
