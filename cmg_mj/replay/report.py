@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cmg_mj.replay.log_replay import ReplayResult, describe_log
+from cmg_mj.replay.noise_remarks import noise_figures, noise_remarks
 from cmg_mj.replay.reference import remarks_on
 from cmg_mj.replay.scores import RECONSTRUCTED_S, Figures
 from cmg_mj.results import markdown
@@ -67,6 +68,7 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
             "tilt_rad": noise.tilt,
             **(acceleration if "acceleration" in log.has else {}),
         },
+        **noise_figures(log, noise),
         **({"reference": replayed.alignment._asdict()} if replayed.alignment else {}),
         "observers": {name: dict(figures) for name, figures in replayed.summaries.items()},
         "left_out": dict(replayed.left_out),
@@ -184,7 +186,7 @@ def _text(line: str) -> Text:
 
 def remarks(replayed: ReplayResult) -> list[str]:
     """Return the remarks on a log and its reference, and the observers left out."""
-    lines = remarks_on(replayed.log, replayed.alignment)
+    lines = remarks_on(replayed.log, replayed.alignment) + noise_remarks(replayed.log, replayed.noise)
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
         reasons.setdefault(reason, []).append(name)

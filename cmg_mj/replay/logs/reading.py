@@ -28,6 +28,7 @@ from cmg_mj.replay.logs.resampling import sampled_where_known
 from cmg_mj.replay.logs.sampling import SAME_TIME, Part, Sampler
 from cmg_mj.replay.logs.table import read_table
 from cmg_mj.replay.logs.units import in_si
+from cmg_mj.replay.logs.white_noise import white_noise_of
 from cmg_mj.results.stored_columns import (
     LONG,
     Reader,
@@ -84,7 +85,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         notes += implausible_acceleration(rows.columns, rows.signals, motion, rows.tilt)
     units = {role: column.unit for role, column in rows.columns.items()}
     options = replace(options, units=units)
-    return Log(path.stem, dt, joined, slices, has, rows.tilt, windows, tuple(notes), options, None, sampler.period)
+    period = sampler.period or dt
+    noise = white_noise_of(parts, period)
+    return Log(path.stem, dt, joined, slices, has, rows.tilt, windows, tuple(notes), options, None, period, noise)
 
 
 def _read_run(path: Path, options: ReadOptions) -> Log:

@@ -18,9 +18,11 @@ from cmg_mj.replay.alignment import Alignment
 from cmg_mj.replay.log_replay import NO_MODEL, replay_log
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.replay.noise_remarks import noise_figures, noise_remarks
 from cmg_mj.replay.observer_inputs import ObserverInputs, observer_inputs
 from cmg_mj.replay.parameter_options import ParameterValue
 from cmg_mj.replay.reference import alignment_of, remarks_on
+from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.sensors.tilt import TiltNoise
 from cmg_mj.studies.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, level_of
 from cmg_mj.studies.tuning.parameters import (
@@ -112,6 +114,7 @@ class LogStudy:
         split: The share of each log that was fitted; the rest is scored.
         level: Tuned parameters and their scores.
         noises: Sensor noise that the observer assumed, log by log.
+        noises_by_the_logs: White noise that the logs show, as `--json` prints it, log by log.
         alignments: Lag, scale and offset of the reference, log by log.
         remarks: Remarks as in a replay, log by log.
         stretch_s: The shortest of the scored stretches [s].
@@ -125,6 +128,7 @@ class LogStudy:
     split: float
     level: NoiseLevelResult
     noises: Sequence[TiltNoise]
+    noises_by_the_logs: Sequence[Mapping[str, SummaryValue]]
     alignments: Sequence[Alignment | None]
     remarks: Sequence[Sequence[str]]
     stretch_s: float
@@ -209,8 +213,12 @@ def tune_on_logs(
         split,
         level,
         [log_inputs.noise for log_inputs in inputs],
+        [noise_figures(log, log_inputs.noise) for log, log_inputs in zip(logs, inputs, strict=True)],
         alignments,
-        [remarks_on(log, aligned) for log, aligned in zip(logs, alignments, strict=True)],
+        [
+            remarks_on(log, aligned) + noise_remarks(log, log_inputs.noise)
+            for log, aligned, log_inputs in zip(logs, alignments, inputs, strict=True)
+        ],
         held_out.shortest_s,
     )
 

@@ -32,8 +32,13 @@ def figures_of_logs(study: LogStudy) -> dict[str, SummaryValue]:
         "tuned": [number.name for number in study.numbers],
         "idle": list(study.insensitive_parameters),
         "noise": [
-            {"tilt_rad": noise.tilt, "acceleration_rad_s2": noise.acceleration, "correlation": noise.correlation}
-            for noise in study.noises
+            {
+                "tilt_rad": noise.tilt,
+                "acceleration_rad_s2": noise.acceleration,
+                "correlation": noise.correlation,
+                **by_the_log,
+            }
+            for noise, by_the_log in zip(study.noises, study.noises_by_the_logs, strict=True)
         ],
         "notes": [list(log) for log in study.remarks],
         "reference": [aligned and aligned._asdict() for aligned in study.alignments],
