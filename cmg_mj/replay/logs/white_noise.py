@@ -21,6 +21,10 @@ TAPS = 32
 CUTOFF = 0.29
 """The motion is a low-pass of so many rows to either side, with this cut-off in shares of half the row rate: 80 dB
 below 0.2, nothing above 0.38."""
+RESPONSE = 16
+"""Rows for which an angular acceleration follows a command."""
+FEWEST_RESPONSES = 20
+"""Fewest rows to fit it, in times that."""
 BANDS = np.arange(0.4, 0.95, 0.1)
 """Lower ends of the bands, each a tenth of half the row rate wide."""
 FLOORS = ((0, 1.1), (2, 1.05))
@@ -83,10 +87,12 @@ def white_noise_of(parts: Sequence[Part], period: float) -> LogNoise:
     names = [name for name in ("y1_rad", "acceleration_rad_s2") if name in parts[0].rows]
     residuals: list[np.ndarray] = []
     steps, sizes = dict.fromkeys(names, math.inf), dict.fromkeys(names, 0.0)
-    for places, values in _blocks(parts, names, period):
+    for places, values in _blocks(parts, period):
         for name in names:
             steps[name] = min(steps[name], _smallest_step(values[name]))
             sizes[name] = max(sizes[name], float(np.std(values[name])))
+        if names[-1] == "acceleration_rad_s2" and "u_rad_s" in values:
+            places, values = _without_response(places, values)
         if len(places) >= 2 * TAPS + SEGMENT:
             residuals.append(np.stack([_without_motion(places, values[name]) for name in names]))
     n_rows = sum(residual.shape[1] for residual in residuals)
@@ -107,16 +113,14 @@ def white_noise_of(parts: Sequence[Part], period: float) -> LogNoise:
     return LogNoise(tilt, acceleration, _correlation(spectra))
 
 
-def _blocks(
-    parts: Sequence[Part], names: Sequence[str], period: float
-) -> Iterator[tuple[np.ndarray, Mapping[str, np.ndarray]]]:
+def _blocks(parts: Sequence[Part], period: float) -> Iterator[tuple[np.ndarray, Mapping[str, np.ndarray]]]:
     """Yield blocks of successive rows: their places in periods, and their values."""
     blocks = [(p, start) for p in parts for start in range(0, len(p.placed), BLOCK)]
     few = np.unique(np.linspace(0, len(blocks) - 1, MOST_BLOCKS).round().astype(int))
     for part, start in blocks if len(blocks) <= MOST_BLOCKS else [blocks[i] for i in few]:
         rows = slice(start, start + BLOCK)
         placed = part.placed[rows]
-        yield (placed - placed[0]) / period, {name: part.rows.read(name, rows) for name in names}
+        yield (placed - placed[0]) / period, {name: part.rows.read(name, rows) for name in part.rows}
 
 
 def _smallest_step(values: np.ndarray) -> float:
@@ -124,6 +128,29 @@ def _smallest_step(values: np.ndarray) -> float:
     steps = np.diff(np.sort(values))
     steps = steps[steps > 1e-9 * np.ptp(values)]
     return float(steps.min()) if len(steps) else math.inf
+
+
+def _without_response(
+    places: np.ndarray, values: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, Mapping[str, np.ndarray]]:
+    """Subtract what the acceleration owes to the commands of the last rows, which go up to half the row rate too.
+
+    A command knows the noise of rows before, and none of the rows after it: least squares on it alone leave white noise
+    as it is. Gimbals turn a rig by the cosine of their angle.
+    """
+    acceleration, command = values["acceleration_rad_s2"], values["u_rad_s"] * np.cos(values.get("y2_rad", 0.0))
+    n_rows = len(places) - RESPONSE
+    if n_rows < FEWEST_RESPONSES * RESPONSE or np.abs(places - np.arange(len(places))).max() >= EVEN:
+        return places, values
+    before = np.stack([np.ones(n_rows), *(command[RESPONSE - k : -k] for k in range(1, RESPONSE + 1))], axis=1)
+    rest = acceleration[RESPONSE:]
+    for _ in range(2):  # the second time without what is far off, such as a push
+        usual = np.abs(rest - np.median(rest))
+        few = usual <= 8.0 * np.median(usual)
+        response = np.linalg.lstsq(before[few], acceleration[RESPONSE:][few], rcond=None)[0]
+        rest = acceleration[RESPONSE:] - before @ response
+    rest *= math.sqrt(n_rows / (n_rows - RESPONSE))
+    return places[RESPONSE:], {"y1_rad": values["y1_rad"][RESPONSE:], "acceleration_rad_s2": rest}
 
 
 def _without_motion(places: np.ndarray, values: np.ndarray) -> np.ndarray:
