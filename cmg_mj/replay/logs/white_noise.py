@@ -42,7 +42,7 @@ MOST_BLOCKS = 8
 """Of a longer log so many blocks of rows are taken, spread evenly."""
 OUTLIER = 5.0
 """Segments with more than so many times the median power hold a spike or a blow, and do not count."""
-FEW_OUTLIERS = 0.1
+FEW_OUTLIERS = 0.3
 """Largest share of such segments."""
 COARSE = 0.6
 """Noise below this share of the smallest step between two values is the quantiser's: Sheppard's correction holds from
