@@ -15,8 +15,13 @@ from cmg_mj.replay.user_noise import noise_in
 
 OFF = 0.005
 """Deviation of the reference's scale from 1, or its offset by its RMS, from which it matters, if it is significant."""
+NEAR = 0.05
+"""The same deviation, up to which a reference that correlates less than `AGREES` still agrees."""
 SURE = 2.365
 """Standard errors of a 95 % interval: Student's, of the seven degrees of freedom of eight stretches."""
+CLEAR = 4.03
+"""Standard errors of a 99.5 % interval, which a deviation leaves that is reported: one of 20 faultless logs would leave
+the other."""
 NOISE = 1.2
 """What is left of the tilt is its white noise up to this ratio."""
 LATE = 0.1
@@ -58,7 +63,7 @@ def _reference_remarks(log: Log, aligned: Alignment) -> list[str]:
     if scale is None or offset is None or correlation is None:
         return ["The reference cannot be compared with the tilt: too little motion, or too short."]
     lag_error, scale_error, offset_error = (
-        math.inf if error is None else SURE * error
+        math.inf if error is None else CLEAR * error
         for error in (aligned.lag_error_s, aligned.scale_error, aligned.offset_error_rad_s)
     )
     noisy = _is_noise(log, aligned.residual_rad)
@@ -79,14 +84,15 @@ def _reference_remarks(log: Log, aligned: Alignment) -> list[str]:
     late = None if lag is None or abs(lag) <= max(LATE * period, lag_error) else lag
     resized = abs(scale - 1.0) > max(OFF, scale_error)
     known = log[REFERENCE][np.isfinite(log[REFERENCE])]
-    shifted = abs(offset) > max(OFF * math.sqrt(float(np.mean(known**2))), offset_error)
-    agrees = correlation >= AGREES or goes_along
-    if not agrees and (correlation < 0.0 or lag is None or late is not None or resized or shifted):
+    motion = math.sqrt(float(np.mean(known**2)))
+    shifted = abs(offset) > max(OFF * motion, offset_error)
+    near = lag is not None and abs(lag) <= LATE * period and abs(scale - 1.0) <= NEAR and abs(offset) <= NEAR * motion
+    if correlation < AGREES and not goes_along and not near:
         return [
             f"Tilt and reference hardly agree (correlation {correlation:.2f} at the best lag; below {AGREES:g} neither "
             "delay nor scale is offered): look at the log, whether one of them stands still, leaps or is noise."
         ]
-    fit = _fit_text(scale, scale_error, offset, offset_error)
+    fit = _fit_text(scale, SURE / CLEAR * scale_error, offset, SURE / CLEAR * offset_error)
     if late is None and not resized and not shifted:
         return [f"Tilt and reference agree: {fit.replace('it', 'the reference', 1)} fits."]
     behind = "" if late is None else f"comes {abs(late) * 1e3:.2f} ms {'behind' if late > 0.0 else 'before'}; "

@@ -201,7 +201,9 @@ def test_of_the_reference_it_says_what_matters() -> None:
     late = replay("sine.csv", "--columns", PLAIN, "--observers", "linear", "--delay", "0.01").out
     assert "(beyond what was set; to take it out: --delay -0.01" in " ".join(late.split())
     real = " ".join(replay(LOG, "--columns", REAL, "--observers", "linear").out.split())
-    assert "12.10 ms behind; 1.0157 times it plus 0.0007 rad/s fits (to take it out: --delay 0.0121)." in real
+    assert "12.10 ms behind; 1.0157 (1.0152 to 1.0163) times it plus 0.0007 (0.0000 to 0.0014) rad/s fits" in real
+    assert "(to take it out: --delay 0.0121 --scale rate=1.016)." in real
+    assert "Noise of the tilt: 0.1 deg is used; the log cannot tell: it goes in steps of 0.08 deg" in real
     unlike_log = dict(sine(), gyro_rad_s=np.random.default_rng(0).standard_normal(4000))
     write_csv("other.csv", unlike_log)
     assert "is it the rate of this tilt?\n" in replay("other.csv", "--columns", PLAIN, "--observers", "linear").out

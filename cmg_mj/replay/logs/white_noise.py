@@ -222,11 +222,11 @@ def _floor(power: np.ndarray, step: float, size: float, unit: tuple[float, str])
             noise = WhiteNoise(sigma, low, high)
             break
     top = math.sqrt(float(power[:, _columns(FLOORS[-1][0])].mean()))
-    if top < COARSE * step < math.inf and step > HARDLY * size:
-        steps = f"{step / unit[0]:.3g} {unit[1]}"
-        return f"it goes in steps of {steps}, and noise below {COARSE:g} of a step is the quantiser's"
     if top < HARDLY * size:
         return "there is hardly any"
+    if top < COARSE * step < math.inf:
+        steps = f"{step / unit[0]:.3g} {unit[1]}"
+        return f"it goes in steps of {steps}, and noise below {COARSE:g} of a step is the quantiser's"
     if noise is None and levels[-1] < levels[:-1].max() - math.log(FLOORS[0][1]):
         return "its density falls off towards half the row rate, as of a filtered or fused signal: no white floor"
     return noise or "its density is not the same in the upper part of the band: no white floor"
