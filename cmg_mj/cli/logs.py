@@ -67,7 +67,7 @@ def noise_option() -> Decorator:
         default="",
         metavar="NAME=VALUE,...",
         help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of "
-        "one sample.  [default: accelerometer=400, or tilt=0.1,acceleration=1]",
+        "one sample.  [default: by the log; if it cannot tell, accelerometer=400, or tilt=0.1,acceleration=1]",
     )
 
 

@@ -94,7 +94,8 @@ def _reference_remarks(log: Log, aligned: Alignment) -> list[str]:
         ]
     fit = _fit_text(scale, SURE / CLEAR * scale_error, offset, SURE / CLEAR * offset_error)
     if late is None and not resized and not shifted:
-        return [f"Tilt and reference agree: {fit.replace('it', 'the reference', 1)} fits."]
+        roughly = " as far as can be told" if SURE / CLEAR * scale_error > NEAR else ""
+        return [f"Tilt and reference agree{roughly}: {fit.replace('it', 'the reference', 1)} fits."]
     behind = "" if late is None else f"comes {abs(late) * 1e3:.2f} ms {'behind' if late > 0.0 else 'before'}; "
     fit = f"the reference {behind}{fit}" if behind else fit.replace("it", "the reference", 1)
     cures = [f"--delay {late:.4f}"] if late is not None else []
