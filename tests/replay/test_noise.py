@@ -64,7 +64,9 @@ def run_scenario(density: float, seed: int, duration_s: float) -> Scenario:
 def errors_of_a_run(folder: Path, density: float, seed: int, duration_s: float) -> list[tuple[float, ...]]:
     """Return the errors of `gyro_free` and `kalman` on a run's log: noise told, and not told."""
     experiment = prepare(run_scenario(density, seed, duration_s))
-    experiment.run().trajectory.save(folder / "run.parquet")
+    trajectory = experiment.run().trajectory
+    assert trajectory is not None
+    trajectory.save(folder / "run.parquet")
     log = read_log(folder / "run.parquet", ReadOptions(RUN_COLUMNS))
     _, model, truth = experiment.design.constructor_arguments
     told = {"tilt": math.degrees(truth.tilt), "acceleration": truth.acceleration}
