@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError, nearest, shortened
 from cmg_mj.replay.logs.units import UNITS, Quantity, in_si, unit, unit_of_name
 
 ROLES: dict[str, Quantity] = {
@@ -30,6 +30,12 @@ ROLES: dict[str, Quantity] = {
 `acceleration` the angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright
 place (or `gimbal1` and `gimbal2`, whose half difference it is), `command` their rate, `rate` the reference.
 """
+
+HOW_TO_QUOTE = """; a heading with commas in it goes into quotes: --columns 'tilt="roll,x (deg)",rate=gyro'"""
+_ASSIGNMENT = re.compile(
+    r"""\s*(?P<role>\w+)\s*=\s*(?:"(?P<quoted>(?:[^"]|"")*)"\s*|(?P<plain>.*?))(?:,(?=\s*\w+\s*=)|$)""", re.DOTALL
+)
+"""ROLE=HEADING or ROLE="HEADING"; the heading ends at a comma before another ROLE=, a quoted one at its quote."""
 
 ACCELEROMETERS = ("inner_x", "inner_z", "outer_x", "outer_z")
 
@@ -58,6 +64,9 @@ class Column:
 def assignments(texts: str | Iterable[str], option: str) -> dict[str, str]:
     """Parse `tilt=pitch_deg,rate=gyro dps` into role -> heading; a heading may contain commas.
 
+    A heading with a comma before something like `x=` goes into quotes as in a CSV: `tilt="roll,x=1 (deg)"`, where a
+    quote is written twice.
+
     Args:
         texts: One text or several.
         option: The option's name, for messages.
@@ -70,17 +79,35 @@ def assignments(texts: str | Iterable[str], option: str) -> dict[str, str]:
     """
     values: dict[str, str] = {}
     for text in [texts] if isinstance(texts, str) else texts:
-        parts = [part for part in re.split(r"(?:^|,)\s*(?=\w+\s*=)", text.strip()) if part]
-        for part in parts or [text]:
-            role, equals, value = part.partition("=")
-            role, value = role.strip(), value.strip()
-            if not equals or not value or not re.fullmatch(r"\w+", role):
-                raise InputError(f"{option} {text!r}: write ROLE=VALUE with commas between, such as tilt=pitch_deg")
-            check_role(role, option)
+        rest = text.strip().lstrip(",")
+        while True:
+            part = _ASSIGNMENT.match(rest)
+            quoted = None if part is None else part["quoted"]
+            value = "" if part is None else (part["plain"] if quoted is None else quoted.replace('""', '"')).strip()
+            if part is None or not value:
+                raise InputError(f"{option} {shortened(text)!r}: write ROLE=VALUE with commas between, such as tilt=pitch_deg")
+            if quoted is None and value.startswith('"'):
+                raise InputError(
+                    f"{option} {shortened(text)!r}: what begins with a quote ends with one, before a comma or at the end; a "
+                    "quote inside is written twice"
+                )
+            role = part["role"]
+            _check_part(role, option, later=len(rest) < len(text.strip()))
             if role in values:
                 raise InputError(f"{option}: {role} is given twice")
             values[role] = value
+            rest = rest[part.end() :]
+            if not rest:
+                break
     return values
+
+
+def _check_part(role: str, option: str, *, later: bool) -> None:
+    """Refuse an unknown role; behind a comma, one that is like no role may be part of a heading."""
+    allowed = nearest(role, ROLES)
+    if role not in ROLES and later and not allowed.startswith("did you mean"):
+        raise InputError(f"{option} {role}: no such role; {allowed}{HOW_TO_QUOTE}")
+    check_role(role, option)
 
 
 def check_role(role: str, option: str) -> None:
