@@ -127,17 +127,27 @@ def gravity_mismatch(
         return None
     names = " and ".join(off)
     sizes_text = " and ".join(f"{size:.4g}" for size in off.values())
-    units, scales = [], []
-    for name, size in off.items():
-        for role in (f"{name}_x", f"{name}_z"):
-            column = columns[role]
-            scale = column.factor / in_si("acceleration", column.unit)
-            units.append((role, unit_of_factor("acceleration", column.unit, 1.0 / size, NEAR)))
-            scales.append(f"{role}={scale / size:.4g}")
-    cure = "--scale " + ",".join(scales)
-    if all(unit for _, unit in units):
-        cure = "--units " + ",".join(f"{role}={unit}" for role, unit in units)
+    roles = {f"{name}_{axis}": size for name, size in off.items() for axis in "xz"}
+    cure = cure_of_size(columns, roles)
     return f"the {names} accelerometer's specific force is {sizes_text} times gravity's 9.81 m/s^2 (median): {cure}"
+
+
+def cure_of_size(columns: Mapping[str, Column], sizes: Mapping[str, float]) -> str:
+    """Return the options that give specific forces of a wrong size gravity's: units if all have one, else scales.
+
+    Args:
+        columns: Role -> column.
+        sizes: Role -> its specific force's size, by gravity's.
+    """
+    units, scales = [], []
+    for role, size in sizes.items():
+        column = columns[role]
+        scale = column.factor / in_si("acceleration", column.unit)
+        units.append((role, unit_of_factor("acceleration", column.unit, 1.0 / size, NEAR)))
+        scales.append(f"{role}={scale / size:.4g}")
+    if all(unit for _, unit in units):
+        return "--units " + ",".join(f"{role}={unit}" for role, unit in units)
+    return "--scale " + ",".join(scales)
 
 
 def second_derivative_mismatch(motion: TiltMotion, columns: Mapping[str, Column]) -> str | None:

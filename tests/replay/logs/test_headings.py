@@ -69,5 +69,5 @@ def test_messages_show_how_to_quote(text: str, message: str) -> None:
 
 def test_a_column_that_is_not_there(tmp_path: Path) -> None:
     path = write(tmp_path, 'n,"Roll,x (deg)",a,w_dps')
-    with pytest.raises(InputError, match="has no column 'Roll'.* goes into quotes"):
+    with pytest.raises(InputError, match=r"has no column 'Roll'.* goes into quotes"):
         read_log(path, ReadOptions({"tilt": "Roll", "rate": "w_dps"}, {"tilt": "deg"}, rate_hz=200.0))
