@@ -25,6 +25,7 @@ from cmg_mj.replay.parameter_options import Parameters
 from cmg_mj.replay.reference import alignment_of
 from cmg_mj.replay.scores import Figures, noise_gain, scores
 from cmg_mj.replay.user_noise import noise_of
+from cmg_mj.replay.zero_phase import ZeroPhase, zero_phase
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.stored_columns import LONG, ColumnStore, StoredColumns, shelved, stored
 from cmg_mj.results.trajectory import ESTIMATES
@@ -58,6 +59,7 @@ class ReplayResult:
         settle_s: Time at the start of each part that is not scored [s].
         noise: The sensors' noise that observers assumed; also the noise of the noise gain.
         parameters: Parameters that were set.
+        zero_phase: Figures of a smoother that sees the future, which is no observer; None without a reference.
     """
 
     log: Log
@@ -68,6 +70,7 @@ class ReplayResult:
     settle_s: float
     noise: TiltNoise
     parameters: Parameters = field(default_factory=dict)
+    zero_phase: ZeroPhase | None = None
 
 
 def replay_log(
@@ -121,8 +124,9 @@ def replay_log(
         del disturbed
         summaries[name] = {**scores(log, signals["x2_rad_s"], scored), "noise_gain_1_s": gain}
     zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
+    smoother = zero_phase(log, scored) if "reference" in log.has else None
     return ReplayResult(
-        log, estimates, {**summaries, ZERO: zero}, left_out, alignment_of(log), settle_s, noise, parameters
+        log, estimates, {**summaries, ZERO: zero}, left_out, alignment_of(log), settle_s, noise, parameters, smoother
     )
 
 
