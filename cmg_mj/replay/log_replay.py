@@ -20,6 +20,7 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay.alignment import Alignment
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.replay.model_check import model_misfit
 from cmg_mj.replay.open_loop import replay_stretches
 from cmg_mj.replay.parameter_options import Parameters
 from cmg_mj.replay.reference import alignment_of
@@ -60,6 +61,7 @@ class ReplayResult:
         noise: The sensors' noise that observers assumed; also the noise of the noise gain.
         parameters: Parameters that were set.
         zero_phase: Figures of a smoother that sees the future, which is no observer; None without a reference.
+        misfit: How badly the model predicts the log, from `model_misfit`; None without a model.
     """
 
     log: Log
@@ -71,6 +73,7 @@ class ReplayResult:
     noise: TiltNoise
     parameters: Parameters = field(default_factory=dict)
     zero_phase: ZeroPhase | None = None
+    misfit: float | None = None
 
 
 def replay_log(
@@ -124,10 +127,25 @@ def replay_log(
         del disturbed
         summaries[name] = {**scores(log, signals["x2_rad_s"], scored), "noise_gain_1_s": gain}
     zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
-    smoother = zero_phase(log, scored) if "reference" in log.has else None
     return ReplayResult(
-        log, estimates, {**summaries, ZERO: zero}, left_out, alignment_of(log), settle_s, noise, parameters, smoother
+        log,
+        estimates,
+        {**summaries, ZERO: zero},
+        left_out,
+        alignment_of(log),
+        settle_s,
+        noise,
+        parameters,
+        zero_phase(log, scored) if "reference" in log.has else None,
+        misfit_of(log, model),
     )
+
+
+def misfit_of(log: Log, model: ReducedModel | None) -> float | None:
+    """Return the model's misfit; None without a model, or where its gimbals are not in the log."""
+    if model is None or (gimbals_matter(model) and "gimbals" not in log.has):
+        return None
+    return model_misfit(log, model)
 
 
 def _check_scored(log: Log, scored: np.ndarray, settle_s: float) -> None:

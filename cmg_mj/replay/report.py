@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cmg_mj.replay.log_replay import ReplayResult, describe_log
+from cmg_mj.replay.model_check import model_remark
 from cmg_mj.replay.reference import remarks_on
 from cmg_mj.replay.scores import RECONSTRUCTED_S, Figures
 from cmg_mj.replay.zero_phase import ZERO_PHASE
@@ -71,6 +72,7 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
         **({"reference": replayed.alignment._asdict()} if replayed.alignment else {}),
         "observers": {name: dict(figures) for name, figures in replayed.summaries.items()},
         **_zero_phase_figures(replayed),
+        **({} if replayed.misfit is None else {"model_misfit": replayed.misfit}),
         "left_out": dict(replayed.left_out),
     }
 
@@ -209,6 +211,8 @@ def remarks(replayed: ReplayResult) -> list[str]:
     lines = remarks_on(replayed.log, replayed.alignment)
     if replayed.zero_phase is not None:
         lines.append(replayed.zero_phase.remark)
+    if doubt := model_remark(replayed.misfit):
+        lines.append(doubt)
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
         reasons.setdefault(reason, []).append(name)

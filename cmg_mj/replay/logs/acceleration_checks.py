@@ -62,18 +62,32 @@ class TiltMotion:
         Returns:
             Weighted sums of a and of y'', (n_stretches,); None for fewer than `FEWEST` stretches.
         """
-        half = max(FEWEST_SAMPLES // 2, round(WIDTH_S / 2.0 / self.dt))
+        a, b = self.weighted_sums()
+        return (a, b) if len(a) >= FEWEST else None
+
+    @property
+    def half(self) -> int:
+        """Number of samples on either side of a stretch's middle."""
+        return max(FEWEST_SAMPLES // 2, round(WIDTH_S / 2.0 / self.dt))
+
+    @staticmethod
+    def weights(half: int, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the weights w and their second derivative w'', (2 half + 1,)."""
         s = np.arange(-half, half + 1) / (half + 1.0)
-        weights = (1.0 - s**2) ** 4
-        second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * self.dt) ** 2
-        second -= second.mean()
+        second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * dt) ** 2
+        return (1.0 - s**2) ** 4, second - second.mean()
+
+    def weighted_sums(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the sums of `second_derivative_pairs`, however few."""
+        half = self.half
+        weights, second = self.weights(half, self.dt)
         smoothed, derived = [], []
         for part in self.parts:
-            if part.stop - part.start >= len(s):
+            if part.stop - part.start >= len(weights):
                 smoothed.append(np.convolve(self.acceleration[part], weights, mode="valid")[::half])
                 derived.append(np.convolve(self.tilt[part], second, mode="valid")[::half])
         a, b = (np.concatenate(rows) if rows else np.zeros(0) for rows in (smoothed, derived))
-        return (a, b) if len(a) >= FEWEST else None
+        return a, b
 
 
 def implausible_acceleration(

@@ -15,9 +15,10 @@ from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay import replay
 from cmg_mj.replay.alignment import Alignment
-from cmg_mj.replay.log_replay import NO_MODEL, replay_log
+from cmg_mj.replay.log_replay import NO_MODEL, misfit_of, replay_log
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.replay.model_check import model_remark
 from cmg_mj.replay.observer_inputs import ObserverInputs, observer_inputs
 from cmg_mj.replay.parameter_options import ParameterValue
 from cmg_mj.replay.reference import alignment_of, remarks_on
@@ -239,7 +240,10 @@ def tune_on_logs(
         level,
         [log_inputs.noise for log_inputs in inputs],
         alignments,
-        [remarks_on(log, aligned) for log, aligned in zip(logs, alignments, strict=True)],
+        [
+            [*remarks_on(log, aligned), *filter(None, [model_remark(misfit_of(log, of_log.model))])]
+            for log, aligned, of_log in zip(logs, alignments, inputs, strict=True)
+        ],
         held_out.shortest_s,
         closed_loop and compare_in_loop(closed_loop, kind, values, level.parameters),
     )
