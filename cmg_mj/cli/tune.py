@@ -157,7 +157,7 @@ def tune_log(
       cmg-mj tune-log LOG.csv --columns tilt=pitch_deg,rate=gyro_dps --observer linear
 
     The score is the RMS of the estimated rate less the reference, compared with that of the parameters as given: better
-    is better by more than 1 % and beyond chance. Eight short worlds show what both do in a closed loop. Logs are read
+    is better by more than 1 % and beyond chance. Sixteen short worlds show what both do in a closed loop. Logs are read
     as in replay. Writes a folder with tuned.json.
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.replay.logs import read_log

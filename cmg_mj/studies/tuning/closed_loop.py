@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.replay.logs import Log
-from cmg_mj.results.intervals import Interval, PairedVerdict, paired_verdict, ratio_interval
+from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, paired_verdict, ratio_interval
 from cmg_mj.scenario.disturbances import push_windows
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
@@ -21,7 +21,7 @@ SCENARIO = "push_recovery"
 """The scenario by default."""
 NO_LOOP = "none"
 """Name of no scenario: nothing is simulated."""
-WORLDS = 8
+WORLDS = 16
 USUAL_S = 5.0
 """The loop runs for so long, or until the scenario ends [s]; longer only if the second after a push ends later."""
 RELEVANT = 1.01
@@ -47,7 +47,8 @@ class LoopComparison:
         scenario: Its title.
         duration_s: Simulated time [s].
         worlds: Number of worlds, the same noise in both loops.
-        stood: Worlds that stood to the end, with the given and with the tuned parameters.
+        stood: Number of worlds that stood to the end, with the given and with the tuned parameters.
+        stood_alone: Number of those that fell with the other parameters.
         ratio: RMS of the tilt, given by tuned, over the worlds that stood with both; None of fewer than two.
         refused: Why an observer could not be in this loop; empty if it could.
     """
@@ -56,16 +57,17 @@ class LoopComparison:
     duration_s: float
     worlds: int
     stood: tuple[int, int] = (0, 0)
+    stood_alone: tuple[int, int] = (0, 0)
     ratio: Interval | None = None
     refused: str = ""
 
     @property
     def verdict(self) -> PairedVerdict | None:
-        """Compare the tuned parameters with the given ones: by the worlds that stand, then by the tilt."""
+        """Compare the tuned parameters with the given ones: by falls if these are beyond chance, else by the tilt."""
         if self.refused:
             return None
-        given, tuned = self.stood
-        if given != tuned:
+        given, tuned = self.stood_alone
+        if _beyond_chance(given, tuned):
             return "better" if tuned > given else "worse"
         return "tie" if self.ratio is None else judged(self.ratio)
 
@@ -82,6 +84,12 @@ class LoopComparison:
             line += "; RMS of the tilt, given / tuned, {:.3f} ({:.3f} to {:.3f})".format(*self.ratio)
         words = {"better": "better there", "worse": "WORSE there", "tie": "no different there"}
         return f"{line}: the tuned ones are {words[self.verdict or 'tie']}."
+
+
+def _beyond_chance(one: int, other: int) -> bool:
+    """Return whether worlds that stood with one set alone and with the other alone differ by the sign test, 5 %."""
+    n, fewer = one + other, min(one, other)
+    return 2.0 * sum(math.comb(n, k) for k in range(fewer + 1)) / 2.0**n < 1.0 - CONFIDENCE
 
 
 def loop_scenario(name: str | None, log: Log) -> Scenario | None:
@@ -147,5 +155,7 @@ def compare_in_loop(
     tilts = [result.values("tilt_rms_deg") for result in results]
     both = np.isfinite(tilts[0]) & np.isfinite(tilts[1])
     ratio = ratio_interval(tilts[0][both], tilts[1][both]) if both.sum() >= 2 else None
-    stood = (int(results[0].stood.sum()), int(results[1].stood.sum()))
-    return LoopComparison(title, duration, worlds, stood, ratio)
+    given_stood, tuned_stood = (result.stood for result in results)
+    stood = int(given_stood.sum()), int(tuned_stood.sum())
+    alone = int((given_stood & ~tuned_stood).sum()), int((tuned_stood & ~given_stood).sum())
+    return LoopComparison(title, duration, worlds, stood, alone, ratio)

@@ -71,14 +71,27 @@ def test_a_tie_says_why(study: LogStudy) -> None:
 
 
 def test_the_loop_is_told_in_a_line(study: LogStudy) -> None:
-    worse = LoopComparison("Push", 5.0, 8, (8, 6), Interval(0.5, 0.4, 0.6))
+    worse = LoopComparison("Push", 5.0, 8, (8, 6), (2, 0), Interval(0.5, 0.4, 0.6))
     text = table(replace(study, loop=worse))
     assert "In the closed loop of Push (8 worlds of 5 s, its rig, sensors and control rate) the tuned" in text
     assert "stand 6 times, the given ones 8; RMS of the tilt, given / tuned, 0.500 (0.400 to 0.600)" in text
     assert "the tuned ones are WORSE there." in text
-    assert LoopComparison("Push", 5.0, 8, (8, 8), Interval(0.999, 0.998, 0.9995)).verdict == "tie"
     refused = LoopComparison("Push", 5.0, 8, refused="linear: tau: too small")
     assert "cannot be compared: linear: tau: too small." in table(replace(study, loop=refused))
+
+
+@pytest.mark.parametrize(
+    ("alone", "ratio", "verdict"),
+    [
+        ((6, 0), Interval(1.5, 1.4, 1.6), "worse"),  # 2/2^6 = 3 %
+        ((0, 6), None, "better"),
+        ((5, 0), None, "tie"),  # 2/2^5 = 6 %
+        ((0, 1), Interval(0.4, 0.3, 0.5), "worse"),
+        ((0, 0), Interval(0.999, 0.998, 0.9995), "tie"),
+    ],
+)
+def test_falls_count_only_beyond_chance(alone: tuple[int, int], ratio: Interval | None, verdict: str) -> None:
+    assert LoopComparison("Push", 5.0, 16, (8, 8), alone, ratio).verdict == verdict
 
 
 @pytest.mark.slow
