@@ -82,7 +82,7 @@ class LoopComparison:
         line = f"{loop} the tuned parameters stand {tuned} times, the given ones {given}"
         if self.ratio is not None:
             line += "; RMS of the tilt, given / tuned, {:.3f} ({:.3f} to {:.3f})".format(*self.ratio)
-        words = {"better": "better there", "worse": "WORSE there", "tie": "no different there"}
+        words = {"better": "better there", "worse": "WORSE there", "tie": "not different there beyond chance"}
         return f"{line}: the tuned ones are {words[self.verdict or 'tie']}."
 
 
