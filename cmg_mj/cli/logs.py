@@ -31,8 +31,8 @@ _LOG_OPTIONS = all_of(
         "--columns",
         multiple=True,
         metavar="ROLE=HEADING,...",
-        help="Roles of the columns: time, tilt, rate (the reference), inner_x, inner_z, outer_x, outer_z, "
-        "acceleration, gimbal (or gimbal1, gimbal2), command. Not for a run's own recording.",
+        help="Roles of the columns: time, tilt, rate (the reference), ax, az, inner_x, inner_z, outer_x, "
+        "outer_z, acceleration, gimbal (or gimbal1, gimbal2), command. Not for a run's own recording.",
     ),
     click.option(
         "--units",

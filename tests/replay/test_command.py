@@ -162,7 +162,7 @@ def test_a_window_of_ones_own() -> None:
 def test_tune_on_a_log() -> None:
     """For a sine without noise the smallest time constant is the best; fitted on one part, scored on the other."""
     arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
-    outcome = cmg_mj("tune-log", *arguments, "--split", "0.3", "--json", "--out", "it")
+    outcome = cmg_mj("tune-log", *arguments, "--split", "0.3", "--json", "--out", "it", "--closed-loop", "none")
     result = json.loads(outcome.out)
     assert result["parameters"]["tau"] == pytest.approx(0.004, rel=0.01)
     assert result["at_a_limit"] == ["tau"]
@@ -178,6 +178,7 @@ def test_tune_on_a_log() -> None:
         (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--split", "1"), "between 0 and 1"),
         (("sine.csv", "--columns", PLAIN, "--observer", "ltv"), "needs a model"),
         (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--worlds", "20"), "No such option"),
+        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--closed-loop", "x"), "--closed-loop: scenario 'x'"),
         (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--noise", "100,200"), "--noise 100: no such"),
         (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--set", "tau=1"), "write observer.PARAMETER=VALUE"),
         ((), "Missing argument 'LOG...'"),
