@@ -165,7 +165,7 @@ def test_short_parts_tell_nothing_and_gaps_nothing_wrong() -> None:
 
 
 def test_of_a_long_log_a_bounded_part_is_read() -> None:
-    n = 5_000_000
+    n = 1_000_000
     read = []
 
     def rows(start: int, end: int) -> np.ndarray:
