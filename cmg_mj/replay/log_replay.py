@@ -20,11 +20,13 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay.alignment import Alignment
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.replay.model_check import model_misfit
 from cmg_mj.replay.open_loop import replay_stretches
 from cmg_mj.replay.parameter_options import Parameters
 from cmg_mj.replay.reference import alignment_of
 from cmg_mj.replay.scores import Figures, noise_gain, scores
 from cmg_mj.replay.user_noise import noise_of
+from cmg_mj.replay.zero_phase import ZeroPhase, zero_phase
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.stored_columns import LONG, ColumnStore, StoredColumns, shelved, stored
 from cmg_mj.results.trajectory import ESTIMATES
@@ -58,6 +60,8 @@ class ReplayResult:
         settle_s: Time at the start of each part that is not scored [s].
         noise: The sensors' noise that observers assumed; also the noise of the noise gain.
         parameters: Parameters that were set.
+        zero_phase: Figures of a smoother that sees the future, which is no observer; None without a reference.
+        misfit: How badly the model predicts the log, from `model_misfit`; None without a model.
     """
 
     log: Log
@@ -68,6 +72,8 @@ class ReplayResult:
     settle_s: float
     noise: TiltNoise
     parameters: Parameters = field(default_factory=dict)
+    zero_phase: ZeroPhase | None = None
+    misfit: float | None = None
 
 
 def replay_log(
@@ -122,8 +128,24 @@ def replay_log(
         summaries[name] = {**scores(log, signals["x2_rad_s"], scored), "noise_gain_1_s": gain}
     zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
     return ReplayResult(
-        log, estimates, {**summaries, ZERO: zero}, left_out, alignment_of(log), settle_s, noise, parameters
+        log,
+        estimates,
+        {**summaries, ZERO: zero},
+        left_out,
+        alignment_of(log),
+        settle_s,
+        noise,
+        parameters,
+        zero_phase(log, scored) if "reference" in log.has else None,
+        misfit_of(log, model),
     )
+
+
+def misfit_of(log: Log, model: ReducedModel | None) -> float | None:
+    """Return the model's misfit; None without a model, or where its gimbals are not in the log."""
+    if model is None or (gimbals_matter(model) and "gimbals" not in log.has):
+        return None
+    return model_misfit(log, model)
 
 
 def _check_scored(log: Log, scored: np.ndarray, settle_s: float) -> None:

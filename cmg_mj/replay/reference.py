@@ -9,9 +9,21 @@ import numpy as np
 from cmg_mj.replay.alignment import Alignment, alignment
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.replay.logs.units import in_si
+from cmg_mj.replay.logs.white_noise import WhiteNoise
+from cmg_mj.replay.user_noise import noise_in
 
-OFF = 0.05
-"""Relative deviation of the reference's scale or offset from which it is reported."""
+OFF = 0.005
+"""Deviation of the reference's scale from 1, or its offset by its RMS, from which it matters, if it is significant."""
+NEAR = 0.05
+"""The same deviation, up to which a reference that correlates less than `AGREES` still agrees."""
+SURE = 2.365
+"""Standard errors of a 95 % interval: Student's, of the seven degrees of freedom of eight stretches."""
+CLEAR = 4.03
+"""Standard errors of a 99.5 % interval, which a deviation leaves that is reported: one of 20 faultless logs would leave
+the other."""
+NOISE = 1.2
+"""What is left of the tilt is its white noise up to this ratio."""
 LATE = 0.1
 """Lag from which it is reported, in periods of the log's rows or its samples, the longer of the two."""
 ALIKE = 0.5
@@ -46,41 +58,75 @@ def remarks_on(log: Log, aligned: Alignment | None) -> list[str]:
 
 
 def _reference_remarks(log: Log, aligned: Alignment) -> list[str]:
-    """Describe the reference's lag, scale and offset if they matter, with options that correct them."""
-    lag, scale, offset, correlation = aligned
+    """Describe the reference's lag, scale and offset, with options that correct those that matter."""
+    lag, scale, offset, correlation = aligned[:4]
     if scale is None or offset is None or correlation is None:
         return ["The reference cannot be compared with the tilt: too little motion, or too short."]
-    if correlation <= -AGREES:
+    lag_error, scale_error, offset_error = (
+        math.inf if error is None else CLEAR * error
+        for error in (aligned.lag_error_s, aligned.scale_error, aligned.offset_error_rad_s)
+    )
+    noisy = _is_noise(log, aligned.residual_rad)
+    if correlation <= -AGREES or (noisy and scale < -scale_error):
         scale_now = log.options.scale.get("rate", 1.0)
         return [
             f"The reference does not go with the tilt (correlation {correlation:.2f}): it counts the other way: "
             f"--scale rate={-scale_now:g}."
         ]
-    if abs(correlation) < ALIKE:
+    goes_along = noisy and scale > scale_error
+    if abs(correlation) < ALIKE and noisy and not goes_along:
+        return ["The reference cannot be compared with the tilt, whose noise hides its motion."]
+    if abs(correlation) < ALIKE and not goes_along:
         return [
             f"The reference does not go with the tilt (correlation {correlation:.2f}): is it the rate of this tilt?"
         ]
-    late = None if lag is None or abs(lag) <= LATE * max(log.dt, log.row_period_s or 0.0) else lag
-    resized = abs(scale - 1.0) > OFF
+    period = max(log.dt, log.row_period_s or 0.0)
+    late = None if lag is None or abs(lag) <= max(LATE * period, lag_error) else lag
+    resized = abs(scale - 1.0) > max(OFF, scale_error)
     known = log[REFERENCE][np.isfinite(log[REFERENCE])]
     motion = math.sqrt(float(np.mean(known**2)))
-    if correlation > 0.0 and lag is not None and late is None and not resized and abs(offset) <= OFF * motion:
-        return []
-    if correlation < AGREES:
+    shifted = abs(offset) > max(OFF * motion, offset_error)
+    near = lag is not None and abs(lag) <= LATE * period and abs(scale - 1.0) <= NEAR and abs(offset) <= NEAR * motion
+    if correlation < AGREES and not goes_along and not near:
         return [
             f"Tilt and reference hardly agree (correlation {correlation:.2f} at the best lag; below {AGREES:g} neither "
             "delay nor scale is offered): look at the log, whether one of them stands still, leaps or is noise."
         ]
-    when = "an unknown time" if lag is None else f"{abs(lag) * 1e3:.2f} ms {'behind' if lag >= 0.0 else 'before'}"
-    sign = "plus" if offset >= 0.0 else "less"
-    times = f"{scale:.4f}" if scale > 0.1 else f"{scale:.4g}"
-    remark = f"Beside the tilt the reference comes {when}; {times} times it {sign} {abs(offset):.4f} rad/s fits"
+    fit = _fit_text(scale, SURE / CLEAR * scale_error, offset, SURE / CLEAR * offset_error)
+    if late is None and not resized and not shifted:
+        roughly = " as far as can be told" if SURE / CLEAR * scale_error > NEAR else ""
+        return [f"Tilt and reference agree{roughly}: {fit.replace('it', 'the reference', 1)} fits."]
+    behind = "" if late is None else f"comes {abs(late) * 1e3:.2f} ms {'behind' if late > 0.0 else 'before'}; "
+    fit = f"the reference {behind}{fit}" if behind else fit.replace("it", "the reference", 1)
     cures = [f"--delay {late:.4f}"] if late is not None else []
     cures += [f"--scale rate={scale:.4g}"] if resized else []
+    cures += [f"--offset rate={offset / in_si('rate', log.options.units.get('rate', 'rad_s')):.3g}"] if shifted else []
     corrected = log.options.delay_s or log.options.scale or log.options.offset
     beyond = "beyond what was set; " if corrected else ""
-    cure = f" ({beyond}to take it out: {' '.join(cures)})" if cures else ""
-    return [remark + cure + (_unit_question(log, scale) or ".")]
+    cure = f" ({beyond}to take it out: {' '.join(cures)})"
+    return [f"Beside the tilt {fit} fits{cure}" + (_unit_question(log, scale) or ".")]
+
+
+def _is_noise(log: Log, residual: float | None) -> bool:
+    """Return whether the tilt's noise explains all by which its increments differ from the reference's."""
+    noise = noise_in(log).tilt
+    return residual is not None and isinstance(noise, WhiteNoise) and residual <= NOISE * math.sqrt(2.0) * noise.high
+
+
+def _fit_text(scale: float, scale_error: float, offset: float, offset_error: float) -> str:
+    """Write a scale and an offset with their intervals, where there are any."""
+    size, sign = (offset, "plus") if offset >= 0.0 else (-offset, "less")
+    times, addend = _digits(scale, scale), f"{size:.4f}"
+    if math.isfinite(scale_error):
+        times += f" ({_digits(scale - scale_error, scale)} to {_digits(scale + scale_error, scale)})"
+    if math.isfinite(offset_error):
+        low, high = (round(value, 4) + 0.0 for value in (size - offset_error, size + offset_error))  # no -0.0000
+        addend += f" ({low:.4f} to {high:.4f})"
+    return f"{times} times it {sign} {addend} rad/s"
+
+
+def _digits(value: float, scale: float) -> str:
+    return f"{value:.4f}" if abs(scale) > 0.1 else f"{value:.4g}"
 
 
 def _unit_question(log: Log, scale: float) -> str | None:

@@ -12,8 +12,11 @@ from rich.table import Table
 from rich.text import Text
 
 from cmg_mj.replay.log_replay import ReplayResult, describe_log
+from cmg_mj.replay.model_check import model_remark
+from cmg_mj.replay.noise_remarks import noise_figures, noise_remarks
 from cmg_mj.replay.reference import remarks_on
 from cmg_mj.replay.scores import RECONSTRUCTED_S, Figures
+from cmg_mj.replay.zero_phase import ZERO_PHASE
 from cmg_mj.results import markdown
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.intervals import Interval, known_interval
@@ -67,10 +70,31 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
             "tilt_rad": noise.tilt,
             **(acceleration if "acceleration" in log.has else {}),
         },
+        **noise_figures(log, noise),
         **({"reference": replayed.alignment._asdict()} if replayed.alignment else {}),
         "observers": {name: dict(figures) for name, figures in replayed.summaries.items()},
+        **_zero_phase_figures(replayed),
+        **({} if replayed.misfit is None else {"model_misfit": replayed.misfit}),
         "left_out": dict(replayed.left_out),
     }
+
+
+def _zero_phase_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
+    """Return the figures of the smoother that sees the future, if there are any."""
+    smoother = replayed.zero_phase
+    if smoother is None:
+        return {}
+    more = {"best_cutoff_hz": smoother.best_cutoff_hz, "best_rms_error_rad_s": smoother.best_rms_error_rad_s}
+    return {ZERO_PHASE: {**smoother.figures, "cutoff_hz": smoother.cutoff_hz, **more}}
+
+
+def _figures_by_row(replayed: ReplayResult) -> dict[str, Figures]:
+    """Return the figures of a table's rows: the observers, the smoother that is none, and the baseline."""
+    rows = dict(replayed.summaries)
+    zero = rows.pop(ZERO)
+    if replayed.zero_phase is not None:
+        rows[ZERO_PHASE] = replayed.zero_phase.figures
+    return {**rows, ZERO: zero}
 
 
 class _Mean(NamedTuple):
@@ -90,10 +114,12 @@ class _ObserverMeans(NamedTuple):
 
 def _means(replays: Sequence[ReplayResult]) -> dict[str, _ObserverMeans]:
     """Return every observer's means over the logs, the baseline's last."""
-    names = [name for name in dict.fromkeys(n for r in replays for n in r.summaries) if name != ZERO]
+    rows = [_figures_by_row(replayed) for replayed in replays]
+    last = [name for name in (ZERO_PHASE, ZERO) if any(name in row for row in rows)]
+    names = [name for name in dict.fromkeys(n for row in rows for n in row) if name not in last]
     means = {}
-    for name in [*names, ZERO]:
-        summaries = [replayed.summaries[name] for replayed in replays if name in replayed.summaries]
+    for name in [*names, *last]:
+        summaries = [row[name] for row in rows if name in row]
         means[name] = _ObserverMeans(len(summaries), {key: _mean_of(summaries, key) for key in _keys(replays)})
     return means
 
@@ -115,7 +141,7 @@ def replay_tables(replays: Sequence[ReplayResult]) -> Group:
     for replayed in replays:
         keys = _keys([replayed])
         table = _table(describe_log(replayed.log), keys)
-        for name, figures in replayed.summaries.items():
+        for name, figures in _figures_by_row(replayed).items():
             table.add_row(name, *(figure_text(key, figures.get(key)) for key in keys))
         lines = [_text(line) for line in remarks(replayed)]
         parts += [table, *lines, *([Text("")] if lines else [])]  # a table ends with an empty line of its own
@@ -136,7 +162,7 @@ def replay_markdown(replays: Sequence[ReplayResult]) -> str:
         keys = _keys([replayed])
         rows = [
             (f"`{name}`", *(figure_text(key, figures.get(key)) for key in keys))
-            for name, figures in replayed.summaries.items()
+            for name, figures in _figures_by_row(replayed).items()
         ]
         parts += [f"{describe_log(replayed.log)}:", markdown.table(["observer", *map(_heading, keys)], rows)]
         parts += remarks(replayed)
@@ -187,7 +213,11 @@ def _text(line: str) -> Text:
 
 def remarks(replayed: ReplayResult) -> list[str]:
     """Return the remarks on a log and its reference, and the observers left out."""
-    lines = remarks_on(replayed.log, replayed.alignment)
+    lines = remarks_on(replayed.log, replayed.alignment) + noise_remarks(replayed.log, replayed.noise)
+    if replayed.zero_phase is not None:
+        lines.append(replayed.zero_phase.remark)
+    if doubt := model_remark(replayed.misfit):
+        lines.append(doubt)
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
         reasons.setdefault(reason, []).append(name)

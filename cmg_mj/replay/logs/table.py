@@ -15,6 +15,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
 from cmg_mj.replay.logs.cells import MISSING, Clock, is_number, numbers
+from cmg_mj.replay.logs.columns import HOW_TO_QUOTE
 from cmg_mj.results.stored_columns import ColumnStore, StoredColumns, stored
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 MOST_ROWS = 5_000_000
 """Most rows of a log; more take hours."""
 DELIMITERS = (",", ";", "\t", "|")
+ROWS_OF_DELIMITER = 20
+"""Number of rows below the heading that show the delimiter: a heading may contain others."""
 HEAD = 1 << 16
 """Size of the part of a CSV that is searched for its heading, which must end in it [bytes]."""
 PARQUET = b"PAR1"
@@ -106,8 +109,8 @@ def _of_csv(
     import pyarrow as pa
     import pyarrow.csv as pacsv
 
-    encoding, skipped, line = _heading(path, head)
-    delimiter = max(DELIMITERS, key=line.count)
+    encoding, skipped, line, rows = _heading(path, head)
+    delimiter = _delimiter(line, rows)
     comma = delimiter == ";" and "," in line + head.decode(encoding, "replace")
     read = pacsv.ReadOptions(skip_rows=skipped, encoding=encoding, use_threads=False)
     torn: list[str] = []
@@ -200,8 +203,21 @@ def _column(store: ColumnStore, column: int, start: int, end: int) -> np.ndarray
     return store.read(column, start, end)[:, 0]
 
 
-def _heading(path: Path, head: bytes) -> tuple[str, int, str]:
-    """Return the encoding, the number of lines above the heading (comments, empty ones), and the heading."""
+def _delimiter(heading: str, rows: Sequence[str]) -> str:
+    """Return the delimiter with which most rows have as many cells as the heading; among several, the most frequent."""
+
+    def count(line: str, delimiter: str) -> int:
+        return sum(part.count(delimiter) for part in line.split('"')[::2])  # a delimiter in quotes divides nothing
+
+    def fits(delimiter: str) -> tuple[int, int]:
+        n = count(heading, delimiter)
+        return (sum(count(row, delimiter) == n for row in rows) if n else 0), n
+
+    return max(DELIMITERS, key=fits)
+
+
+def _heading(path: Path, head: bytes) -> tuple[str, int, str, Sequence[str]]:
+    """Return the encoding, the number of lines above the heading (comments, empty ones), it, and some rows below."""
     encoding = "utf-8"
     if head.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
         raise InputError(f"{path}: is written in UTF-32; save it as UTF-8")
@@ -215,7 +231,7 @@ def _heading(path: Path, head: bytes) -> tuple[str, int, str]:
     lines = head.decode(encoding, "ignore").lstrip("\ufeff").splitlines()
     for i, line in enumerate(lines):
         if line.strip() and not line.lstrip().startswith(COMMENTS):
-            return encoding, i, line
+            return encoding, i, line, lines[i + 1 : i + 1 + ROWS_OF_DELIMITER]
     raise InputError(f"{path}: no heading in its first {HEAD // 1024} kB")
 
 
@@ -236,7 +252,8 @@ def _check_columns(path: Path, headings: Sequence[str], names: Sequence[str]) ->
     for name in headings:
         if name.strip() not in [known.strip() for known in names]:
             few = [shown(known) for known in names]
-            raise InputError(f"{path}: has no column {name!r}; {nearest(name, few, 'it has')}")
+            quoted = HOW_TO_QUOTE if any("," in known for known in names) else ""
+            raise InputError(f"{path}: has no column {name!r}; {nearest(name, few, 'it has')}{quoted}")
         if list(names).count(name) > 1:
             raise InputError(f"{path}: has the column {name!r} {list(names).count(name)} times: rename all but one")
 
