@@ -59,7 +59,7 @@ class ZeroPhase:
         )
 
 
-def zero_phase(log: Log, scored: np.ndarray) -> ZeroPhase:
+def zero_phase(log: Log, scored: np.ndarray) -> ZeroPhase | None:
     """Choose the smoother's cut-off on a log with a reference, and score it.
 
     Args:
@@ -67,9 +67,11 @@ def zero_phase(log: Log, scored: np.ndarray) -> ZeroPhase:
         scored: Which samples count, (n,).
 
     Returns:
-        Its figures.
+        Its figures; None if all parts are shorter than four samples.
     """
     blocks = list(_blocks(log))
+    if not blocks:
+        return None
     cutoffs = _cutoffs(log)
     cutoff = chosen_cutoff([log["y1_rad"][rows] for rows in blocks], log.dt, cutoffs)
     best = _best_for_reference(log, blocks, scored, cutoffs)

@@ -68,7 +68,8 @@ class SavitzkyGolay:
         from scipy.signal import savgol_coeffs
 
         last = self.window - 1
-        return savgol_coeffs(self.window, self.order, deriv=1, delta=self.dt, pos=last, use="dot").tolist()
+        weights = savgol_coeffs(self.window, self.order, deriv=1, delta=self.dt, pos=last, use="dot")
+        return [float(weight) for weight in np.ravel(weights)]
 
     def init(self, y: Measurement) -> tuple[Scalar, ...]:
         """Take the tilt to have been what it is."""

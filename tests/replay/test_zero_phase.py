@@ -13,7 +13,7 @@ from cmg_mj.replay.log_replay import replay_log
 from cmg_mj.replay.logs import Log, ReadOptions, read_log
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import log_figures, remarks, replay_markdown
-from cmg_mj.replay.zero_phase import noise_gain_of, rate_of_log, smoothed_rate, zero_phase
+from cmg_mj.replay.zero_phase import ZeroPhase, noise_gain_of, rate_of_log, smoothed_rate, zero_phase
 from tests.replay.logs.motion import COLUMNS, DT, sine, write_csv
 from tests.replay.test_stretches import in_stretches
 
@@ -31,6 +31,12 @@ def noisy_log(folder: Path, seed: int = 0, n: int = 4000, sigma: float = 0.01) -
         w += 0.03 * omega * np.cos(omega * t + phase)
     columns = {"t_s": t, "tilt_rad": y + sigma * random.standard_normal(n), "gyro_rad_s": w}
     return read_log(write_csv(folder / "noisy.csv", columns), ReadOptions(COLUMNS))
+
+
+def scored_smoother(log: Log) -> ZeroPhase:
+    result = zero_phase(log, log.scored(1.0))
+    assert result is not None
+    return result
 
 
 @pytest.mark.parametrize("frequency", [0.7, 4.0, 9.0])
@@ -65,8 +71,7 @@ def test_what_white_noise_becomes() -> None:
 def test_its_width_does_not_know_the_reference(tmp_path: Path) -> None:
     log = noisy_log(tmp_path)
     other = dataclasses.replace(log, columns={**log.columns, REFERENCE: np.sin(np.arange(len(log)))})
-    scored = log.scored(1.0)
-    results = zero_phase(log, scored), zero_phase(other, scored)
+    results = scored_smoother(log), scored_smoother(other)
     assert results[0].cutoff_hz == results[1].cutoff_hz
     assert results[0].best_cutoff_hz != results[1].best_cutoff_hz
 
@@ -74,7 +79,7 @@ def test_its_width_does_not_know_the_reference(tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_width_is_nearly_the_best(seed: int, tmp_path: Path) -> None:
     log = noisy_log(tmp_path, seed)
-    result = zero_phase(log, log.scored(1.0))
+    result = scored_smoother(log)
     error, best = result.figures["velocity_rms_error_rad_s"], result.best_rms_error_rad_s
     assert error is not None
     assert best is not None
@@ -84,7 +89,7 @@ def test_the_width_is_nearly_the_best(seed: int, tmp_path: Path) -> None:
 
 def test_without_white_noise_it_is_said(tmp_path: Path) -> None:
     log = read_log(write_csv(tmp_path / "log.csv", sine()), ReadOptions(COLUMNS))
-    result = zero_phase(log, log.scored(1.0))
+    result = scored_smoother(log)
     assert result.smooths == (result.cutoff_hz < 98.0)
     assert ("no white noise could be told" in result.remark) != result.smooths
 
@@ -113,3 +118,9 @@ def test_the_row_is_said_to_be_no_observer(tmp_path: Path) -> None:
     assert replay_markdown([replayed, replayed]).count("`zero_phase`") == 3
     unreferred = dataclasses.replace(log, has=frozenset())
     assert replay_log(unreferred, ["linear"]).zero_phase is None
+
+
+def test_parts_too_short_have_no_row(tmp_path: Path) -> None:
+    log = noisy_log(tmp_path, n=60)
+    short = dataclasses.replace(log, parts=[slice(start, start + 3) for start in range(0, 60, 3)])
+    assert zero_phase(short, short.scored(0.0)) is None

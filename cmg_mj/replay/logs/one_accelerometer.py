@@ -11,7 +11,7 @@ from cmg_mj.replay.logs.acceleration_checks import NEAR, cure_of_size
 from cmg_mj.replay.logs.columns import ONE_ACCELEROMETER, Column
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.logs.units import in_si
-from cmg_mj.results.stored_columns import select_rows, stretches
+from cmg_mj.results.stored_columns import number_of_rows, select_rows, stretches
 from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY
 
 RADIUS_M = 0.1
@@ -76,12 +76,12 @@ def remarks_on_one(
     Returns:
         Lines; the first is there always.
     """
-    ax, az = (signals[role] for role in ONE_ACCELEROMETER)
-    known = np.isfinite(ax) & np.isfinite(az)
-    size = np.hypot(ax[known], az[known])
-    upward = float(np.median(az[known]))
+    size = np.concatenate([_size(signals, rows) for rows in stretches(number_of_rows(signals))])
     usual = float(np.median(size)) / STANDARD_GRAVITY
-    shakes = float(np.sqrt(np.mean((size / STANDARD_GRAVITY - usual) ** 2)))
+    size -= usual * STANDARD_GRAVITY
+    shakes = float(np.sqrt(np.mean(size**2))) / STANDARD_GRAVITY
+    del size  # of a long log, a column takes much memory
+    upward = float(np.nanmedian(signals["az"]))
     line = (
         "the tilt is that of one accelerometer, atan2(-ax, az): an acceleration a of its place puts it off by about "
         f"a/g, 0.1 g by {math.degrees(0.1):.1f} deg"
@@ -105,6 +105,13 @@ def remarks_on_one(
             f"sensor shows gravity itself, --scale az={-_scale(columns['az']):g} if it is mounted upside down"
         )
     return lines
+
+
+def _size(signals: Mapping[str, np.ndarray], rows: slice) -> np.ndarray:
+    """Return the size of the specific force in those of some rows that have both parts [m/s^2]."""
+    some = select_rows(signals, rows)
+    size = np.hypot(some["ax"], some["az"])
+    return size[np.isfinite(size)]
 
 
 def _scale(column: Column) -> float:
