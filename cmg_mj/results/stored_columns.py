@@ -209,7 +209,7 @@ def shelved(values: np.ndarray) -> Reader:
         return _rows_of(values)
     store = ColumnStore(1, Path(tempfile.gettempdir()))
     for rows in stretches(len(values)):
-        store.append([values[rows, None]])
+        store.append([values[rows, None].copy()])  # a view of the last rows would keep the whole array
     return lambda start, end: store.read(0, start, end)[:, 0]
 
 
