@@ -11,6 +11,7 @@ from pathlib import Path
 
 from cmg_mj.errors import InputError, shown
 from cmg_mj.results.files import is_plain_file
+from cmg_mj.results.run_folder.written_names import foreign_names
 
 HIDDEN = ".cmg-mj"
 """Folder of cmg_mj's own files in a run folder: the manifest; during a run also its lock and the unfinished result."""
@@ -44,19 +45,22 @@ class Manifest:
         """Read a folder's manifest; empty where there is none: then nothing there is known to be cmg_mj's.
 
         Raises:
-            InputError: The manifest names what is not a file of its own folder. Somebody else has written it.
+            InputError: The manifest names a file that cmg_mj never writes, or gives one no SHA-256. Somebody else has
+                written it.
         """
         path = folder / HIDDEN / FILES
         try:
             if not is_plain_file(path) or path.stat().st_size > LARGEST_MANIFEST:
                 return Manifest()
             stored = json.loads(path.read_text(encoding="utf-8"))
-            files, complete = dict(stored["files"]), bool(stored["complete"])
-        except (OSError, ValueError, LookupError, TypeError, RecursionError):
+            files, complete = dict(stored["files"].items()), bool(stored["complete"])
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
             return Manifest()
+        for name in foreign_names(files):
+            raise InputError(f"{HIDDEN} there names {shown(name)}, which cmg-mj never writes: {REMOVE}")
         for name, digest in files.items():
-            if not _is_bare(name) or not isinstance(digest, str):
-                raise InputError(f"{HIDDEN} there names {shown(name)}, which cmg-mj never writes: {REMOVE}")
+            if not isinstance(digest, str) or not re.fullmatch("[0-9a-f]{64}", digest):
+                raise InputError(f"{HIDDEN} there gives {shown(digest)} as the SHA-256 of {shown(name)}: {REMOVE}")
         return Manifest(files, complete)
 
     def write(self, folder: Path) -> None:
@@ -109,11 +113,6 @@ def remove_result(folder: Path) -> None:
             empty.rmdir()
         except OSError:  # what holds something stays
             return
-
-
-def _is_bare(name: str) -> bool:
-    """Return whether a name leads to a file in the folder itself, on any system."""
-    return bool(name) and name not in (".", "..", HIDDEN) and not re.search(r"[/\\:\0]", name)
 
 
 def _digest(path: Path) -> str:
