@@ -240,6 +240,21 @@ def a_list_with_a_number_for_a_digest() -> None:
     manifest("got", "plot.png", digest=5)
 
 
+@forgery
+def a_new_result_with_a_folder_in_it() -> None:
+    write(VICTIM, f"got/{HIDDEN}/new/deep/er/mine")
+
+
+@forgery
+def a_ready_result_with_a_folder_in_it() -> None:
+    write(VICTIM, f"got/{HIDDEN}/ready/deep/er/mine")
+
+
+@forgery
+def a_list_beside_a_folder() -> None:
+    write(VICTIM, f"got/{HIDDEN}/deep/mine")
+
+
 def outside() -> dict[str, str]:
     """Return everything but what is in the folder of the run: kind and content of each name."""
     content = {}
@@ -301,6 +316,24 @@ def test_a_list_that_is_not_as_written_is_refused(forged: dict[str, str], said: 
     complaint = cmg_mj("run", "quick.toml", "--out", "got").complaint
     assert complaint == f"--out got: {HIDDEN} there {said}: remove {HIDDEN}, or name another folder"
     assert {path.name: path.read_text() for path in Path("got").iterdir() if path.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    ("forged", "place"),
+    [
+        ("a new result with a folder in it", "new/deep"),
+        ("a ready result with a folder in it", "ready/deep"),
+        ("a list beside a folder", "deep"),
+    ],
+    indirect=["forged"],
+)
+def test_folders_that_are_not_its_own_stay(forged: dict[str, str], place: str) -> None:
+    before = sorted(Path("got").rglob("*"))
+    complaint = cmg_mj("run", "quick.toml", "--out", "got").complaint
+    assert complaint == (
+        f"--out got: {HIDDEN}/{place} there is no folder that cmg-mj makes: remove {HIDDEN}, or name another folder"
+    )
+    assert sorted(Path("got").rglob("*")) == before
 
 
 def test_what_the_commands_write_is_listed() -> None:

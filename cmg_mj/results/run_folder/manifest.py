@@ -22,6 +22,9 @@ REMOVE = f"remove {HIDDEN}, or name another folder"
 LARGEST_MANIFEST = 4_000_000
 """A manifest of more bytes is not cmg_mj's."""
 
+MADE = {"": ("new", "ready"), "new": (HIDDEN,), "ready": (HIDDEN,), f"new/{HIDDEN}": (), f"ready/{HIDDEN}": ()}
+"""Folder in `HIDDEN` -> the folders that cmg_mj makes in it."""
+
 
 @dataclass(frozen=True)
 class Manifest:
@@ -90,6 +93,10 @@ def require_own(folder: Path) -> None:
     for path in (hidden, hidden / "new", hidden / "new" / HIDDEN, hidden / "ready", hidden / "ready" / HIDDEN):
         if path.is_symlink() or (path.exists() and not path.is_dir()):
             raise InputError(f"{path.relative_to(folder)} there is no folder that cmg-mj makes: {REMOVE}")
+    for parent, names in MADE.items():
+        for path in sorted((hidden / parent).glob("*")):
+            if path.is_dir() and path.name not in names:
+                raise InputError(f"{path.relative_to(folder)} there is no folder that cmg-mj makes: {REMOVE}")
     for path in (hidden / "lock", hidden / FILES, hidden / "ready" / HIDDEN / FILES):
         if path.is_symlink() or (path.exists() and not is_plain_file(path)):
             raise InputError(f"{path.relative_to(folder)} there is no file that cmg-mj writes: {REMOVE}")
