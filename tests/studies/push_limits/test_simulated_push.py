@@ -235,6 +235,18 @@ def test_it_says_what_the_robot_itself_stands(
     assert [push.torque_n_m for push in pushes] == pytest.approx(torques)
 
 
+@pytest.mark.parametrize("standing", [9, 10])
+def test_a_robot_that_falls_gets_no_hint_on_the_push_it_stands(
+    pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, standing: int
+) -> None:
+    monkeypatch.setattr(mount_files, "simulated_push", lambda *_: SimulatedPush(standing, 0.3 * (standing == WORLDS)))
+    monkeypatch.setattr(mount_files, "_sufficient_scale", lambda *_: None)
+    monkeypatch.setattr(Prospects, "noisy", True)
+    done = cmg_mj(*pendulum)
+    assert ("with other noise it may fall of smaller pushes than it stands here" in done.err) == (standing == WORLDS)
+    assert ("the sensors' noise alone may fell the robot" in done.err) == (standing == WORLDS)
+
+
 def test_a_scale_is_named_only_if_it_was_tried(pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mount_files, "simulated_push", lambda *_: SimulatedPush(3))
     monkeypatch.setattr(mount_files, "standing_unpushed", lambda experiment, *_: WORLDS if heavy(experiment) else 9)
