@@ -131,5 +131,5 @@ def mount(
         )
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:
-        note_hints(result.prospects.hints)
+        note_hints(result.hints)
         note(f"wrote {result.path} and {result.scenario_path}; try: cmg-mj run {result.scenario_path}")

@@ -12,7 +12,7 @@ import mujoco
 
 from cmg_mj.errors import InputError, shown
 from cmg_mj.inputs.includes import check_files
-from cmg_mj.inputs.paths import expanded
+from cmg_mj.inputs.paths import expanded, not_text
 from cmg_mj.inputs.sanity import is_text
 from cmg_mj.plant.mjcf import as_mjcf, check_rig
 from cmg_mj.plant.mounting.target import check_written_by_mount
@@ -80,7 +80,7 @@ def check_target(target: Path, robot: Path) -> None:
             beside it would.
     """
     if not is_text(str(target.absolute())):  # MuJoCo opens no such file, and a scenario names it in UTF-8
-        raise InputError(f"-o {shown(str(target))}: not UTF-8 text, or in a folder whose name is none")
+        raise InputError(f"-o {shown(str(target))}: {not_text(target, target.absolute())}")
     if target.suffix != ".xml":
         raise InputError(
             f"-o {target}: must be a file that ends in .xml, such as balanced.xml; a .toml comes beside it"

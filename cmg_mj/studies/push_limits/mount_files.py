@@ -25,7 +25,13 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
 from cmg_mj.studies.push_limits.pair_demands import PairDemands, pair_demands
-from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG, Prospects, prospects, smallest_sufficient_scale
+from cmg_mj.studies.push_limits.prospects import (
+    LOW_LIMIT_DEG,
+    NOISE_HINT,
+    Prospects,
+    prospects,
+    smallest_sufficient_scale,
+)
 from cmg_mj.studies.push_limits.simulated_push import (
     OutOfTimeError,
     SimulatedPush,
@@ -70,6 +76,12 @@ class MountResult:
     def scenario_path(self) -> Path:
         """The scenario's file."""
         return self.path.with_suffix(".toml")
+
+    @property
+    def hints(self) -> list[str]:
+        """Clauses on what is likely to make the robot fall; none on noise if it falls in MuJoCo anyway."""
+        falls = self.simulated is not None and self.simulated.falls
+        return [hint for hint in self.prospects.hints if not (falls and hint.startswith(NOISE_HINT))]
 
     def figures(self) -> dict[str, float | str | list[str] | None]:
         """Return the figures that `cmg-mj mount --json` prints."""

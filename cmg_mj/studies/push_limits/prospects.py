@@ -25,6 +25,9 @@ NOISY = 0.75
 """Where the worst world of the reduced model recovers from less than this share of E, the sensors' noise alone may fell
 a robot."""
 
+NOISE_HINT = "the pair is so small that the sensors' noise alone may fell the robot"
+"""Beginning of the hint that tells so."""
+
 
 @dataclass(frozen=True)
 class Prospects:
@@ -80,8 +83,8 @@ class Prospects:
         if self.noisy:
             share = self.push_margin.worst_impulse / self.push_margin.median_impulse
             hints.append(
-                "the pair is so small that the sensors' noise alone may fell the robot, and other noise with less than "
-                f"it stands here (its reduced model's worst world recovers from {share:.0%} of E)"
+                f"{NOISE_HINT}; with other noise it may fall of smaller pushes than it stands here (its "
+                f"reduced model's worst world recovers from {share:.0%} of E)"
             )
         if self.push_margin.median_impulse == 0.0:
             hints.append("with this controller it falls without a push")

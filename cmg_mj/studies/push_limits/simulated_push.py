@@ -87,14 +87,16 @@ class SimulatedPush(NamedTuple):
     """Worlds that stand 20 s without a push, from the tilt that the scenario starts with; None if the time did not
     suffice to see it."""
     impulse: float = 0.0
-    """Largest impulse about the line, as a push of 0.1 s either way, that all worlds stand, less a tenth, and that
-    twenty others stand too [N m s]. 0 if it does not stand, or not the smallest push tried."""
+    """Largest impulse about the line, as a push of 0.1 s either way, that all worlds stand, less a tenth [N m s]. If
+    the search is complete, twenty others stand it too. 0 if it does not stand, or not the smallest push tried."""
     complete: bool = True
     """Whether the search came to its end within its time."""
     servo_torque: float | None = None
     """Largest torque of a gimbal servo that this push takes [N m]; None if that was not seen."""
     servo_rate: float | None = None
     """Largest rate of a gimbal that it takes [rad/s]."""
+    others_fell: bool = False
+    """Whether the time ended after some of the twenty others had fallen with a larger push than `impulse`."""
     worlds: int = WORLDS
     """Worlds that were tried without a push: ten, and twenty others where it is `Prospects.noisy`."""
 
@@ -149,6 +151,7 @@ def simulated_push(
     def all_stand(impulse: float) -> bool:
         return attempt(impulse, range(WORLDS), after).all_stand
 
+    found, others_fell = 0.0, False
     try:
         if all_stand(high):
             low, high = high, expected
@@ -157,13 +160,15 @@ def simulated_push(
         while high - low > max(RESOLUTION * high, least):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if all_stand(middle) else (low, middle)
-        while (low := (1.0 - MARGIN) * low) > least:
+        while (found := (1.0 - MARGIN) * (found or low)) > least:
             longer = min(AFTER_LONGER * after, LONGEST_AFTER_S)
-            result = attempt(low, range(WORLDS, WORLDS + OTHER_WORLDS), longer)
+            result = attempt(found, range(WORLDS, WORLDS + OTHER_WORLDS), longer)
             if result.all_stand:
-                return SimulatedPush(standing, low, True, result.servo_torque, result.servo_rate, worlds)
+                return SimulatedPush(standing, found, True, result.servo_torque, result.servo_rate, worlds=worlds)
+            others_fell = True
     except OutOfTimeError:
-        return SimulatedPush(standing, (1.0 - MARGIN) * low, complete=False, worlds=worlds)
+        found = found or (1.0 - MARGIN) * low
+        return SimulatedPush(standing, found, complete=False, others_fell=others_fell, worlds=worlds)
     return SimulatedPush(standing, worlds=worlds)
 
 

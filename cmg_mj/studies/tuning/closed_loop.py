@@ -80,6 +80,8 @@ class LoopComparison:
             return f"{loop} the parameters cannot be compared: {self.refused}."
         given, tuned = self.stood
         line = f"{loop} the tuned parameters stand {tuned} times, the given ones {given}"
+        if any(self.stood_alone):
+            line += " (in {1} and {0} worlds alone)".format(*self.stood_alone)
         if self.ratio is not None:
             line += "; RMS of the tilt, given / tuned, {:.3f} ({:.3f} to {:.3f})".format(*self.ratio)
         words = {"better": "better there", "worse": "WORSE there", "tie": "not different there beyond chance"}
