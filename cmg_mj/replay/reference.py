@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,14 @@ UNIT_NEAR = 1.1
 """A scale within this factor of a degree, or of its inverse, is probably a unit."""
 
 
+class _Judgement(NamedTuple):
+    """Judgement on a reference."""
+
+    remark: str
+    fault: str | None
+    """Why errors against the reference are not the estimates' own, in a clause; None if it agrees with the tilt."""
+
+
 def alignment_of(log: Log) -> Alignment | None:
     """Align a log's reference with its tilt; None without a reference, and for a run's recording."""
     if "reference" not in log.has or log.scenario is not None:
@@ -54,14 +63,25 @@ def remarks_on(log: Log, aligned: Alignment | None) -> list[str]:
         Sentences.
     """
     lines = [f"{note[:1].upper()}{note[1:]}{'' if note.endswith('?') else '.'}" for note in log.notes]
-    return lines if aligned is None else lines + _reference_remarks(log, aligned)
+    return lines if aligned is None else [*lines, _judgement(log, aligned).remark]
 
 
-def _reference_remarks(log: Log, aligned: Alignment) -> list[str]:
+def reference_fault(log: Log, aligned: Alignment | None) -> str | None:
+    """Say in a clause why errors against a log's reference are not the estimates' own; None if nothing is known of it.
+
+    Args:
+        log: The log.
+        aligned: Alignment from `alignment_of`.
+    """
+    return None if aligned is None else _judgement(log, aligned).fault
+
+
+def _judgement(log: Log, aligned: Alignment) -> _Judgement:
     """Describe the reference's lag, scale and offset, with options that correct those that matter."""
     lag, scale, offset, correlation = aligned[:4]
     if scale is None or offset is None or correlation is None:
-        return ["The reference cannot be compared with the tilt: too little motion, or too short."]
+        remark = "The reference cannot be compared with the tilt: too little motion, or too short."
+        return _Judgement(remark, "the reference cannot be compared with the tilt")
     lag_error, scale_error, offset_error = (
         math.inf if error is None else CLEAR * error
         for error in (aligned.lag_error_s, aligned.scale_error, aligned.offset_error_rad_s)
@@ -69,17 +89,20 @@ def _reference_remarks(log: Log, aligned: Alignment) -> list[str]:
     noisy = _is_noise(log, aligned.residual_rad)
     if correlation <= -AGREES or (noisy and scale < -scale_error):
         scale_now = log.options.scale.get("rate", 1.0)
-        return [
+        remark = (
             f"The reference does not go with the tilt (correlation {correlation:.2f}): it counts the other way: "
             f"--scale rate={-scale_now:g}."
-        ]
+        )
+        return _Judgement(remark, "the reference counts the other way than the tilt")
     goes_along = noisy and scale > scale_error
     if abs(correlation) < ALIKE and noisy and not goes_along:
-        return ["The reference cannot be compared with the tilt, whose noise hides its motion."]
+        remark = "The reference cannot be compared with the tilt, whose noise hides its motion."
+        return _Judgement(remark, "the tilt's noise hides its motion")
     if abs(correlation) < ALIKE and not goes_along:
-        return [
+        remark = (
             f"The reference does not go with the tilt (correlation {correlation:.2f}): is it the rate of this tilt?"
-        ]
+        )
+        return _Judgement(remark, "the reference does not go with the tilt")
     period = max(log.dt, log.row_period_s or 0.0)
     late = None if lag is None or abs(lag) <= max(LATE * period, lag_error) else lag
     resized = abs(scale - 1.0) > max(OFF, scale_error)
@@ -88,14 +111,16 @@ def _reference_remarks(log: Log, aligned: Alignment) -> list[str]:
     shifted = abs(offset) > max(OFF * motion, offset_error)
     near = lag is not None and abs(lag) <= LATE * period and abs(scale - 1.0) <= NEAR and abs(offset) <= NEAR * motion
     if correlation < AGREES and not goes_along and not near:
-        return [
+        remark = (
             f"Tilt and reference hardly agree (correlation {correlation:.2f} at the best lag; below {AGREES:g} neither "
             "delay nor scale is offered): look at the log, whether one of them stands still, leaps or is noise."
-        ]
+        )
+        return _Judgement(remark, "tilt and reference hardly agree")
     fit = _fit_text(scale, SURE / CLEAR * scale_error, offset, SURE / CLEAR * offset_error)
     if late is None and not resized and not shifted:
         roughly = " as far as can be told" if SURE / CLEAR * scale_error > NEAR else ""
-        return [f"Tilt and reference agree{roughly}: {fit.replace('it', 'the reference', 1)} fits."]
+        remark = f"Tilt and reference agree{roughly}: {fit.replace('it', 'the reference', 1)} fits."
+        return _Judgement(remark, None)
     behind = "" if late is None else f"comes {abs(late) * 1e3:.2f} ms {'behind' if late > 0.0 else 'before'}; "
     fit = f"the reference {behind}{fit}" if behind else fit.replace("it", "the reference", 1)
     cures = [f"--delay {late:.4f}"] if late is not None else []
@@ -104,7 +129,12 @@ def _reference_remarks(log: Log, aligned: Alignment) -> list[str]:
     corrected = log.options.delay_s or log.options.scale or log.options.offset
     beyond = "beyond what was set; " if corrected else ""
     cure = f" ({beyond}to take it out: {' '.join(cures)})"
-    return [f"Beside the tilt {fit} fits{cure}" + (_unit_question(log, scale) or ".")]
+    remark = f"Beside the tilt {fit} fits{cure}" + (_unit_question(log, scale) or ".")
+    size = "another scale or offset than" if resized or shifted else ""
+    if late is None:
+        return _Judgement(remark, f"the reference has {size} the tilt's rate")
+    comes = f"the reference comes {'behind' if late > 0.0 else 'before'} the tilt"
+    return _Judgement(remark, f"{comes}, with {size} its rate" if size else comes)
 
 
 def _is_noise(log: Log, residual: float | None) -> bool:
