@@ -102,6 +102,7 @@ def _judgement(log: Log, aligned: Alignment) -> _Judgement:
         remark = (
             f"The reference does not go with the tilt (correlation {correlation:.2f}): is it the rate of this tilt?"
         )
+        remark += _accelerometer_question(log)
         return _Judgement(remark, "the reference does not go with the tilt")
     period = max(log.dt, log.row_period_s or 0.0)
     late = None if lag is None or abs(lag) <= max(LATE * period, lag_error) else lag
@@ -115,6 +116,10 @@ def _judgement(log: Log, aligned: Alignment) -> _Judgement:
             f"Tilt and reference hardly agree (correlation {correlation:.2f} at the best lag; below {AGREES:g} neither "
             "delay nor scale is offered): look at the log, whether one of them stands still, leaps or is noise."
         )
+        remark += _accelerometer_question(log)
+        if correlation < 0.0:
+            turned = -log.options.scale.get("rate", 1.0)
+            remark += f" The correlation is negative: does one of them count the other way (--scale rate={turned:g})?"
         return _Judgement(remark, "tilt and reference hardly agree")
     fit = _fit_text(scale, SURE / CLEAR * scale_error, offset, SURE / CLEAR * offset_error)
     if late is None and not resized and not shifted:
@@ -135,6 +140,16 @@ def _judgement(log: Log, aligned: Alignment) -> _Judgement:
         return _Judgement(remark, f"the reference has {size} the tilt's rate")
     comes = f"the reference comes {'behind' if late > 0.0 else 'before'} the tilt"
     return _Judgement(remark, f"{comes}, with {size} its rate" if size else comes)
+
+
+def _accelerometer_question(log: Log) -> str:
+    """Name the motion of one accelerometer's place among the causes of a disagreement."""
+    if "ax" not in log.options.columns:
+        return ""
+    return (
+        " Or the accelerometer's own motion puts off the tilt, with both sensors faultless: look how far, in the line "
+        "on one accelerometer."
+    )
 
 
 def _is_noise(log: Log, residual: float | None) -> bool:

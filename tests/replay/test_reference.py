@@ -217,3 +217,19 @@ def test_of_short_stretches_there_is_no_interval(elsewhere: None) -> None:
         ) != has_interval
         result = json.loads(cmg_mj("tune-log", "log.csv", *tune, "--json").out)
         assert (result["verdict"] is not None) == (result["held_out_ratio"] is not None) == has_interval
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_one_accelerometer_away_from_the_pivot_is_a_cause(turn: float, tmp_path: Path) -> None:
+    """0.3 m from it, a faultless one; with the other sign of all three the tilt turns as before, the gyro does not."""
+    log = sine()
+    y, w = log["tilt_rad"] * np.cos(1e-3 * log["t_s"]), log["gyro_rad_s"]
+    ax = 0.3 * np.gradient(w, DT) + 5.0 * np.sin(23.0 * log["t_s"]) * 0.1 - 9.80665 * np.sin(y)
+    ax += 0.25 * np.sin(17.0 * log["t_s"]) * 9.80665
+    columns = {"t_s": log["t_s"], "ax": turn * ax, "az": turn * 9.80665 * np.cos(y), "gyro_rad_s": turn * w}
+    roles = {"time": "t_s", "ax": "ax", "az": "az", "rate": "gyro_rad_s"}
+    path = write_csv(tmp_path / "imu.csv", columns)
+    remark = remarks(path, roles, units={"ax": "m/s2", "az": "m/s2"})[-1]
+    assert remark.startswith(f"Tilt and reference hardly agree (correlation {'-' if turn < 0.0 else ''}0.")
+    assert "Or the accelerometer's own motion puts off the tilt, with both sensors faultless" in remark
+    assert remark.endswith("does one of them count the other way (--scale rate=-1)?") == (turn < 0.0)
