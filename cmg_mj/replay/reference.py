@@ -27,6 +27,8 @@ NOISE = 1.2
 """What is left of the tilt is its white noise up to this ratio."""
 LATE = 0.1
 """Lag from which it is reported, in periods of the log's rows or its samples, the longer of the two."""
+FINE = 0.01
+"""Step in which a delay is offered, at most, in the same periods."""
 ALIKE = 0.5
 """Correlation below which tilt and reference are unrelated."""
 AGREES = 0.95
@@ -126,14 +128,20 @@ def _judgement(log: Log, aligned: Alignment) -> _Judgement:
         roughly = " as far as can be told" if SURE / CLEAR * scale_error > NEAR else ""
         remark = f"Tilt and reference agree{roughly}: {fit.replace('it', 'the reference', 1)} fits."
         return _Judgement(remark, None)
-    behind = "" if late is None else f"comes {abs(late) * 1e3:.2f} ms {'behind' if late > 0.0 else 'before'}; "
+    decimals = max(0, math.ceil(-math.log10(FINE * period)))
+    milliseconds = "" if late is None else f"{abs(late) * 1e3:.{max(2, decimals - 3)}f} ms"
+    behind = "" if late is None else f"comes {milliseconds} {'behind' if late > 0.0 else 'before'}; "
     fit = f"the reference {behind}{fit}" if behind else fit.replace("it", "the reference", 1)
-    cures = [f"--delay {late:.4f}"] if late is not None else []
-    cures += [f"--scale rate={scale:.4g}"] if resized else []
-    cures += [f"--offset rate={offset / in_si('rate', log.options.units.get('rate', 'rad_s')):.3g}"] if shifted else []
-    corrected = log.options.delay_s or log.options.scale or log.options.offset
-    beyond = "beyond what was set; " if corrected else ""
-    cure = f" ({beyond}to take it out: {' '.join(cures)})"
+    cures = [] if late is None else [f"--delay {round(log.options.delay_s + late, decimals) + 0.0:.{decimals}f}"]
+    factor = scale if resized else 1.0
+    cures += [f"--scale rate={factor * log.options.scale.get('rate', 1.0):.4g}"] if resized else []
+    offset_before = log.options.offset.get("rate", 0.0)
+    unit_size = in_si("rate", log.options.units.get("rate", "rad_s"))
+    total = factor * offset_before + (offset / unit_size if shifted else 0.0)
+    cures += [f"--offset rate={total:.3g}"] if shifted or (resized and offset_before) else []
+    corrected = log.options.delay_s or "rate" in log.options.scale or "rate" in log.options.offset
+    instead = ", instead of what is set" if corrected else ""
+    cure = f" (to take it out{instead}: {' '.join(cures)})"
     remark = f"Beside the tilt {fit} fits{cure}" + (_unit_question(log, scale) or ".")
     size = "another scale or offset than" if resized or shifted else ""
     if late is None:

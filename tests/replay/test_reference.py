@@ -170,7 +170,7 @@ def test_late_is_late_by_the_logs_own_rows() -> None:
         notes = remarks(REAL, ENCODER, delay_s=0.0119, rate_hz=rate, scale=scale)
         assert [line for line in notes if "Beside the tilt" in line] == []
     late = remarks(REAL, ENCODER, delay_s=0.010, rate_hz=1000.0)
-    assert "(beyond what was set; to take it out: --delay 0.002" in late[-1]
+    assert "(to take it out, instead of what is set: --delay 0.012" in late[-1]
 
 
 @pytest.mark.parametrize(
@@ -233,3 +233,38 @@ def test_one_accelerometer_away_from_the_pivot_is_a_cause(turn: float, tmp_path:
     assert remark.startswith(f"Tilt and reference hardly agree (correlation {'-' if turn < 0.0 else ''}0.")
     assert "Or the accelerometer's own motion puts off the tilt, with both sensors faultless" in remark
     assert remark.endswith("does one of them count the other way (--scale rate=-1)?") == (turn < 0.0)
+
+
+def offered(remark: str) -> dict[str, float]:
+    """Return the numbers of the options that a remark offers."""
+    options = remark.partition("take it out")[2].partition(": ")[2].partition(")")[0].replace("rate=", "")
+    words = options.split()
+    return {name.removeprefix("--"): float(number) for name, number in zip(words[::2], words[1::2], strict=True)}
+
+
+def test_the_delay_of_a_fast_log_is_offered_so_that_it_cures(tmp_path: Path) -> None:
+    """Late by 0.16 ms at 5 kHz; after a first delay of 0.1 ms the whole one is offered."""
+    t = 2e-4 * np.arange(N)
+    y, w = 0.2 * np.sin(30.0 * t), 6.0 * np.cos(30.0 * (t - 1.6e-4))
+    path = write_csv(tmp_path / "fast.csv", {"t_s": t, "tilt_rad": y, "gyro_rad_s": w})
+    (remark,) = remarks(path)
+    assert "comes 0.160 ms behind" in remark
+    assert offered(remark)["delay"] == pytest.approx(1.6e-4, abs=4e-6)
+    (again,) = remarks(path, delay_s=1e-4)
+    assert "(to take it out, instead of what is set: --delay 0.00016" in again
+    (cured,) = remarks(path, delay_s=offered(again)["delay"])
+    assert cured.startswith("Tilt and reference agree")
+
+
+def test_what_is_offered_beyond_what_is_set_is_the_whole(tmp_path: Path) -> None:
+    log = sine()
+    path = write_sine(tmp_path, gyro_rad_s=np.degrees(log["gyro_rad_s"] - 0.1) / 2.0)
+    units = {"rate": "deg_s"}
+    (remark,) = remarks(path, units=units, scale={"rate": 1.5}, offset={"rate": 3.0})
+    assert "instead of what is set" in remark
+    assert offered(remark) == pytest.approx({"scale": 2.0, "offset": np.degrees(0.1)}, rel=0.01)
+    (half,) = remarks(path, units=units, scale={"rate": 1.0}, offset={"rate": np.degrees(0.05)})
+    assert offered(half) == pytest.approx({"scale": 2.0, "offset": np.degrees(0.1)}, rel=0.01)
+    cures = offered(half)
+    (cured,) = remarks(path, units=units, scale={"rate": cures["scale"]}, offset={"rate": cures["offset"]})
+    assert cured.startswith("Tilt and reference agree")
