@@ -248,7 +248,6 @@ def _doubt_of_price(replayed: ReplayResult) -> str | None:
 
 def table_note(replays: Sequence[ReplayResult]) -> str:
     """Explain the figures of the tables."""
-    first = replays[0]
     keys = _keys(replays)
     lines = []
     if "velocity_fit" in keys:
@@ -262,9 +261,27 @@ def table_note(replays: Sequence[ReplayResult]) -> str:
             "against the measured one. Roughness: the white noise whose second differences are as large. Neither",
             "is an error of the rate.",
         ]
-    size = f"{math.degrees(first.noise.tilt):.3g} deg"
-    more = " and the acceleration's beside it" if "acceleration" in first.log.has else ""
-    lines.append(f"Noise gain: what white noise of {size} in the tilt{more} makes of the rate, by that size.")
-    if first.settle_s:
-        lines.append(f"Scored from {first.settle_s:g} s after each start on.")
+    beside = " and the acceleration's beside it"
+    sizes = [
+        f"{math.degrees(replayed.noise.tilt):.3g} deg in the tilt{beside if 'acceleration' in replayed.log.has else ''}"
+        for replayed in replays
+    ]
+    names = [replayed.log.name for replayed in replays]
+    size = _by_log(names, sizes)
+    lines.append(f"Noise gain: what white noise of {size} makes of the rate, by the tilt's noise.")
+    if len(set(sizes)) > 1:
+        lines.append("Gains of observers that are not linear depend on that size, so their mean is of no one noise.")
+    starts = [f"from {r.settle_s:g} s after each start on" if r.settle_s else "from its start on" for r in replays]
+    if any(replayed.settle_s for replayed in replays):
+        lines.append(f"Scored {_by_log(names, starts)}.")
     return "\n".join(lines)
+
+
+def _by_log(names: Sequence[str], texts: Sequence[str]) -> str:
+    """Write the text of all logs, or of each where they differ."""
+    logs: dict[str, list[str]] = {}
+    for name, text in zip(names, texts, strict=True):
+        logs.setdefault(text, []).append(name)
+    if len(logs) == 1:
+        return next(iter(logs))
+    return ", ".join(f"{text} ({', '.join(few)})" for text, few in logs.items())
