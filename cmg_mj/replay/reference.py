@@ -27,6 +27,10 @@ NOISE = 1.2
 """What is left of the tilt is its white noise up to this ratio."""
 LATE = 0.1
 """Lag from which it is reported, in periods of the log's rows or its samples, the longer of the two."""
+NOTHING = 0.001
+"""An offset that with its interval is below this share of the reference's RMS is not mentioned."""
+MOST_DECIMALS = 6
+"""Most decimals of an interval; a narrower one is not mentioned."""
 FINE = 0.01
 """Step in which a delay is offered, at most, in the same periods."""
 ALIKE = 0.5
@@ -123,7 +127,7 @@ def _judgement(log: Log, aligned: Alignment) -> _Judgement:
             turned = -log.options.scale.get("rate", 1.0)
             remark += f" The correlation is negative: does one of them count the other way (--scale rate={turned:g})?"
         return _Judgement(remark, "tilt and reference hardly agree")
-    fit = _fit_text(scale, SURE / CLEAR * scale_error, offset, SURE / CLEAR * offset_error)
+    fit = _fit_text(scale, SURE / CLEAR * scale_error, offset, SURE / CLEAR * offset_error, motion)
     if late is None and not resized and not shifted:
         roughly = " as far as can be told" if SURE / CLEAR * scale_error > NEAR else ""
         remark = f"Tilt and reference agree{roughly}: {fit.replace('it', 'the reference', 1)} fits."
@@ -166,20 +170,26 @@ def _is_noise(log: Log, residual: float | None) -> bool:
     return residual is not None and isinstance(noise, WhiteNoise) and residual <= NOISE * math.sqrt(2.0) * noise.high
 
 
-def _fit_text(scale: float, scale_error: float, offset: float, offset_error: float) -> str:
-    """Write a scale and an offset with their intervals, where there are any."""
-    size, sign = (offset, "plus") if offset >= 0.0 else (-offset, "less")
-    times, addend = _digits(scale, scale), f"{size:.4f}"
-    if math.isfinite(scale_error):
-        times += f" ({_digits(scale - scale_error, scale)} to {_digits(scale + scale_error, scale)})"
-    if math.isfinite(offset_error):
-        low, high = (round(value, 4) + 0.0 for value in (size - offset_error, size + offset_error))  # no -0.0000
-        addend += f" ({low:.4f} to {high:.4f})"
-    return f"{times} times it {sign} {addend} rad/s"
+def _fit_text(scale: float, scale_error: float, offset: float, offset_error: float, motion: float) -> str:
+    """Write a scale and an offset with their intervals, where there are any; no offset that is nothing beside a motion.
+
+    An interval has at least four decimals, and more for the first digit of its half width, up to `MOST_DECIMALS`; a
+    narrower one is left out.
+    """
+    size, sign = abs(offset), "plus" if offset >= 0.0 else "less"
+    times = f"{_with_interval(scale, scale_error)} times it"
+    if size + offset_error < NOTHING * motion:
+        return times
+    return f"{times} {sign} {_with_interval(size, offset_error)} rad/s"
 
 
-def _digits(value: float, scale: float) -> str:
-    return f"{value:.4f}" if abs(scale) > 0.1 else f"{value:.4g}"
+def _with_interval(value: float, error: float) -> str:
+    decimals = 4 if error == 0.0 or not math.isfinite(error) else max(4, math.ceil(-math.log10(error)))
+    known = math.isfinite(error) and error > 0.0 and decimals <= MOST_DECIMALS
+    if not known:
+        return f"{value:.4f}" if abs(value) >= 0.1 else f"{value:.4g}"
+    low, high = (round(end, decimals) + 0.0 for end in (value - error, value + error))  # no -0.0000
+    return f"{value:.{decimals}f} ({low:.{decimals}f} to {high:.{decimals}f})"
 
 
 def _unit_question(log: Log, scale: float) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -268,3 +269,19 @@ def test_what_is_offered_beyond_what_is_set_is_the_whole(tmp_path: Path) -> None
     cures = offered(half)
     (cured,) = remarks(path, units=units, scale={"rate": cures["scale"]}, offset={"rate": cures["offset"]})
     assert cured.startswith("Tilt and reference agree")
+
+
+def test_an_interval_has_the_digits_that_show_it(tmp_path: Path) -> None:
+    (remark,) = remarks(write_sine(tmp_path))
+    assert remark == "Tilt and reference agree: 1.0001 times the reference fits."
+    t = DT * np.arange(N)
+    beside = 1e-4 * np.random.default_rng(0).standard_normal(N)
+    (remark,) = remarks(write_sine(tmp_path, tilt_rad=sine(t)["tilt_rad"] + beside))
+    fit = alignment_of(read_log(tmp_path / "log.csv", ReadOptions(COLUMNS)))
+    assert fit is not None
+    assert fit.scale is not None
+    assert fit.scale_error is not None
+    value, low, high = (float(text) for text in re.findall(r"\d\.\d+", remark)[:3])
+    assert low < value < high
+    assert (high - low) / 2.0 == pytest.approx(SURE * fit.scale_error, rel=0.5)
+    assert "rad/s" not in remark
