@@ -109,9 +109,13 @@ def test_the_noise_is_printed_beside_what_was_told(tmp_path: Path) -> None:
     (near,) = noise_remarks(log, noise_of(log, {"tilt": 0.3}))
     assert near == "Noise of the tilt: 0.3 deg is used; the log shows 0.36 (0.35 to 0.371)."
     (less,) = noise_remarks(log, noise_of(log, {"tilt": 0.1}))
-    assert less.endswith("(0.35 to 0.371), 3.6 times as much: give --noise tilt=0.36, or no tilt for the log's own.")
+    assert less.endswith(
+        "(0.35 to 0.371), more by a factor of 3.6: give --noise tilt=0.36, or no tilt for the log's own."
+    )
     (more,) = noise_remarks(log, noise_of(log, {"tilt": 0.6}))
-    assert ", 1.7 times less: give --noise tilt=0.36," in more
+    assert ", less by a factor of 1.7: give --noise tilt=0.36," in more
+    (far,) = noise_remarks(log, noise_of(log, {"tilt": 3.6}))
+    assert ", less by a factor of 10: give" in far
     fine = noisy_log(tmp_path, 0.0)
     (untold,) = noise_remarks(fine, noise_of(fine))
     assert untold == "Noise of the tilt: 0.1 deg is used; the log cannot tell: there is hardly any."
@@ -130,7 +134,7 @@ def test_the_noise_of_two_accelerometers(tmp_path: Path) -> None:
     assert remark.endswith("by the log, and used.")
     (told,) = noise_remarks(log, noise_of(log, {"accelerometer": 400.0}))
     assert told.startswith("Noise of the accelerometers: 400 ug/rtHz is used; the log shows 8")
-    assert "2.0 times as much: give --noise accelerometer=8" in told
+    assert "more by a factor of 2.0: give --noise accelerometer=8" in told
 
 
 @pytest.mark.parametrize("rate", [100.0, 400.0, 1000.0])
