@@ -69,5 +69,6 @@ def model_remark(misfit: float | None) -> str | None:
     return (
         f"Can the model be that of this log? The tilt acceleration that it predicts misses the tilt's own by {times} "
         f"times as much as one of zero would (of right models at most 1.15): look at --model, the tilt's unit, "
-        "sign and zero, or for large torques that the model does not know. Estimates of observers with a model mean little here."
+        "sign and zero, or for large torques that the model does not know. Estimates of observers with a model mean "
+        "little here."
     )
