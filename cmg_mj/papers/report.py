@@ -70,6 +70,12 @@ OURS: dict[Verdict, str] = {
     "not reproduced": "does not hold",
 }
 """The verdicts' words where there is no paper to reproduce."""
+PLURALS = {
+    "holds": "hold",
+    "holds within stated conditions": "hold within stated conditions",
+    "does not hold": "do not hold",
+}
+"""The same words of several claims."""
 
 
 def verdict_words(claim: Claim) -> str:
@@ -147,7 +153,9 @@ def _count_of_verdicts(entries: Sequence[Reproduction]) -> str:
         counts = Counter(verdict_words(claim) for claim in claims if claim.is_ours is is_ours)
         if counts:
             order = [OURS[v] if is_ours else v for v in OURS]
-            counts_text = ", ".join(f"{counts[v]} {v}" for v in order if counts[v])
+            counts_text = ", ".join(
+                f"{counts[v]} {PLURALS.get(v, v) if counts[v] > 1 else v}" for v in order if counts[v]
+            )
             sentences.append(f"{sum(counts.values())} {words}: {counts_text}.")
     return " ".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
 

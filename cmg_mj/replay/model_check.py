@@ -12,7 +12,7 @@ from cmg_mj.results.stored_columns import select_rows, stretches
 RATE_SPAN_S = 0.04
 """Time over which increments of the tilt give the rate in the model's damping term [s]."""
 MISFIT = 1.5
-"""Misfit from which a model is doubted. Of right models it is at most 1.2: docs/studies/model_misfit.py."""
+"""Misfit from which a model is doubted. Of right models it is at most 1.15: docs/studies/model_misfit.py."""
 
 
 def model_misfit(log: Log, model: ReducedModel) -> float | None:
@@ -68,6 +68,7 @@ def model_remark(misfit: float | None) -> str | None:
     times = f"{misfit:.1f}" if misfit < 100.0 else f"{misfit:.0f}"
     return (
         f"Can the model be that of this log? The tilt acceleration that it predicts misses the tilt's own by {times} "
-        f"times as much as one of zero would (of right models at most 1.2): look at --model, the tilt's unit, sign and "
-        "zero, or for large torques that the model does not know. Estimates of observers with a model mean little here."
+        f"times as much as one of zero would (of right models at most 1.15): look at --model, the tilt's unit, "
+        "sign and zero, or for large torques that the model does not know. Estimates of observers with a model mean "
+        "little here."
     )

@@ -54,8 +54,10 @@ def _remark(signal: str, used: float, estimate: WhiteNoise | str, unit: str, opt
     ratio = estimate.sigma / used
     if max(ratio, 1.0 / ratio) < APART:
         return f"{remark}."
-    times = f"{ratio:.1f} times as much" if ratio > 1.0 else f"{1.0 / ratio:.1f} times less"
-    return f"{remark}, {times}: give --noise {option}={estimate.sigma:.3g}, or no {option} for the log's own."
+    factor = max(ratio, 1.0 / ratio)
+    size = f"{factor:.1f}" if factor < 9.95 else f"{factor:.0f}"
+    apart = f"{'more' if ratio > 1.0 else 'less'} by a factor of {size}"
+    return f"{remark}, {apart}: give --noise {option}={estimate.sigma:.3g}, or no {option} for the log's own."
 
 
 def noise_figures(log: Log, noise: TiltNoise) -> dict[str, SummaryValue]:

@@ -11,10 +11,12 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from cmg_mj.observers import OBSERVER_CLASSES
+from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import ReplayResult, describe_log
 from cmg_mj.replay.model_check import model_remark
 from cmg_mj.replay.noise_remarks import noise_figures, noise_remarks
-from cmg_mj.replay.reference import remarks_on
+from cmg_mj.replay.reference import reference_fault, remarks_on
 from cmg_mj.replay.scores import RECONSTRUCTED_S, Figures
 from cmg_mj.replay.zero_phase import ZERO_PHASE
 from cmg_mj.results import markdown
@@ -215,7 +217,7 @@ def remarks(replayed: ReplayResult) -> list[str]:
     """Return the remarks on a log and its reference, and the observers left out."""
     lines = remarks_on(replayed.log, replayed.alignment) + noise_remarks(replayed.log, replayed.noise)
     if replayed.zero_phase is not None:
-        lines.append(replayed.zero_phase.remark)
+        lines.append(replayed.zero_phase.remark(_doubt_of_price(replayed)))
     if doubt := model_remark(replayed.misfit):
         lines.append(doubt)
     reasons: dict[str, list[str]] = {}
@@ -224,9 +226,28 @@ def remarks(replayed: ReplayResult) -> list[str]:
     return [*lines, *(f"Without {', '.join(names)}: {reason}." for reason, names in reasons.items())]
 
 
+def _doubt_of_price(replayed: ReplayResult) -> str | None:
+    """Say why the distance from the smoother is not the price of causality; None where it is.
+
+    Observers that know more than the tilt may well be nearer to the reference.
+    """
+    doubts = [fault] if (fault := reference_fault(replayed.log, replayed.alignment)) else []
+    assert replayed.zero_phase is not None
+    error = replayed.zero_phase.figures["velocity_rms_error_rad_s"]
+    errors = {
+        name: other
+        for name, figures in replayed.summaries.items()
+        if (other := figures["velocity_rms_error_rad_s"]) is not None
+        and (name == ZERO or not needs(OBSERVER_CLASSES.find(name)))
+    }
+    best = min(errors, key=lambda name: errors[name], default=None)
+    if error is not None and best is not None and errors[best] < error:
+        doubts.append(f"{best}, which knows no more than the past, is nearer to the reference")
+    return "; ".join(doubts) or None
+
+
 def table_note(replays: Sequence[ReplayResult]) -> str:
     """Explain the figures of the tables."""
-    first = replays[0]
     keys = _keys(replays)
     lines = []
     if "velocity_fit" in keys:
@@ -240,9 +261,27 @@ def table_note(replays: Sequence[ReplayResult]) -> str:
             "against the measured one. Roughness: the white noise whose second differences are as large. Neither",
             "is an error of the rate.",
         ]
-    size = f"{math.degrees(first.noise.tilt):.3g} deg"
-    more = " and the acceleration's beside it" if "acceleration" in first.log.has else ""
-    lines.append(f"Noise gain: what white noise of {size} in the tilt{more} makes of the rate, by that size.")
-    if first.settle_s:
-        lines.append(f"Scored from {first.settle_s:g} s after each start on.")
+    beside = " and the acceleration's beside it"
+    sizes = [
+        f"{math.degrees(replayed.noise.tilt):.3g} deg in the tilt{beside if 'acceleration' in replayed.log.has else ''}"
+        for replayed in replays
+    ]
+    names = [replayed.log.name for replayed in replays]
+    size = _by_log(names, sizes)
+    lines.append(f"Noise gain: what white noise of {size} makes of the rate, by the tilt's noise.")
+    if len(set(sizes)) > 1:
+        lines.append("Gains of observers that are not linear depend on that size, so their mean is of no one noise.")
+    starts = [f"from {r.settle_s:g} s after each start on" if r.settle_s else "from its start on" for r in replays]
+    if any(replayed.settle_s for replayed in replays):
+        lines.append(f"Scored {_by_log(names, starts)}.")
     return "\n".join(lines)
+
+
+def _by_log(names: Sequence[str], texts: Sequence[str]) -> str:
+    """Write the text of all logs, or of each where they differ."""
+    logs: dict[str, list[str]] = {}
+    for name, text in zip(names, texts, strict=True):
+        logs.setdefault(text, []).append(name)
+    if len(logs) == 1:
+        return next(iter(logs))
+    return ", ".join(f"{text} ({', '.join(few)})" for text, few in logs.items())

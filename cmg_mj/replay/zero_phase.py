@@ -45,17 +45,22 @@ class ZeroPhase:
     best_rms_error_rad_s: float | None
     smooths: bool
 
-    @property
-    def remark(self) -> str:
-        """Say what the row is."""
+    def remark(self, doubt: str | None = None) -> str:
+        """Say what the row is.
+
+        Args:
+            doubt: Why its distance from an observer is not the price of causality; None where it is.
+        """
         how = f"smooths the tilt to both sides of each sample, below {self.cutoff_hz:.3g} Hz, chosen by the tilt alone"
         if not self.smooths:
             how += " (where no white noise could be told, so hardly at all)"
         best = "-" if self.best_rms_error_rad_s is None else f"{self.best_rms_error_rad_s:.4f}"
+        price = "What an observer of the tilt alone lacks to it is the price of causality."
+        if doubt is not None:
+            price = f"What causality costs cannot be read off it here: {doubt}."
         return (
             f"{ZERO_PHASE} is no observer: it sees the future. It {how}; with {self.best_cutoff_hz:.3g} Hz, the best "
-            f"for the reference, its error is {best} rad/s. What an observer of the "
-            "tilt alone lacks to it is the price of causality."
+            f"for the reference, its error is {best} rad/s. {price}"
         )
 
 

@@ -287,3 +287,10 @@ def test_a_missing_package_ends_it_before_anything_is_computed(
 def test_papers_that_do_not_need_it_are_reproduced_without(paper: str) -> None:
     assert cmg_mj("reproduce", paper).status == 0
     assert (Path("runs") / f"reproduce-{paper}" / "report.md").is_file()
+
+
+def test_several_claims_of_ours_hold() -> None:
+    several = report_text([papers.Reproduction("andrieu2009", [OURS, OURS, NOT], complete=True)])
+    assert "2 beside them, not the papers': 2 do not hold." in several
+    one = report_text([papers.Reproduction("andrieu2009", [OURS], complete=True)])
+    assert "1 beside them, not the papers': 1 does not hold." in one

@@ -200,7 +200,7 @@ def test_of_the_reference_it_says_what_matters() -> None:
     good = replay("sine.csv", "--columns", PLAIN, "--observers", "linear").out
     assert "Beside the tilt" not in good
     late = replay("sine.csv", "--columns", PLAIN, "--observers", "linear", "--delay", "0.01").out
-    assert "(beyond what was set; to take it out: --delay -0.01" in " ".join(late.split())
+    assert "(to take it out, instead of what is set: --delay 0.0000" in " ".join(late.split())
     real = " ".join(replay(LOG, "--columns", REAL, "--observers", "linear").out.split())
     assert "12.10 ms behind; 1.0157 (1.0152 to 1.0163) times it plus 0.0007 (0.0000 to 0.0014) rad/s fits" in real
     assert "(to take it out: --delay 0.0121 --scale rate=1.016)." in real

@@ -121,3 +121,10 @@ def test_right_models_are_not_doubted(settings: list[str]) -> None:
         misfit = model_misfit(log, right)
         assert misfit is not None
         assert misfit < 1.3 < MISFIT
+
+
+def test_the_most_of_right_models_is_that_of_the_docs() -> None:
+    remark = model_remark(2.0)
+    assert remark is not None
+    assert "(of right models at most 1.15)" in remark
+    assert "right ones have at most 1.15" in (ROOT / "docs" / "replay.md").read_text(encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections.abc import Sequence
@@ -16,9 +17,10 @@ from cmg_mj.replay.logs import Log, ReadOptions, read_log
 from cmg_mj.replay.logs.columns import ACCELEROMETERS
 from cmg_mj.replay.noise_remarks import noise_figures, noise_remarks
 from cmg_mj.replay.observer_inputs import replay_prepared
+from cmg_mj.replay.report import table_note
 from cmg_mj.replay.user_noise import noise_in, noise_of
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 from cmg_mj.studies.tuning import figures_of_logs, tune_on_logs
 from tests.command import cmg_mj
 from tests.replay.logs.motion import COLUMNS, DT, N, sine, write_csv
@@ -107,9 +109,13 @@ def test_the_noise_is_printed_beside_what_was_told(tmp_path: Path) -> None:
     (near,) = noise_remarks(log, noise_of(log, {"tilt": 0.3}))
     assert near == "Noise of the tilt: 0.3 deg is used; the log shows 0.36 (0.35 to 0.371)."
     (less,) = noise_remarks(log, noise_of(log, {"tilt": 0.1}))
-    assert less.endswith("(0.35 to 0.371), 3.6 times as much: give --noise tilt=0.36, or no tilt for the log's own.")
+    assert less.endswith(
+        "(0.35 to 0.371), more by a factor of 3.6: give --noise tilt=0.36, or no tilt for the log's own."
+    )
     (more,) = noise_remarks(log, noise_of(log, {"tilt": 0.6}))
-    assert ", 1.7 times less: give --noise tilt=0.36," in more
+    assert ", less by a factor of 1.7: give --noise tilt=0.36," in more
+    (far,) = noise_remarks(log, noise_of(log, {"tilt": 3.6}))
+    assert ", less by a factor of 10: give" in far
     fine = noisy_log(tmp_path, 0.0)
     (untold,) = noise_remarks(fine, noise_of(fine))
     assert untold == "Noise of the tilt: 0.1 deg is used; the log cannot tell: there is hardly any."
@@ -128,7 +134,7 @@ def test_the_noise_of_two_accelerometers(tmp_path: Path) -> None:
     assert remark.endswith("by the log, and used.")
     (told,) = noise_remarks(log, noise_of(log, {"accelerometer": 400.0}))
     assert told.startswith("Noise of the accelerometers: 400 ug/rtHz is used; the log shows 8")
-    assert "2.0 times as much: give --noise accelerometer=8" in told
+    assert "more by a factor of 2.0: give --noise accelerometer=8" in told
 
 
 @pytest.mark.parametrize("rate", [100.0, 400.0, 1000.0])
@@ -196,3 +202,23 @@ def test_tuning_takes_the_same_noise(tmp_path: Path) -> None:
     assert noise_remarks(log, noise_of(log))[0] in study.remarks[0]
     (noise,) = json.loads(json.dumps(figures_of_logs(study)))["noise"]
     assert noise["noise_by_the_log"]["tilt_rad"]["used"]
+
+
+def test_the_note_on_the_noise_gain_is_true_of_every_log(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    few = [
+        dataclasses.replace(replay_log(noisy_log(tmp_path, 0.36), ["linear"]), settle_s=settle) for settle in (1.0, 0.0)
+    ]
+    first = dataclasses.replace(few[0], log=dataclasses.replace(few[0].log, name="a"))
+    tilt = TiltNoise(math.radians(0.1), 1.0, 0.0)
+    log = dataclasses.replace(few[1].log, name="b", has=few[1].log.has | {"acceleration"})
+    second = dataclasses.replace(few[1], log=log, noise=tilt)
+    note = table_note([first, second])
+    size = "white noise of 0.36 deg in the tilt (a), 0.1 deg in the tilt and the acceleration's beside it (b) makes"
+    assert size in note
+    assert "so their mean is of no one noise." in note
+    assert "Scored from 1 s after each start on (a), from its start on (b)." in note
+    alone = table_note([first, first])
+    assert "white noise of 0.36 deg in the tilt makes of the rate" in alone
+    assert "mean" not in alone
+    assert alone.endswith("Scored from 1 s after each start on.")

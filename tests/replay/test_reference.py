@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -170,7 +171,7 @@ def test_late_is_late_by_the_logs_own_rows() -> None:
         notes = remarks(REAL, ENCODER, delay_s=0.0119, rate_hz=rate, scale=scale)
         assert [line for line in notes if "Beside the tilt" in line] == []
     late = remarks(REAL, ENCODER, delay_s=0.010, rate_hz=1000.0)
-    assert "(beyond what was set; to take it out: --delay 0.002" in late[-1]
+    assert "(to take it out, instead of what is set: --delay 0.012" in late[-1]
 
 
 @pytest.mark.parametrize(
@@ -217,3 +218,70 @@ def test_of_short_stretches_there_is_no_interval(elsewhere: None) -> None:
         ) != has_interval
         result = json.loads(cmg_mj("tune-log", "log.csv", *tune, "--json").out)
         assert (result["verdict"] is not None) == (result["held_out_ratio"] is not None) == has_interval
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_one_accelerometer_away_from_the_pivot_is_a_cause(turn: float, tmp_path: Path) -> None:
+    """0.3 m from it, a faultless one; with the other sign of all three the tilt turns as before, the gyro does not."""
+    log = sine()
+    y, w = log["tilt_rad"] * np.cos(1e-3 * log["t_s"]), log["gyro_rad_s"]
+    ax = 0.3 * np.gradient(w, DT) + 5.0 * np.sin(23.0 * log["t_s"]) * 0.1 - 9.80665 * np.sin(y)
+    ax += 0.25 * np.sin(17.0 * log["t_s"]) * 9.80665
+    columns = {"t_s": log["t_s"], "ax": turn * ax, "az": turn * 9.80665 * np.cos(y), "gyro_rad_s": turn * w}
+    roles = {"time": "t_s", "ax": "ax", "az": "az", "rate": "gyro_rad_s"}
+    path = write_csv(tmp_path / "imu.csv", columns)
+    remark = remarks(path, roles, units={"ax": "m/s2", "az": "m/s2"})[-1]
+    assert remark.startswith(f"Tilt and reference hardly agree (correlation {'-' if turn < 0.0 else ''}0.")
+    assert "Or the accelerometer's own motion puts off the tilt, with both sensors faultless" in remark
+    assert remark.endswith("does one of them count the other way (--scale rate=-1)?") == (turn < 0.0)
+
+
+def offered(remark: str) -> dict[str, float]:
+    """Return the numbers of the options that a remark offers."""
+    options = remark.partition("take it out")[2].partition(": ")[2].partition(")")[0].replace("rate=", "")
+    words = options.split()
+    return {name.removeprefix("--"): float(number) for name, number in zip(words[::2], words[1::2], strict=True)}
+
+
+def test_the_delay_of_a_fast_log_is_offered_so_that_it_cures(tmp_path: Path) -> None:
+    """Late by 0.16 ms at 5 kHz; after a first delay of 0.1 ms the whole one is offered."""
+    t = 2e-4 * np.arange(N)
+    y, w = 0.2 * np.sin(30.0 * t), 6.0 * np.cos(30.0 * (t - 1.6e-4))
+    path = write_csv(tmp_path / "fast.csv", {"t_s": t, "tilt_rad": y, "gyro_rad_s": w})
+    (remark,) = remarks(path)
+    assert "comes 0.160 ms behind" in remark
+    assert offered(remark)["delay"] == pytest.approx(1.6e-4, abs=4e-6)
+    (again,) = remarks(path, delay_s=1e-4)
+    assert "(to take it out, instead of what is set: --delay 0.00016" in again
+    (cured,) = remarks(path, delay_s=offered(again)["delay"])
+    assert cured.startswith("Tilt and reference agree")
+
+
+def test_what_is_offered_beyond_what_is_set_is_the_whole(tmp_path: Path) -> None:
+    log = sine()
+    path = write_sine(tmp_path, gyro_rad_s=np.degrees(log["gyro_rad_s"] - 0.1) / 2.0)
+    units = {"rate": "deg_s"}
+    (remark,) = remarks(path, units=units, scale={"rate": 1.5}, offset={"rate": 3.0})
+    assert "instead of what is set" in remark
+    assert offered(remark) == pytest.approx({"scale": 2.0, "offset": np.degrees(0.1)}, rel=0.01)
+    (half,) = remarks(path, units=units, scale={"rate": 1.0}, offset={"rate": np.degrees(0.05)})
+    assert offered(half) == pytest.approx({"scale": 2.0, "offset": np.degrees(0.1)}, rel=0.01)
+    cures = offered(half)
+    (cured,) = remarks(path, units=units, scale={"rate": cures["scale"]}, offset={"rate": cures["offset"]})
+    assert cured.startswith("Tilt and reference agree")
+
+
+def test_an_interval_has_the_digits_that_show_it(tmp_path: Path) -> None:
+    (remark,) = remarks(write_sine(tmp_path))
+    assert remark == "Tilt and reference agree: 1.0001 times the reference fits."
+    t = DT * np.arange(N)
+    beside = 1e-4 * np.random.default_rng(0).standard_normal(N)
+    (remark,) = remarks(write_sine(tmp_path, tilt_rad=sine(t)["tilt_rad"] + beside))
+    fit = alignment_of(read_log(tmp_path / "log.csv", ReadOptions(COLUMNS)))
+    assert fit is not None
+    assert fit.scale is not None
+    assert fit.scale_error is not None
+    value, low, high = (float(text) for text in re.findall(r"\d\.\d+", remark)[:3])
+    assert low < value < high
+    assert (high - low) / 2.0 == pytest.approx(SURE * fit.scale_error, rel=0.5)
+    assert "rad/s" not in remark

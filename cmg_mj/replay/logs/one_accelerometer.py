@@ -91,8 +91,8 @@ def remarks_on_one(
         line += f"; the specific force's size varies by {shakes:.2g} g RMS (horizontal motion hardly shows in it)"
     else:
         line += (
-            f"; {RADIUS_M:g} m from the pivot the turning that the reference shows puts it off by "
-            f"{math.degrees(error * RADIUS_M):.2g} deg RMS, -r (y'' cos y - y'^2 sin y)/g, in proportion to r"
+            f"; the turning that the reference shows puts it off by {math.degrees(error * RADIUS_M):.2g} deg RMS at "
+            f"{RADIUS_M:g} m from the pivot, and in proportion to that distance elsewhere"
         )
     lines = [line]
     if not NEAR[0] <= usual <= NEAR[1] and usual > 0.0:
@@ -101,8 +101,8 @@ def remarks_on_one(
     if upward < 0.0:
         turned = ",".join(f"{role}={-_scale(columns[role]):g}" for role in ONE_ACCELEROMETER)
         lines.append(
-            f"az is {upward / STANDARD_GRAVITY:.2g} g (median), so the tilt is beyond 90 deg: --scale {turned} if the "
-            f"sensor shows gravity itself, --scale az={-_scale(columns['az']):g} if it is mounted upside down"
+            f"the median of az is {upward / STANDARD_GRAVITY:.2g} g, so the tilt is beyond 90 deg: --scale {turned} if "
+            f"the sensor shows gravity itself, --scale az={-_scale(columns['az']):g} if it is mounted upside down"
         )
     return lines
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import csv
 import os
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -133,7 +134,7 @@ def _of_csv(
     with _arrow_errors(path):
         with path.open("rb") as file:
             names = pacsv.open_csv(file, read, parse).schema.names
-        _check_columns(path, headings, [name.strip() for name in names])
+        _check_columns(path, headings, [name.strip() for name in names], _cells_apart(len(names), rows, delimiter))
         spelled = {name.strip(): name for name in names}
         headings = [spelled[name.strip()] for name in headings]
         time = spelled.get(time.strip()) if time else None
@@ -248,12 +249,25 @@ def _is_utf8(path: Path) -> bool:
     return True
 
 
-def _check_columns(path: Path, headings: Sequence[str], names: Sequence[str]) -> None:
+def _cells_apart(n_heading: int, rows: Sequence[str], delimiter: str) -> str:
+    """Say that all rows below a heading have another number of cells, if they have."""
+    numbers_of_cells = {len(cells) for cells in csv.reader(rows, delimiter=delimiter) if cells}
+    if len(numbers_of_cells) != 1 or n_heading in numbers_of_cells:
+        return ""
+    n_row = numbers_of_cells.pop()
+    apart = f"; its heading has {n_heading} cells, and the rows below it have {n_row}"
+    if n_heading > n_row:
+        apart += f": one with {shown(delimiter)} in it must be in quotes in the file too"
+    return apart
+
+
+def _check_columns(path: Path, headings: Sequence[str], names: Sequence[str], cells_apart: str = "") -> None:
     for name in headings:
         if name.strip() not in [known.strip() for known in names]:
             few = [shown(known) for known in names]
             quoted = HOW_TO_QUOTE if any("," in known for known in names) else ""
-            raise InputError(f"{path}: has no column {name!r}; {nearest(name, few, 'it has')}{quoted}")
+            guess = nearest(name, few, "it has", quoted=True)
+            raise InputError(f"{path}: has no column {name!r}; {guess}{cells_apart or quoted}")
         if list(names).count(name) > 1:
             raise InputError(f"{path}: has the column {name!r} {list(names).count(name)} times: rename all but one")
 

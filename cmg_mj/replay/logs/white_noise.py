@@ -36,7 +36,7 @@ must be flatter than this; and what rises more steeply below a floor is motion."
 HANN = 0.947
 """Share of the rows' information that half-overlapping Hann windows keep."""
 FEWEST = 1024
-"""Fewest rows for an estimate."""
+"""Fewest rows for an estimate, those counted for which `_without_motion` knows the motion."""
 BLOCK = 16384
 MOST_BLOCKS = 8
 """Of a longer log so many blocks of rows are taken, spread evenly."""
@@ -87,17 +87,24 @@ def white_noise_of(parts: Sequence[Part], period: float) -> LogNoise:
     names = [name for name in ("y1_rad", "acceleration_rad_s2") if name in parts[0].rows]
     residuals: list[np.ndarray] = []
     steps, sizes = dict.fromkeys(names, math.inf), dict.fromkeys(names, 0.0)
+    n_all, lead = 0, 0
     for places, values in _blocks(parts, period):
+        n_all += len(places)
         for name in names:
             steps[name] = min(steps[name], _smallest_step(values[name]))
             sizes[name] = max(sizes[name], float(np.std(values[name])))
         if names[-1] == "acceleration_rad_s2" and "u_rad_s" in values:
+            n_before = len(places)
             places, values = _without_response(places, values)
+            lead = max(lead, n_before - len(places))
         if len(places) >= 2 * TAPS + SEGMENT:
             residuals.append(np.stack([_without_motion(places, values[name]) for name in names]))
     n_rows = sum(residual.shape[1] for residual in residuals)
     if n_rows < FEWEST:
-        short = f"it takes {FEWEST:,} rows without a gap, and there are {n_rows:,}"
+        short = (
+            f"it takes {FEWEST:,} rows, in parts of {2 * TAPS + SEGMENT + lead} or more, without the first "
+            f"{TAPS + lead} and the last {TAPS} of each; of {n_all:,} rows {n_rows:,} are such"
+        )
         return LogNoise(short, short if len(names) > 1 else None, 0.0)
     spectra = np.concatenate([_spectra(residual) for residual in residuals], axis=1)
     floors = [

@@ -71,3 +71,14 @@ def test_a_column_that_is_not_there(tmp_path: Path) -> None:
     path = write(tmp_path, 'n,"Roll,x (deg)",a,w_dps')
     with pytest.raises(InputError, match=r"has no column 'Roll'.* goes into quotes"):
         read_log(path, ReadOptions({"tilt": "Roll", "rate": "w_dps"}, {"tilt": "deg"}, rate_hz=200.0))
+
+
+def test_a_heading_with_a_comma_that_the_file_does_not_quote(tmp_path: Path) -> None:
+    path = write(tmp_path, "n,tilt,Gyro, x (dps),w")
+    with pytest.raises(InputError) as error:
+        read_log(path, ReadOptions({"tilt": "tilt", "rate": "Gyro, x (dps)"}, {"tilt": "deg"}, rate_hz=200.0))
+    text = str(error.value)
+    assert "has no column 'Gyro, x (dps)'; did you mean 'x (dps)'? it has: 'Gyro', 'n', 'tilt', 'w', 'x (dps)'" in text
+    assert text.endswith(
+        "; its heading has 5 cells, and the rows below it have 4: one with ',' in it must be in quotes in the file too"
+    )

@@ -9,6 +9,7 @@ import pytest
 
 from cmg_mj import InputError
 from cmg_mj.replay.logs import Log, ReadOptions, read_log
+from cmg_mj.replay.reference import remarks_on
 from tests.replay.logs.motion import DT, OMEGA, N, rate, tilt, write_csv
 from tests.replay.test_stretches import in_stretches
 
@@ -39,6 +40,7 @@ def test_what_turning_at_a_radius_does_to_it(tmp_path: Path) -> None:
     error = log["y1_rad"] - tilt(np.arange(N) * DT)
     hint = log.notes[0]
     assert "0.1 g by 5.7 deg" in hint
+    assert hint.endswith(" deg RMS at 0.1 m from the pivot, and in proportion to that distance elsewhere")
     told = float(hint.split("puts it off by ")[-1].split(" deg RMS")[0])
     assert told == pytest.approx(np.degrees(np.sqrt(np.mean(error**2))), rel=0.03)
     assert told > 3.0
@@ -56,7 +58,9 @@ def test_without_a_gyro_the_size_shows_motion(tmp_path: Path) -> None:
 def test_a_wrong_unit_and_a_wrong_direction(tmp_path: Path) -> None:
     wrong_unit = read(tmp_path, 0.0, units={"ax": "m/s2", "az": "mm/s2"}).notes[1]
     assert wrong_unit.endswith("times gravity's 9.81 m/s^2 (median): --units ax=g,az=m_s2") or "--scale" in wrong_unit
-    gravity_itself = read(tmp_path, 0.0, turn=-1.0).notes
+    downward = read(tmp_path, 0.0, turn=-1.0)
+    gravity_itself = downward.notes
+    assert any(line.startswith("The median of az is -0.9") for line in remarks_on(downward, None))
     assert "--scale ax=-1,az=-1 if the sensor shows gravity itself, --scale az=-1 if" in " ".join(gravity_itself)
     turned = read(tmp_path, 0.0, turn=-1.0, scale={"ax": -1.0, "az": -1.0})
     np.testing.assert_allclose(turned["y1_rad"], tilt(np.arange(N) * DT), atol=1e-12)

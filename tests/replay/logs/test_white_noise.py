@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -157,7 +158,9 @@ def test_short_parts_tell_nothing_and_gaps_nothing_wrong() -> None:
     random = np.random.default_rng(0)
     y = motion(CLOCK) + white(random)
     short = noise_of_rows(CLOCK, slice(0, 1000), y1_rad=y).tilt
-    assert short == "it takes 1,024 rows without a gap, and there are 936"
+    assert str(short).endswith(
+        "parts of 192 or more, without the first 32 and the last 32 of each; of 1,000 rows 936 are such"
+    )
     t = np.where(np.arange(N) < 1800, CLOCK, CLOCK + 7.0)
     parts = noise_of_rows(t, slice(0, 1800), slice(1800, 1900), slice(1900, N), y1_rad=np.where(t > 9.0, y + 1.0, y))
     assert isinstance(parts.tilt, WhiteNoise)
@@ -210,3 +213,19 @@ def test_what_follows_from_the_command_is_no_noise_of_the_acceleration() -> None
         noise = noise_of_rows(CLOCK, y1_rad=y, acceleration_rad_s2=true + n, **signals).acceleration
         assert isinstance(noise, WhiteNoise) == told
         assert not isinstance(noise, WhiteNoise) or noise.sigma == pytest.approx(0.4, rel=0.04)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "n_rows"), [((1087,), 1023), ((1088,), None), ((600, 500), 972), ((600, 600), None), ((1000, 191), 936)]
+)
+def test_the_rows_that_count_are_those_of_the_message(lengths: tuple[int, ...], n_rows: int | None) -> None:
+    y = motion(CLOCK) + white(np.random.default_rng(0))
+    ends = np.cumsum([0, *lengths])
+    parts = [slice(a, b) for a, b in pairwise(ends)]
+    noise = noise_of_rows(CLOCK, *parts, y1_rad=y).tilt
+    assert isinstance(noise, WhiteNoise) == (n_rows is None)
+    if n_rows is not None:
+        assert str(noise) == (
+            "it takes 1,024 rows, in parts of 192 or more, without the first 32 and the last 32 of each; "
+            f"of {sum(lengths):,} rows {n_rows:,} are such"
+        )
