@@ -60,6 +60,8 @@ def _loop_figures(loop: LoopComparison) -> dict[str, SummaryValue]:
         "worlds": loop.worlds,
         "given_stood": loop.stood[0],
         "tuned_stood": loop.stood[1],
+        "given_stood_alone": loop.stood_alone[0],
+        "tuned_stood_alone": loop.stood_alone[1],
         "tilt_rms_ratio": None if loop.ratio is None else [finite_or_none(value) for value in loop.ratio],
         "verdict": loop.verdict,
         "refused": loop.refused or None,
