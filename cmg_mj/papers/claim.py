@@ -17,8 +17,8 @@ MEANINGS: dict[Verdict, str] = {
     "reproduced within stated conditions": "it holds with something assumed by us (a push, a bias e, noise, a drive), "
     "with a misprint mended, or for a part of what is said; that stands below the claim",
     "illustrated": "it is a general statement, and holds for the systems on which it was tried; that is no proof",
-    "cannot be tested": "it was not found to hold, but is about something that the paper does not give, such as a "
-    "recording or a threshold; so that says nothing against it",
+    "cannot be tested": "whether it holds depends on something that the paper does not give, such as a recording, a "
+    "gain or a threshold; so what came out with ours speaks neither for it nor against it",
     "not reproduced": "it does not hold, and the reason stands below the claim",
 }
 """The rule by which `Claim.verdict` decides, in words."""
@@ -61,7 +61,7 @@ class Claim:
             measures, all of which must hold.
         assumes: Assumptions of ours that the claim depends on, each with its size in a few words.
         is_general: Whether the statement is a general one, which was tried on some systems and not proved.
-        missing_data: Data that the claim is about and the paper does not give, a whole sentence; empty if none.
+        missing_data: Data that the paper does not give and that decide the outcome, a whole sentence; empty if none.
         conditions: The misprint that was mended, or for which part it holds, a whole sentence; empty if neither.
         otherwise: Explanation where it does not hold, a whole sentence.
         figures: The numbers behind `result`, by names that end in their unit, as JSON can hold them.
@@ -107,12 +107,13 @@ class Claim:
     @property
     def verdict(self) -> Verdict:
         """The comparison of the paper with what was obtained: the one rule, whose words are `MEANINGS`."""
+        if self.missing_data:
+            return "cannot be tested"
         if not self.holds:
-            return "cannot be tested" if self.missing_data else "not reproduced"
+            return "not reproduced"
         if self.is_general:
             return "illustrated"
-        depends_on_us = self.assumes or self.conditions or self.missing_data
-        return "reproduced within stated conditions" if depends_on_us else "reproduced"
+        return "reproduced within stated conditions" if self.assumes or self.conditions else "reproduced"
 
     @property
     def reason(self) -> str:

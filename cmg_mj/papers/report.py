@@ -70,12 +70,6 @@ OURS: dict[Verdict, str] = {
     "not reproduced": "does not hold",
 }
 """The verdicts' words where there is no paper to reproduce."""
-PLURALS = {
-    "holds": "hold",
-    "holds within stated conditions": "hold within stated conditions",
-    "does not hold": "do not hold",
-}
-"""The same words of several claims."""
 
 
 def verdict_words(claim: Claim) -> str:
@@ -141,7 +135,9 @@ def _parts_of_claim(claim: Claim, log: SentenceLog) -> list[str]:
     if claim.assumes:
         parts.append(f"**Assumed by us:** {'; '.join(f'{name}: {size}' for name, size in claim.assumes.items())}.")
     if claim.reason:
-        parts.append(f"**{'Conditions' if claim.holds else 'Why not'}:** {log.omit_repeats(claim.reason, claim.place)}")
+        label = "Conditions" if claim.holds else "Why not"
+        label = "Why" if claim.verdict == "cannot be tested" else label
+        parts.append(f"**{label}:** {log.omit_repeats(claim.reason, claim.place)}")
     return parts + [f"![{picture.title}]({picture.name}.png)" for picture in claim.pictures]
 
 
@@ -153,11 +149,16 @@ def _count_of_verdicts(entries: Sequence[Reproduction]) -> str:
         counts = Counter(verdict_words(claim) for claim in claims if claim.is_ours is is_ours)
         if counts:
             order = [OURS[v] if is_ours else v for v in OURS]
-            counts_text = ", ".join(
-                f"{counts[v]} {PLURALS.get(v, v) if counts[v] > 1 else v}" for v in order if counts[v]
-            )
+            counts_text = ", ".join(_counted(counts[v], v) for v in order if counts[v])
             sentences.append(f"{sum(counts.values())} {words}: {counts_text}.")
     return " ".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
+
+
+def _counted(count: int, verdict: str) -> str:
+    """Write a verdict's count: `1 holds`, `6 hold`."""
+    plural = {"holds": "hold", "does": "do"}
+    first, *others = verdict.split(" ")
+    return " ".join([str(count), first if count == 1 else plural.get(first, first), *others])
 
 
 REPORT_FILES = ["report.md", "figures.json"]

@@ -14,6 +14,7 @@ import numpy as np
 
 from cmg_mj.controllers.dry_run import dry_run_observer
 from cmg_mj.errors import InputError, raised
+from cmg_mj.inputs.users_line import in_users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
 from cmg_mj.observers.protocol import extra_signals, needs
 from cmg_mj.observers.reduced_model import ReducedModel
@@ -191,8 +192,11 @@ def _ready(
                 raise
             left_out[name] = f"refused: {error}"
             continue
-        with np.errstate(all="ignore"):
-            dry_run_observer(observer, None)
+        try:
+            with np.errstate(all="ignore"):
+                dry_run_observer(observer, None)
+        except InputError as error:
+            raise InputError(f"observer {name!r}: {error}") from error
         ready[name] = observer
     if not ready:
         reasons = "; ".join(f"{name} {reason}" for name, reason in left_out.items())
@@ -214,7 +218,7 @@ def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
             except KeyboardInterrupt:
                 raise
             except BaseException as error:  # a user's observer may fail in any way
-                return f"raised {raised(error)}"
+                return f"raised {raised(error)}{in_users_line(error)}"
             if piece is None:
                 break
             if message := _not_finite(piece, log, len(store)):

@@ -18,7 +18,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, needs
 from cmg_mj.results import markdown
 from cmg_mj.results.baselines import GYROS, MEMS_FUSED, REFERENCES
-from cmg_mj.results.intervals import format_interval, in_line, positive_mean_interval
+from cmg_mj.results.intervals import format_interval, in_line, known_interval
 from cmg_mj.results.result import Result
 from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
 
@@ -31,8 +31,7 @@ def errors(result: Result, open_loop_observer: str | None = None) -> list[str]:
     cells = []
     for key in (ERROR, PUSH_ERROR):
         values = result.values(key, open_loop_observer)
-        known = values[np.isfinite(values)]
-        interval = positive_mean_interval(known) if len(known) else None
+        interval = known_interval(values, positive=True)
         figure = "-" if interval is None else f"{interval.mean:.4f}"
         cells.append(in_line([figure, *(format_interval("{:.4f}", interval) if interval else [])]))
     return cells

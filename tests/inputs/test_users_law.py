@@ -312,7 +312,12 @@ def test_a_law_that_changes_what_it_is_given_changes_no_record() -> None:
 
 
 @table(
-    ("raises", FailsLater, "law FailsLater raised ZeroDivisionError: division by zero at t = 0.15 s; "),
+    (
+        "raises",
+        FailsLater,
+        "law FailsLater raised ZeroDivisionError: division by zero at t = 0.15 s (test_users_law.py, line ",
+        "); ",
+    ),
     ("NaN", GivesNan, "law GivesNan returned nan for u at t = 0.15 s; "),
     ("infinity", GivesInfinity, "law GivesInfinity returned inf for u at t = 0.15 s; "),
     ("text", ReturnsTextLater, "law ReturnsTextLater raised TypeError: the law returned <U3 of shape (), not a real "),

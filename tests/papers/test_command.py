@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -120,7 +121,7 @@ def test_general_claims_and_those_without_data(monkeypatch: pytest.MonkeyPatch) 
     assert "**Assumed by us:** signal: a sine; noise: none." in report
     assert "### Table 2: cannot be tested" in report
     assert "**By measure:** (9): holds; (10): does not hold." in report
-    assert "**Why not:** The paper has no recording. Ours is another." in report
+    assert "**Why:** The paper has no recording. Ours is another." in report
     for verdict, meaning in MEANINGS.items():
         assert f"- *{verdict}*: {meaning}." in report
     figures = json.loads(cmg_mj("reproduce", "dao2023", "--json").out)
@@ -206,9 +207,14 @@ def test_the_verdict_follows_from_what_was_found() -> None:
         ({}, "reproduced", "not reproduced"),
         ({"conditions": "A misprint is mended."}, "reproduced within stated conditions", "not reproduced"),
         ({"assumes": {"push": "1 N m"}}, "reproduced within stated conditions", "not reproduced"),
-        ({"missing_data": "No recording is given."}, "reproduced within stated conditions", "cannot be tested"),
+        ({"missing_data": "No recording is given."}, "cannot be tested", "cannot be tested"),
         ({"is_general": True, "conditions": "One system."}, "illustrated", "not reproduced"),
         ({"is_general": True, "assumes": {"signal": "a sine"}}, "illustrated", "not reproduced"),
+        ({"missing_data": "No gain is given.", "assumes": {"gains": "2"}}, "cannot be tested", "cannot be tested"),
+        (
+            {"missing_data": "No gain is given.", "is_general": True, "conditions": "One system."},
+            *["cannot be tested"] * 2,
+        ),
     ],
 )
 def test_one_rule_decides(declared: dict[str, Any], holding: str, failing: str) -> None:
@@ -249,6 +255,13 @@ def test_conditions_and_otherwise_are_whole_sentences(name: str, text: str, hold
 def test_what_does_not_hold_is_explained() -> None:
     with pytest.raises(ValueError, match=r"Fig\. 9: otherwise: say what to make of it"):
         Claim(place="Fig. 9", statement="it is so", result="it is", holds=True, otherwise="")
+
+
+@pytest.mark.parametrize(("n_claims", "words"), [(1, "1 holds within stated"), (2, "2 hold within stated")])
+def test_ours_are_counted_in_good_english(n_claims: int, words: str) -> None:
+    claim = replace(OURS, holds=True, conditions="It is so on one rig.")
+    entry = papers.Reproduction("beyond", [claim] * n_claims, complete=True)
+    assert f"{n_claims} beside them, not the papers': {words} conditions." in report_text([entry])
 
 
 # --- without the packages of the extra [papers] ---------------------------------------------------------------

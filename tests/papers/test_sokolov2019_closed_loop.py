@@ -149,9 +149,9 @@ def test_verdicts_follow_the_lags_and_the_cycles(runs: Loops, lags: Lags, cycles
     assert figure_5(runs, lags, replace_cycles(luenberger=calm)).verdict == "not reproduced"
     by_itself = figure_5(runs, replace_lags("luenberger", True), replace_cycles(luenberger=calm))
     assert (by_itself.verdict, "backlash" in by_itself.assumes) == (WITHIN, False)
-    assert figure_6_at_rest(lags, replace_cycles(homogeneous=calm)).verdict == WITHIN
+    assert figure_6_at_rest(lags, replace_cycles(homogeneous=calm)).holds
     quiet = replace_cycles(homogeneous=calm, linear=calm, luenberger=calm)
-    assert figure_6_at_rest(lags, quiet).verdict == "cannot be tested"  # nothing for (10) to be without
+    assert not figure_6_at_rest(lags, quiet).holds  # nothing for (10) to be without
     assert cause_of_figure_5(lags, replace_cycles(**{WITH_Y2: Cycle(True, 0.1, 1.0)})).verdict == WITHIN
     other = cause_of_figure_5(lags, replace_cycles(**{WITH_Y2: Cycle(True, 0.12, 1.0)}))
     assert other.verdict == "not reproduced"

@@ -10,6 +10,7 @@ from scipy import stats
 
 from cmg_mj.errors import InputError
 from cmg_mj.results.intervals import (
+    FEWEST,
     Interval,
     known_interval,
     mean_interval,
@@ -111,6 +112,32 @@ def test_intervals_of_what_is_positive_and_skewed_cover_better_than_students(
     np.testing.assert_array_equal([found.mean for found in positive], [found.mean for found in student])
 
 
+@pytest.mark.parametrize("kind", SKEWED)
+def test_fewer_worlds_than_cover_have_no_interval(kind: str) -> None:
+    """Of `FEWEST` on it holds the mean as often as of six; of two its upper end could be 330,000 times the mean."""
+    mean, draw = SKEWED[kind]
+    samples = draw(np.random.default_rng(FEWEST), (4000, FEWEST))
+    results = [known_interval(values, positive=True) for values in samples]
+    intervals = [result for result in results if result is not None]
+    assert len(intervals) == len(samples)
+    assert covered(mean, intervals) > 0.87
+    assert np.median([interval.high / interval.mean for interval in intervals if interval.mean]) < 10.0
+    for n_worlds in range(FEWEST):
+        assert known_interval([0.1, 0.2, 0.3][:n_worlds], positive=True) is None
+    with pytest.raises(InputError, match="needs four worlds or more, not 2"):
+        positive_mean_interval([0.0, 1.0])
+
+
+def test_three_worlds_of_which_half_are_zero_are_not_covered() -> None:
+    """Hence `FEWEST`: the same formula of one world fewer."""
+    mean, draw = SKEWED["half are zero"]
+    samples = draw(np.random.default_rng(3), (4000, FEWEST - 1))
+    with np.errstate(invalid="ignore"):
+        factors = np.exp([(high - mean) / mean if mean else 0.0 for mean, _, high in map(mean_interval, samples)])
+    means = samples.mean(axis=1)
+    assert np.mean((means / factors <= mean) & (mean <= means * factors)) < 0.87
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", SKEWED)
 def test_a_bootstrap_of_few_worlds_covers_less(kind: str) -> None:
@@ -127,10 +154,11 @@ def test_narrow_intervals_are_students_and_zeros_have_none() -> None:
     values = np.random.default_rng(2).normal(1.0, 0.05, 20)
     assert positive_mean_interval(values) == pytest.approx(mean_interval(values), rel=5e-4)
     assert not positive_mean_interval(values).is_lopsided
-    assert positive_mean_interval([0.0, 0.0, 5.0]).is_lopsided
-    assert positive_mean_interval([0.0, 0.0]) == (0.0, 0.0, 0.0)
-    assert positive_mean_interval([1.0, np.inf])[1:] == (-np.inf, np.inf)
-    assert known_interval([1.0, np.nan, 2.0], positive=True) == positive_mean_interval([1.0, 2.0])
+    assert positive_mean_interval([0.0, 0.0, 0.0, 5.0]).is_lopsided
+    assert positive_mean_interval([0.0] * FEWEST) == (0.0, 0.0, 0.0)
+    assert positive_mean_interval([1.0, np.inf, 1.0, 2.0])[1:] == (-np.inf, np.inf)
+    known = [1.0, 2.0, 3.0, 4.0]
+    assert known_interval([np.nan, *known], positive=True) == positive_mean_interval(known)
 
 
 def test_ratio_interval_of_an_exact_ratio() -> None:

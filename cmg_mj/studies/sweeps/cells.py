@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmg_mj.results.intervals import Interval, finite_values, known_interval
+from cmg_mj.results.intervals import Interval, finite_mean, known_interval
 from cmg_mj.results.summary_keys import KEYS, Figures, Summary
 from cmg_mj.studies.sweeps.failure_reasons import Reasons
 from cmg_mj.studies.sweeps.study import SweepStudy
@@ -125,12 +125,11 @@ def _best(values: np.ndarray, key: str) -> int | None:
 
 
 def _with_ends(key: str, values: np.ndarray, positive: bool = False) -> Figures:
-    """Average the known values, with the mean's interval; a single value has none."""
+    """Average the known values, with the mean's interval; too few values have none."""
     interval = known_interval(values, positive)
     if interval is not None:
         return {key: interval.mean, f"{key}_low": interval.low, f"{key}_high": interval.high}
-    alone = finite_values(values)
-    return {key: float(alone[0]) if len(alone) else None, f"{key}_low": None, f"{key}_high": None}
+    return {key: finite_mean(values), f"{key}_low": None, f"{key}_high": None}
 
 
 def cells_schema(study: SweepStudy) -> pa.Schema:

@@ -79,9 +79,9 @@ class LoopComparison:
         if self.refused:
             return f"{loop} the parameters cannot be compared: {self.refused}."
         given, tuned = self.stood
-        line = f"{loop} the tuned parameters stand {tuned} times, the given ones {given}"
-        if any(self.stood_alone):
-            line += " (in {1} and {0} worlds alone)".format(*self.stood_alone)
+        given_alone, tuned_alone = self.stood_alone
+        line = f"{loop} the tuned parameters stand {tuned} times ({tuned_alone} where the given ones fall), "
+        line += f"the given ones {given} ({given_alone} where the tuned ones fall)"
         if self.ratio is not None:
             line += "; RMS of the tilt, given / tuned, {:.3f} ({:.3f} to {:.3f})".format(*self.ratio)
         words = {"better": "better there", "worse": "WORSE there", "tie": "not different there beyond chance"}

@@ -74,14 +74,12 @@ def test_the_loop_is_told_in_a_line(study: LogStudy) -> None:
     worse = LoopComparison("Push", 5.0, 8, (8, 6), (2, 0), Interval(0.5, 0.4, 0.6))
     text = table(replace(study, loop=worse))
     assert "In the closed loop of Push (8 worlds of 5 s, its rig, sensors and control rate) the tuned" in text
-    assert (
-        "stand 6 times, the given ones 8 (in 0 and 2 worlds alone)"
-        "; RMS of the tilt, given / tuned, 0.500 (0.400 to 0.600)" in text
-    )
-    assert "the tuned ones are WORSE there." in text
+    assert "stand 6 times (0 where the given ones fall), the given ones 8 (2 where the tuned ones fall)" in text
     figures = figures_of_logs(replace(study, loop=worse))["closed_loop"]
     assert isinstance(figures, dict)
     assert (figures["given_stood_alone"], figures["tuned_stood_alone"]) == (2, 0)
+    assert "; RMS of the tilt, given / tuned, 0.500 (0.400 to 0.600)" in text
+    assert "the tuned ones are WORSE there." in text
     refused = LoopComparison("Push", 5.0, 8, refused="linear: tau: too small")
     assert "cannot be compared: linear: tau: too small." in table(replace(study, loop=refused))
 
