@@ -293,7 +293,8 @@ def test_gains_reach_a_law_of_ones_own_that_takes_them() -> None:
     (
         "in place",
         ChangesWhatItIsGiven,
-        "step(state, y, x, u) raised ValueError: output array is read-only; many worlds",
+        "step(state, y, x, u) raised ValueError: output array is read-only (",
+        "); many worlds",
     ),
 )
 def test_a_law_for_one_world_among_many(quick: str, wrong_input: type, fragments: list[str]) -> None:
