@@ -42,7 +42,7 @@ Assumption = Literal[
     "signal",
     "threshold",
 ]
-"""What a claim depends on, is not printed in the paper, and was therefore assumed by us."""
+"""An assumption of ours: a claim depends on it, and the paper does not print it."""
 
 OnShare = Callable[[float], None]
 """Called with the share of a section that is done."""

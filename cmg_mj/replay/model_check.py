@@ -12,7 +12,7 @@ from cmg_mj.results.stored_columns import select_rows, stretches
 RATE_SPAN_S = 0.04
 """Time over which increments of the tilt give the rate in the model's damping term [s]."""
 MISFIT = 1.5
-"""Misfit from which a model is doubted. Of right models it is at most 1.15: docs/studies/model_misfit.py."""
+"""Misfit from which a model is doubted. Right models have at most 1.15: docs/studies/model_misfit.py."""
 
 
 def model_misfit(log: Log, model: ReducedModel) -> float | None:

@@ -24,7 +24,7 @@ CLEAR = 4.03
 """Standard errors of a 99.5 % interval, which a deviation leaves that is reported: one of 20 faultless logs would leave
 the other."""
 NOISE = 1.2
-"""What is left of the tilt is its white noise up to this ratio."""
+"""Ratio up to which the rest of the tilt is its white noise."""
 LATE = 0.1
 """Lag from which it is reported, in periods of the log's rows or its samples, the longer of the two."""
 NOTHING = 0.001

@@ -51,7 +51,7 @@ class FusedGyro:
         self._tilt_noise, self._walk = (gyro_sigma * dt) ** 2, bias_instability**2 * dt
         zero = 0.0 * self._R
         self.covariance: tuple[Scalar, Scalar, Scalar] = self._R, zero, rate_start**2 + gyro_sigma**2 + zero
-        """Of the errors of x1 and b after the last sample: of x1, of both, of b."""
+        """Covariance of the errors of x1 and b after the last sample: of x1, of both, of b."""
         self._gains: list[tuple[Scalar, Scalar]] = []
         self._is_settled = False
         self._turned = self._reading = self._x1 = self._turn = np.zeros(len(sigmas))

@@ -125,7 +125,7 @@ class ColumnStore:
     Args:
         n_columns: Number of columns.
         folder: Folder for a file without a name, to which the rows of one world go as soon as they are a stretch; None
-            to keep them in memory. What the disk does not take stays in memory too.
+            to keep them in memory. Rows that the disk does not take stay in memory too.
     """
 
     def __init__(self, n_columns: int, folder: Path | None = None) -> None:

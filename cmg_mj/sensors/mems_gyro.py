@@ -119,7 +119,7 @@ class MemsGyro:
         return read
 
     def _shown(self, rate: np.ndarray, errors: np.ndarray) -> np.ndarray:
-        """What is read of a true rate with these errors of the zero, (n_rows, n_worlds) [rad/s]."""
+        """Read a true rate with these errors of the zero, (n_rows, n_worlds) [rad/s]."""
         step = math.radians(1.0 / self.counts_per_deg_s) if self.counts_per_deg_s else 0.0
         return digitise((1.0 + self.scale_error) * rate + errors, math.radians(self.range_deg_s), step)
 

@@ -59,7 +59,7 @@ def test_the_error_of_the_bias_is_the_riccati_equations(tilt: float) -> None:
     standard_error = squares.std(ddof=1) / math.sqrt(WORLDS)
     assert abs(squares.mean() - expected) < 4.0 * standard_error < 0.15 * expected
     assert fused.covariance[2] == pytest.approx(expected, rel=0.01)
-    # What is left of the rate's error is the reading's own noise.
+    # The rest of the rate's error is the reading's own noise.
     errors = reading - biases - rate
     assert np.square(errors)[1500:].mean() == pytest.approx(SIGMA**2 + expected, rel=0.05)
 

@@ -39,7 +39,7 @@ FEWEST = 1024
 """Fewest rows for an estimate, those counted for which `_without_motion` knows the motion."""
 BLOCK = 16384
 MOST_BLOCKS = 8
-"""Of a longer log so many blocks of rows are taken, spread evenly."""
+"""Blocks of rows, spread evenly, that a longer log gives."""
 OUTLIER = 5.0
 """Segments with more than so many times the median power hold a spike or a blow, and do not count."""
 FEW_OUTLIERS = 0.3

@@ -29,7 +29,7 @@ LONGEST_AFTER_S = 12.0
 """Longest time to wait for a pushed robot to recover or fall [s]."""
 OTHER_WORLDS = 20
 AFTER_LONGER = 3.0
-"""What was found is tried on so many other worlds, each way, and so many times longer: where the ceiling is low some
+"""The result is tried on so many other worlds, each way, and so many times longer: where the ceiling is low some
 worlds stand the push and fall of the noise while the gimbals come back."""
 RESOLUTION = 0.05
 """The search ends where a push that all worlds stand and one that not all stand differ by such a share."""

@@ -60,7 +60,7 @@ def times(kind: str, n: int, random: np.random.Generator) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", ["even", "uneven", "missing rows"])
 def test_the_interval_covers_the_truth(kind: str) -> None:
-    """Of 60 seeds 95 % are 57; 52 or fewer come once in a hundred times."""
+    """95 % of 60 seeds are 57; 52 or fewer come once in a hundred times."""
     covered, sizes = 0, []
     for seed in range(60):
         random = np.random.default_rng(seed)

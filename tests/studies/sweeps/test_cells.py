@@ -27,7 +27,7 @@ def test_the_share_of_falls_is_of_those_that_fell_or_stood() -> None:
 
 
 def test_cells_of_few_worlds_have_their_mean_and_no_interval() -> None:
-    """Of what cannot be negative three worlds make no interval; of what can, they do."""
+    """Three worlds make no interval of what cannot be negative; of what can, they do."""
     few = _with_ends("error", np.array([1.0, np.nan, 2.0, 6.0]), positive=True)
     assert few == {"error": 3.0, "error_low": None, "error_high": None}
     assert _with_ends("error", np.array([1.0, np.nan, 2.0, 6.0]))["error_low"] is not None
