@@ -66,8 +66,8 @@ def positive_mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
     """Compute an interval of the mean of what cannot be negative, such as a settle time.
 
     It is Student's in the logarithm of the mean, whose standard error is that of the mean over the mean: no end is
-    below zero, and the upper one is the farther. If skewed, it holds the mean more often than Student's, and than
-    a bootstrap of few worlds (`tests/results/test_intervals.py`); of narrow ones it is Student's.
+    below zero, and the upper one is the farther. For skewed values it holds the mean more often than Student's interval
+    and than a bootstrap of few worlds (`tests/results/test_intervals.py`); for narrow ones it is Student's.
 
     Args:
         values: One a world, at least `FEWEST`, none below zero.
