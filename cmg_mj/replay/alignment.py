@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.replay.lag import STRETCHES, Piece, jackknife_stretches, lag_with_error
-from cmg_mj.results.stored_columns import LONG, stretches
+from cmg_mj.results.stored_columns import stretches
 
 SPAN_S = 0.2
 """Time over which increments of the tilt and of the integrated reference are compared [s]; slopes are mostly noise."""
@@ -51,25 +51,16 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
         The alignment.
     """
     span = max(2, round(SPAN_S / dt))
-    if sum(map(len, tilt)) > LONG:
-        return _alignment_by_stretches(tilt, reference, dt, span)
     pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
-    rises = [y[span:] - y[:-span] for y, _ in pieces]
-    late = lag_with_error([_travelled(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
+    rises = [_Rises(y, span) for y, _ in pieces]
+    late = lag_with_error([_Travels(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
     lag_s, lag_error = late or (None, None)
-    travels = [_travelled(rate, span, dt, lag_s or 0.0) for _, rate in pieces]
-    if not rises:
+    fit = _Fit.of(rises, [_Travels(rate, span, dt, lag_s or 0.0) for _, rate in pieces])
+    line = fit and fit.line(fit.sums.sum(axis=0))
+    if fit is None or line is None:
         return Alignment(lag_s, None, None, None)
-    fit = _Fit.of(rises, travels)
-    rise, travel = np.concatenate(rises), np.concatenate(travels)
-    rise, travel = rise[np.isfinite(travel)], travel[np.isfinite(travel)]
-    rounding = np.finfo(float).eps * len(travel) * float(np.abs(travel).max(initial=0.0))
-    if len(rise) < 3 or not np.ptp(travel) > rounding or not np.ptp(rise) > 0.0:
-        return Alignment(lag_s, None, None, None)
-    correlation = float(np.corrcoef(rise, travel)[0, 1])
-    slope, start = np.polynomial.polynomial.polyfit(travel, rise, 1)[::-1]
-    errors = fit.errors(span * dt) if fit else (None, None, None)
-    return Alignment(lag_s, float(slope), float(start / (span * dt)), correlation, lag_error, *errors)
+    errors = fit.errors(span * dt)
+    return Alignment(lag_s, line.slope, line.start / (span * dt), line.correlation, lag_error, *errors)
 
 
 @dataclass(frozen=True)
@@ -105,22 +96,6 @@ class _Travels:
         first = max(0, start - margin)
         rate = self.rate[first : stop + self.span + margin]
         return _travelled(rate, self.span, self.dt, self.lag_s)[start - first : stop - first]
-
-
-def _alignment_by_stretches(
-    tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: float, span: int
-) -> Alignment:
-    """Compare as `alignment` does, in sums over stretches."""
-    pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
-    rises = [_Rises(y, span) for y, _ in pieces]
-    late = lag_with_error([_Travels(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
-    lag_s, lag_error = late or (None, None)
-    fit = _Fit.of(rises, [_Travels(rate, span, dt, lag_s or 0.0) for _, rate in pieces])
-    line = fit and fit.line(fit.sums.sum(axis=0))
-    if fit is None or line is None:
-        return Alignment(lag_s, None, None, None)
-    errors = fit.errors(span * dt)
-    return Alignment(lag_s, line.slope, line.start / (span * dt), line.correlation, lag_error, *errors)
 
 
 class _Line(NamedTuple):
@@ -169,7 +144,8 @@ class _Fit:
             return None
         means = sums[0, 1:] / n
         (xx, xy), (_, yy) = sums[1:, 1:] - n * np.outer(means, means)
-        if not xx > 0.0 or not yy > 0.0:
+        rounding = n * (n * np.finfo(float).eps * (means + self.middle[1:])) ** 2
+        if not xx > rounding[0] or not yy > rounding[1]:
             return None
         slope = xy / xx
         start = (means[1] + self.middle[2]) - slope * (means[0] + self.middle[1])
