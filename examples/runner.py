@@ -16,7 +16,7 @@ print(result.outcomes[0])
 for name, value in result.summaries[0].items():
     if isinstance(value, float):
         print(f"  {name}: {value:.4g}")
-for name in ("zero", "mems_gyro", "floor_y1", "floor_accel"):  # the baselines
+for name in ("zero", "mems_as_bought", "mems_gyro", "mems_fused", "floor_y1", "floor_accel"):  # the baselines
     print(f"  error of {name}: {result.mean('velocity_rms_error_rad_s', name):.4g} rad/s")
 error = result.trajectory["estimate/homogeneous/x2_rad_s"] - result.trajectory["x2_rad_s"]
 print(f"largest velocity error: {np.abs(error).max():.3f} rad/s")

@@ -31,8 +31,8 @@ _LOG_OPTIONS = all_of(
         "--columns",
         multiple=True,
         metavar="ROLE=HEADING,...",
-        help="Roles of the columns: time, tilt, rate (the reference), inner_x, inner_z, outer_x, outer_z, "
-        "acceleration, gimbal (or gimbal1, gimbal2), command. Not for a run's own recording.",
+        help="Roles of the columns: time, tilt, rate (the reference), ax, az, inner_x, inner_z, outer_x, "
+        "outer_z, acceleration, gimbal (or gimbal1, gimbal2), command. Not for a run's own recording.",
     ),
     click.option(
         "--units",
@@ -67,7 +67,7 @@ def noise_option() -> Decorator:
         default="",
         metavar="NAME=VALUE,...",
         help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of "
-        "one sample.  [default: accelerometer=400, or tilt=0.1,acceleration=1]",
+        "one sample.  [default: by the log; if it cannot tell, accelerometer=400, or tilt=0.1,acceleration=1]",
     )
 
 

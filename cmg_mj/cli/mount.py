@@ -95,8 +95,9 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
 @click.option(
     "--free-base",
     "base",
-    flag_value="free",
-    default="as_is",
+    is_flag=True,
+    # click 8.1 takes a default beside flag_value for a flag that is set.
+    callback=lambda *arguments: "free" if arguments[-1] else "as_is",
     help="Replace the joints of the robot's root by a free joint.",
 )
 @observer_option(default="gyro_free")
@@ -131,5 +132,5 @@ def mount(
         )
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:
-        note_hints(result.prospects.hints)
+        note_hints(result.hints)
         note(f"wrote {result.path} and {result.scenario_path}; try: cmg-mj run {result.scenario_path}")

@@ -19,7 +19,10 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     PAPER may also be beyond: a table of every observer over 100 seeds, which is in no paper and takes some minutes.
 
     Writes a folder: report.md, its plots, and figures.json. The report compares every claim of the paper with the
-    figures obtained here. The verdicts are reproduced, reproduced within stated conditions, or not reproduced and why.
+    figures obtained here. One rule decides the verdicts: reproduced if it holds and all that it depends on is printed
+    in the paper; reproduced within stated conditions if something is assumed by us (a push, a bias, noise, a drive);
+    illustrated if it is a general statement tried on some systems; cannot be tested if it is about data that the paper
+    does not give; else not reproduced, and why. The exit status is 0 whatever the verdicts are.
     """
     from cmg_mj.papers import BEYOND, PAPERS, check_installed
     from cmg_mj.papers import reproduce as reproduce_papers

@@ -83,6 +83,7 @@ def sweep(
       report.md       the tables, with pictures
       study.toml      reruns the sweep
     """  # noqa: D301  (click wants the character itself)
+    from cmg_mj.scenario.differences import safe_name
     from cmg_mj.studies.sweeps.cells import COLUMNS, Trials
     from cmg_mj.studies.sweeps.chunk_store import Store
     from cmg_mj.studies.sweeps.plan import estimate_cost
@@ -105,7 +106,7 @@ def sweep(
             "--yes (--dry-run prints the time and memory)"
         )
     with _runner(cluster) as run:
-        folder = claim_output(arguments.out, f"sweep-{Path(arguments.name).stem}", FILES)
+        folder = claim_output(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}", FILES)
         store = Store(folder.path, study)
         before = store.open(on_damage=note)
         if before:

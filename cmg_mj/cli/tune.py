@@ -124,6 +124,12 @@ def tune(
     metavar="SECONDS",
     help="Seconds to ignore at the start of each part of a log.",
 )
+@click.option(
+    "--closed-loop",
+    metavar="SCENARIO",
+    help="Scenario in whose closed loop the tuned parameters are compared with the given ones; none for no loop.  "
+    "[default: push_recovery, or that of a run's recording]",
+)
 @pendulum_option()
 @noise_option()
 @settings_option("Set a parameter to start from and to compare with.", "observer.NAME=VALUE")
@@ -138,6 +144,7 @@ def tune_log(
     ranges: tuple[str, ...],
     split: float,
     settle_s: float,
+    closed_loop: str | None,
     model: str | None,
     noise: str,
     settings: tuple[str, ...],
@@ -149,8 +156,9 @@ def tune_log(
     \b
       cmg-mj tune-log LOG.csv --columns tilt=pitch_deg,rate=gyro_dps --observer linear
 
-    The score is the RMS of the estimated rate less the reference, compared with that of the parameters as given. Logs
-    are read as in replay. Writes a folder with tuned.json.
+    The score is the RMS of the estimated rate less the reference, compared with that of the parameters as given: better
+    is better by more than 1 % and beyond chance. Sixteen short worlds show what both do in a closed loop. Logs are read
+    as in replay. Writes a folder with tuned.json.
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.replay.logs import read_log
     from cmg_mj.replay.logs.checks import check_distinct_logs
@@ -160,6 +168,7 @@ def tune_log(
     from cmg_mj.scenario.differences import safe_name
     from cmg_mj.studies.save import file_name
     from cmg_mj.studies.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
+    from cmg_mj.studies.tuning.closed_loop import loop_scenario
     from cmg_mj.studies.tuning.save_on_logs import FILES
 
     for setting in settings:
@@ -170,6 +179,7 @@ def tune_log(
     check_distinct_logs(logs)
     recordings = [read_log(path, options) for path in logs]
     pendulum = None if model is None else model_of(model)
+    loop = loop_scenario(closed_loop, recordings[0])
     folder = claim_output(out, f"tune-{file_name(observer)}-{safe_name(recordings[0].name)}", FILES)
     with CtrlC() as ctrl_c:
         with progress(f"{recordings[0].name}: {observer}", 1.0, ctrl_c) as on_progress:
@@ -183,6 +193,7 @@ def tune_log(
                 settle_s=settle_s,
                 parameters=names_in(parameters),
                 ranges=_ranges(ranges),
+                closed_loop=loop,
                 on_share=on_progress,
             )
         show(figures_of_logs(study), logs_table(study), as_json)

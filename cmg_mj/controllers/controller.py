@@ -157,6 +157,8 @@ class Controller:
             None if type(self.backlash) is float and not self.backlash else Backlash(self.backlash, self.law.dt)
         )
         self._true_rate: Scalar = math.nan
+        self.body_rate: Scalar = math.nan
+        """Rate of the frame along the tilt axis at the last update, as a perfect gyro on it shows [rad/s]."""
         self.coriolis: Scalar | None = None
         """Coriolis part of the measured angular acceleration, on a plant that turns [rad/s^2]."""
         self.step: int | None = None
@@ -229,6 +231,7 @@ class Controller:
         """Take the samples that are due at a physics step: see `update`."""
         first, self.step = self.step is None, step
         self._true_rate = ideal.rate
+        self.body_rate = ideal.gyro
         for sensor in self._sampled:
             if step % sensor.steps_per_sample == 0 or first:  # a start between two samples still has something to show
                 sensor.sample(step, ideal)

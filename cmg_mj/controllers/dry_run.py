@@ -10,6 +10,7 @@ import numpy as np
 from cmg_mj.controllers.laws.protocol import Law, feedback_state
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, listed, raised, shown
+from cmg_mj.inputs.users_line import in_users_line
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.runner import read_only
@@ -33,7 +34,9 @@ def dry_run_observer(observer: Observer, worlds: int | None) -> None:
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # a user's observer may fail in any way
-        raise InputError(f"{call} raised {raised(error)}{_longer_estimate(error)}{_hint(worlds)}") from error
+        raise InputError(
+            f"{call} raised {raised(error)}{in_users_line(error)}{_longer_estimate(error)}{_hint(worlds)}"
+        ) from error
     try:
         _, estimate = returned
         if not hasattr(estimate, "__len__"):  # a generator, which could be read once
@@ -65,7 +68,7 @@ def dry_run_law(law: Law, extra: int, worlds: int | None) -> None:
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # a user's law may fail in any way
-        raise InputError(f"{call} raised {raised(error)}{_hint(worlds)}") from error
+        raise InputError(f"{call} raised {raised(error)}{in_users_line(error)}{_hint(worlds)}") from error
     trimmed = getattr(law, "trim_gain", None) is not None
     if trimmed and not (hasattr(state, "_replace") and hasattr(state, "x_e")):
         raise InputError(f"has a trim_gain, so its state must be a NamedTuple with x_e, not {shown(state)}")

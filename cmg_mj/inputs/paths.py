@@ -37,9 +37,26 @@ def require_file(path: Path) -> None:
     try:
         if path.is_file():
             if not is_text(str(path.resolve())):  # MuJoCo opens no such file
-                raise InputError(f"{name}: not UTF-8 text, or in a folder whose name is none")
+                raise InputError(f"{name}: {not_text(path, path.resolve())}")
             return
         what = "is a folder" if path.is_dir() else "is no ordinary file" if path.exists() else "no such file"
     except OSError as error:  # a name that is too long, a folder that may not be looked into
         what = f"cannot be read: {error.strerror}"
     raise InputError(f"{name}: {what}")
+
+
+def not_text(path: Path, whole: Path) -> str:
+    """Say which part of a path is not UTF-8 text, though it must be.
+
+    Args:
+        path: The path as the user wrote it.
+        whole: The whole path, with a part that is not UTF-8 text.
+
+    Returns:
+        The clause.
+    """
+    why = "is not UTF-8 text, and MuJoCo opens no such file"
+    if not is_text(path.name):
+        return f"the file's name {why}"
+    part = next((part for part in reversed(whole.parts[:-1]) if not is_text(part)), None)
+    return f"the file's name {why}" if part is None else f"the name of the folder {shown(part)} in its path {why}"

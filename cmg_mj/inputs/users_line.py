@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sysconfig
 from pathlib import Path
 from types import TracebackType
 
-_OURS = str(Path(__file__).resolve().parents[1])
+_OURS = f"{Path(__file__).resolve().parents[1]}{os.sep}"
 _STANDARD = sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib")
 _OTHERS = {"site-packages", "dist-packages"}
 
@@ -25,3 +26,9 @@ def users_line(traceback: TracebackType | None) -> str | None:
             line = f"{path.name}, line {traceback.tb_lineno}"
         traceback = traceback.tb_next
     return line
+
+
+def in_users_line(error: BaseException) -> str:
+    """Return ` (own.py, line 12)`, to follow what an error raised; nothing if no line is the user's."""
+    line = users_line(error.__traceback__)
+    return "" if line is None else f" ({line})"

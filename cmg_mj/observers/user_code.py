@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmg_mj.errors import RunStopped, raised
+from cmg_mj.inputs.users_line import in_users_line
 
 
 class UserCode(NamedTuple):
@@ -26,7 +27,8 @@ class UserCode(NamedTuple):
         Raises:
             RunStopped: Always.
         """
-        raise RunStopped(f"{self.kind} {self.name} {failure} at t = {step * self.timestep:g} s") from cause
+        line = "" if cause is None else in_users_line(cause)
+        raise RunStopped(f"{self.kind} {self.name} {failure} at t = {step * self.timestep:g} s{line}") from cause
 
     def fail_from(self, error: BaseException, step: int) -> NoReturn:
         """Stop the run at a physics step because the user's code raised.

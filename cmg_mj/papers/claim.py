@@ -4,11 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from cmg_mj.visualization.plots.figure_spec import Picture
 
-Verdict = Literal["reproduced", "reproduced within stated conditions", "not reproduced"]
+Verdict = Literal[
+    "reproduced", "reproduced within stated conditions", "illustrated", "cannot be tested", "not reproduced"
+]
+
+MEANINGS: dict[Verdict, str] = {
+    "reproduced": "it holds, and all that it depends on is printed in the paper",
+    "reproduced within stated conditions": "it holds with something assumed by us (a push, a bias e, noise, a drive), "
+    "with a misprint mended, or for a part of what is said; that stands below the claim",
+    "illustrated": "it is a general statement, and holds for the systems on which it was tried; that is no proof",
+    "cannot be tested": "whether it holds depends on something that the paper does not give, such as a recording, a "
+    "gain or a threshold; so what came out with ours speaks neither for it nor against it",
+    "not reproduced": "it does not hold, and the reason stands below the claim",
+}
+"""The rule by which `Claim.verdict` decides, in words."""
+
+Assumption = Literal[
+    "push",
+    "e",
+    "noise",
+    "drive",
+    "servo",
+    "backlash",
+    "bearing",
+    "body",
+    "mismatch",
+    "friction",
+    "control rate",
+    "method",
+    "gains",
+    "initial values",
+    "duration",
+    "signal",
+    "threshold",
+]
+"""An assumption of ours: a claim depends on it, and the paper does not print it."""
 
 OnShare = Callable[[float], None]
 """Called with the share of a section that is done."""
@@ -16,52 +50,75 @@ OnShare = Callable[[float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One figure, table, remark, proof or statement. Its verdict follows from what was found.
+    """One figure, table, remark, proof or statement. Its verdict follows from what was found and what is declared.
 
     Attributes:
         place: Place in the paper: `Fig. 2`, `Remark 1`, `Section V`.
         statement: Statement of the paper there, in our words.
         result: Result obtained, with its figures, in words.
         table: More figures than a sentence bears, as a Markdown table below the words.
-        holds: Whether what was obtained bears the paper out, computed from the figures.
-        conditions: Under which conditions it holds, a whole sentence; empty if it holds outright.
+        holds: Whether what was obtained bears the paper out, computed from the figures; or that by each of several
+            measures, all of which must hold.
+        assumes: Assumptions of ours that the claim depends on, each with its size in a few words.
+        is_general: Whether the statement is a general one, which was tried on some systems and not proved.
+        missing_data: Data that the paper does not give and that decide the outcome, a whole sentence; empty if none.
+        conditions: The misprint that was mended, or for which part it holds, a whole sentence; empty if neither.
         otherwise: Explanation where it does not hold, a whole sentence.
         figures: The numbers behind `result`, by names that end in their unit, as JSON can hold them.
         pictures: Plots.
         is_ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
+        measures: Measure -> whether it holds by it, if `holds` was told by each.
     """
 
     place: str
     statement: str
     result: str
     table: str = ""
-    holds: bool
+    holds: bool | Mapping[str, bool]
+    assumes: Mapping[Assumption, str] = field(default_factory=dict)
+    is_general: bool = False
+    missing_data: str = ""
     conditions: str = ""
     otherwise: str = "The figures above do not bear it out."
     figures: Mapping[str, Any] = field(default_factory=dict)
     pictures: Sequence[Picture] = ()
     is_ours: bool = False
+    measures: Mapping[str, bool] = field(init=False)
 
     def __post_init__(self) -> None:
-        for name in ("conditions", "otherwise"):
+        for name in ("conditions", "otherwise", "missing_data"):
             text = getattr(self, name)
             if text and not (" " in text and text.endswith(".")):
                 raise ValueError(f"{self.place}: {name} = {text!r}: must be a whole sentence, which the report prints")
         if not self.otherwise:
             raise ValueError(f"{self.place}: otherwise: say what to make of it where it does not hold")
-        object.__setattr__(self, "holds", bool(self.holds))  # numpy's truth is no JSON
+        if self.is_general and not (self.conditions or self.assumes):
+            raise ValueError(f"{self.place}: conditions: say on which systems a general statement was tried")
+        unknown_names = sorted(set(self.assumes) - set(get_args(Assumption)))
+        if unknown_names:
+            raise ValueError(f"{self.place}: assumes: {', '.join(unknown_names)}: no `Assumption`")
+        measures = self.holds if isinstance(self.holds, Mapping) else {}
+        if isinstance(self.holds, Mapping) and not measures:
+            raise ValueError(f"{self.place}: holds: name a measure")
+        holds = all(measures.values()) if measures else self.holds
+        object.__setattr__(self, "measures", {name: bool(value) for name, value in measures.items()})
+        object.__setattr__(self, "holds", bool(holds))  # numpy's truth is no JSON
 
     @property
     def verdict(self) -> Verdict:
-        """The comparison of the paper with what was obtained."""
+        """The comparison of the paper with what was obtained: the one rule, whose words are `MEANINGS`."""
+        if self.missing_data:
+            return "cannot be tested"
         if not self.holds:
             return "not reproduced"
-        return "reproduced within stated conditions" if self.conditions else "reproduced"
+        if self.is_general:
+            return "illustrated"
+        return "reproduced within stated conditions" if self.assumes or self.conditions else "reproduced"
 
     @property
     def reason(self) -> str:
         """The conditions under which it holds, or why it does not; empty if it holds outright."""
-        return self.conditions if self.holds else self.otherwise
+        return " ".join(text for text in (self.missing_data, self.conditions if self.holds else self.otherwise) if text)
 
 
 @dataclass(frozen=True)

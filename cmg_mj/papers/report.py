@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cmg_mj.papers import BEYOND, PAPERS, Reproduction
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import MEANINGS, Claim, Verdict
 from cmg_mj.papers.sentences import SentenceLog
 from cmg_mj.results import markdown
 from cmg_mj.results.run_folder import RunFolder, Writers, claimed, write_text
@@ -41,6 +41,10 @@ def _figures_of_claim(claim: Claim) -> dict[str, Any]:
         "found": claim.result,
         "table": claim.table,
         "verdict": claim.verdict,
+        "measures": dict(claim.measures),
+        "assumes": dict(claim.assumes),
+        "general": claim.is_general,
+        "missing": claim.missing_data,
         "why": claim.reason,
         "ours": claim.is_ours,
         "figures": dict(claim.figures),
@@ -58,9 +62,11 @@ def verdict_table(entries: Sequence[Reproduction]) -> str:
     return markdown.table(("paper", "place", "claim", "verdict"), rows, text_columns=4)
 
 
-OURS = {
+OURS: dict[Verdict, str] = {
     "reproduced": "holds",
     "reproduced within stated conditions": "holds within stated conditions",
+    "illustrated": "illustrated",
+    "cannot be tested": "cannot be tested",
     "not reproduced": "does not hold",
 }
 """The verdicts' words where there is no paper to reproduce."""
@@ -83,30 +89,25 @@ def report_text(entries: Sequence[Reproduction]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-MEANINGS = {
-    "reproduced": "what was obtained bears the claim out, as the paper says it",
-    "reproduced within stated conditions": "it does under conditions that the paper does not name, or with a misprint "
-    "mended; they stand below the claim",
-    "not reproduced": "it does not, and the reason stands below the claim",
-}
-"""The meanings of the verdicts."""
-
-
 def _opening(entries: Sequence[Reproduction]) -> list[str]:
-    """List the meanings of the verdicts, their counts, and the claims that were not reproduced."""
+    """List the meanings of the verdicts, their counts, and the claims that do not hold or cannot be tested."""
     parts = [
-        "Each claim stands beside what this software obtains. Its verdict is computed from the figures behind it, "
-        "and no parameter was tuned to bring one about.",
+        "Each claim stands beside what this software obtains. Its verdict is computed, by one rule, from the figures "
+        "behind it and from what it is declared to depend on; no parameter was tuned to bring one about.",
         "\n".join(f"- *{verdict}*: {meaning}." for verdict, meaning in MEANINGS.items()),
+        "A claim of several measures is judged by each: all must hold. What the bench assumes of the rig, claim or no "
+        "claim, is in docs/assumptions.md.",
         _count_of_verdicts(entries),
     ]
-    failed = [
-        f"- {entry.paper}, {claim.place}{_owner_note(claim)}: {claim.statement}"
-        for entry in entries
-        for claim in entry.claims
-        if not claim.holds
-    ]
-    return [*parts, "Not reproduced:", "\n".join(failed)] if failed else parts
+    for verdict in ("not reproduced", "cannot be tested"):
+        places = [
+            f"- {entry.paper}, {claim.place}{_owner_note(claim)}: {claim.statement}"
+            for entry in entries
+            for claim in entry.claims
+            if claim.verdict == verdict
+        ]
+        parts += [f"{verdict.capitalize()}:", "\n".join(places)] if places else []
+    return parts
 
 
 def _owner_note(claim: Claim) -> str:
@@ -128,8 +129,15 @@ def _parts_of_claim(claim: Claim, log: SentenceLog) -> list[str]:
     ]
     if claim.table:
         parts.append(claim.table)
+    if claim.measures:
+        words = "; ".join(f"{name}: {'holds' if holds else 'does not hold'}" for name, holds in claim.measures.items())
+        parts.append(f"**By measure:** {words}.")
+    if claim.assumes:
+        parts.append(f"**Assumed by us:** {'; '.join(f'{name}: {size}' for name, size in claim.assumes.items())}.")
     if claim.reason:
-        parts.append(f"**{'Conditions' if claim.holds else 'Why not'}:** {log.omit_repeats(claim.reason, claim.place)}")
+        label = "Conditions" if claim.holds else "Why not"
+        label = "Why" if claim.verdict == "cannot be tested" else label
+        parts.append(f"**{label}:** {log.omit_repeats(claim.reason, claim.place)}")
     return parts + [f"![{picture.title}]({picture.name}.png)" for picture in claim.pictures]
 
 
@@ -141,9 +149,16 @@ def _count_of_verdicts(entries: Sequence[Reproduction]) -> str:
         counts = Counter(verdict_words(claim) for claim in claims if claim.is_ours is is_ours)
         if counts:
             order = [OURS[v] if is_ours else v for v in OURS]
-            counts_text = ", ".join(f"{counts[v]} {v}" for v in order if counts[v])
+            counts_text = ", ".join(_counted(counts[v], v) for v in order if counts[v])
             sentences.append(f"{sum(counts.values())} {words}: {counts_text}.")
     return " ".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
+
+
+def _counted(count: int, verdict: str) -> str:
+    """Write a verdict's count: `1 holds`, `6 hold`."""
+    plural = {"holds": "hold", "does": "do"}
+    first, *others = verdict.split(" ")
+    return " ".join([str(count), first if count == 1 else plural.get(first, first), *others])
 
 
 REPORT_FILES = ["report.md", "figures.json"]

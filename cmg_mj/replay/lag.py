@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -34,6 +34,13 @@ class Piece(Protocol):
         ...
 
 
+class Lag(NamedTuple):
+    """A lag and its standard error [s]."""
+
+    value: float
+    error: float
+
+
 def lag(
     behind: Sequence[Piece],
     ahead: Sequence[Piece],
@@ -57,6 +64,17 @@ def lag(
         The lag [s], negative if the signal comes before the other. None for no motion, a low correlation (`ALIKE`), a
         peak at the end, or a standard error (jackknife over `STRETCHES`) above a sample and above half of the lag.
     """
+    result = lag_with_error(behind, ahead, dt, longest_s)
+    return None if result is None else result.value
+
+
+def lag_with_error(
+    behind: Sequence[Piece],
+    ahead: Sequence[Piece],
+    dt: float,
+    longest_s: float = LONGEST_LAG_S,
+) -> Lag | None:
+    """Find a lag as `lag` does, with its standard error."""
     size = max((len(piece) for piece in behind), default=0)
     reach = min(math.ceil(longest_s / dt), (size - 1) // 4)
     if reach < 1:
@@ -71,7 +89,7 @@ def lag(
     if len(known) < max(2, len(others)):
         return None
     error = math.sqrt((len(known) - 1) * float(np.var(known)))
-    return peak * dt if error <= max(1.0, abs(peak) / 2.0) else None
+    return Lag(peak * dt, error * dt) if error <= max(1.0, abs(peak) / 2.0) else None
 
 
 def _sums(behind: Sequence[Piece], ahead: Sequence[Piece], reach: int) -> np.ndarray:
@@ -81,7 +99,7 @@ def _sums(behind: Sequence[Piece], ahead: Sequence[Piece], reach: int) -> np.nda
     # Numbers of like size: of the products of transforms, what is far smaller than the largest is lost.
     middle_x, middle_y = _mean(behind), _mean(ahead)
     sums = np.zeros((STRETCHES, 6, 2 * reach + 1))
-    for stretch, piece, rows in _stretches([len(piece) for piece in behind], 2 * reach):
+    for stretch, piece, rows in jackknife_stretches([len(piece) for piece in behind], 2 * reach):
         around = slice(max(0, rows.start - reach), rows.stop + reach)
         x, y = behind[piece][around] - middle_x, ahead[piece][rows] - middle_y
         known_x, known_y = np.isfinite(x), np.isfinite(y)
@@ -108,7 +126,7 @@ def _mean(pieces: Sequence[Piece]) -> float:
     return total / count if count else 0.0
 
 
-def _stretches(sizes: Sequence[int], least: int) -> Iterator[tuple[int, int, slice]]:
+def jackknife_stretches(sizes: Sequence[int], least: int) -> Iterator[tuple[int, int, slice]]:
     """Cut all pieces longer than the least into `STRETCHES` of equal size: stretch, piece and its rows."""
     total, before = sum(size for size in sizes if size > least), 0
     edges = [round(total * k / STRETCHES) for k in range(STRETCHES + 1)]

@@ -14,17 +14,20 @@ import numpy as np
 
 from cmg_mj.controllers.dry_run import dry_run_observer
 from cmg_mj.errors import InputError, raised
+from cmg_mj.inputs.users_line import in_users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
 from cmg_mj.observers.protocol import extra_signals, needs
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay.alignment import Alignment
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.replay.model_check import model_misfit
 from cmg_mj.replay.open_loop import replay_stretches
 from cmg_mj.replay.parameter_options import Parameters
 from cmg_mj.replay.reference import alignment_of
 from cmg_mj.replay.scores import Figures, noise_gain, scores
 from cmg_mj.replay.user_noise import noise_of
+from cmg_mj.replay.zero_phase import ZeroPhase, zero_phase
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.stored_columns import LONG, ColumnStore, StoredColumns, shelved, stored
 from cmg_mj.results.trajectory import ESTIMATES
@@ -58,6 +61,8 @@ class ReplayResult:
         settle_s: Time at the start of each part that is not scored [s].
         noise: The sensors' noise that observers assumed; also the noise of the noise gain.
         parameters: Parameters that were set.
+        zero_phase: Figures of a smoother that sees the future, which is no observer; None without a reference.
+        misfit: How badly the model predicts the log, from `model_misfit`; None without a model.
     """
 
     log: Log
@@ -68,6 +73,8 @@ class ReplayResult:
     settle_s: float
     noise: TiltNoise
     parameters: Parameters = field(default_factory=dict)
+    zero_phase: ZeroPhase | None = None
+    misfit: float | None = None
 
 
 def replay_log(
@@ -122,8 +129,24 @@ def replay_log(
         summaries[name] = {**scores(log, signals["x2_rad_s"], scored), "noise_gain_1_s": gain}
     zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
     return ReplayResult(
-        log, estimates, {**summaries, ZERO: zero}, left_out, alignment_of(log), settle_s, noise, parameters
+        log,
+        estimates,
+        {**summaries, ZERO: zero},
+        left_out,
+        alignment_of(log),
+        settle_s,
+        noise,
+        parameters,
+        zero_phase(log, scored) if "reference" in log.has else None,
+        misfit_of(log, model),
     )
+
+
+def misfit_of(log: Log, model: ReducedModel | None) -> float | None:
+    """Return the model's misfit; None without a model, or where its gimbals are not in the log."""
+    if model is None or (gimbals_matter(model) and "gimbals" not in log.has):
+        return None
+    return model_misfit(log, model)
 
 
 def _check_scored(log: Log, scored: np.ndarray, settle_s: float) -> None:
@@ -169,8 +192,11 @@ def _ready(
                 raise
             left_out[name] = f"refused: {error}"
             continue
-        with np.errstate(all="ignore"):
-            dry_run_observer(observer, None)
+        try:
+            with np.errstate(all="ignore"):
+                dry_run_observer(observer, None)
+        except InputError as error:
+            raise InputError(f"observer {name!r}: {error}") from error
         ready[name] = observer
     if not ready:
         reasons = "; ".join(f"{name} {reason}" for name, reason in left_out.items())
@@ -192,7 +218,7 @@ def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
             except KeyboardInterrupt:
                 raise
             except BaseException as error:  # a user's observer may fail in any way
-                return f"raised {raised(error)}"
+                return f"raised {raised(error)}{in_users_line(error)}"
             if piece is None:
                 break
             if message := _not_finite(piece, log, len(store)):

@@ -11,21 +11,26 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from cmg_mj.observers import OBSERVER_CLASSES
+from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import ReplayResult, describe_log
-from cmg_mj.replay.reference import remarks_on
+from cmg_mj.replay.model_check import model_remark
+from cmg_mj.replay.noise_remarks import noise_figures, noise_remarks
+from cmg_mj.replay.reference import reference_fault, remarks_on
 from cmg_mj.replay.scores import RECONSTRUCTED_S, Figures
+from cmg_mj.replay.zero_phase import ZERO_PHASE
 from cmg_mj.results import markdown
 from cmg_mj.results.baselines import ZERO
-from cmg_mj.results.intervals import known_interval
+from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.summary_keys import Key, SummaryValue
 from cmg_mj.visualization.plots.readability import observers_to_draw
 
 FIGURES = {
     "velocity_rms_error_rad_s": Key("RMS error", "rad/s", "{:.4f}"),
-    "velocity_fit": Key("fit", "", "{:.3f}", better="more"),
+    "velocity_fit": Key("fit", "", "{:.3f}", better="more", positive=False),
     "velocity_rms_error_push_rad_s": Key("error in windows", "rad/s", "{:.4f}"),
-    "velocity_fit_push": Key("fit in windows", "", "{:.3f}", better="more"),
-    "lag_s": Key("lag", "s", "{:.5f}"),
+    "velocity_fit_push": Key("fit in windows", "", "{:.3f}", better="more", positive=False),
+    "lag_s": Key("lag", "s", "{:.5f}", positive=False),
     "reconstruction_rms_deg": Key("reconstruction error", "deg", "{:.4f}"),
     "roughness_rad_s": Key("roughness", "rad/s", "{:.4f}"),
     "noise_gain_1_s": Key("noise gain", "1/s", "{:.1f}"),
@@ -67,10 +72,31 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
             "tilt_rad": noise.tilt,
             **(acceleration if "acceleration" in log.has else {}),
         },
+        **noise_figures(log, noise),
         **({"reference": replayed.alignment._asdict()} if replayed.alignment else {}),
         "observers": {name: dict(figures) for name, figures in replayed.summaries.items()},
+        **_zero_phase_figures(replayed),
+        **({} if replayed.misfit is None else {"model_misfit": replayed.misfit}),
         "left_out": dict(replayed.left_out),
     }
+
+
+def _zero_phase_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
+    """Return the figures of the smoother that sees the future, if there are any."""
+    smoother = replayed.zero_phase
+    if smoother is None:
+        return {}
+    more = {"best_cutoff_hz": smoother.best_cutoff_hz, "best_rms_error_rad_s": smoother.best_rms_error_rad_s}
+    return {ZERO_PHASE: {**smoother.figures, "cutoff_hz": smoother.cutoff_hz, **more}}
+
+
+def _figures_by_row(replayed: ReplayResult) -> dict[str, Figures]:
+    """Return the figures of a table's rows: the observers, the smoother that is none, and the baseline."""
+    rows = dict(replayed.summaries)
+    zero = rows.pop(ZERO)
+    if replayed.zero_phase is not None:
+        rows[ZERO_PHASE] = replayed.zero_phase.figures
+    return {**rows, ZERO: zero}
 
 
 class _Mean(NamedTuple):
@@ -90,17 +116,19 @@ class _ObserverMeans(NamedTuple):
 
 def _means(replays: Sequence[ReplayResult]) -> dict[str, _ObserverMeans]:
     """Return every observer's means over the logs, the baseline's last."""
-    names = [name for name in dict.fromkeys(n for r in replays for n in r.summaries) if name != ZERO]
+    rows = [_figures_by_row(replayed) for replayed in replays]
+    last = [name for name in (ZERO_PHASE, ZERO) if any(name in row for row in rows)]
+    names = [name for name in dict.fromkeys(n for row in rows for n in row) if name not in last]
     means = {}
-    for name in [*names, ZERO]:
-        summaries = [replayed.summaries[name] for replayed in replays if name in replayed.summaries]
+    for name in [*names, *last]:
+        summaries = [row[name] for row in rows if name in row]
         means[name] = _ObserverMeans(len(summaries), {key: _mean_of(summaries, key) for key in _keys(replays)})
     return means
 
 
 def _mean_of(summaries: Sequence[Figures], key: str) -> _Mean:
     values = [value for summary in summaries if (value := summary.get(key)) is not None]
-    interval = known_interval(values)
+    interval = known_interval(values, FIGURES[key].positive)
     ends = [interval.low, interval.high] if interval and math.isfinite(interval.low) else None
     return _Mean(sum(values) / len(values) if values else None, ends, len(values))
 
@@ -115,7 +143,7 @@ def replay_tables(replays: Sequence[ReplayResult]) -> Group:
     for replayed in replays:
         keys = _keys([replayed])
         table = _table(describe_log(replayed.log), keys)
-        for name, figures in replayed.summaries.items():
+        for name, figures in _figures_by_row(replayed).items():
             table.add_row(name, *(figure_text(key, figures.get(key)) for key in keys))
         lines = [_text(line) for line in remarks(replayed)]
         parts += [table, *lines, *([Text("")] if lines else [])]  # a table ends with an empty line of its own
@@ -136,7 +164,7 @@ def replay_markdown(replays: Sequence[ReplayResult]) -> str:
         keys = _keys([replayed])
         rows = [
             (f"`{name}`", *(figure_text(key, figures.get(key)) for key in keys))
-            for name, figures in replayed.summaries.items()
+            for name, figures in _figures_by_row(replayed).items()
         ]
         parts += [f"{describe_log(replayed.log)}:", markdown.table(["observer", *map(_heading, keys)], rows)]
         parts += remarks(replayed)
@@ -175,6 +203,9 @@ def _mean_text(key: str, figure: _Mean) -> str:
     if figure.interval is None:
         return text
     low, high = figure.interval
+    assert figure.mean is not None
+    if Interval(figure.mean, low, high).is_lopsided:
+        return f"{text}\n{figure_text(key, low)}\nto {figure_text(key, high)}"
     return f"{text}\n±{figure_text(key, (high - low) / 2.0)}"
 
 
@@ -184,16 +215,39 @@ def _text(line: str) -> Text:
 
 def remarks(replayed: ReplayResult) -> list[str]:
     """Return the remarks on a log and its reference, and the observers left out."""
-    lines = remarks_on(replayed.log, replayed.alignment)
+    lines = remarks_on(replayed.log, replayed.alignment) + noise_remarks(replayed.log, replayed.noise)
+    if replayed.zero_phase is not None:
+        lines.append(replayed.zero_phase.remark(_doubt_of_price(replayed)))
+    if doubt := model_remark(replayed.misfit):
+        lines.append(doubt)
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
         reasons.setdefault(reason, []).append(name)
     return [*lines, *(f"Without {', '.join(names)}: {reason}." for reason, names in reasons.items())]
 
 
+def _doubt_of_price(replayed: ReplayResult) -> str | None:
+    """Say why the distance from the smoother is not the price of causality; None where it is.
+
+    Observers that know more than the tilt may well be nearer to the reference.
+    """
+    doubts = [fault] if (fault := reference_fault(replayed.log, replayed.alignment)) else []
+    assert replayed.zero_phase is not None
+    error = replayed.zero_phase.figures["velocity_rms_error_rad_s"]
+    errors = {
+        name: other
+        for name, figures in replayed.summaries.items()
+        if (other := figures["velocity_rms_error_rad_s"]) is not None
+        and (name == ZERO or not needs(OBSERVER_CLASSES.find(name)))
+    }
+    best = min(errors, key=lambda name: errors[name], default=None)
+    if error is not None and best is not None and errors[best] < error:
+        doubts.append(f"{best}, which knows no more than the past, is nearer to the reference")
+    return "; ".join(doubts) or None
+
+
 def table_note(replays: Sequence[ReplayResult]) -> str:
     """Explain the figures of the tables."""
-    first = replays[0]
     keys = _keys(replays)
     lines = []
     if "velocity_fit" in keys:
@@ -207,9 +261,27 @@ def table_note(replays: Sequence[ReplayResult]) -> str:
             "against the measured one. Roughness: the white noise whose second differences are as large. Neither",
             "is an error of the rate.",
         ]
-    size = f"{math.degrees(first.noise.tilt):.3g} deg"
-    more = " and the acceleration's beside it" if "acceleration" in first.log.has else ""
-    lines.append(f"Noise gain: what white noise of {size} in the tilt{more} makes of the rate, by that size.")
-    if first.settle_s:
-        lines.append(f"Scored from {first.settle_s:g} s after each start on.")
+    beside = " and the acceleration's beside it"
+    sizes = [
+        f"{math.degrees(replayed.noise.tilt):.3g} deg in the tilt{beside if 'acceleration' in replayed.log.has else ''}"
+        for replayed in replays
+    ]
+    names = [replayed.log.name for replayed in replays]
+    size = _by_log(names, sizes)
+    lines.append(f"Noise gain: what white noise of {size} makes of the rate, by the tilt's noise.")
+    if len(set(sizes)) > 1:
+        lines.append("Gains of observers that are not linear depend on that size, so their mean is of no one noise.")
+    starts = [f"from {r.settle_s:g} s after each start on" if r.settle_s else "from its start on" for r in replays]
+    if any(replayed.settle_s for replayed in replays):
+        lines.append(f"Scored {_by_log(names, starts)}.")
     return "\n".join(lines)
+
+
+def _by_log(names: Sequence[str], texts: Sequence[str]) -> str:
+    """Write the text of all logs, or of each where they differ."""
+    logs: dict[str, list[str]] = {}
+    for name, text in zip(names, texts, strict=True):
+        logs.setdefault(text, []).append(name)
+    if len(logs) == 1:
+        return next(iter(logs))
+    return ", ".join(f"{text} ({', '.join(few)})" for text, few in logs.items())

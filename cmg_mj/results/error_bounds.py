@@ -1,4 +1,7 @@
-"""Lower bounds (floors) on the error of a rate estimate: from y1 alone, and from y1 with its acceleration."""
+"""Lower bounds (floors) on the error of a rate estimate: from y1 alone, and from y1 with its acceleration.
+
+They are for the sensors' noise alone: offsets, other errors of the sensors and a pivot that moves are not in them.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,16 @@ from cmg_mj.sensors.tilt import TiltNoise
 FLOOR_Y1, FLOOR_ACCELERATION = "floor_y1", "floor_accel"
 FLOORS = (FLOOR_Y1, FLOOR_ACCELERATION)
 """Names of the floors, in the order of every table."""
+NOISE_ALONE = "Floors are for the sensors' noise alone: no other error of theirs, and a pivot at rest."
+"""Said wherever they are printed."""
 
 MEMORY_S = 0.5
 """Memory of the filters of y1 that are tried for its floor [s]."""
 SINGLE, WIDER = 4, 1.3
 """Their newest samples have a tap each; older ones share one, and every share is so much wider than the one before.
-A tap a sample takes 0.3 % off the floor, half a second more of memory 1 % (docs/studies/gyro_free.py --taps)."""
+A tap a sample takes 0.3 to 0.8 % off the floor of a whole run of 15 s, 200 taps over a second 2 to 4 %. About 3 % are
+due to their number alone: so much of a world's noise do 200 taps learn of its 3,000 samples
+(docs/studies/gyro_free.py --parts taps)."""
 PIECE = 16
 """Worlds whose sums are taken together: so many stay in a processor's cache."""
 ROWS_A_TAP = 10
@@ -64,9 +71,10 @@ class TiltFloor:
 
     Without a model y1 bounds nothing unless it is told what motions there are. This filter is told more than any
     observer can know: what the rate was, in the very world that is judged. No time-invariant linear filter of y1 with
-    its taps, started at rest, has a smaller error there, however it is tuned. The whole run and the push windows
-    have a filter each. One filter for all of 20 worlds has an error 1 % larger over the whole run of push_recovery,
-    and 6 % in the push window: so much is fitted to the one world's noise.
+    its taps (16 over 0.5 s at 200 Hz), started at rest, has a smaller error there, however it is tuned. Filters with
+    more taps, or that vary with time, may have. The whole run and the push windows have a filter each. One filter for
+    all of 20 worlds has an error 1 % larger over the whole run of push_recovery, and 6 % in the push window: so much is
+    fitted to the one world's noise.
 
     Args:
         dt: Sample period [s].

@@ -74,6 +74,7 @@ def write_row_groups(
         metadata: What the file says of the table beside it; by default nothing.
         durable: Whether the file must outlast a power cut.
     """
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
     stored = None if metadata is None else {METADATA_KEY: json.dumps(metadata).encode()}
@@ -84,6 +85,7 @@ def write_row_groups(
             table = rows if stored is None else rows.replace_schema_metadata(stored)
             writer = writer or pq.ParquetWriter(file, table.schema)
             writer.write_table(table)
+            pa.default_memory_pool().release_unused()  # of a long file, hundreds of row groups pile up
         assert writer is not None
         writer.close()
         if durable:

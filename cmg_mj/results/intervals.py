@@ -11,6 +11,13 @@ import numpy as np
 from cmg_mj.errors import InputError
 
 CONFIDENCE = 0.95
+LOPSIDED = 0.1
+FEWEST = 4
+"""Fewer values than these have no interval of a mean that cannot be negative.
+
+From four on it holds the mean in 87 % or more of skewed samples, of three in 85 %, of two in 74 %. One of two can reach
+330,000 times the mean.
+"""
 
 PairedVerdict = Literal["better", "tie", "worse"]
 
@@ -21,6 +28,11 @@ class Interval(NamedTuple):
     mean: float
     low: float
     high: float
+
+    @property
+    def is_lopsided(self) -> bool:
+        """Return whether the mean is off the middle by more than a tenth of half the width: then ± would mislead."""
+        return abs(self.high + self.low - 2.0 * self.mean) > LOPSIDED * (self.high - self.low)
 
     @property
     def half(self) -> float:
@@ -50,10 +62,44 @@ def mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
     return Interval(mean, mean - half, mean + half)
 
 
-def known_interval(values: Sequence[float] | np.ndarray) -> Interval | None:
-    """Compute the interval of the mean over the finite values, as of the worlds that stood; None of fewer than two."""
+def positive_mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
+    """Compute an interval of the mean of what cannot be negative, such as a settle time.
+
+    It is Student's in the logarithm of the mean, whose standard error is that of the mean over the mean: no end is
+    below zero, and the upper one is the farther. For skewed values it holds the mean more often than Student's interval
+    and than a bootstrap of few worlds (`tests/results/test_intervals.py`); for narrow ones it is Student's.
+
+    Args:
+        values: One a world, at least `FEWEST`, none below zero.
+
+    Returns:
+        The mean and its interval; infinite ends if a value is not finite.
+
+    Raises:
+        InputError: There are fewer values.
+    """
+    if len(values) < FEWEST:
+        raise InputError(f"an interval of what cannot be negative needs four worlds or more, not {len(values)}")
+    mean, low, high = mean_interval(values)
+    if not mean > 0.0:  # all are zero, or one is no number
+        return Interval(mean, low, high)
+    factor = math.exp((high - mean) / mean)
+    return Interval(mean, mean / factor, mean * factor)
+
+
+def known_interval(values: Sequence[float] | np.ndarray, positive: bool = False) -> Interval | None:
+    """Compute the interval of the mean over the finite values, as of the worlds that stood; None of too few.
+
+    Fewer than two are too few, and fewer than `FEWEST` of what cannot be negative.
+
+    Args:
+        values: One a world.
+        positive: Whether the quantity cannot be negative (`positive_mean_interval`).
+    """
     known = finite_values(values)
-    return mean_interval(known) if len(known) >= 2 else None
+    if len(known) < (FEWEST if positive else 2):
+        return None
+    return positive_mean_interval(known) if positive else mean_interval(known)
 
 
 def finite_values(values: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -66,6 +112,19 @@ def finite_mean(values: Sequence[float] | np.ndarray) -> float | None:
     """Compute the mean over the finite values; None of none."""
     known = finite_values(values)
     return float(known.mean()) if len(known) else None
+
+
+def format_interval(pattern: str, interval: Interval) -> list[str]:
+    """Format a mean's interval for a table, a line each: half its width, or both ends if it is lop-sided."""
+    if interval.is_lopsided:
+        return [pattern.format(interval.low), "to " + pattern.format(interval.high)]
+    return ["±" + pattern.format(interval.half)]
+
+
+def in_line(lines: Sequence[str]) -> str:
+    """Write a figure and the lines of its interval on one line, both ends in brackets."""
+    figure, *interval = lines
+    return f"{figure} ({' '.join(interval)})" if len(interval) > 1 else " ".join(lines)
 
 
 def ratio_interval(numerator: np.ndarray, denominator: np.ndarray) -> Interval:

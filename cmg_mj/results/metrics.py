@@ -20,6 +20,7 @@ class TickBlock(NamedTuple):
     Attributes:
         x1: True tilt [rad].
         x2: True tilt rate [rad/s].
+        body_rate: Rate of the frame along the tilt axis, as a perfect gyro on it shows [rad/s].
         x3: True gimbal angle [rad].
         y1: Measured tilt [rad].
         fog: The gyro's rate [rad/s].
@@ -31,6 +32,7 @@ class TickBlock(NamedTuple):
 
     x1: np.ndarray
     x2: np.ndarray
+    body_rate: np.ndarray
     x3: np.ndarray
     y1: np.ndarray
     fog: np.ndarray

@@ -125,7 +125,7 @@ class ColumnStore:
     Args:
         n_columns: Number of columns.
         folder: Folder for a file without a name, to which the rows of one world go as soon as they are a stretch; None
-            to keep them in memory. What the disk does not take stays in memory too.
+            to keep them in memory. Rows that the disk does not take stay in memory too.
     """
 
     def __init__(self, n_columns: int, folder: Path | None = None) -> None:
@@ -176,12 +176,19 @@ class ColumnStore:
         first = max(0, bisect_right(self._starts, start) - 1)
         last = bisect_left(self._starts, end)
         ends = [*self._starts[first + 1 : last + 1], self._end]
-        parts = [
+        parts = (
             piece.read(column, max(0, start - begin), min(end, until) - begin)
             for piece, begin, until in zip(self._pieces[first:last], self._starts[first:last], ends, strict=False)
             if start < until
-        ]
-        return np.concatenate(parts) if parts else np.zeros((0, 1))
+        )
+        if self.in_memory:
+            known = list(parts)
+            return np.concatenate(known) if known else np.zeros((0, 1))
+        values, n_rows = np.empty((max(0, min(end, self._end) - start), 1)), 0
+        for part in parts:  # one by one: of a long column, twice the values take much memory
+            values[n_rows : n_rows + len(part)] = part
+            n_rows += len(part)
+        return values
 
 
 def stored(columns: Mapping[str, np.ndarray]) -> StoredColumns:
@@ -202,7 +209,7 @@ def shelved(values: np.ndarray) -> Reader:
         return _rows_of(values)
     store = ColumnStore(1, Path(tempfile.gettempdir()))
     for rows in stretches(len(values)):
-        store.append([values[rows, None]])
+        store.append([values[rows, None].copy()])  # a view of the last rows would keep the whole array
     return lambda start, end: store.read(0, start, end)[:, 0]
 
 

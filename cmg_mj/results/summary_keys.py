@@ -23,6 +23,7 @@ class Key(NamedTuple):
         pattern: How it is written.
         compared: Whether it is a column where observers are compared, which has room for a few.
         better: Which values are; empty where it is neither good nor bad.
+        positive: Whether no value is below zero, so that no end of a mean's interval may be.
     """
 
     label: str
@@ -30,6 +31,7 @@ class Key(NamedTuple):
     pattern: str
     compared: bool = True
     better: Literal["less", "more", ""] = "less"
+    positive: bool = True
 
     @property
     def heading(self) -> str:
@@ -42,14 +44,14 @@ KEYS = {
     "velocity_rms_error_push_rad_s": Key("error in push window", "rad/s", "{:.4f}"),
     "velocity_rms_error_fog_rad_s": Key("error against the gyro", "rad/s", "{:.4f}", compared=False),
     "velocity_rms_rad_s": Key("true velocity RMS", "rad/s", "{:.4f}", better=""),
-    "velocity_fit": Key("fit", "", "{:.2f}", better="more"),
-    "velocity_fit_push": Key("fit in push window", "", "{:.2f}", better="more"),
+    "velocity_fit": Key("fit", "", "{:.2f}", better="more", positive=False),
+    "velocity_fit_push": Key("fit in push window", "", "{:.2f}", better="more", positive=False),
     "tilt_rms_deg": Key("tilt RMS", "deg", "{:.3f}"),
     "settle_time_s": Key("settle time", "s", "{:.2f}"),
     "gimbal_peak_deg": Key("gimbal peak", "deg", "{:.1f}"),
     "command_rms_rad_s": Key("command RMS", "rad/s", "{:.3f}"),
     "command_saturated_fraction": Key("command limited", "", "{:.1%}", compared=False),
-    "bias_estimate_deg": Key("bias found", "deg", "{:.4f}", compared=False),
+    "bias_estimate_deg": Key("bias found", "deg", "{:.4f}", compared=False, positive=False),
     "bias_rms_error_deg": Key("bias RMS error", "deg", "{:.4f}", compared=False),
     "fell_fraction": Key("fell", "", "{:.0%}", better=""),
     "stopped_fraction": Key("stopped", "", "{:.0%}", better=""),
@@ -77,11 +79,6 @@ def heading(key: str) -> str:
 def format_figure(key: str, value: SummaryValue) -> str:
     """Format a summary's number for a table; a dash where there is none."""
     return "-" if value is None else KEYS[key].pattern.format(value)
-
-
-def format_half_interval(key: str, half: float | None) -> str:
-    """Format half the width of a number's interval for a table; nothing where there is none."""
-    return "" if half is None else "±" + KEYS[key].pattern.format(half)
 
 
 def format_difference(key: str, value: SummaryValue) -> str:

@@ -14,6 +14,8 @@ from rich.text import Text
 from cmg_mj.inputs.bundled import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.results import markdown
+from cmg_mj.results.error_bounds import FLOORS, NOISE_ALONE
+from cmg_mj.results.intervals import Interval, format_interval, in_line
 from cmg_mj.results.summary_keys import (
     AXES,
     KEYS,
@@ -22,7 +24,6 @@ from cmg_mj.results.summary_keys import (
     capitalised,
     format_difference,
     format_figure,
-    format_half_interval,
     heading,
     open_loop_figures,
     section,
@@ -41,7 +42,7 @@ LESS_BEST = "Less the best of each column, world by world"
 Comparison = Sequence[Mapping[str, SummaryValue]]
 """The rows of a comparison, as `cmg-mj compare --json` prints them."""
 Cell = Callable[[Mapping[str, SummaryValue], str], list[str]]
-"""Formats a row's figure: its number, and half its interval if there is one."""
+"""Formats a row's figure: its number, and the lines of its interval if there is one."""
 
 
 def columns_of(summaries: Comparison) -> list[str]:
@@ -81,7 +82,7 @@ def comparison_markdown(summaries: Comparison) -> str:
 
 
 def _markdown(summaries: Comparison, columns: Sequence[str], cell: Cell) -> str:
-    rows = [(f"`{s['observer']}`", *(" ".join(cell(s, key)) for key in columns)) for s in summaries]
+    rows = [(f"`{s['observer']}`", *(in_line(cell(s, key)) for key in columns)) for s in summaries]
     return markdown.table(["observer", *map(heading, columns)], rows)
 
 
@@ -97,27 +98,30 @@ def _has_differences(summaries: Comparison) -> bool:
 def _mean_cell(summary: Mapping[str, SummaryValue], key: str) -> list[str]:
     intervals = summary["intervals"]
     ends = intervals.get(key) if isinstance(intervals, Mapping) else None
-    return _with_half_interval(format_figure(key, summary[key]), key, ends)
+    return _with_interval(format_figure(key, summary[key]), key, summary[key], ends)
 
 
 def _difference_cell(summary: Mapping[str, SummaryValue], key: str) -> list[str]:
     less = section(summary, "minus_best").get(key)
     return (
-        ["best"] if less is None else _with_half_interval(format_difference(key, less["mean"]), key, less["interval"])
+        ["best"]
+        if less is None
+        else _with_interval(format_difference(key, less["mean"]), key, less["mean"], less["interval"])
     )
 
 
-def _with_half_interval(text: str, key: str, ends: SummaryValue) -> list[str]:
-    match ends:
-        case [float() as low, float() as high]:
-            return [text, format_half_interval(key, (high - low) / 2.0)]
+def _with_interval(text: str, key: str, mean: SummaryValue, ends: SummaryValue) -> list[str]:
+    match mean, ends:
+        case float(), [float() as low, float() as high]:
+            return [text, *format_interval(KEYS[key].pattern, Interval(mean, low, high))]
     return [text]
 
 
 def comparison_note(summaries: Comparison) -> str:
     """Say what the tables of a comparison do not say by themselves."""
     lines = [
-        "Means over the worlds that stood to the end (settle time: that settled), with 95 % intervals.",
+        "Means over the worlds that stood to the end (settle time: that settled), with 95 % intervals,",
+        "both ends where one is much nearer to the mean.",
         "Push window: from a push's start to 1 s after its end.",
         "Fit: 1 - RMS error / RMS of the true velocity; 1 is the truth, 0 an estimate of zero.",
     ]
@@ -125,9 +129,11 @@ def comparison_note(summaries: Comparison) -> str:
     if loop:
         lines.append(
             f"Open loop, on the motion of {loop}, the best:\n"
-            "zero, an estimate of zero; mems_gyro, a two-dollar gyro; floor_y1, the best linear filter of\n"
-            "y1 alone (its last 0.5 s) for this very world, found afterwards; floor_accel, the least error that\n"
-            "y1 with its acceleration allow for whatever motion, by the noise of their datasheet."
+            "zero, an estimate of zero; mems_as_bought, a two-dollar gyro with its offset; mems_gyro, the same\n"
+            "after a second at rest, at constant temperature; mems_fused, as bought, in a Kalman filter with y1;\n"
+            "floor_y1, the best time-invariant filter of y1 alone (its last 0.5 s, 16 taps) for this very world,\n"
+            "found afterwards; floor_accel, the least error that y1 with its acceleration allow for whatever\n"
+            f"motion. {NOISE_ALONE}"
         )
     return "\n".join(lines)
 
@@ -158,7 +164,8 @@ def summary_table(summary: Mapping[str, SummaryValue]) -> Group:
             figures = (format_figure(key, axis_summary.get(key)) for axis_summary in axes.values())
             table.add_row(capitalised(heading(key)), *figures)
     open_loop = [_open_loop_table(name, axis_summary) for name, axis_summary in axes.items()]
-    return Group(table, *(rows for rows in open_loop if rows.row_count))
+    has_floors = any(name in open_loop_figures(axis_summary) for axis_summary in axes.values() for name in FLOORS)
+    return Group(table, *(rows for rows in open_loop if rows.row_count), *([NOISE_ALONE] if has_floors else []))
 
 
 def _open_loop_table(axis: str, summary: Mapping[str, SummaryValue]) -> Table:

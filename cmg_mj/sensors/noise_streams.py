@@ -24,6 +24,8 @@ class NoiseStream(IntEnum):
     """1/f noise of the accelerometers."""
     TURN_GYRO = 5
     """The gyro about the vertical, which a plant of several axes has once."""
+    MEMS_PART = 6
+    """The signs of the cheap gyro's offset and drift: which part was bought."""
 
     def on_axis(self, axis: int) -> int:
         """Return the number of the stream of one axis of several."""

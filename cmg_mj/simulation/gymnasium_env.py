@@ -15,10 +15,11 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.plant.mujoco_state import quiet
-from cmg_mj.results.baselines import MEMS_GYRO, References
+from cmg_mj.results.baselines import MEMS_GYRO
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.ideal import IdealReading
+from cmg_mj.sensors.noise_streams import NoiseStream, normals
 from cmg_mj.sensors.timing import whole_steps
 from cmg_mj.simulation.control_loop import ControlLoop
 from cmg_mj.simulation.experiment import Experiment, prepare
@@ -152,7 +153,9 @@ class ScissoredPairEnv(gymnasium.Env):
         self._controller = dataclasses.replace(part.design, scenario=scenario).controller(
             part.plant.interface, worlds=self._world
         )
-        self._gyro = References(scenario.sensors.mems_gyro, experiment.law.dt, seed, self._world)
+        gyro = scenario.sensors.mems_gyro
+        noise = normals(seed, self._world, NoiseStream.MEMS_GYRO, gyro.channels)
+        self._read_gyro = gyro.make_reading_function(experiment.law.dt, noise)
         self._fall = np.radians(scenario.metrics.fall_angle_deg).item()
         self._steps = whole_steps(scenario.duration_s, timestep, "duration_s", f"{scenario.duration_s:g} s")
         instants = sampling_instants(
@@ -227,7 +230,7 @@ class ScissoredPairEnv(gymnasium.Env):
         x1, x2, x3 = self._state()
         tilt = controller.tilt
         extra = {
-            MEMS_GYRO: float(self._gyro.rates(np.array([[x2]]))[MEMS_GYRO][0, 0]),
+            MEMS_GYRO: self._read_gyro(np.array([[controller.body_rate]])).item(),
             "acceleration": tilt.acceleration(forces[0], forces[2]),
             "fog": fog,
         }

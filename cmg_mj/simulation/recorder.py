@@ -30,6 +30,7 @@ class TickRecorder:
         observers: Names of the observer in the loop, then of the open-loop observers.
         controller: The controller whose ticks they are: floats of one world, or arrays (n_worlds,).
         metrics: Takes every piece.
+        references: The baselines that give a rate.
         keep: Whether to keep the pieces for a trajectory.
         joints: Whether to keep the joints.
         spool: Folder whose disk takes what a long trajectory of one world would need in memory, if any.
@@ -41,6 +42,7 @@ class TickRecorder:
         observers: Sequence[str],
         controller: Controller,
         metrics: Metrics,
+        references: References,
         *,
         keep: bool,
         joints: bool,
@@ -49,29 +51,34 @@ class TickRecorder:
         self._axis = plants[0].axis
         self._bias = np.array([plant.bias for plant in plants])
         names, kinds = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ((), ())
-        extras, seed, worlds = controller.extra_signals, controller.seed, controller.worlds
+        extras, worlds = controller.extra_signals, controller.worlds
         self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), names, kinds)
         self._joints = joints
         self._estimated = [(*ESTIMATES, *names) for names in extras]
         self.metrics = metrics
         self._dt = controller.law.dt
-        self._references = References(controller.sensors.mems_gyro, self._dt, seed, worlds, controller.axis)
+        self._references = references
         self._keep = keep
         self._single = isinstance(worlds, int)
         self._waiting: list[tuple] = []
         self._kept = ColumnStore(len(self._layout.columns()), spool if isinstance(worlds, int) else None)
 
-    def add(self, q: Joints, v: Joints, tick: Tick, torque: Scalar, running: np.ndarray | None) -> None:
+    def add(
+        self, q: Joints, v: Joints, tick: Tick, body_rate: Scalar, torque: Scalar, running: np.ndarray | None
+    ) -> None:
         """Take one tick.
 
         Args:
             q: Joint angles at the tick [rad].
             v: Joint rates at the tick [rad/s].
             tick: What the controller measured and decided.
+            body_rate: Rate of the frame along the tilt axis, as a perfect gyro on it shows [rad/s].
             torque: The push, a float, or (n_worlds,) [N m].
             running: Which worlds have not ended, (n_worlds,); None for one world.
         """
-        self._waiting.append((q, v, tick, torque, running))
+        if not self._single:  # a row of all sensors' readings, which would be held as long
+            body_rate = body_rate.copy()
+        self._waiting.append((q, v, tick, body_rate, torque, running))
         if len(self._waiting) >= TICKS_A_PIECE:
             self.flush()
 
@@ -81,7 +88,7 @@ class TickRecorder:
             return
         piece = self._piece(self._waiting)
         self._waiting = []
-        self.metrics.update(piece, self._references.rates(piece.x2))
+        self.metrics.update(piece, self._references.rates(piece.body_rate, piece.y1))
         if self._keep:
             columns, ended = piece.columns, piece.ended
             if ended is not None:
@@ -89,10 +96,11 @@ class TickRecorder:
             self._kept.append([columns[name] for name in self._layout.columns()])
 
     def _piece(self, waiting: Sequence[tuple]) -> TickBlock:
-        qs, vs, ticks, torques, runnings = zip(*waiting, strict=True)
+        qs, vs, ticks, body_rates, torques, runnings = zip(*waiting, strict=True)
         q, v = self._columns(qs), self._columns(vs)
         *signals, estimates = zip(*ticks, strict=True)
         y1, y2, acceleration, fog, u, x_e = self._columns(list(zip(*signals, strict=True)))
+        body_rate = np.array(body_rates).reshape(u.shape)
         push = np.broadcast_to(self._columns([(torque,) for torque in torques])[0], u.shape)
         estimated = [self._columns(estimate) for estimate in zip(*estimates, strict=True)]
         x1 = self._axis.line.lean(q) + self._bias
@@ -104,7 +112,7 @@ class TickRecorder:
         named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
         joints = [*q, *v] if self._joints else []
         signals = [x1, x2, x3, y1, y2, acceleration, fog, u, x_e, push, *chain.from_iterable(estimated), *joints]
-        return TickBlock(x1, x2, x3, y1, fog, u, named, self._layout.named(signals), ended)
+        return TickBlock(x1, x2, body_rate, x3, y1, fog, u, named, self._layout.named(signals), ended)
 
     def _columns(self, ticks: Sequence) -> np.ndarray:
         """(n_ticks, n_signals[, n_worlds]) -> (n_signals, n_ticks, n_worlds)."""

@@ -16,7 +16,7 @@ from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.plant import Plant
-from cmg_mj.results.baselines import RATES
+from cmg_mj.results.baselines import RATES, References
 from cmg_mj.results.error_bounds import Floors
 from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.result import Driver, Outcome, Result
@@ -133,13 +133,19 @@ class _Simulation:
         plants, observers = [plant.single_axis(axis) for plant in self.plants], self.observers[axis]
         pairs = list(zip(plants, split_values(controller.sensors, len(plants)), strict=True))
         targets = {BIAS: [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs]}
-        dt, limit = controller.law.dt, controller.law.rate_limit
+        dt, limit, sensors = controller.law.dt, controller.law.rate_limit, controller.sensors
         noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
-        floors = Floors(noises, max(dt, 1.0 / controller.sensors.accelerometer.rate_hz))
+        y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
+        floors = Floors(noises, y1_period)
+        # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
+        tilt_sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
+        references = References(
+            sensors.mems_gyro, dt, controller.seed, controller.worlds, tilt_sigmas, axis=controller.axis
+        )
         metrics = Metrics(observers, len(plants), dt, self.pushes, limit, self.settings, targets, RATES, floors)
         keep, first = options.get("keep_trajectory", True), axis == self.axis_names[0]
         spool = options.get("spool")
-        return TickRecorder(plants, observers, controller, metrics, keep=keep, joints=first, spool=spool)
+        return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first, spool=spool)
 
     def advance(self, physics: Physics, driver: Driver) -> None:
         """Run to the end, whatever that is."""
@@ -175,7 +181,7 @@ class _Simulation:
             running = None if worlds.running is None else worlds.running.copy()
             for axis, part, recorder in parts:
                 assert part.tick is not None
-                recorder.add(tick.q, tick.v, part.tick, tick.torques[axis], running)
+                recorder.add(tick.q, tick.v, part.tick, part.body_rate, tick.torques[axis], running)
             if on_progress:
                 on_progress((tick.step + tick.steps) * timestep)
 

@@ -17,8 +17,8 @@ from cmg_mj.codegen.board.cost import cost_scenario, measure
 from cmg_mj.errors import InputError
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, needs
 from cmg_mj.results import markdown
-from cmg_mj.results.baselines import REFERENCES
-from cmg_mj.results.intervals import mean_interval
+from cmg_mj.results.baselines import GYROS, MEMS_FUSED, REFERENCES
+from cmg_mj.results.intervals import format_interval, in_line, known_interval
 from cmg_mj.results.result import Result
 from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
 
@@ -31,9 +31,9 @@ def errors(result: Result, open_loop_observer: str | None = None) -> list[str]:
     cells = []
     for key in (ERROR, PUSH_ERROR):
         values = result.values(key, open_loop_observer)
-        known = values[np.isfinite(values)]
-        interval = mean_interval(known) if len(known) else None
-        cells.append("-" if interval is None else f"{interval.mean:.4f} ±{interval.half:.4f}")
+        interval = known_interval(values, positive=True)
+        figure = "-" if interval is None else f"{interval.mean:.4f}"
+        cells.append(in_line([figure, *(format_interval("{:.4f}", interval) if interval else [])]))
     return cells
 
 
@@ -71,7 +71,7 @@ def main() -> None:
         )
     stood = {name: mean for name, r in results.items() if r.stood.all() and (mean := r.mean(ERROR)) is not None}
     best = min(stood, key=stood.__getitem__)
-    asked = {"mems_gyro": "a gyro"}
+    asked = dict.fromkeys(GYROS, "a gyro") | {MEMS_FUSED: "a gyro, y1"}
     rows += [[f"`{name}`", *errors(results[best], name), "-", "-", "-", asked.get(name, "-")] for name in REFERENCES]
     headings = ["observer", "error [rad/s]", "in push window", "fell", "stands at e [deg]", "instructions", "needs"]
     print(f"{worlds} worlds; the last rows are open loop, in the loop of {best}\n")

@@ -15,7 +15,7 @@ from bias_limits import LARGEST_DEG, PARTS, SEED, WORLDS, Case, cell, limits
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.results import markdown
-from cmg_mj.results.intervals import known_interval
+from cmg_mj.results.intervals import format_interval, in_line, known_interval
 from cmg_mj.results.result import Result
 
 LQG = "`lqg`"
@@ -36,9 +36,11 @@ PUSHES = np.arange(0.25, 6.01, 0.25)
 
 
 def figure(values: np.ndarray, sign: str = "") -> str:
-    """A mean with its interval."""
-    found = known_interval(values)
-    return "-" if found is None else f"{found.mean:{sign}.3f} ±{found.half:.3f}"
+    """A mean with its interval; a sign is given to differences, which may be negative."""
+    interval = known_interval(values, positive=not sign)
+    if interval is None:
+        return "-"
+    return in_line([f"{interval.mean:{sign}.3f}", *format_interval("{:.3f}", interval)])
 
 
 def table(e: float, worlds: int) -> None:

@@ -2,11 +2,13 @@
 
 python docs/studies/mounted_robots.py [ROBOT ...] (about six minutes on a quiet core)
 python docs/studies/mounted_robots.py --commands (with what each is mounted)
+python docs/studies/mounted_robots.py --homogeneous [ROBOT ...] (`homogeneous` in the loop, beside `gyro_free`)
 
 The robots are those of tests/plant/mounting/robots.py; ROBOT is a part of a name. The sensors of the datasheets,
 `gyro_free`. The push that a robot stands is what `cmg-mj mount` prints, without the limit of a minute. It, and 1.8
 times it, is tried on ten worlds of another seed, to both sides, at 2 s from upright; and 30 s from the tilt that the
-scenario starts with, alone, are tried on that seed too.
+scenario starts with, alone, are tried on that seed too. With --homogeneous both observers are pushed with the E
+that the reduced model has with `homogeneous`, and with 1.2 times it.
 """
 
 import math
@@ -62,9 +64,31 @@ def row(name: str, robot: Robot, folder: Path) -> list[str]:
     ]
 
 
+def beside_homogeneous(name: str, robot: Robot, folder: Path) -> list[str]:
+    """E with either observer, and the worlds that stand that of `homogeneous`, and 1.2 times it, to both sides."""
+    model = mount(robot.path, **robot.options).save(folder / "balanced.xml")
+    loops = [write_scenario(model, robot.path, observer) for observer in ("homogeneous", "gyro_free")]
+    limits = [prospects(loop) for loop in loops]
+    push = limits[0].push_margin.median_impulse / PUSH_S
+    upright = {"seed": SEED, "duration_s": 14.0, "plant.initial_tilt_deg": 0.0}
+    upright["push"] = [{"start_s": 2.0, "duration_s": PUSH_S, "torque_n_m": push}]
+    signs = [1.0] * WORLDS + [-1.0] * WORLDS
+    pushed = [loop.with_settings(upright) for loop in loops]
+    stand = [[stood(loop, [share * push * sign for sign in signs]) for share in (1.0, 1.2)] for loop in pushed]
+    margins = [f"{can.push_margin.median_impulse:.2f}" for can in limits]
+    return [name, *margins, *(f"{once}, {more} of {2 * WORLDS}" for once, more in stand)]
+
+
 def main() -> None:
     """Print the table."""
-    wanted = [name for name in ROBOTS if not sys.argv[1:] or any(part in name for part in sys.argv[1:])]
+    parts = [word for word in sys.argv[1:] if not word.startswith("--")]
+    wanted = [name for name in ROBOTS if not parts or any(part in name for part in parts)]
+    if "--homogeneous" in sys.argv:
+        with tempfile.TemporaryDirectory() as folder:
+            rows = [beside_homogeneous(name, ROBOTS[name], Path(folder)) for name in wanted]
+        names = ["robot", "E of homogeneous [N m s]", "E of gyro_free [N m s]"]
+        print(table([*names, "homogeneous stands its E, 1.2 E", "gyro_free stands them"], rows, text_columns=1))
+        return
     if sys.argv[1:] == ["--commands"]:
         print("\n".join(robot.command for robot in ROBOTS.values()))
         return

@@ -20,7 +20,7 @@ from cmg_mj.codegen.board import Board, on_a_board
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.processor import Decision
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.results.intervals import known_interval
+from cmg_mj.results.intervals import format_interval, in_line, known_interval
 from cmg_mj.results.markdown import table
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
@@ -73,12 +73,12 @@ def row(experiment: Experiment, worlds: int) -> list[str]:
 
 def _beside(pattern: str, on_host: np.ndarray, on_board: np.ndarray) -> list[str]:
     """The host's mean and interval, the board's mean, and whether that lies within."""
-    host, board = known_interval(on_host), known_interval(on_board)
+    host, board = known_interval(on_host, positive=True), known_interval(on_board, positive=True)
     if host is None or board is None:
         return ["-", "-", "-"]
     within = host.low <= board.mean <= host.high
-    mean, half, its = (pattern.format(number) for number in (host.mean, host.half, board.mean))
-    return [f"{mean} +- {half}", its, "yes" if within else "NO"]
+    figure = in_line([pattern.format(host.mean), *format_interval(pattern, host)])
+    return [figure.replace("±", "+- "), pattern.format(board.mean), "yes" if within else "NO"]
 
 
 def main() -> None:

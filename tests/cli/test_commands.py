@@ -168,7 +168,10 @@ def test_a_person_reads_a_table_and_where_the_files_are(quick: str) -> None:
         r"Tilt RMS \[deg\] +\d",
         r"ltv +0\.\d+ +0\.\d+ +-?\d",
         r"zero +0\.\d+ +0\.\d+ +0\.00 +0\.00\n",
+        r"mems_as_bought +0\.3\d+ +0\.3\d+ +-\d",
         r"mems_gyro +0\.0\d+ +0\.0\d+ +0\.9\d",
+        r"mems_fused +0\.0\d+ +0\.0\d+ +0\.\d",
+        r"Floors are for the sensors' noise alone",
     ):
         assert re.search(row, outcome.out)
     folder = "runs/quick-homogeneous-0"

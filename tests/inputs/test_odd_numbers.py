@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from cmg_mj.replay.alignment import alignment
 from tests.command import cmg_mj
@@ -108,8 +109,9 @@ def test_a_log_of_very_many_columns() -> None:
     assert len(complaint) < 1200
 
 
-def test_a_reference_that_says_nothing_is_compared_without_a_warning() -> None:
+@pytest.mark.parametrize("n", [200, 30_000, 300_000])
+def test_a_reference_that_says_nothing_is_compared_without_a_warning(n: int) -> None:
     """Over the span that they are compared over, this rate's integral is the same everywhere but for rounding."""
-    rows = np.arange(200)
+    rows = np.arange(n)
     compared = alignment([np.radians(rows % 7)], [np.radians(rows % 5)], 0.01)
     assert (compared.scale, compared.offset_rad_s, compared.correlation) == (None, None, None)

@@ -109,7 +109,8 @@ def test_one_that_cannot_be_copied_is_not_exported() -> None:
 def test_cancelled_in_a_run_it_keeps_what_was_recorded(quick: str, driver: str) -> None:
     outcome = cmg_mj("run", quick, "--observer", kind("IsCancelledLater"), "--driver", driver, "--out", "it", "--json")
     assert outcome.status == 2
-    assert "observer IsCancelledLater raised CancelledError: later at t = 0.03 s; what was recorded" in outcome.err
+    assert "observer IsCancelledLater raised CancelledError: later at t = 0.03 s (odd_observers.py, " in outcome.err
+    assert "); what was recorded" in outcome.err
     assert (Path("it") / "recording.rrd").exists()
 
 

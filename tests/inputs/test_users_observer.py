@@ -133,7 +133,12 @@ RETURN = "step(state, y, u) must return"
         "observer tests.inputs.test_users_observer:FailsWhenMade: RuntimeError: no licence for this",
     ),
     ("made without dt", TakesNoPeriod, "TakesNoPeriod: TypeError: ", "unexpected keyword argument 'dt'"),
-    ("init", FailsAtFirst, "'tests.inputs.test_users_observer:FailsAtFirst': init(y) raised KeyError: 'gain'"),
+    (
+        "init",
+        FailsAtFirst,
+        "'tests.inputs.test_users_observer:FailsAtFirst': init(y) raised KeyError: 'gain' (",
+        "py, line ",
+    ),
     ("signature", ForgetsArguments, "step(state, y, u) raised TypeError: ", "positional arguments"),
     ("None", ReturnsNothing, f"{RETURN} (state, (x1, x2, x3)), not None"),
     ("no estimate", ReturnsNoEstimate, f"{RETURN} (state, (x1, x2, x3)), not (state, None)"),
@@ -176,7 +181,12 @@ def test_an_observer_for_one_world_among_many(quick: str, wrong_input: type, fra
 
 
 @table(
-    ("raises", FailsLater, "observer FailsLater raised ZeroDivisionError: division by zero at t = 0.15 s; "),
+    (
+        "raises",
+        FailsLater,
+        "observer FailsLater raised ZeroDivisionError: division by zero at t = 0.15 s (test_users_observer.py, line ",
+        "); ",
+    ),
     ("NaN", GivesNan, "observer GivesNan returned ", "nan", " at t = 0.15 s; "),
     ("infinity", GivesInfinity, "observer GivesInfinity returned ", "inf", " at t = 0.15 s; "),
 )

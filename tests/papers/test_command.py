@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 
 from cmg_mj import papers
 from cmg_mj.errors import InputError
-from cmg_mj.papers.claim import Claim, OnShare, Section
+from cmg_mj.papers.claim import MEANINGS, Claim, OnShare, Section
 from cmg_mj.papers.report import report_text
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 from tests.command import cmg_mj
@@ -37,6 +38,23 @@ OURS = Claim(
     holds=False,
     otherwise="It is too light.",
     is_ours=True,
+)
+GENERAL = Claim(
+    place="Theorem 1",
+    statement="any system",
+    result="two systems",
+    holds=True,
+    is_general=True,
+    conditions="Two systems were tried.",
+    assumes={"signal": "a sine", "noise": "none"},
+)
+UNKNOWN = Claim(
+    place="Table 2",
+    statement="tuned",
+    result="not tuned",
+    holds={"(9)": True, "(10)": False},
+    missing_data="The paper has no recording.",
+    otherwise="Ours is another.",
 )
 NOT = Claim(place="Section V", statement="best", result="worst", holds=False, otherwise="The noise is another.")
 
@@ -89,6 +107,29 @@ def test_all_papers_make_one_report() -> None:
     assert "**Ours:** it stands" in report
     assert (folder / "a-fig-1.png").read_bytes().startswith(b"\x89PNG")
     assert f"Read {folder / 'report.md'}" in run.err
+
+
+def test_general_claims_and_those_without_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are counted, listed and explained apart, for people as for programs."""
+    monkeypatch.setattr(papers, "sections_of", lambda paper: sections(GENERAL, UNKNOWN, NOT))
+    run = cmg_mj("reproduce", "dao2023")
+    assert run.status == 0, run
+    report = Path("runs/reproduce-dao2023/report.md").read_text()
+    assert "3 claims of the papers: 1 illustrated, 1 cannot be tested, 1 not reproduced." in report
+    assert "Not reproduced:\n\n- dao2023, Section V: best\n\nCannot be tested:\n\n- dao2023, Table 2: tuned\n" in report
+    assert "### Theorem 1: illustrated" in report
+    assert "**Assumed by us:** signal: a sine; noise: none." in report
+    assert "### Table 2: cannot be tested" in report
+    assert "**By measure:** (9): holds; (10): does not hold." in report
+    assert "**Why:** The paper has no recording. Ours is another." in report
+    for verdict, meaning in MEANINGS.items():
+        assert f"- *{verdict}*: {meaning}." in report
+    figures = json.loads(cmg_mj("reproduce", "dao2023", "--json").out)
+    general, unknown, _ = figures["papers"]["dao2023"]["claims"]
+    assert (general["verdict"], general["general"]) == ("illustrated", True)
+    assert general["assumes"] == {"signal": "a sine", "noise": "none"}
+    assert (unknown["verdict"], unknown["missing"]) == ("cannot be tested", "The paper has no recording.")
+    assert unknown["measures"] == {"(9)": True, "(10)": False}
 
 
 def test_one_papers_figures_as_json() -> None:
@@ -160,7 +201,48 @@ def test_the_verdict_follows_from_what_was_found() -> None:
     assert type(claim(np.float64(1.0) > 0.5).holds) is bool  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", ["conditions", "otherwise"])
+@pytest.mark.parametrize(
+    ("declared", "holding", "failing"),
+    [
+        ({}, "reproduced", "not reproduced"),
+        ({"conditions": "A misprint is mended."}, "reproduced within stated conditions", "not reproduced"),
+        ({"assumes": {"push": "1 N m"}}, "reproduced within stated conditions", "not reproduced"),
+        ({"missing_data": "No recording is given."}, "cannot be tested", "cannot be tested"),
+        ({"is_general": True, "conditions": "One system."}, "illustrated", "not reproduced"),
+        ({"is_general": True, "assumes": {"signal": "a sine"}}, "illustrated", "not reproduced"),
+        ({"missing_data": "No gain is given.", "assumes": {"gains": "2"}}, "cannot be tested", "cannot be tested"),
+        (
+            {"missing_data": "No gain is given.", "is_general": True, "conditions": "One system."},
+            *["cannot be tested"] * 2,
+        ),
+    ],
+)
+def test_one_rule_decides(declared: dict[str, Any], holding: str, failing: str) -> None:
+    """By what a claim is declared to depend on and by what was found; no verdict is there whatever was found."""
+
+    def verdict(holds: bool | dict[str, bool]) -> str:
+        return Claim(place="Fig. 9", statement="it is so", result="it is", holds=holds, **declared).verdict
+
+    assert (verdict(True), verdict(False)) == (holding, failing)
+    assert verdict({"tilt": True, "rate": True}) == holding
+    assert verdict({"tilt": True, "rate": False}) == failing  # all measures must hold
+
+
+@pytest.mark.parametrize(
+    ("declared", "complaint"),
+    [
+        ({"is_general": True}, "conditions: say on which systems"),
+        ({"assumes": {"weather": "dry"}}, "assumes: weather: no `Assumption`"),
+        ({"holds": {}}, "holds: name a measure"),
+    ],
+)
+def test_a_claim_says_what_it_depends_on(declared: dict[str, Any], complaint: str) -> None:
+    fields: dict[str, Any] = {"holds": True} | declared
+    with pytest.raises(ValueError, match=rf"Fig\. 9: {complaint}"):
+        Claim(place="Fig. 9", statement="it is so", result="it is", **fields)
+
+
+@pytest.mark.parametrize("name", ["conditions", "otherwise", "missing_data"])
 @pytest.mark.parametrize("text", ["conditions", "conditions.", "at 200 Hz"])
 @pytest.mark.parametrize("holds", [False, True])
 def test_conditions_and_otherwise_are_whole_sentences(name: str, text: str, holds: bool) -> None:
@@ -173,6 +255,13 @@ def test_conditions_and_otherwise_are_whole_sentences(name: str, text: str, hold
 def test_what_does_not_hold_is_explained() -> None:
     with pytest.raises(ValueError, match=r"Fig\. 9: otherwise: say what to make of it"):
         Claim(place="Fig. 9", statement="it is so", result="it is", holds=True, otherwise="")
+
+
+@pytest.mark.parametrize(("n_claims", "words"), [(1, "1 holds within stated"), (2, "2 hold within stated")])
+def test_ours_are_counted_in_good_english(n_claims: int, words: str) -> None:
+    claim = replace(OURS, holds=True, conditions="It is so on one rig.")
+    entry = papers.Reproduction("beyond", [claim] * n_claims, complete=True)
+    assert f"{n_claims} beside them, not the papers': {words} conditions." in report_text([entry])
 
 
 # --- without the packages of the extra [papers] ---------------------------------------------------------------
@@ -211,3 +300,10 @@ def test_a_missing_package_ends_it_before_anything_is_computed(
 def test_papers_that_do_not_need_it_are_reproduced_without(paper: str) -> None:
     assert cmg_mj("reproduce", paper).status == 0
     assert (Path("runs") / f"reproduce-{paper}" / "report.md").is_file()
+
+
+def test_several_claims_of_ours_hold() -> None:
+    several = report_text([papers.Reproduction("andrieu2009", [OURS, OURS, NOT], complete=True)])
+    assert "2 beside them, not the papers': 2 do not hold." in several
+    one = report_text([papers.Reproduction("andrieu2009", [OURS], complete=True)])
+    assert "1 beside them, not the papers': 1 does not hold." in one

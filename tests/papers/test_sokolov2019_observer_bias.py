@@ -12,7 +12,7 @@ def test_observers_biases() -> None:
     biased = observer_bias.biased_luenberger(e_deg=-0.15)
     vicinity = observer_bias.homogeneous_vicinity((-0.4,))
     assert biased.verdict == "reproduced within stated conditions"
-    assert vicinity.verdict == "reproduced"
+    assert vicinity.verdict == "illustrated"  # by one alpha
     assert biased.figures["rate_estimate_rad_s"] > 0.0
 
 

@@ -162,7 +162,7 @@ def test_a_window_of_ones_own() -> None:
 def test_tune_on_a_log() -> None:
     """For a sine without noise the smallest time constant is the best; fitted on one part, scored on the other."""
     arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
-    outcome = cmg_mj("tune-log", *arguments, "--split", "0.3", "--json", "--out", "it")
+    outcome = cmg_mj("tune-log", *arguments, "--split", "0.3", "--json", "--out", "it", "--closed-loop", "none")
     result = json.loads(outcome.out)
     assert result["parameters"]["tau"] == pytest.approx(0.004, rel=0.01)
     assert result["at_a_limit"] == ["tau"]
@@ -178,6 +178,7 @@ def test_tune_on_a_log() -> None:
         (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--split", "1"), "between 0 and 1"),
         (("sine.csv", "--columns", PLAIN, "--observer", "ltv"), "needs a model"),
         (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--worlds", "20"), "No such option"),
+        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--closed-loop", "x"), "--closed-loop: scenario 'x'"),
         (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--noise", "100,200"), "--noise 100: no such"),
         (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--set", "tau=1"), "write observer.PARAMETER=VALUE"),
         ((), "Missing argument 'LOG...'"),
@@ -199,9 +200,11 @@ def test_of_the_reference_it_says_what_matters() -> None:
     good = replay("sine.csv", "--columns", PLAIN, "--observers", "linear").out
     assert "Beside the tilt" not in good
     late = replay("sine.csv", "--columns", PLAIN, "--observers", "linear", "--delay", "0.01").out
-    assert "(beyond what was set; to take it out: --delay -0.01" in " ".join(late.split())
+    assert "(to take it out, instead of what is set: --delay 0.0000" in " ".join(late.split())
     real = " ".join(replay(LOG, "--columns", REAL, "--observers", "linear").out.split())
-    assert "12.10 ms behind; 1.0157 times it plus 0.0007 rad/s fits (to take it out: --delay 0.0121)." in real
+    assert "12.10 ms behind; 1.0157 (1.0152 to 1.0163) times it plus 0.0007 (0.0000 to 0.0014) rad/s fits" in real
+    assert "(to take it out: --delay 0.0121 --scale rate=1.016)." in real
+    assert "Noise of the tilt: 0.1 deg is used; the log cannot tell: it goes in steps of 0.08 deg" in real
     unlike_log = dict(sine(), gyro_rad_s=np.random.default_rng(0).standard_normal(4000))
     write_csv("other.csv", unlike_log)
     assert "is it the rate of this tilt?\n" in replay("other.csv", "--columns", PLAIN, "--observers", "linear").out

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -150,7 +151,18 @@ def test_one_that_is_lost_is_said_and_the_others_go_on(tmp_path: Path) -> None:
     )
     assert set(result.estimates) == {"linear"}
     assert "x2_rad_s is not finite from 0.05 s on" in result.left_out["tests.replay.test_replayed:Loses"]
-    assert "raised ZeroDivisionError" in result.left_out["tests.replay.test_replayed:Raises"]
+    reason = result.left_out["tests.replay.test_replayed:Raises"]
+    assert re.fullmatch(r"raised ZeroDivisionError: .* \(test_replayed\.py, line \d+\).*", reason)
+
+
+def test_one_that_cannot_begin_is_named_with_its_line(tmp_path: Path) -> None:
+    """Also by `tune-log`, which replays the log before it tunes."""
+    name = "tests.replay.test_replayed:RaisesAtOnce"
+    expected = rf"^observer '{name}': step\(state, y, u\) raised ValueError: x \(test_replayed\.py, line \d+\)$"
+    with pytest.raises(InputError, match=expected):
+        replay_log(log(tmp_path), ["linear", name])
+    with pytest.raises(InputError, match=expected):
+        tune_on_logs([log(tmp_path)], name)
 
 
 class Loses:
@@ -164,6 +176,11 @@ class Loses:
 
     def step(self, state: int, y: Measurement, u: float) -> tuple[int, tuple]:
         return state + 1, (y.y1, float("nan") if state == 9 else 0.0, 0.0)
+
+
+class RaisesAtOnce(Loses):
+    def step(self, state: int, y: Measurement, u: float) -> tuple[int, tuple]:
+        raise ValueError("x")
 
 
 class Raises(Loses):

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from cmg_mj.errors import InputError
 from cmg_mj.replay.log_replay import ReplayResult, replay_log
 from cmg_mj.replay.logs import ReadOptions, read_log
+from cmg_mj.replay.logs.resampling import is_even, resolution_of
 from cmg_mj.replay.plot import liveliest_span, plot_replay
 from cmg_mj.replay.recording import write_replay
 from cmg_mj.replay.save import signals
@@ -70,7 +72,10 @@ def test_stretches_give_what_the_whole_gives(kind: str, tmp_path: Path, monkeypa
         assert long.summaries[kind_of] == pytest.approx(whole.summaries[kind_of], rel=1e-7)
     assert long.alignment is not None
     assert whole.alignment is not None
-    assert long.alignment._asdict() == pytest.approx(whole.alignment._asdict(), rel=1e-5, abs=1e-9)
+    assert long.alignment.lag_error_s == pytest.approx(whole.alignment.lag_error_s, abs=1e-8)  # to its search's step
+    long_alignment, whole_alignment = (fit._replace(lag_error_s=0.0) for fit in (long.alignment, whole.alignment))
+    assert long_alignment._asdict() == pytest.approx(whole_alignment._asdict(), rel=1e-5, abs=1e-9)
+    assert long.log.white_noise == whole.log.white_noise
     assert liveliest_span(long) == pytest.approx(liveliest_span(whole), abs=2.0 * DT)
     assert_saved_alike(long, whole, tmp_path)
 
@@ -105,3 +110,38 @@ def test_a_long_log_is_drawn_and_recorded(tmp_path: Path, monkeypatch: pytest.Mo
     _, expected = replayed.log.broken(np.degrees(replayed.log["y1_rad"]))
     assert len(batches) == -(-len(replayed.log) // 256)
     np.testing.assert_array_equal([value for _, (value,) in rows], expected)
+
+
+@pytest.mark.parametrize("last", ["", "no date"])
+def test_dates_are_read_piece_by_piece(tmp_path: Path, last: str) -> None:
+    """A file of several of Arrow's batches, of a megabyte each: seconds count from the first row of all."""
+    n = 40_000
+    seconds = 0.005 * np.arange(n)
+    stamps = np.datetime64("2026-11-22T23:59:00.000", "ms") + np.rint(1000.0 * seconds).astype("timedelta64[ms]")
+    stamps = np.datetime_as_string(stamps).tolist()
+    stamps[-1] = last or stamps[-1]
+    rows = [f"{stamp},{0.1 * np.sin(second):.15g}" for stamp, second in zip(stamps, seconds, strict=True)]
+    path = tmp_path / "dates.csv"
+    path.write_text("\n".join(["when,tilt_rad", *rows]) + "\n")
+    assert path.stat().st_size > 1 << 20
+    options = ReadOptions({"time": "when", "tilt": "tilt_rad"})
+    if last:
+        with pytest.raises(InputError, match=f"row {n:d}, column 'when': 'no date' is not a date, as the rows before"):
+            read_log(path, options)
+        return
+    log = read_log(path, options)
+    assert log["time_s"] == pytest.approx(seconds, abs=1e-9)
+    assert np.array_equal(log["y1_rad"], [float(row.split(",")[1]) for row in rows])
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-5, 9e-5, 1.1e-4, 1e-3])
+@pytest.mark.parametrize("rounded_s", [0.0, 1e-4, 1e-3])
+@pytest.mark.parametrize("drift", [0.0, 5e-4, 2e-3])
+@pytest.mark.parametrize("gap", [False, True])
+def test_evenness(monkeypatch: pytest.MonkeyPatch, jitter: float, rounded_s: float, drift: float, gap: bool) -> None:
+    t = 100.0 + DT * (1.0 + drift) * np.arange(N) + jitter * np.random.default_rng(0).uniform(-1.0, 1.0, N)
+    t = np.round(t / rounded_s) * rounded_s if rounded_s else t
+    t = np.delete(t, slice(500, 503)) if gap else t
+    whole = [is_even(t, period, resolution_of(t)) for period in (DT, DT * (1.0 + drift))]
+    in_stretches(monkeypatch, 130)
+    assert [is_even(t, period, resolution_of(t)) for period in (DT, DT * (1.0 + drift))] == whole

@@ -11,9 +11,15 @@ from pathlib import Path
 
 import pytest
 
+from cmg_mj.codegen.export.names import export_files
 from cmg_mj.errors import InputError
+from cmg_mj.papers.report import REPORT_FILES
+from cmg_mj.replay.save import files_of_replay
 from cmg_mj.results.run_folder import RunFolder, write_text
 from cmg_mj.results.run_folder.manifest import HIDDEN
+from cmg_mj.results.run_folder.written_names import foreign_names
+from cmg_mj.studies.sweeps.report import FILES as SWEEP_FILES
+from cmg_mj.studies.tuning.save import files_of_study
 from tests.command import cmg_mj
 from tests.run_folders import FILES, write
 
@@ -217,6 +223,38 @@ def a_result_that_is_a_link() -> None:
     link("got/summary.json", "user/victim.txt")
 
 
+@forgery
+def a_list_with_a_users_file() -> None:
+    write(VICTIM, "got/thesis.txt")
+    manifest("got", "thesis.txt")
+
+
+@forgery
+def a_list_with_a_users_c_file() -> None:
+    write(VICTIM, "got/thesis.c")
+    manifest("got", "thesis.c", "summary.json")
+
+
+@forgery
+def a_list_with_a_number_for_a_digest() -> None:
+    manifest("got", "plot.png", digest=5)
+
+
+@forgery
+def a_new_result_with_a_folder_in_it() -> None:
+    write(VICTIM, f"got/{HIDDEN}/new/deep/er/mine")
+
+
+@forgery
+def a_ready_result_with_a_folder_in_it() -> None:
+    write(VICTIM, f"got/{HIDDEN}/ready/deep/er/mine")
+
+
+@forgery
+def a_list_beside_a_folder() -> None:
+    write(VICTIM, f"got/{HIDDEN}/deep/mine")
+
+
 def outside() -> dict[str, str]:
     """Return everything but what is in the folder of the run: kind and content of each name."""
     content = {}
@@ -262,3 +300,49 @@ def test_a_command_refuses_what_is_not_its_own(forged: dict[str, str]) -> None:
     assert complaint.startswith(f"--out got: {HIDDEN} there ")
     assert complaint.endswith(f": remove {HIDDEN}, or name another folder")
     assert outside() == forged
+
+
+@pytest.mark.parametrize(
+    ("forged", "said"),
+    [
+        ("a list with a users file", "names 'thesis.txt', which cmg-mj never writes"),
+        ("a list with a users c file", "names 'thesis.c', which cmg-mj never writes"),
+        ("a list with a number for a digest", "gives 5 as the SHA-256 of 'plot.png'"),
+    ],
+    indirect=["forged"],
+)
+def test_a_list_that_is_not_as_written_is_refused(forged: dict[str, str], said: str) -> None:
+    before = {path.name: path.read_text() for path in Path("got").iterdir() if path.is_file()}
+    complaint = cmg_mj("run", "quick.toml", "--out", "got").complaint
+    assert complaint == f"--out got: {HIDDEN} there {said}: remove {HIDDEN}, or name another folder"
+    assert {path.name: path.read_text() for path in Path("got").iterdir() if path.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    ("forged", "place"),
+    [
+        ("a new result with a folder in it", "new/deep"),
+        ("a ready result with a folder in it", "ready/deep"),
+        ("a list beside a folder", "deep"),
+    ],
+    indirect=["forged"],
+)
+def test_folders_that_are_not_its_own_stay(forged: dict[str, str], place: str) -> None:
+    before = sorted(Path("got").rglob("*"))
+    complaint = cmg_mj("run", "quick.toml", "--out", "got").complaint
+    assert complaint == (
+        f"--out got: {HIDDEN}/{place} there is no folder that cmg-mj makes: remove {HIDDEN}, or name another folder"
+    )
+    assert sorted(Path("got").rglob("*")) == before
+
+
+def test_what_the_commands_write_is_listed() -> None:
+    names = {
+        "sweep": list(SWEEP_FILES),
+        "tune": files_of_study([1.0, 2.5]),
+        "replay": files_of_replay(["ein Log", "b-2"]),
+        "reproduce": REPORT_FILES,
+        "export": export_files("my_observer"),
+    }
+    assert not [(command, name) for command, files in names.items() for name in foreign_names(files)]
+    assert foreign_names(export_files("mine")[:3]) == export_files("mine")[:3]

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy import stats
 
 from cmg_mj.errors import InputError
-from cmg_mj.results.intervals import Interval, known_interval, mean_interval, paired_verdict, ratio_interval
+from cmg_mj.results.intervals import (
+    FEWEST,
+    Interval,
+    known_interval,
+    mean_interval,
+    paired_verdict,
+    positive_mean_interval,
+    ratio_interval,
+)
 from cmg_mj.studies.sweeps.cells import fell_interval
 
 
@@ -72,6 +82,83 @@ def test_the_share_of_falls_is_covered(share: float, worlds: int) -> None:
     n_fallen = np.random.default_rng(9).binomial(worlds, share, TIMES)
     assert 0.925 <= is_covered[n_fallen].mean() <= 0.975
     assert is_covered[n_fallen].mean() == pytest.approx(exactly, abs=0.01)
+
+
+SKEWED: dict[str, tuple[float, Callable[[np.random.Generator, tuple[int, int]], np.ndarray]]] = {
+    "exponential": (1.0, lambda rng, shape: rng.exponential(1.0, shape)),
+    "lognormal": (float(np.exp(0.5)), lambda rng, shape: rng.lognormal(0.0, 1.0, shape)),
+    "half are zero": (0.5, lambda rng, shape: np.where(rng.random(shape) < 0.5, 0.0, rng.exponential(1.0, shape))),
+}
+"""Positive quantities: the mean, and samples of them."""
+
+
+def covered(mean: float, intervals: list[Interval]) -> float:
+    return float(np.mean([low <= mean <= high for _, low, high in intervals]))
+
+
+@pytest.mark.parametrize(("n_worlds", "gain"), [(6, 0.04), (20, 0.01)])
+@pytest.mark.parametrize("kind", SKEWED)
+def test_intervals_of_what_is_positive_and_skewed_cover_better_than_students(
+    kind: str, n_worlds: int, gain: float
+) -> None:
+    mean, draw = SKEWED[kind]
+    samples = draw(np.random.default_rng(n_worlds), (4000, n_worlds))
+    positive, student = (
+        [interval(values) for values in samples] for interval in (positive_mean_interval, mean_interval)
+    )
+    assert covered(mean, positive) > max(0.87, covered(mean, student) + gain)
+    assert min(low for _, low, _ in positive) >= 0.0
+    assert n_worlds > 6 or sum(low < 0.0 for _, low, _ in student) > 1000
+    np.testing.assert_array_equal([found.mean for found in positive], [found.mean for found in student])
+
+
+@pytest.mark.parametrize("kind", SKEWED)
+def test_fewer_worlds_than_cover_have_no_interval(kind: str) -> None:
+    """From `FEWEST` on it holds the mean as often as of six; of two its upper end could be 330,000 times the mean."""
+    mean, draw = SKEWED[kind]
+    samples = draw(np.random.default_rng(FEWEST), (4000, FEWEST))
+    results = [known_interval(values, positive=True) for values in samples]
+    intervals = [result for result in results if result is not None]
+    assert len(intervals) == len(samples)
+    assert covered(mean, intervals) > 0.87
+    assert np.median([interval.high / interval.mean for interval in intervals if interval.mean]) < 10.0
+    for n_worlds in range(FEWEST):
+        assert known_interval([0.1, 0.2, 0.3][:n_worlds], positive=True) is None
+    with pytest.raises(InputError, match="needs four worlds or more, not 2"):
+        positive_mean_interval([0.0, 1.0])
+
+
+def test_three_worlds_of_which_half_are_zero_are_not_covered() -> None:
+    """Hence `FEWEST`: the same formula of one world fewer."""
+    mean, draw = SKEWED["half are zero"]
+    samples = draw(np.random.default_rng(3), (4000, FEWEST - 1))
+    with np.errstate(invalid="ignore"):
+        factors = np.exp([(high - mean) / mean if mean else 0.0 for mean, _, high in map(mean_interval, samples)])
+    means = samples.mean(axis=1)
+    assert np.mean((means / factors <= mean) & (mean <= means * factors)) < 0.87
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SKEWED)
+def test_a_bootstrap_of_few_worlds_covers_less(kind: str) -> None:
+    """Scipy's bias-corrected and accelerated one."""
+    mean, draw = SKEWED[kind]
+    samples = draw(np.random.default_rng(0), (400, 6))
+    results = [stats.bootstrap((values,), np.mean, n_resamples=999, rng=1) for values in samples if values.std() > 0.0]
+    ends = [result.confidence_interval for result in results]
+    bootstrap = np.mean([low <= mean <= high for low, high in ends])
+    assert bootstrap < covered(mean, [positive_mean_interval(values) for values in samples]) - 0.05
+
+
+def test_narrow_intervals_are_students_and_zeros_have_none() -> None:
+    values = np.random.default_rng(2).normal(1.0, 0.05, 20)
+    assert positive_mean_interval(values) == pytest.approx(mean_interval(values), rel=5e-4)
+    assert not positive_mean_interval(values).is_lopsided
+    assert positive_mean_interval([0.0, 0.0, 0.0, 5.0]).is_lopsided
+    assert positive_mean_interval([0.0] * FEWEST) == (0.0, 0.0, 0.0)
+    assert positive_mean_interval([1.0, np.inf, 1.0, 2.0])[1:] == (-np.inf, np.inf)
+    known = [1.0, 2.0, 3.0, 4.0]
+    assert known_interval([np.nan, *known], positive=True) == positive_mean_interval(known)
 
 
 def test_ratio_interval_of_an_exact_ratio() -> None:

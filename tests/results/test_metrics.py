@@ -49,7 +49,7 @@ def estimates(rates: Iterable[np.ndarray]) -> list[dict[str, np.ndarray]]:
 
 def block(estimates: list[dict[str, np.ndarray]], **signals: np.ndarray) -> TickBlock:
     """Ticks of which nothing but these signals is known."""
-    return TickBlock(**signals, y1=signals["x1"], estimates=estimates, columns={}, ended=None)
+    return TickBlock(**signals, body_rate=signals["x2"], y1=signals["x1"], estimates=estimates, columns={}, ended=None)
 
 
 def summary(run: Metrics, n: int = len(T), fell: bool = False, rates: tuple = (0.0,), **signals: Any) -> dict[str, Any]:

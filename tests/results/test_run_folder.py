@@ -11,12 +11,18 @@ from pathlib import Path
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.results.run_folder import RunFolder, Writers, swap, write_text
+from cmg_mj.results.run_folder import RunFolder, Writers, swap, write_text, written_names
 from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest
 from tests.command import cmg_mj
 from tests.run_folders import FILES, assert_whole, names, write
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+@pytest.fixture(autouse=True)
+def _short_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if cmg_mj wrote files of these names."""
+    monkeypatch.setattr(written_names, "NAMES", (*written_names.NAMES, "[a-d]"))
 
 
 @pytest.fixture(params=["folders change names", "files are moved"])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from cmg_mj.results.baselines import References
+from cmg_mj.results.baselines import GYROS, References
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.mems_gyro import MemsGyro
 from cmg_mj.sensors.noise_streams import NoiseStream, normals
@@ -76,27 +76,53 @@ def test_scale_offset_range_and_resolution() -> None:
     assert read_rate(np.radians([0.1, 0.3]), **quiet(counts_per_deg_s=2.0)) == pytest.approx([0.0, 0.5])
 
 
-def test_a_world_reads_the_same_alone_and_in_a_batch_and_in_any_pieces() -> None:
-    rate = np.random.default_rng(0).normal(size=(700, 3))
-    batch = References(MemsGyro(), DT, 5, [4, 0, 7]).rates(rate)["mems_gyro"]
+@pytest.mark.parametrize("sigmas", [[0.006, 0.006, 0.006], [0.006, 0.002, 0.0]])
+@pytest.mark.parametrize("name", GYROS)
+def test_a_world_reads_the_same_alone_and_in_a_batch_and_in_any_pieces(name: str, sigmas: list[float]) -> None:
+    rate, y1 = np.random.default_rng(0).normal(size=(2, 700, 3))
+    batch = References(MemsGyro(), DT, 5, [4, 0, 7], sigmas).rates(rate, y1)[name]
     for i, world in enumerate((4, 0, 7)):
-        alone = References(MemsGyro(), DT, 5, world)
-        pieces = [alone.rates(part[:, [i]])["mems_gyro"] for part in np.split(rate, (1, 256, 300))]
+        alone = References(MemsGyro(), DT, 5, world, sigmas[i : i + 1])
+        parts = zip(*(np.split(signal[:, [i]], (1, 256, 300)) for signal in (rate, y1)), strict=True)
+        pieces = [alone.rates(*part)[name] for part in parts]
         np.testing.assert_array_equal(np.concatenate(pieces)[:, 0], batch[:, i])
     assert not np.array_equal(batch[:, 0] - rate[:, 0], batch[:, 1] - rate[:, 1])
-    other = References(MemsGyro(), DT, 6, [4, 0, 7]).rates(rate)["mems_gyro"]
+    other = References(MemsGyro(), DT, 6, [4, 0, 7], sigmas).rates(rate, y1)[name]
     assert not np.array_equal(batch, other)
+
+
+def test_as_bought_it_is_offset_and_drifts_to_either_side() -> None:
+    """PS-MPU-6000A, 6.1: 20 deg/s, and 20 deg/s more over 60 K; a degree warmer in a minute."""
+    gyro, rate = MemsGyro(**quiet()), np.radians(np.full((12_001, 40), 10.0))
+    part = np.random.default_rng(3).normal(size=(2, 40))
+    shown = np.degrees(gyro.make_both(DT, normals(0, range(40), 3, gyro.channels), part)(rate)[1])
+    offset, drift = shown[0] - 10.0, shown[-1] - shown[0]
+    np.testing.assert_allclose(offset, 20.0 * np.sign(part[0]))
+    np.testing.assert_allclose(drift, 0.33 * np.sign(part[1]), rtol=1e-9)
+    assert {*np.sign(offset), *np.sign(offset * drift)} == {-1.0, 1.0}
+    assert gyro.as_bought_drift_deg_s_k == pytest.approx(20.0 / (85.0 - 25.0), rel=0.02)
+
+
+def test_calibrated_it_is_what_it_was() -> None:
+    """The part as bought takes no number of the calibrated one's noise."""
+    gyro, rate = MemsGyro(bias_deg_s=0.1), np.random.default_rng(1).normal(size=(600, 2))
+    noise = [normals(2, [3, 8], NoiseStream.MEMS_GYRO, gyro.channels) for _ in range(2)]
+    alone = gyro.make_reading_function(DT, noise[0])(rate)
+    calibrated, as_bought = gyro.make_both(DT, noise[1], np.array([[1.0, -1.0], [1.0, -1.0]]))(rate)
+    np.testing.assert_array_equal(calibrated, alone)
+    resting = gyro.make_both(DT, normals(2, [3, 8], NoiseStream.MEMS_GYRO, gyro.channels), np.zeros((2, 2)))
+    np.testing.assert_allclose(as_bought[0] - resting(rate)[1][0], np.radians([20.0, -20.0]), atol=2e-4)
 
 
 @pytest.mark.parametrize("stream", range(3))
 def test_its_noise_is_none_of_the_other_sensors(stream: int) -> None:
     rate, gyro = np.zeros((50, 1)), MemsGyro()
     other_stream = gyro.make_reading_function(DT, normals(5, 4, stream, gyro.channels))(rate)
-    assert not np.array_equal(References(gyro, DT, 5, 4).rates(rate)["mems_gyro"], other_stream)
+    assert not np.array_equal(References(gyro, DT, 5, 4, [0.006]).rates(rate, rate)["mems_gyro"], other_stream)
 
 
 def test_zero_is_zero() -> None:
-    assert not References(MemsGyro(), DT, 0, 0).rates(np.ones((5, 1)))["zero"].any()
+    assert not References(MemsGyro(), DT, 0, 0, [0.006]).rates(np.ones((5, 1)), np.ones((5, 1)))["zero"].any()
 
 
 def test_it_is_open_loop_and_changes_nothing() -> None:

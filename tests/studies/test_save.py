@@ -303,11 +303,16 @@ def test_a_title_of_any_letters_under_an_ascii_locale(command: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["run", "compare", "tune"])
+@pytest.mark.parametrize("command", ["run", "compare", "tune", "sweep"])
 @pytest.mark.parametrize("locale", [{}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}], ids=["", "C"])
 def test_a_folder_and_a_file_named_in_bytes_that_are_no_letters(command: str, locale: dict[str, str]) -> None:
     Path(os.fsdecode(b"my\xff.toml")).write_text("duration_s = 0.2\n[observer]\nkind = 'linear'")
-    options = {"run": [], "compare": ["--observers", "linear", "--worlds", "1"], "tune": ["--worlds", "2"]}[command]
+    options = {
+        "run": [],
+        "compare": ["--observers", "linear", "--worlds", "1"],
+        "tune": ["--worlds", "2"],
+        "sweep": ["--vary", "plant.equilibrium_bias_deg=0,1", "--worlds", "2"],
+    }[command]
     for place in (["--out", b"it\xff"], []):
         process = subprocess.run(
             [*COMMAND, command, b"my\xff.toml", *options, *place],

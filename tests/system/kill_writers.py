@@ -16,12 +16,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cmg_mj.results.run_folder import RunFolder, swap
+from cmg_mj.results.run_folder import RunFolder, swap, written_names
 from cmg_mj.results.run_folder.manifest import HIDDEN
 
 EVENTS = {"open", "os.link", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.chmod", "os.utime"}
 """Events that change files, as Python's audit hooks name them."""
 
+written_names.NAMES = (*written_names.NAMES, "[a-d]")  # as if cmg_mj wrote files of these names
 OLD, NEW = {"a": "old", "b": "old", "c": "old"}, {"b": "new", "c": "new", "d": "new"}
 
 

@@ -37,6 +37,14 @@ def test_the_tables_of_the_accelerometers_errors() -> None:
 
 
 @pytest.mark.slow
+def test_the_tables_of_the_baselines() -> None:
+    command = [sys.executable, STUDIES / "baselines.py", "--worlds", "2"]
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert re.search(r"\| fused, told nothing, offset 20 deg/s +\| +0\.\d+ \| +0\.00\d+ \| +0\.001", process.stdout)
+    assert re.search(r"\| 0\.1, 0\.15 +\| +0\.83 \| +1\.11 \| +0\.0366 \|", process.stdout)
+
+
+@pytest.mark.slow
 def test_the_tables_of_gyro_free() -> None:
     study = STEPS.with_name("gyro_free.py")
     arguments = "--worlds 2 --noise 400 --e 0.5 --parts model,taps"

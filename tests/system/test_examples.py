@@ -23,7 +23,7 @@ OUTPUT = {
     "bode_and_step": "phase margin 65.9 deg",
     "control_callback": "the tilt is",
     "gymnasium_env": "observer and law: stood until 4.00 s",
-    "gymnasium_robot": "pushed with 1.8 of what it bears: 0 of 5 stood",
+    "gymnasium_robot": "pushed with 1.8 of E: 0 of 5 stood",
     "many_worlds": "homogeneous beside ltv: better",
     "mujoco_viewer": "pushed at 1.00 s; at 4.00 s the tilt is",
     "own_law": "own_law:Leaning: 5 of 5 stood",

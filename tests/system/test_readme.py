@@ -131,14 +131,10 @@ def test_the_tables_are_complete() -> None:
 
 
 def test_the_verdicts_are_those_of_the_report() -> None:
-    pattern = (
-        r"(\d+) claims of the papers: (\d+) reproduced, (\d+) reproduced within stated conditions, (\d+) not reproduced"
-    )
-    report = re.search(pattern, (ROOT / "docs" / "reproduced.md").read_text(encoding="utf-8"))
-    assert report
-    total, plain, conditions, failed = report.groups()
-    sentence = f"{total} claims of the papers: {plain} reproduced, {conditions} within stated conditions, "
-    sentence += f"{failed} not reproduced"
+    report = (ROOT / "docs" / "reproduced.md").read_text(encoding="utf-8")
+    counts = re.search(r"\d+ claims of the papers: [^.]*\.", report)
+    assert counts
+    sentence = counts[0].rstrip(".").replace("reproduced within", "within")
     assert sentence in README.replace("\n", " ")
 
 

@@ -39,6 +39,7 @@ def theorem_2() -> Claim:
         f"shrink to at most {largest_end:.1e} of their length within tau = 40. K, dilated by 1e4, 1e8, 1e12, "
         "approaches its approximations at 0 and infinity every time. Not every l will do: with l = (1, 2, 0.9), whose "
         f"linear part is Hurwitz, and d_inf = 0.2, an error of 1 is {growth:.0f} times as long by then.",
+        is_general=True,
         holds=largest_end < 1e-3 and limits_shrink,
         conditions=by_simulation,
         otherwise=by_simulation,

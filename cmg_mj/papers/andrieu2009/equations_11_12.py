@@ -103,6 +103,7 @@ def scaled_error(balls: np.ndarray, from_errors: np.ndarray) -> Claim:
         f"disturbance of amplitude 0.1, 0.01, 0.001 at {TURNS:g} rad per time its largest value after t = {LATE:g} "
         "shrinks with the amplitude, in f as well as in y.",
         table=markdown.table(("disturbance", *(f"{size:g}" for size in SIZES)), rows),
+        is_general=True,
         holds=balls_shrink and bool(ends.max() < 1e-5),
         conditions="By simulation of system (1), p = 0.5, x1 = sin t, one observer: see Theorem 1.",
         otherwise="It does not fade, or does not shrink with the disturbance.",
@@ -132,6 +133,7 @@ def gain_bound(from_errors: np.ndarray, from_gains: np.ndarray, of_solutions: np
         f"but its largest late value differs by {relative_spread:.0e} of itself only, from L(0) up to {GAINS[-1]:g} "
         f"phi2 too. It follows the solution: {', '.join(f'{value:.0f}' for value in of_solutions)} for x1 of amplitude "
         f"{', '.join(f'{a:g}' for a in SOLUTIONS)}.",
+        is_general=True,
         holds=bool(relative_spread < 1e-3 and np.isfinite(peaks).all() and np.isfinite(of_solutions).all()),
         conditions="By simulation of system (1), p = 0.5, x1 = sin t, one observer: see Theorem 1.",
         otherwise="L does not forget its start.",

@@ -66,6 +66,7 @@ def claim() -> Claim:
         f"{len(pairs)} of {len(results)} d_inf. c1 and c2 are the largest constants at {len(FINE)} scales from "
         f"{FINE[0]:.0e} to {FINE[-1]:.0e}, {ANGLES} directions and more each.",
         table=markdown.table(("d_inf", "b", "l1", "sigma", "c1", "c2"), rows, text_columns=0),
+        is_general=True,
         holds=len(pairs) == len(results) and all(min(pair.decay) > 0.0 for pair in pairs),
         conditions="For two dimensions, by numbers; a d_inf near its limit asks for a larger l1.",
         otherwise="For some d_inf none was found, which does not say that there is none.",

@@ -6,7 +6,7 @@ import numpy as np
 
 from cmg_mj.papers.andrieu2009.paper import PHI1, PHI2, PHI3
 from cmg_mj.papers.andrieu2009.simulation import HOMOGENEOUS, KINDS, TIME, UPDATED, WINDOWS, window_means
-from cmg_mj.papers.andrieu2009.study import Study
+from cmg_mj.papers.andrieu2009.study import ASSUMED, Study
 from cmg_mj.papers.claim import Claim
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
@@ -36,6 +36,7 @@ def figure_1(study: Study) -> Claim:
         f"{words(means[0])}; Omega_1 {words(means[1])}; Omega_2 {words(means[2])}; df2/dx2 {words(means[3])}: in order "
         f"in {in_order.sum()} of 4 windows. L is {min(map(np.min, ratios)):.3f} to "
         f"{max(map(np.max, ratios)):.3f} times phi2 + (phi3/phi1) Omega, as (13) says.",
+        assumes=ASSUMED,
         holds=bool(in_order.all()),
         otherwise="The means are not in order in every window.",
         figures={f"{name}_mean_per_time": row.tolist() for name, row in zip(RATES, means, strict=True)}

@@ -122,6 +122,7 @@ def no_observer_beyond_1() -> Claim:
         f"above {MISSED} in {count} of {len(STARTS)}, {max(ends[BEYOND]):.2f} at worst.{first} With p = {INSIDE} "
         "solutions escape as well, but y with them: the same observer then finds x2 from every start, to "
         f"{max(ends[INSIDE]):.0e}.",
+        is_general=True,
         holds=max(ends[INSIDE]) < FOUND and misses[-1],
         conditions=one_observer,
         otherwise=one_observer,

@@ -71,7 +71,9 @@ def increments() -> Claim:
         result=f"Over both signs and sizes from 1e-4 to 1e4 the left side is at most {largest_inside:.6f} of the "
         f"right side for p = 0.1, 0.5, 0.9. The check can fail: for p = 1.5 and 2 the quotient is {quotients[1.5]:.3f} "
         f"and {quotients[2.0]:.3f}.",
+        is_general=True,
         holds=largest_inside <= 1.0 + 1e-9,
+        conditions="For all p in (0, 1), of which three were tried.",
         figures={"worst_quotient_by_p": {str(p): quotient for p, quotient in quotients.items()}},
     )
 
@@ -103,8 +105,10 @@ def exponent_of_6() -> Claim:
         statement="For system (1), (3) has the form (6) with d_inf = p, Gamma = |g| + 1 + p and v_2 = p.",
         result=f"With the exponent 1 + p the left side is at most {max(quotients.values()):.4f} of the right one. (6) "
         f"as printed has the exponent 1 for n = 2: up to x2 = 1e4 and 1e8 the quotient reaches {growth}.",
+        is_general=True,
         holds=max(quotients.values()) <= 1.0 + 1e-9,
-        conditions=f"{CORRECTED} In the copy at hand (6) has n - i for n - i - 1." if misprint else "",
+        conditions=(f"{CORRECTED} In the copy at hand (6) has n - i for n - i - 1. " if misprint else "")
+        + "For all p in (0, 1), of which three were tried.",
         otherwise="Neither exponent bounds the increments.",
         figures={
             "worst_quotient_by_p": {str(p): value for p, value in quotients.items()},

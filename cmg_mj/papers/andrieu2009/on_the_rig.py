@@ -8,6 +8,7 @@ import numpy as np
 
 from cmg_mj.observers import make_observer
 from cmg_mj.observers.high_gain import HighGain, updated_gain
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
@@ -81,6 +82,7 @@ def comparison_claim(results: dict[str, Result]) -> Claim:
         f"{means(VELOCITY)}. Less theirs, over the worlds in which both stand: "
         + "; ".join(words(label, difference) for label, difference in excess.items())
         + f". Tilt RMS [deg]: {means(TILT)}.",
+        assumes=PUSH_RECOVERY,
         holds=standing_counts["high_gain"] == worlds,
         conditions=remark,
         otherwise=remark,
@@ -124,6 +126,7 @@ def idle_claim(result: Result) -> Claim:
         result=f"Along the {Omega.shape[1]} runs Omega = |u damping| is at most {largest:.5f} 1/s, RMS {rms:.5f} "
         f"1/s, against {fastest:.0f} 1/s of the observer's linear part; L stays between {observer.phi2:g} and "
         f"{gain:.4f}.",
+        assumes=PUSH_RECOVERY,
         holds=gain < 1.05 * observer.phi2,
         otherwise="L moves by more than 5 %.",
         figures={"largest_Omega_1_s": largest, "rms_Omega_1_s": rms, "largest_L": gain, "linear_rate_1_s": fastest},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from cmg_mj.papers.andrieu2009.simulation import (
     run_plant,
     select_seeds,
 )
+from cmg_mj.papers.claim import Assumption
 
 LOUD = 0.0986
 """10 % of the domain of eta1, which the paper takes for 0.05."""
@@ -38,6 +40,13 @@ class Study(NamedTuple):
     """Runs with noise, without error of hbar."""
     rate: np.ndarray
     """df2/dx2, (n, seeds)."""
+
+
+ASSUMED: Mapping[Assumption, str] = {
+    "initial values": "drawn from M_eta for each seed",
+    "noise": "a new value every 10 ms, straight in between",
+}
+"""What the paper does not give of Figs 1 and 2."""
 
 
 def study(seeds: int, seed: int = 0, dt: float = 0.01) -> Study:

@@ -49,6 +49,7 @@ def theorem_1() -> Claim:
         f"gain of 12 with linear correction fails in {failures[PLAIN]} of {n}; updated, with linear correction, in "
         f"{failures[UPDATED]}, but its gain has to rise to {largest[UPDATED]:.0f}, against {largest[HOMOGENEOUS]:.0f} "
         "with the homogeneous one.",
+        is_general=True,
         holds=failures[HOMOGENEOUS] == 0 and shrinks,
         conditions=by_simulation,
         otherwise=by_simulation,

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval, known_interval
@@ -26,7 +27,7 @@ Order = Literal["holds", "is inverted", "does not hold"]
 PAIRS = (("ltv", "homogeneous"), ("linear", "ltv"))
 """The worse and the better of Section V's ranking."""
 JUDGED = "velocity_rms_error_rad_s"
-"""The measure that the verdict goes by: the paper's comparison is one of velocity observers."""
+"""The measure of the paper's subject, velocity observers: the first."""
 MEASURES = (JUDGED, "velocity_rms_error_push_rad_s", "tilt_rms_deg", "command_rms_rad_s")
 """Summary keys that an observer could be better by; the paper names none."""
 
@@ -85,32 +86,36 @@ def read_measures(results: Mapping[AngleSource, Mapping[str, Result]]) -> list[M
     ]
 
 
-def order(measures: list[Measure]) -> Claim:
-    """Judge Section V's ranking by the measures, that of `JUDGED` among them."""
-    verdict_measure = next(measure for measure in measures if measure.key == JUDGED)
-    worlds = len(next(iter(verdict_measure.numbers.values()))["linear"])
+def orders(measures: list[Measure]) -> list[Claim]:
+    """Judge Section V's ranking by each measure, that of `JUDGED` first; the picture is the first one's."""
+    return [_order(measure, [] if i else [_picture(measures)]) for i, measure in enumerate(measures)]
+
+
+def _order(measure: Measure, pictures: list[Picture]) -> Claim:
+    worlds = len(next(iter(measure.numbers.values()))["linear"])
+    label = KEYS[measure.key].label
+    turns = (
+        "At low noise or large bias the order turns round, because (11) mistakes the bias for a rate most: the map "
+        "over noise and bias is in docs/results.md."
+    )
     return Claim(
-        place="Section V, the comparison",
+        place=f"Section V, the comparison: {label}",
         statement="The homogeneous differentiator performs best, the time-varying observer second, the linear one "
-        "last.",
+        f"last; judged by the {label}.",
         result=(
             f"Means over {worlds} seeds of (11), (10), (9); an order is one if both steps of it are beyond chance, "
-            f"world by world. {' '.join(_in_words(measure) for measure in measures)}"
+            f"world by world. The paper names no measure. {_in_words(measure)}"
         ),
-        holds=verdict_measure.has_order("holds"),
-        conditions=(
-            f"{_by_measure(measures)} At e = 0.5 deg and 400 ug/rtHz under this push. At low noise or large bias the "
-            "order turns round, because (11) mistakes the bias for a rate most: the map over noise and bias is in "
-            "docs/results.md."
-        ),
-        otherwise="The map over noise and bias in docs/results.md shows where the order holds.",
+        assumes=PUSH_RECOVERY,
+        holds={f"{angles} angles": order == "holds" for angles, order in measure.orders.items()},
+        conditions=turns if measure.key == JUDGED else "",
+        otherwise=_in_which_order(measure) + (f" {turns}" if measure.key == JUDGED else ""),
         figures={
             f"{worse}_less_{better}_{angles}_angles_{measure.key}": step
-            for measure in measures
             for angles, numbers in measure.numbers.items()
             for (worse, better), step in zip(PAIRS, differences(numbers), strict=True)
         },
-        pictures=[_picture(measures)],
+        pictures=pictures,
     )
 
 
@@ -125,19 +130,12 @@ def _in_words(measure: Measure) -> str:
     return f"{label[0].upper()}{label[1:]}: {'; '.join(parts)}."
 
 
-def _by_measure(measures: list[Measure]) -> str:
-    """Say by which measures the order holds or is inverted."""
-    sentences = []
-    words: dict[Order, str] = {"holds": "the order holds", "is inverted": "it is inverted: (9), (10), (11)"}
-    for kind, wording in words.items():
-        labels = [f"the {KEYS[measure.key].label}" for measure in measures if measure.has_order(kind)]
-        if labels:
-            sentences.append(f"By {join_with_and(labels)} {wording}.")
-    for measure in measures:
-        if not (measure.has_order("holds") or measure.has_order("is inverted")):
-            best_equations = join_with_and(sorted({OBSERVERS[name] for name in measure.best_observers.values()}))
-            sentences.append(f"By the {KEYS[measure.key].label} it does not hold: best is {best_equations}.")
-    return " ".join(sentences)
+def _in_which_order(measure: Measure) -> str:
+    """Say how the order is not the ranking's."""
+    if measure.has_order("is inverted"):
+        return "It is inverted: (9), (10), (11)."
+    best_equations = join_with_and(sorted({OBSERVERS[name] for name in measure.best_observers.values()}))
+    return f"The best is {best_equations}."
 
 
 def _picture(measures: list[Measure]) -> Picture:

@@ -121,6 +121,7 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
             f"{comparison.difference:.3f} rad/s RMS and its error from {comparison.error:.3f} to "
             f"{comparison.other_error:.3f} rad/s."
         ),
+        assumes={"control rate": f"{1.0 / DT:g} Hz", "method": "explicit Euler, Runge-Kutta 4, the exact step"},
         holds=euler_first and rk4_fine and ours_fine,
         conditions=(
             "At 200 Hz the equation is delicate for explicit Euler alone, and H only until it has settled, the "

@@ -10,6 +10,7 @@ from cmg_mj.papers.aranovskiy2020 import comparison, second_place
 from cmg_mj.papers.aranovskiy2020.comparison import AngleSource
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import loop_panels, trajectory_of
 from cmg_mj.papers.scales import on_common_scales
@@ -56,6 +57,7 @@ def figure(name: str, results: Mapping[AngleSource, Result]) -> Claim:
             f"e = 0.5 deg, 400 ug/rtHz, 1 N m for 0.1 s, {worlds} seeds of {DURATION_S:g} s, the law on measured or "
             f"on estimated angles. {sentences}"
         ),
+        assumes=PUSH_RECOVERY,
         holds=max(falls.values()) == 0.0 and min(settles.values()) == 1.0,
         otherwise="It falls in some worlds, or does not settle.",
         figures={
@@ -103,6 +105,6 @@ def claims(on_share: OnShare) -> list[Claim]:
     errors = second_place.all_errors(exact, WORLDS, SEED)
     return [
         *on_common_scales([figure(name, {angles: results[angles][name] for angles in ANGLES}) for name in FIGURES]),
-        comparison.order(comparison.read_measures(results)),
+        *comparison.orders(comparison.read_measures(results)),
         second_place.cause(errors),
     ]

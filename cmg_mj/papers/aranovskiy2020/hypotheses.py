@@ -10,6 +10,7 @@ import numpy as np
 from cmg_mj.papers.aranovskiy2020.mismatch import MISMATCHES, Mismatch, MismatchRuns, run_all
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S
 from cmg_mj.papers.aranovskiy2020.yaw_momentum import balanced_yaw_rate, predict_yaw_rate
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.results.intervals import Interval, ratio_interval
@@ -104,6 +105,7 @@ def broken_claim(runs: MismatchRuns) -> Claim:
             f"RMS by at most {tilt:.0%}; {runs.fell} worlds fall."
         ),
         holds=runs.fell == 0 and velocity < 0.1,
+        assumes={**PUSH_RECOVERY, "mismatch": ", ".join(f"up to {_size(m, m.sizes[-1])}" for m in MISMATCHES)},
         conditions=(
             "For the tilt and its estimate, up to the mismatches tried. Body A itself does not stay: on a bearing "
             "without friction it turns while the gimbals are out, and stays where it was left."
@@ -183,6 +185,7 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
             f"gimbal rate ({gimbal:.2f} rad/s) and {nominal / tilt:.0f} times the fastest tilt rate. The term with "
             f"omega_d' that (3) leaves out is {share:.2%} of the tilt acceleration (RMS)."
         ),
+        assumes={**PUSH_RECOVERY, "drive": "a speed loop of 0.11 s, at most 0.5 N m"},
         holds=speed_error / nominal < 0.01 and share < 0.01 and nominal > 10.0 * max(gimbal, tilt),
         otherwise="The speed strays too far.",
         figures={

@@ -7,13 +7,16 @@ from typing import NamedTuple
 
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.retuned import DEFAULT_NOISE, Studies, beats_zero, level_at
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Assumption, Claim
 from cmg_mj.papers.words import join_with_and, with_ends
 from cmg_mj.studies.tuning import NoiseLevelResult
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 ROUNDED = 1.05
 """The cost of printing a parameter to one digit: tau = 0.02 stands for 0.015 to 0.025."""
+
+
+UNRECORDED = "The paper gives neither the recording that its observers were tuned on, nor its push, e and noise."
 
 
 def is_best(level: NoiseLevelResult) -> bool:
@@ -48,6 +51,14 @@ class JointExperiment(NamedTuple):
     def best_observers(self) -> list[str]:
         """The observers whose given parameters are the best ones."""
         return [name for name, level in self.levels.items() if is_best(level)]
+
+
+def assumed(experiment: JointExperiment) -> dict[Assumption, str]:
+    """Name the push, with its e, and the noise of an experiment as assumptions."""
+    return {
+        "push": experiment.push,
+        "noise": f"{experiment.noise_ug_rthz:g} ug/rtHz (the bench's own is {DEFAULT_NOISE:g})",
+    }
 
 
 def experiments(studies: Studies) -> Iterator[JointExperiment]:
@@ -89,14 +100,14 @@ def joint_claim(studies: Studies) -> Claim:
             f"Table 2's error by that of the tuned is {ratios}. Zero left aside it is {least.words}, where the worst "
             f"has {least.largest_ratio:.2f} times the error of the tuned. {_describe_separate_optima(studies)}"
         ),
+        assumes=assumed(nearest),
+        missing_data=UNRECORDED,
         holds=nearest.beats_zero and not misfits,
-        conditions=f"At {nearest.words} (the bench's own noise is {DEFAULT_NOISE:g}); the paper gives neither.",
         otherwise=(
             f"No experiment tried has all three: where the worst loses least, {join_with_and(misfits)} is not the best."
             if misfits
             else "Where all three are the best, an estimate of zero is better still."
-        )
-        + " The paper gives neither its push nor its noise.",
+        ),
         figures={
             "experiment": nearest.words,
             "worst_table_2_by_tuned_error": {experiment.words: experiment.largest_ratio for experiment in candidates},

@@ -75,6 +75,7 @@ def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
             f"eigenvalues lie between {least:.5f} and {largest:.5f}; for any a within the bound, between "
             f"{bound[0]:.5f} and {bound[1]:.5f}."
         ),
+        assumes={"servo": f"at most {StateFeedback.rate_limit:g} rad/s"},
         holds=margin > 0.1 and margin_without_tilt < 1e-12 and bound[0] > 0.0 and math.isfinite(bound[1]),
         conditions=(
             "Pointwise observability alone is not uniform; a bounded u, as the servos have it, closes the gap."

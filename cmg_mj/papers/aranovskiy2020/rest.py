@@ -11,7 +11,8 @@ import numpy as np
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import K_E, gimbal_rest, integrator_rest, printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT, push_recovery, replay_at_rest
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.assumed import PUSH_RECOVERY
+from cmg_mj.papers.claim import Assumption, Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.results.intervals import Interval, mean_interval
@@ -25,6 +26,7 @@ DURATION_S = 26.0
 AVERAGED_S = 6.0
 """The last so many seconds are averaged [s]; the slowest poles, -0.2 +- 0.29j 1/s, have then faded to 2 %."""
 BIAS_DEG = 0.5
+ASSUMED: Mapping[Assumption, str] = {"e": f"{BIAS_DEG:g} deg", "noise": PUSH_RECOVERY["noise"]}
 
 TRUE_RATE = "the true rate, (8)"
 
@@ -132,6 +134,7 @@ def laws_claim(rest: Rest, static: Rest) -> Claim:
             f"seeds: tilt {plus_minus(rest.x1, with_sign=True)} deg, gimbal {rest.x3.mean:+.2f} deg, x_e = "
             f"{rest.x_e.mean:.3f} rad s (+k_e1/k_e4 e = {x_e:.3f})."
         ),
+        assumes=ASSUMED,
         holds=rest.is_at_zero(x_e) and abs(static.x3.mean / x3 - 1.0) < 0.05,
         conditions="With the signs that follow from y1 = x1 - e: k1/k3 e and +k_e1/k_e4 e.",
         otherwise="They rest elsewhere.",
@@ -165,6 +168,7 @@ def observers_claim(rests: Mapping[str, Rest]) -> Claim:
             f"The same rig with an observer in the law, {WORLDS} seeds. {observers_text}. Without noise (11) would "
             f"estimate {quiet:+.4f} rad/s: its gains fall with the size of its error, so noise adds to its bias."
         ),
+        assumes=ASSUMED,
         holds=all(rest.is_at_zero(expected_x_e[case]) for case, rest in observer_rests.items()),
         otherwise="The rest is not where it should be.",
         figures={

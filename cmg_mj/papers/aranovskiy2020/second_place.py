@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from cmg_mj.papers.aranovskiy2020.rig import push_recovery
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.results.intervals import Interval, known_interval
@@ -63,6 +64,7 @@ def cause(errors: Errors) -> Claim:
             f"{plus_minus(gain, with_sign=True)} rad/s more error than with the exact H and Euler in the estimate "
             "alone."
         ),
+        assumes={**PUSH_RECOVERY, "method": "explicit Euler at 200 Hz"},
         holds=_positive(method) and _positive(exact),
         conditions=(
             f"By explicit Euler at 200 Hz, of which the paper says nothing: then {share_text} of the distance is the "

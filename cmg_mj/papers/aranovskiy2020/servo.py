@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery, run_on_rigs
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.plant.plant import Plant, load_plant
@@ -123,6 +124,7 @@ def servo_claim(servos: Servos) -> Claim:
             f"{', '.join(falling) or 'none'}. The bench's own servo, which integrates its command, has "
             f"{bench.mean:.2f} times the velocity error."
         ),
+        assumes={**PUSH_RECOVERY, "servo": f"a lag of {1e3 * LAG_S:g} ms", "friction": "a deadband"},
         holds=RESOLUTION in harmless and fine_error is not None and fine_error.mean < WITHIN,
         conditions=(
             f"With a servo that stiff, up to a deadband of {max(harmless, default=0.0):g} rad/s, with which the "

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from cmg_mj.papers.aranovskiy2020.joint import JointExperiment, is_best, joint_claim, nearest_joint
+from cmg_mj.papers.aranovskiy2020.joint import (
+    UNRECORDED,
+    JointExperiment,
+    assumed,
+    is_best,
+    joint_claim,
+    nearest_joint,
+)
 from cmg_mj.papers.aranovskiy2020.retuned import (
     CASES,
-    DEFAULT_NOISE,
     SEED,
     WORLDS,
     Studies,
@@ -33,11 +39,10 @@ def table_2_claim(case: Tuning, studies: Studies, experiment: JointExperiment) -
             f"{level.rms.mean():.4f}, the ratio {with_ends(level.ratio)}. That of an estimate of zero is "
             f"{level.zero_rms:.4f}. {_describe_all_pushes(case, studies)}"
         ),
+        assumes=assumed(experiment),
+        missing_data=UNRECORDED,
         holds=is_best(level) and is_tunable,
-        conditions=(
-            f"At {experiment.words}, the same for all three lines (the bench's own noise is {DEFAULT_NOISE:g}). The "
-            f"paper gives neither its push nor its noise. {_describe_first_push(case, studies)}"
-        ),
+        conditions=f"In an experiment that is the same for all three lines. {_describe_first_push(case, studies)}",
         otherwise=(
             f"In the experiment in which all three could have been tuned they have {level.ratio.mean:.2f} times the "
             f"error of the tuned. {_describe_single_line(case, studies)}"

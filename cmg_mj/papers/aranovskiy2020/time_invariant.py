@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from cmg_mj.papers.aranovskiy2020.paper import printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.summary_keys import format_figure
@@ -160,6 +161,13 @@ def remark(experiment: Factorial) -> Claim:
             f"{rate_bias((PREDECESSOR, LINEAR)):.1f} e/s with the predecessor's gain on the linear model, by "
             f"{rate_bias((FROZEN, MEASURED)):.1f} e/s with the frozen one and gravity at y1."
         ),
+        assumes={
+            "push": PUSH_RECOVERY["push"],
+            "e": f"{min(experiment.whole):g} to {max(experiment.whole):g} deg",
+            "noise": PUSH_RECOVERY["noise"],
+            "gains": ", ".join(GAINS),
+        },
+        missing_data="The paper gives neither the gain nor the model of its time-invariant observer.",
         holds=bool(experiment.failing),
         conditions=_conditions(experiment, safe_gains),
         otherwise=(

@@ -68,6 +68,11 @@ def procedure_claim(studies: Studies, loops: list[Trial]) -> Claim:
             f"{' '.join(_in_words(trial) for trial in loops)} Over {len(ratios)} fits the error on other seeds is "
             f"{min(ratios):.3f} to {max(ratios):.3f} times that on the fitted ones."
         ),
+        assumes={
+            "push": f"{join_with_and(list(studies))}",
+            "noise": f"{min(e.noise_ug_rthz for e in candidates):g} to {max(e.noise_ug_rthz for e in candidates):g} "
+            "ug/rtHz",
+        },
         holds=bool(tunable),
         conditions=(
             f"In {len(tunable)} of the {len(candidates)} experiments tried: there all three, tuned, follow the gyro "

@@ -203,6 +203,11 @@ def axes_claim(couplings: dict[float, Coupling]) -> Claim:
             f"{', '.join(f'{c.vertical_n_m:.2f}' for c in couplings.values())} N m at most."
         ),
         holds=first in separate_pushes,
+        assumes={
+            "body": "four cubes on a body that tilts about two axes",
+            "push": f"{first:g} to {max(couplings):g} N m for {PUSH_S:g} s",
+            "gains": "LQR",
+        },
         conditions=(
             f"Up to pushes of {max(separate_pushes, default=0.0):g} N m for {PUSH_S:g} s, under which the other axis "
             f"changes less than {SMALL:.0%} of the tilt, on a body that does not turn about the vertical. What a pair "

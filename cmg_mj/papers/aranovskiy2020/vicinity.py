@@ -121,8 +121,15 @@ def vicinity_claim(seed: int = SEED) -> Claim:
             f"with either. Of {len(gains)} random pairs of gains, of any sign, the two polynomials are Hurwitz "
             f"together in {'all' if is_equivalent else 'some'}."
         ),
+        is_general=True,
+        assumes={
+            "e": f"{BIASES_DEG[0]:g} to {BIASES_DEG[-1]:g} deg",
+            "noise": f"{NOISES_RAD[0]:g} to {NOISES_RAD[-1]:g} rad",
+            "control rate": f"{1.0 / DT:g} Hz",
+        },
         holds=converges and relative_difference < 0.01 and difference < 0.1 * SEEN_RAD_S and min(slopes.values()) > 0.5,
         conditions=(
+            f"Tried with k1, k2 of Table 2 and alpha = {', '.join(f'{alpha:g}' for alpha in ALPHAS)}. "
             "With s^2 + k1 s + k2 Hurwitz; the printed s^2 + k2 s + k1 has k1 and k2 exchanged"
             + (
                 ", without consequence: either is Hurwitz just when both gains are positive."

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.beyond.league import MEANS, league
 from cmg_mj.papers.beyond.push_recovery import ERROR
 from cmg_mj.papers.claim import Claim, OnShare
@@ -51,6 +52,11 @@ def order_claim(rows: Sequence[Row]) -> Claim:
             "push."
         ),
         table=league_table(rows),
+        assumes={
+            **PUSH_RECOVERY,
+            "e": f"{', '.join(f'{e:g}' for e in sorted({bias for _, bias in cells}))} deg",
+            "noise": f"{', '.join(f'{noise:g}' for noise in sorted({noise for noise, _ in cells}))} ug/rtHz",
+        },
         holds=bool(ordered),
         conditions="" if len(ordered) == len(cells) else "The order turns round where noise is low or the bias large.",
         otherwise="Another order is found at every noise and bias tried.",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import plus_minus
@@ -70,6 +71,7 @@ def fed_bias_claim(rows: Sequence[dict[str, Any]]) -> Claim:
         statement="the rate error of (11) that e causes goes when e is estimated beside it",
         result="Velocity RMS error in `push_recovery`, 95 % intervals:",
         table=markdown.table(headings, cells),
+        assumes={**PUSH_RECOVERY, "e": ", ".join(f"{row['bias_deg']:g}" for row in rows) + " deg"},
         holds=bool(helped_biases),
         conditions="" if len(helped_biases) == len(rows) else helpful_biases,
         otherwise="It helps at none of the biases tried.",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.results.intervals import Interval, known_interval
@@ -65,6 +66,7 @@ def friction_claim(figures: dict[str, Any]) -> Claim:
             f"a rig without it, it takes {_milli(smooth)} off as well: it also damps the estimate of a "
             f"rate whose true value is small. What is due to knowing the friction is the difference, {_milli(due)}."
         ),
+        assumes={**PUSH_RECOVERY, "friction": f"{FRICTION_N_M:g} N m, dry, on the tilt axis"},
         holds=due is not None and due.low > 0.0,
         conditions=(
             "Most of the gain is damping that would help without any friction; push_recovery, e = 0.5 deg, 400 ug/rtHz."

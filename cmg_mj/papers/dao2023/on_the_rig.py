@@ -48,6 +48,7 @@ def bias(seed: int = 50_000, worlds: int = 20) -> Claim:
         f"worst; at most {WITHIN_DEG} in {100.0 * share:.0f} % of {worlds} worlds. With the accelerometers "
         f"{offset_mg[0]:g} and {offset_mg[1]:g} mg off, it finds e less the tilt that they make: "
         f"{excess.mean():+.3f} deg beside e, where {expected_excess.mean():+.3f} is expected.",
+        assumes={"push": "none", "e": "0.3 to 1.5 deg", "noise": "400 ug/rtHz"},
         holds=share >= 0.95 and share_within(rig.errors(offset_run, "bias_rms_error_deg"), WITHIN_DEG) == 1.0,
         conditions=remark,
         otherwise=remark,
@@ -105,6 +106,7 @@ def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
         result=f"Velocity RMS error with `adaptive` in the loop {words('adaptive')} rad/s at e = 0.5, 1.0, 1.5 deg; "
         + "; ".join(f"{name} {words(name)}" for name in OTHERS)
         + ".",
+        assumes={"push": "none", "e": "0.5 to 1.5 deg", "noise": "400 ug/rtHz"},
         holds=all((errors["adaptive"] < errors[name])[biased_cases].all() for name in OTHERS),
         conditions=remark,
         otherwise=remark,
@@ -130,6 +132,7 @@ def torques(seed: int = 52_000, worlds: int = 4) -> Claim:
         f"{gait['not_knowing_rad_s'].mean():.3f} without the sinusoid in the exosystem; the torque is found to "
         f"{gait['disturbance_n_m'].max():.3f} N m RMS, the bias to {gait['bias_deg'].max():.3f} deg. A constant "
         f"torque is found to {torque.max():.3f} N m.",
+        assumes={"push": "0.3 N m at 1 Hz, or 0.1 N m", "e": "0.3 to 1.5 deg", "noise": "400 ug/rtHz"},
         holds=bool(better and gait["disturbance_n_m"].max() < 0.06 and torque.max() < 0.02),
         conditions=remark,
         otherwise=remark,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from cmg_mj.papers.claim import OnShare
+from cmg_mj.papers.claim import Assumption, OnShare
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023 import pendulum_robot as robot
 
@@ -17,6 +18,7 @@ SIGMAS = (*paper.SIGMAS, 10_000.0)
 SETTLED = 0.1
 """Settled: the errors of theta1, theta2 and d, as a vector of their numbers in the units of Fig. 3, stay below this."""
 
+ASSUMED: Mapping[Assumption, str] = {"initial values": "ten motions", "duration": "200 s"}
 UNSTATED = (
     "The paper gives neither time span nor initial values: ten motions with angles within half a turn and rates within "
     "2 rad/s, observers started from zero, 200 s, with the corrected L = -[1; 1]."

@@ -16,7 +16,7 @@ from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.linear_check import poles_as_pairs
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
-from cmg_mj.papers.sokolov2019.rig import experiment
+from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, experiment
 from cmg_mj.papers.sokolov2019.vertical_torque import Locked, locked_run, vertical_torque
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.plant.plant import load_plant
@@ -132,6 +132,7 @@ def claim(runs: Study) -> Claim:
             "bring the gimbal back with, and of the wrong sign: the linearised law has a pole at "
             f"{np.real(k.poles).max():+.3f} 1/s, and a start off the upright makes the gimbal run away."
         ),
+        assumes={**PUSH_AND_NOISE, "bearing": "locked"},
         holds=error < 1e-9 and pair < 1e-6 * peak.mean,
         conditions=(
             "It is so with the thrust bearing locked; on a free one the tilt turns the rig about the vertical, and the "

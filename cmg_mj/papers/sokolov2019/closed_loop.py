@@ -21,10 +21,10 @@ def claims(on_share: OnShare) -> list[Claim]:
     return [
         four,
         five,
-        cause_of_figure_5(ends),
+        cause_of_figure_5(lags, ends),
         six,
         figure_6_at_rest(lags, ends),
-        comparison.best_claim(results),
-        comparison.model_based(results),
+        *comparison.best_claims(results),
+        *comparison.model_based_claims(results),
         lag.claim(lags),
     ]

@@ -10,10 +10,10 @@ from scipy.signal import lsim, lti
 
 from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Assumption, Claim, OnShare
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS, TABLE_II
-from cmg_mj.papers.sokolov2019.rig import estimator, experiment
+from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, estimator, experiment
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.replay import replay
 from cmg_mj.results.intervals import Interval, mean_interval
@@ -25,6 +25,7 @@ from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 SEED, WORLDS = 82_000, 20
 AFTER_S = 0.5
 """The push's window ends so long after the push."""
+ASSUMED: Mapping[Assumption, str] = {**PUSH_AND_NOISE, "e": "0.5 deg"}
 WITH_Y2 = "luenberger and y2"
 L1, L2 = (row[0] for row in TABLE_II["luenberger"]["L"][:2])
 """Gains of (9) on y1 less its estimate [1/s, 1/s^2]."""
@@ -124,6 +125,7 @@ def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
             f"own RMS (an estimate of zero has 1): {errors_text}. When the push ends the gyro shows {truth.mean:+.2f} "
             f"rad/s, {rates_text}{': (9) has the wrong sign' if wrong_sign else ''}."
         ),
+        assumes=ASSUMED,
         holds=relative["luenberger"].low > max(1.0, *(error.high for error in other_errors.values())),
         conditions=(
             f"{failures} fails there too, if less: so does every estimator that takes the command's effect for motion."
@@ -157,7 +159,8 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
             f"{stiffness(tuning.prepared.plant.reduced):.1f}) explains {explained_share:.0%} of its error's variance "
             f"there (and the bias e the {bias_error:+.3f} rad/s before)."
         ),
-        holds=reach == 0.0 and with_y2.high < 1.0,
+        assumes=ASSUMED,
+        holds={"y2 is ignored": reach == 0.0, "the push is missed for this reason": with_y2.high < 1.0},
         otherwise=(
             "That y2 is ignored is so; that the push is missed for this reason is not: with y2 it is missed as well."
             if reach == 0.0

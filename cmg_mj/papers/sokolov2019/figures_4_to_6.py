@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from cmg_mj.papers.claim import Claim
+from collections.abc import Mapping
+
+from cmg_mj.papers.claim import Assumption, Claim
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.cycles import WITH_Y2, Cycles
 from cmg_mj.papers.sokolov2019.lag import Lags, in_ms
@@ -17,12 +19,21 @@ from cmg_mj.papers.sokolov2019.loops import (
     tail,
 )
 from cmg_mj.papers.sokolov2019.pictures_4_to_6 import picture
+from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE
 from cmg_mj.results.intervals import known_interval
 
 HELD = (
     f"With {GAP_ARCMIN:g} arcmin of backlash behind the servo's motor, as its datasheet has it, and friction that "
     "holds the gimbal in the gap. The paper mentions neither."
 )
+
+
+ASSUMED: Mapping[Assumption, str] = {**PUSH_AND_NOISE, "e": f"{SHOWN_DEG:g} deg"}
+LET_GO: Mapping[Assumption, str] = {
+    "backlash": f"{GAP_ARCMIN:g} arcmin",
+    "friction": "it holds the gimbal in the gap",
+}
+BEHIND_BACKLASH: Mapping[Assumption, str] = {**ASSUMED, **LET_GO}
 
 
 def _setting(loops: Loops) -> str:
@@ -70,6 +81,7 @@ def figure_4(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
             f"({prediction.frequency_hz:.1f} Hz). With the gyro in the law it is "
             f"{format_interval(deviation(loops.gyro))} deg."
         ),
+        assumes=ASSUMED if oscillates_by_itself else BEHIND_BACKLASH,
         holds=oscillates_by_itself or cycle.sustained,
         conditions=(
             ""
@@ -98,6 +110,7 @@ def figure_5(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
             f"backlash; with {GAP_ARCMIN:g} arcmin it {cycle.words}, (8) {cycles.ends['linear'].words}. "
             f"{_describe_tilt(loops, 'luenberger')} Without backlash it falls in {falls_text}."
         ),
+        assumes=ASSUMED if oscillates_by_itself else BEHIND_BACKLASH,
         holds=oscillates_by_itself or cycle.sustained,
         conditions=(
             ""
@@ -112,7 +125,7 @@ def figure_5(loops: Loops, lags: Lags, cycles: Cycles) -> Claim:
     )
 
 
-def cause_of_figure_5(cycles: Cycles) -> Claim:
+def cause_of_figure_5(lags: Lags, cycles: Cycles) -> Claim:
     """Judge the cause that Section V gives for the oscillation with (9)."""
     without_y2, with_y2 = cycles.ends["luenberger"], cycles.ends[WITH_Y2]
     predicted_cycles = {name: cycles.predicted[name] for name in ("linear", "luenberger")}
@@ -128,10 +141,12 @@ def cause_of_figure_5(cycles: Cycles) -> Claim:
             f"{with_y2.words}. The linear loop with a gap, for which the linearisation is exact, has by its describing "
             f"function cycles of {cycles_text} with (8) and (9)."
         ),
+        assumes=LET_GO,
         holds=without_y2.sustained and with_y2.amplitude_deg < 0.5 * without_y2.amplitude_deg,
         otherwise=(
             "The terms that the linearisation leaves out change next to nothing. The gap makes the oscillation, and "
             "would do so in a linear system."
+            + ("" if lags.sweeps["luenberger"].sustained[0] else " Without it (9) comes to rest.")
         ),
         figures={
             "cycle_amplitude_deg": without_y2.amplitude_deg,
@@ -154,6 +169,11 @@ def figure_6(loops: Loops, cycles: Cycles) -> Claim:
             f"{', '.join(falls)}. {_describe_tilt(loops, 'homogeneous')} The velocity RMS error is "
             f"{format_interval(error)} rad/s."
         ),
+        assumes={
+            **PUSH_AND_NOISE,
+            "e": f"up to {max(loops.by_bias):g} deg",
+            "backlash": f"0 and {GAP_ARCMIN:g} arcmin",
+        },
         holds=max(falls.values()) == 0.0,
         otherwise="It falls.",
         figures=_figures(loops, "homogeneous", cycles) | {"largest_fell_fraction": max(falls.values())},
@@ -176,6 +196,8 @@ def figure_6_at_rest(lags: Lags, cycles: Cycles) -> Claim:
             f"Without backlash (10) comes to rest at {len(is_sustained) - is_sustained.sum()} of {len(is_sustained)} "
             f"servo lags up to {in_ms(float(lags.sweeps['homogeneous'].lags_s[-1]))}."
         ),
+        assumes=LET_GO,
+        missing_data="The paper does not say what makes (8) and (9) oscillate, nor how wide a gap its servo has.",
         holds=(eight.sustained or nine.sustained) and not ten.sustained,
         otherwise="Nothing oscillates."
         if not ratios_text

@@ -150,6 +150,7 @@ def claim(results: Lags) -> Claim:
             "flywheel then turns the gimbal back, which damps the tilt."
         ),
         table=_table(results),
+        assumes={"servo": f"a lag of up to {1e3 * LARGEST_S:.0f} ms"},
         holds=begin.high is not None and begin.high < least,
         conditions=(
             f"It does with a servo lag from {in_ms(begin.middle)} or a latency of y1 from "

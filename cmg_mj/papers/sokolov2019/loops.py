@@ -121,9 +121,9 @@ def is_smaller(a: Result, b: Result, key: str = "velocity_rms_error_rad_s") -> b
     return None if difference is None else difference.low > 0.0
 
 
-def is_better(a: Result, b: Result) -> bool:
-    """Return true if a's velocity error is smaller beyond chance and a falls no more often, or stands where b fell."""
-    beyond_chance = is_smaller(a, b)
+def is_better(a: Result, b: Result, key: str = "velocity_rms_error_rad_s") -> bool:
+    """Return true if a's numbers are smaller beyond chance and a falls no more often, or a stands where b fell."""
+    beyond_chance = is_smaller(a, b, key)
     if beyond_chance is None:
         return bool(a.stood.all() and b.fell.all())
     return beyond_chance and a.fell.mean() <= b.fell.mean()

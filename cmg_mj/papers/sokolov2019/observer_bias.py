@@ -60,6 +60,7 @@ def biased_luenberger(e_deg: float = 0.25) -> Claim:
             f"{largest_rest:.1e} after {REST_S:.0f} s, the law on estimated angles or on measured ones, while the "
             f"estimated rate rests at {rests['estimated'].x2_estimate:.4f} rad/s (closed form {x_hat[1]:.4f})."
         ),
+        assumes={"e": f"{e_deg:g} deg"},
         holds=largest_rest < 2e-3 and error < 0.02 and x_e_error < 0.02 and float(np.real(poles).max()) < 0.0,
         conditions="With y1 = x1 - e the bias enters y as -C_e e and the error as +L C_e e; the other sign is printed.",
         otherwise="It does not come to rest as the linear equations say.",
@@ -87,7 +88,10 @@ def homogeneous_vicinity(biases_deg: Sequence[float] = (0.0, 0.25, 0.5)) -> Clai
             "With alpha in (1/2, 1] the error of (10) converges to a vicinity of the origin: sin(y1) replaces sin(x1)."
         ),
         result=f"Without noise the estimated rate comes to rest at [rad/s] {text}, the true one being zero.",
+        is_general=True,
+        assumes={"e": f"{', '.join(f'{e:g}' for e in biases_deg)} deg"},
         holds=error < 0.1,
+        conditions=f"Tried with the k1, k2 and alpha = {paper.TABLE_II['homogeneous']['alpha']:g} of Table II.",
         otherwise="The vicinity is not of the size that the equations give.",
         figures={
             "rate_estimate_rad_s": {f"{e:g}_deg": rates[e] for e in biases_deg},

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cmg_mj.observers import Observer, make_observer
+from cmg_mj.papers.claim import Assumption
 from cmg_mj.papers.sokolov2019.paper import K_E, TABLE_II
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
 from cmg_mj.plant.plant import Plant, load_plant
@@ -21,6 +22,9 @@ NO_NOISE = (
     "sensors.encoder.counts_per_revolution=0.0",
     "sensors.fog.angle_random_walk_deg_rth=0.0",
 )
+
+PUSH_AND_NOISE: Mapping[Assumption, str] = {"push": "0.5 N m for 0.1 s", "noise": "400 ug/rtHz"}
+"""What the paper does not give of its experiments, beside e: the scenario single_gimbal."""
 
 FINE = "plant.timestep_s=0.001"
 """A servo that is slow because of its damping is stiff: it asks for a smaller step than the rig's own."""

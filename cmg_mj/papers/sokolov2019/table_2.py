@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.results import markdown
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.studies.tuning import NoiseLevelResult, Recorded, halves, recorder, tune
@@ -104,9 +105,15 @@ def claim(results: Levels) -> Claim:
             f"printed values are not beaten, by noise in ug/rtHz: {text}."
         ),
         table=_table(results),
+        assumes={
+            "push": join_with_and(list(results)),
+            "noise": f"{', '.join(f'{noise:g}' for noise in sorted({noise for *_, noise in settings}))} ug/rtHz",
+        },
+        missing_data="The paper gives neither the recording that its estimators were tuned on, nor its push, e and "
+        "noise.",
         holds=bool(best),
         conditions=(
-            f"For a push of {'; '.join(best)}. The paper gives neither push nor noise."
+            f"For a push of {'; '.join(best)}."
             + (f" The best {' and '.join(losers)} are farther from the gyro than zero is." if losers else "")
         ),
         otherwise=(

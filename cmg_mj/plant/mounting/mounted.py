@@ -12,9 +12,10 @@ import mujoco
 
 from cmg_mj.errors import InputError, shown
 from cmg_mj.inputs.includes import check_files
-from cmg_mj.inputs.paths import expanded
+from cmg_mj.inputs.paths import expanded, not_text
 from cmg_mj.inputs.sanity import is_text
 from cmg_mj.plant.mjcf import as_mjcf, check_rig
+from cmg_mj.plant.mounting.target import check_written_by_mount
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.signed_text import signed
 
@@ -38,6 +39,8 @@ class MountedRobot:
     def save(self, path: str | Path) -> Path:
         """Write the robot as MJCF, which plain MuJoCo loads and `plant.model` takes; whole or not at all.
 
+        A file that a mount has written is replaced, as long as nobody has changed it since. No other file ever is.
+
         Args:
             path: The file, in any folder. It refers to meshes and textures by relative paths; they are not copied.
 
@@ -45,7 +48,8 @@ class MountedRobot:
             The file.
 
         Raises:
-            InputError: The file cannot be written, is no .xml, or would replace the robot or a file that it names.
+            InputError: The file cannot be written, is no .xml, or would replace the robot, a file that it names, or
+                one that is not as a mount wrote it.
         """
         target = expanded(path, "-o")
         check_target(target, self.path)
@@ -55,6 +59,7 @@ class MountedRobot:
             setattr(spec, field, _relative_assets(folder, spec.modelfiledir, getattr(spec, field)))
         spec.modelfiledir = f"{folder}{os.sep}"  # MuJoCo opens the meshes to write them
         try:
+            check_written_by_mount(target, [target] if os.path.lexists(target) else [])
             with whole_file(target, ".xml") as temporary:
                 temporary.write_bytes(signed(as_mjcf(spec, self.path), ".xml"))
                 check_rig(temporary, target)
@@ -75,7 +80,7 @@ def check_target(target: Path, robot: Path) -> None:
             beside it would.
     """
     if not is_text(str(target.absolute())):  # MuJoCo opens no such file, and a scenario names it in UTF-8
-        raise InputError(f"-o {shown(str(target))}: not UTF-8 text, or in a folder whose name is none")
+        raise InputError(f"-o {shown(str(target))}: {not_text(target, target.absolute())}")
     if target.suffix != ".xml":
         raise InputError(
             f"-o {target}: must be a file that ends in .xml, such as balanced.xml; a .toml comes beside it"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -13,8 +13,8 @@ from cmg_mj.errors import InputError, listed
 from cmg_mj.results.run_folder.lock import Busy, Lock
 from cmg_mj.results.signed_text import is_as_written, is_begun
 
-_PARTIAL = re.compile(r"\.+(?P<stem>.+?)\.(?P<process>\d+)\.partial\.(xml|toml|trial\.xml)(\.\d+\.partial(\.xml)?)?")
-"""Names under which a mount writes before it renames: see `mounted.with_scenario`."""
+_PARTIAL = re.compile(r"\.+(?P<stem>.+?)\.(?P<process>\d+)\.partial(\.trial)?\.(xml|toml)(\.\d+\.partial(\.xml)?)?")
+"""Names under which a mount writes before it renames (`mounted.with_scenario`); `trial` is a larger scale."""
 
 
 @contextmanager
@@ -30,8 +30,8 @@ def claimed_target(target: Path, *, overwrite: bool) -> Iterator[None]:
             written.
     """
     try:
-        check_replaceable(target, overwrite=overwrite)
         _clear_left_over(target.parent)
+        check_replaceable(target, overwrite=overwrite)
         lock = Lock(_lock_file(target.parent, target.stem))
     except Busy:
         raise InputError(f"-o {target}: another mount is writing it") from None
@@ -56,15 +56,29 @@ def check_replaceable(target: Path, *, overwrite: bool) -> None:
         OSError: It cannot be read.
     """
     there = [file for file in (target, target.with_suffix(".toml")) if os.path.lexists(file)]
-    theirs = [file for file in there if not is_as_written(file)]
+    check_written_by_mount(target, there)
+    if there and not overwrite:
+        raise InputError(f"-o {target}: {there[0]} exists; give another name, or --overwrite")
+
+
+def check_written_by_mount(target: Path, files: Sequence[Path]) -> None:
+    """Refuse to replace files that no mount has written, or that have changed since.
+
+    Args:
+        target: The model's file, for the message.
+        files: Files that are there.
+
+    Raises:
+        InputError: One of them may not be replaced.
+        OSError: It cannot be read.
+    """
+    theirs = [file for file in files if not is_as_written(file)]
     if theirs:
         are = "is" if len(theirs) == 1 else "are"
         raise InputError(
             f"-o {target}: {listed([str(file) for file in theirs])} {are} there, not as cmg-mj mount wrote it, and "
             "would be lost: move it, or give another name"
         )
-    if there and not overwrite:
-        raise InputError(f"-o {target}: {there[0]} exists; give another name, or --overwrite")
 
 
 def _lock_file(folder: Path, stem: str) -> Path:

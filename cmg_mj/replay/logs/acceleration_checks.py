@@ -62,18 +62,32 @@ class TiltMotion:
         Returns:
             Weighted sums of a and of y'', (n_stretches,); None for fewer than `FEWEST` stretches.
         """
-        half = max(FEWEST_SAMPLES // 2, round(WIDTH_S / 2.0 / self.dt))
+        a, b = self.weighted_sums()
+        return (a, b) if len(a) >= FEWEST else None
+
+    @property
+    def half(self) -> int:
+        """Number of samples on either side of a stretch's middle."""
+        return max(FEWEST_SAMPLES // 2, round(WIDTH_S / 2.0 / self.dt))
+
+    @staticmethod
+    def weights(half: int, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the weights w and their second derivative w'', (2 half + 1,)."""
         s = np.arange(-half, half + 1) / (half + 1.0)
-        weights = (1.0 - s**2) ** 4
-        second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * self.dt) ** 2
-        second -= second.mean()
+        second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * dt) ** 2
+        return (1.0 - s**2) ** 4, second - second.mean()
+
+    def weighted_sums(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the sums of `second_derivative_pairs`, however few."""
+        half = self.half
+        weights, second = self.weights(half, self.dt)
         smoothed, derived = [], []
         for part in self.parts:
-            if part.stop - part.start >= len(s):
+            if part.stop - part.start >= len(weights):
                 smoothed.append(np.convolve(self.acceleration[part], weights, mode="valid")[::half])
                 derived.append(np.convolve(self.tilt[part], second, mode="valid")[::half])
         a, b = (np.concatenate(rows) if rows else np.zeros(0) for rows in (smoothed, derived))
-        return (a, b) if len(a) >= FEWEST else None
+        return a, b
 
 
 def implausible_acceleration(
@@ -127,17 +141,27 @@ def gravity_mismatch(
         return None
     names = " and ".join(off)
     sizes_text = " and ".join(f"{size:.4g}" for size in off.values())
-    units, scales = [], []
-    for name, size in off.items():
-        for role in (f"{name}_x", f"{name}_z"):
-            column = columns[role]
-            scale = column.factor / in_si("acceleration", column.unit)
-            units.append((role, unit_of_factor("acceleration", column.unit, 1.0 / size, NEAR)))
-            scales.append(f"{role}={scale / size:.4g}")
-    cure = "--scale " + ",".join(scales)
-    if all(unit for _, unit in units):
-        cure = "--units " + ",".join(f"{role}={unit}" for role, unit in units)
+    roles = {f"{name}_{axis}": size for name, size in off.items() for axis in "xz"}
+    cure = cure_of_size(columns, roles)
     return f"the {names} accelerometer's specific force is {sizes_text} times gravity's 9.81 m/s^2 (median): {cure}"
+
+
+def cure_of_size(columns: Mapping[str, Column], sizes: Mapping[str, float]) -> str:
+    """Return the options that give specific forces of a wrong size gravity's: units if all have one, else scales.
+
+    Args:
+        columns: Role -> column.
+        sizes: Role -> its specific force's size, by gravity's.
+    """
+    units, scales = [], []
+    for role, size in sizes.items():
+        column = columns[role]
+        scale = column.factor / in_si("acceleration", column.unit)
+        units.append((role, unit_of_factor("acceleration", column.unit, 1.0 / size, NEAR)))
+        scales.append(f"{role}={scale / size:.4g}")
+    if all(unit for _, unit in units):
+        return "--units " + ",".join(f"{role}={unit}" for role, unit in units)
+    return "--scale " + ",".join(scales)
 
 
 def second_derivative_mismatch(motion: TiltMotion, columns: Mapping[str, Column]) -> str | None:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.errors import InputError, nearest, shortened
 from cmg_mj.replay.logs.units import UNITS, Quantity, in_si, unit, unit_of_name
 
 ROLES: dict[str, Quantity] = {
@@ -17,6 +17,8 @@ ROLES: dict[str, Quantity] = {
     "inner_z": "acceleration",
     "outer_x": "acceleration",
     "outer_z": "acceleration",
+    "ax": "acceleration",
+    "az": "acceleration",
     "acceleration": "angular acceleration",
     "gimbal": "angle",
     "gimbal1": "angle",
@@ -26,12 +28,20 @@ ROLES: dict[str, Quantity] = {
 }
 """Role -> quantity of its column.
 
-`tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `RadialTilt` takes them,
-`acceleration` the angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright
-place (or `gimbal1` and `gimbal2`, whose half difference it is), `command` their rate, `rate` the reference.
+`tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `RadialTilt` takes them, `ax` and
+`az` one accelerometer: along the motion of a growing tilt, and outward (upward while upright), `acceleration` the
+angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright place (or `gimbal1` and
+`gimbal2`, whose half difference it is), `command` their rate, `rate` the reference.
 """
 
+HOW_TO_QUOTE = """; a heading with commas in it goes into quotes: --columns 'tilt="roll,x (deg)",rate=gyro'"""
+_ASSIGNMENT = re.compile(
+    r"""\s*(?P<role>\w+)\s*=\s*(?:"(?P<quoted>(?:[^"]|"")*)"\s*|(?P<plain>.*?))(?:,(?=\s*\w+\s*=)|$)""", re.DOTALL
+)
+"""ROLE=HEADING or ROLE="HEADING"; the heading ends at a comma before another ROLE=, a quoted one at its quote."""
+
 ACCELEROMETERS = ("inner_x", "inner_z", "outer_x", "outer_z")
+ONE_ACCELEROMETER = ("ax", "az")
 
 
 @dataclass(frozen=True)
@@ -58,6 +68,9 @@ class Column:
 def assignments(texts: str | Iterable[str], option: str) -> dict[str, str]:
     """Parse `tilt=pitch_deg,rate=gyro dps` into role -> heading; a heading may contain commas.
 
+    A heading with a comma before something like `x=` goes into quotes as in a CSV: `tilt="roll,x=1 (deg)"`, where a
+    quote is written twice.
+
     Args:
         texts: One text or several.
         option: The option's name, for messages.
@@ -70,17 +83,37 @@ def assignments(texts: str | Iterable[str], option: str) -> dict[str, str]:
     """
     values: dict[str, str] = {}
     for text in [texts] if isinstance(texts, str) else texts:
-        parts = [part for part in re.split(r"(?:^|,)\s*(?=\w+\s*=)", text.strip()) if part]
-        for part in parts or [text]:
-            role, equals, value = part.partition("=")
-            role, value = role.strip(), value.strip()
-            if not equals or not value or not re.fullmatch(r"\w+", role):
-                raise InputError(f"{option} {text!r}: write ROLE=VALUE with commas between, such as tilt=pitch_deg")
-            check_role(role, option)
+        rest, where = text.strip().lstrip(","), f"{option} {shortened(text)!r}"
+        while True:
+            part = _ASSIGNMENT.match(rest)
+            quoted = None if part is None else part["quoted"]
+            value = "" if part is None else (part["plain"] if quoted is None else quoted.replace('""', '"')).strip()
+            if part is None or not value:
+                raise InputError(
+                    f"{option} {shortened(text)!r}: write ROLE=VALUE with commas between, such as tilt=pitch_deg"
+                )
+            if quoted is None and value.startswith('"'):
+                raise InputError(
+                    f"{where}: what begins with a quote ends with one, before a comma or at the end; a quote inside is "
+                    "written twice"
+                )
+            role = part["role"]
+            _check_part(role, option, later=len(rest) < len(text.strip()))
             if role in values:
                 raise InputError(f"{option}: {role} is given twice")
             values[role] = value
+            rest = rest[part.end() :]
+            if not rest:
+                break
     return values
+
+
+def _check_part(role: str, option: str, *, later: bool) -> None:
+    """Refuse an unknown role; behind a comma, one that is like no role may be part of a heading."""
+    allowed = nearest(role, ROLES)
+    if role not in ROLES and later and not allowed.startswith("did you mean"):
+        raise InputError(f"{option} {role}: no such role; {allowed}{HOW_TO_QUOTE}")
+    check_role(role, option)
 
 
 def check_role(role: str, option: str) -> None:
@@ -141,13 +174,28 @@ def columns_of(
 def _check_together(names: Mapping[str, str]) -> None:
     """Refuse roles that leave the tilt unknown, or determine it twice."""
     accelerometers = [role for role in ACCELEROMETERS if role in names]
-    missing = [role for role in ACCELEROMETERS if role not in names]
-    if "tilt" in names and accelerometers:
-        raise InputError("--columns: the tilt either as tilt or from inner_x, inner_z, outer_x, outer_z, not both")
-    if accelerometers and missing:
+    one = [role for role in ONE_ACCELEROMETER if role in names]
+    sources = [
+        text
+        for text, known in (
+            ("tilt", "tilt" in names),
+            ("inner_x, inner_z, outer_x, outer_z", accelerometers),
+            ("ax, az", one),
+        )
+        if known
+    ]
+    if len(sources) > 1:
+        raise InputError(f"--columns: the tilt either as {' or from '.join(sources)}, not both")
+    if accelerometers and len(accelerometers) < len(ACCELEROMETERS):
+        missing = [role for role in ACCELEROMETERS if role not in names]
         raise InputError(f"--columns: of two accelerometers {', '.join(missing)} is missing")
-    if "tilt" not in names and not accelerometers:
-        raise InputError("--columns: there is no tilt; name one, or inner_x, inner_z, outer_x and outer_z")
+    if len(one) == 1:
+        (missing,) = set(ONE_ACCELEROMETER) - set(one)
+        raise InputError(f"--columns: of one accelerometer {missing} is missing: the tilt is atan2(-ax, az)")
+    if not sources:
+        raise InputError(
+            "--columns: there is no tilt; name one, or ax and az, or inner_x, inner_z, outer_x and outer_z"
+        )
     if "acceleration" in names and accelerometers:
         raise InputError("--columns: two accelerometers show the angular acceleration; acceleration is one too many")
     if ("gimbal1" in names) != ("gimbal2" in names):

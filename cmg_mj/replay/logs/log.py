@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.errors import TomlValue
+from cmg_mj.replay.logs.white_noise import LogNoise
 from cmg_mj.results.stored_columns import number_of_rows, select_rows
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Window
@@ -71,6 +72,7 @@ class Log:
         options: Options with which it was read, the units of all columns among them.
         scenario: The resolved scenario of a run's recording.
         row_period_s: Period of the file's own rows, whatever the sample period [s]; None for a run's recording.
+        white_noise: White noise of one of these rows; None for a run's recording.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Log:
     options: ReadOptions = ReadOptions()
     scenario: Mapping[str, Any] | None = None
     row_period_s: float | None = None
+    white_noise: LogNoise | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]

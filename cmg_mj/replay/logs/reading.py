@@ -21,13 +21,15 @@ from cmg_mj.replay.logs.checks import (
     check_sizes,
     windows_inside,
 )
-from cmg_mj.replay.logs.columns import ACCELEROMETERS, Column, columns_of
+from cmg_mj.replay.logs.columns import ACCELEROMETERS, ONE_ACCELEROMETER, Column, columns_of
 from cmg_mj.replay.logs.from_run import log_of_trajectory
 from cmg_mj.replay.logs.log import REFERENCE, Log, ReadOptions
+from cmg_mj.replay.logs.one_accelerometer import remarks_on_one, tilt_of_one
 from cmg_mj.replay.logs.resampling import sampled_where_known
 from cmg_mj.replay.logs.sampling import SAME_TIME, Part, Sampler
 from cmg_mj.replay.logs.table import read_table
 from cmg_mj.replay.logs.units import in_si
+from cmg_mj.replay.logs.white_noise import white_noise_of
 from cmg_mj.results.stored_columns import (
     LONG,
     Reader,
@@ -82,9 +84,13 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if "acceleration" in has:
         motion = TiltMotion(joined["y1_rad"], joined["acceleration_rad_s2"], slices, dt)
         notes += implausible_acceleration(rows.columns, rows.signals, motion, rows.tilt)
+    if "ax" in rows.columns:
+        notes += remarks_on_one(rows.columns, rows.signals, joined, slices, dt)
     units = {role: column.unit for role, column in rows.columns.items()}
     options = replace(options, units=units)
-    return Log(path.stem, dt, joined, slices, has, rows.tilt, windows, tuple(notes), options, None, sampler.period)
+    period = sampler.period or dt
+    noise = white_noise_of(parts, period)
+    return Log(path.stem, dt, joined, slices, has, rows.tilt, windows, tuple(notes), options, None, period, noise)
 
 
 def _read_run(path: Path, options: ReadOptions) -> Log:
@@ -194,7 +200,8 @@ def _measured(rows: _Rows) -> StoredColumns:
         angle = of(rows.tilt, *ACCELEROMETERS)
         measured["acceleration_rad_s2"] = of(rows.tilt.acceleration, "inner_x", "outer_x")
     else:
-        angle = of(np.asarray, "tilt")
+        one = "ax" in signals
+        angle = of(tilt_of_one, *ONE_ACCELEROMETER) if one else of(np.asarray, "tilt")
         if "acceleration" in signals:
             measured["acceleration_rad_s2"] = of(np.asarray, "acceleration")
     whole = np.empty(signals.n_rows)

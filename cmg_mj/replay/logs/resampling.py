@@ -10,6 +10,8 @@ from cmg_mj.results.stored_columns import LONG, stretches
 
 EVEN = 0.02
 """Deviation from an even grid, in periods, up to which stamps count as even."""
+SAME_PERIOD = 1e-3
+"""Relative difference up to which the line through the rows has their period."""
 GAP_PERIODS = 1.5
 """A gap is longer than so many periods."""
 FEWEST = 20
@@ -114,11 +116,34 @@ def is_even(time: np.ndarray, period: float, resolution: float) -> bool:
     """Return whether the rows are on an even grid, as far as stamps of this resolution show."""
     if len(time) < 3:
         return True
-    places = np.rint((time - time[0]) / period)
     slack = max(EVEN * period, 0.75 * resolution if resolution < period else 0.0)
-    if np.ptp(np.diff(time)) < EVEN * period:
+    steps = np.diff(time)
+    if np.ptp(steps) < EVEN * period:
         return True
-    order = np.arange(len(time)) if np.diff(time).max() < GAP_PERIODS * period else places
+    in_order = steps.max() < GAP_PERIODS * period
+    del steps
+    if len(time) > LONG:
+        return _is_on_a_line(time, period, slack, in_order)
+    order = np.arange(len(time)) if in_order else np.rint((time - time[0]) / period)
     fit = np.polynomial.polynomial.polyfit(order, time - time[0], 1)
     off = time - time[0] - (fit[0] + fit[1] * order)
-    return bool(np.abs(off).max() <= slack and abs(fit[1] / period - 1.0) < 1e-3)
+    return bool(np.abs(off).max() <= slack and abs(fit[1] / period - 1.0) < SAME_PERIOD)
+
+
+def _is_on_a_line(time: np.ndarray, period: float, slack: float, in_order: bool) -> bool:
+    """Compare the rows of a long log with the straight line through them, stretch by stretch, as `is_even` does."""
+    middle = 0.5 * (len(time) - 1 if in_order else (time[-1] - time[0]) / period)
+
+    def stretch(rows: slice) -> tuple[np.ndarray, np.ndarray]:
+        since = time[rows] - time[0]
+        order = np.arange(rows.start, rows.stop) if in_order else np.rint(since / period)
+        return order - middle, since - middle * period
+
+    sums = np.zeros(4)
+    for rows in stretches(len(time)):
+        x, y = stretch(rows)
+        sums += x.sum(), y.sum(), x @ x, x @ y
+    x_mean, y_mean = sums[:2] / len(time)
+    slope = (sums[3] - len(time) * x_mean * y_mean) / (sums[2] - len(time) * x_mean**2)
+    offs = (y - y_mean - slope * (x - x_mean) for x, y in map(stretch, stretches(len(time))))
+    return bool(max(np.abs(off).max() for off in offs) <= slack and abs(slope / period - 1.0) < SAME_PERIOD)

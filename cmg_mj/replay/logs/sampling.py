@@ -40,12 +40,14 @@ class Part:
         values: Name -> (n,).
         stamps: The rows' own times, (m,) [s].
         placed: The rows' times in `time`, which differ from rounded stamps, (m,) [s].
+        rows: Name -> the rows' own values, (m,).
     """
 
     time: np.ndarray
     values: Mapping[str, np.ndarray]
     stamps: np.ndarray
     placed: np.ndarray
+    rows: StoredColumns
 
     @property
     def step(self) -> float:
@@ -201,7 +203,7 @@ class Sampler:
     def _part(self, time: np.ndarray, values: StoredColumns, period: float, dt: float, resampled: bool) -> Part:
         if not resampled and len(time) == round((time[-1] - time[0]) / dt) + 1:
             grid = time[0] + dt * np.arange(len(time))
-            return Part(grid, values, time, grid)
+            return Part(grid, values, time, grid, values)
         if not resampled:  # rows stay where they are, and those that are missing come between them
             places = np.rint((time - time[0]) / dt).astype(int)
             places = np.maximum.accumulate(places)
@@ -210,14 +212,14 @@ class Sampler:
             values = masked(values, mask)
             stamps, grid = places * dt, dt * np.arange(places[-1] + 1)
             filled = {name: shelved(bridge(grid, stamps, column, name in self.held)) for name, column in values.items()}
-            return Part(time[0] + grid, StoredColumns(filled, 0, len(grid)), time, time[0] + stamps)
+            return Part(time[0] + grid, StoredColumns(filled, 0, len(grid)), time, time[0] + stamps, values)
         grid = dt * np.arange(int((time[-1] - time[0]) / dt + 1e-6) + 1)
         stamps = time - time[0]
         sampled = {
             name: shelved(resample(grid, stamps, column, GAP_PERIODS * period, name in self.held))
             for name, column in values.items()
         }
-        return Part(time[0] + grid, StoredColumns(sampled, 0, len(grid)), time, time)
+        return Part(time[0] + grid, StoredColumns(sampled, 0, len(grid)), time, time, values)
 
 
 def _missing(present: np.ndarray, time: np.ndarray, measured: Mapping[str, np.ndarray]) -> str:

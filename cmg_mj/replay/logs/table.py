@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import csv
 import os
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,6 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
+from cmg_mj.replay.logs.cells import MISSING, Clock, is_number, numbers
+from cmg_mj.replay.logs.columns import HOW_TO_QUOTE
 from cmg_mj.results.stored_columns import ColumnStore, StoredColumns, stored
 
 if TYPE_CHECKING:
@@ -23,13 +26,12 @@ if TYPE_CHECKING:
 MOST_ROWS = 5_000_000
 """Most rows of a log; more take hours."""
 DELIMITERS = (",", ";", "\t", "|")
+ROWS_OF_DELIMITER = 20
+"""Number of rows below the heading that show the delimiter: a heading may contain others."""
 HEAD = 1 << 16
 """Size of the part of a CSV that is searched for its heading, which must end in it [bytes]."""
 PARQUET = b"PAR1"
 """First bytes of a Parquet file."""
-NOT_FINITE = ["nan", "NaN", "NAN", "-nan", "inf", "-inf", "Inf", "-Inf"]
-MISSING = ["", "NA", "N/A", "#N/A", "null", "NULL", "None", "none", *NOT_FINITE]
-"""Cells that hold no number."""
 COMMENTS = ("#", "%", "//")
 
 
@@ -93,11 +95,11 @@ def _of_parquet(path: Path, headings: Sequence[str], time: str | None, dated: li
         if file.metadata.num_rows > MOST_ROWS:
             raise _too_long(path, file.metadata.num_rows)
         names = list(dict.fromkeys(spelled[name.strip()] for name in headings))
-        if all(_is_number(file.schema_arrow.field(name).type) for name in names):
+        if all(is_number(file.schema_arrow.field(name).type) for name in names):
             return _in_pieces(path, names, file.iter_batches(columns=names))
         table = file.read(columns=names)
     return {
-        name.strip(): _numbers(path, name, table[spelled[name.strip()]], dated if name == time else None)
+        name.strip(): numbers(path, name, table[spelled[name.strip()]], dated if name == time else None)
         for name in headings
     }
 
@@ -108,8 +110,8 @@ def _of_csv(
     import pyarrow as pa
     import pyarrow.csv as pacsv
 
-    encoding, skipped, line = _heading(path, head)
-    delimiter = max(DELIMITERS, key=line.count)
+    encoding, skipped, line, rows = _heading(path, head)
+    delimiter = _delimiter(line, rows)
     comma = delimiter == ";" and "," in line + head.decode(encoding, "replace")
     read = pacsv.ReadOptions(skip_rows=skipped, encoding=encoding, use_threads=False)
     torn: list[str] = []
@@ -132,35 +134,28 @@ def _of_csv(
     with _arrow_errors(path):
         with path.open("rb") as file:
             names = pacsv.open_csv(file, read, parse).schema.names
-        _check_columns(path, headings, [name.strip() for name in names])
+        _check_columns(path, headings, [name.strip() for name in names], _cells_apart(len(names), rows, delimiter))
         spelled = {name.strip(): name for name in names}
         headings = [spelled[name.strip()] for name in headings]
         time = spelled.get(time.strip()) if time else None
-        table: pa.Table | None = None
-        columns: Mapping[str, np.ndarray] = {}
+        names = list(dict.fromkeys(headings))
         try:
             torn.clear()
-            names = list(dict.fromkeys(headings))
             columns = _in_pieces(path, names, _batches(path, read, parse, convert(pa.float64())))
-            n_rows = columns.n_rows
         except pa.ArrowInvalid as error:
             if "onversion error" not in str(error):
                 raise
             torn.clear()
-            texts = pa.Table.from_batches(list(_batches(path, read, parse, convert(pa.string()))))
-            table, n_rows = texts, texts.num_rows
-    if torn and not n_rows:
+            texts = _batches(path, read, parse, convert(pa.string()))
+            clock = Clock(path, time, dated, comma=comma) if time else None
+            columns = _in_pieces(path, names, texts, clock, comma=comma)
+    if torn and not columns.n_rows:
         raise InputError(f"{path}: no line has as many cells as the heading; the first, {torn[0]}")
     if torn:
         one = len(torn) == 1
         lines = f"{len(torn)} {'line has' if one else 'lines have'} another number of cells"
         notes.append(f"{lines} and {'was' if one else 'were'} discarded; {'' if one else 'the first, '}{torn[0]}")
-    if table is None:
-        return columns
-    return {
-        name.strip(): _numbers(path, name, table[name], dated if name == time else None, comma=comma)
-        for name in headings
-    }
+    return columns
 
 
 def _batches(
@@ -180,15 +175,27 @@ def _batches(
             yield batch
 
 
-def _in_pieces(path: Path, names: Sequence[str], batches: Iterable[pa.RecordBatch]) -> StoredColumns:
+def _in_pieces(
+    path: Path,
+    names: Sequence[str],
+    batches: Iterable[pa.RecordBatch],
+    clock: Clock | None = None,
+    *,
+    comma: bool = False,
+) -> StoredColumns:
     """Keep columns of numbers, a batch at a time: a long log's go to a file."""
     import pyarrow as pa
 
     store = ColumnStore(len(names), Path(tempfile.gettempdir()))
+
+    def values(name: str, column: pa.ChunkedArray) -> np.ndarray:
+        if clock is not None and clock.name == name:
+            return clock.seconds(column, len(store))
+        return numbers(path, name, column, None, comma=comma, first=len(store))
+
     for batch in batches:
         if len(batch):
-            chunks = (pa.chunked_array([batch.column(name)]) for name in names)
-            store.append([_numbers(path, name, c, None)[:, None] for name, c in zip(names, chunks, strict=True)])
+            store.append([values(name, pa.chunked_array([batch.column(name)]))[:, None] for name in names])
     readers = {name.strip(): partial(_column, store, i) for i, name in enumerate(names)}
     return StoredColumns(readers, 0, len(store))
 
@@ -197,8 +204,21 @@ def _column(store: ColumnStore, column: int, start: int, end: int) -> np.ndarray
     return store.read(column, start, end)[:, 0]
 
 
-def _heading(path: Path, head: bytes) -> tuple[str, int, str]:
-    """Return the encoding, the number of lines above the heading (comments, empty ones), and the heading."""
+def _delimiter(heading: str, rows: Sequence[str]) -> str:
+    """Return the delimiter with which most rows have as many cells as the heading; among several, the most frequent."""
+
+    def count(line: str, delimiter: str) -> int:
+        return sum(part.count(delimiter) for part in line.split('"')[::2])  # a delimiter in quotes divides nothing
+
+    def fits(delimiter: str) -> tuple[int, int]:
+        n = count(heading, delimiter)
+        return (sum(count(row, delimiter) == n for row in rows) if n else 0), n
+
+    return max(DELIMITERS, key=fits)
+
+
+def _heading(path: Path, head: bytes) -> tuple[str, int, str, Sequence[str]]:
+    """Return the encoding, the number of lines above the heading (comments, empty ones), it, and some rows below."""
     encoding = "utf-8"
     if head.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
         raise InputError(f"{path}: is written in UTF-32; save it as UTF-8")
@@ -212,7 +232,7 @@ def _heading(path: Path, head: bytes) -> tuple[str, int, str]:
     lines = head.decode(encoding, "ignore").lstrip("\ufeff").splitlines()
     for i, line in enumerate(lines):
         if line.strip() and not line.lstrip().startswith(COMMENTS):
-            return encoding, i, line
+            return encoding, i, line, lines[i + 1 : i + 1 + ROWS_OF_DELIMITER]
     raise InputError(f"{path}: no heading in its first {HEAD // 1024} kB")
 
 
@@ -229,71 +249,27 @@ def _is_utf8(path: Path) -> bool:
     return True
 
 
-def _check_columns(path: Path, headings: Sequence[str], names: Sequence[str]) -> None:
+def _cells_apart(n_heading: int, rows: Sequence[str], delimiter: str) -> str:
+    """Say that all rows below a heading have another number of cells, if they have."""
+    numbers_of_cells = {len(cells) for cells in csv.reader(rows, delimiter=delimiter) if cells}
+    if len(numbers_of_cells) != 1 or n_heading in numbers_of_cells:
+        return ""
+    n_row = numbers_of_cells.pop()
+    apart = f"; its heading has {n_heading} cells, and the rows below it have {n_row}"
+    if n_heading > n_row:
+        apart += f": one with {shown(delimiter)} in it must be in quotes in the file too"
+    return apart
+
+
+def _check_columns(path: Path, headings: Sequence[str], names: Sequence[str], cells_apart: str = "") -> None:
     for name in headings:
         if name.strip() not in [known.strip() for known in names]:
             few = [shown(known) for known in names]
-            raise InputError(f"{path}: has no column {name!r}; {nearest(name, few, 'it has')}")
+            quoted = HOW_TO_QUOTE if any("," in known for known in names) else ""
+            guess = nearest(name, few, "it has", quoted=True)
+            raise InputError(f"{path}: has no column {name!r}; {guess}{cells_apart or quoted}")
         if list(names).count(name) > 1:
             raise InputError(f"{path}: has the column {name!r} {list(names).count(name)} times: rename all but one")
-
-
-def _is_number(kind: pa.DataType) -> bool:
-    import pyarrow as pa
-
-    return pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
-
-
-def _numbers(
-    path: Path, name: str, column: pa.ChunkedArray, dated: list[str] | None, *, comma: bool = False
-) -> np.ndarray:
-    """Convert a column to floats; `dated`, of the time alone, gets its name if it holds dates."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    kind = column.type
-    if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-        if dated is None:
-            raise InputError(f"{path}: column {name!r} holds times, not numbers")
-        dated.append(name)
-        return _seconds(column)
-    if _is_number(kind):
-        values = column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False).astype(float)
-        return np.where(np.isfinite(values), values, np.nan)
-    if pa.types.is_null(kind):
-        raise InputError(f"{path}: column {name!r} has no number at all")
-    if not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
-        raise InputError(f"{path}: column {name!r} holds {kind}, not numbers")
-    text = pc.call_function("utf8_trim_whitespace", [column])
-    if dated is not None:
-        try:
-            seconds = _seconds(text.cast(pa.timestamp("ns")))
-            dated.append(name)
-            return seconds
-        except pa.ArrowInvalid:
-            pass  # numbers, or neither
-    values = np.empty(len(text))
-    for i, cell in enumerate(text.to_pylist()):
-        try:
-            values[i] = np.nan if cell is None or cell in MISSING else float(cell.replace(",", ".") if comma else cell)
-        except ValueError:
-            expected = "a number or a date" if dated is not None else "a number"
-            raise InputError(f"{path}: row {i + 1}, column {name!r}: {shown(str(cell))} is not {expected}") from None
-    return np.where(np.isfinite(values), values, np.nan)
-
-
-def _seconds(column: pa.ChunkedArray) -> np.ndarray:
-    """Convert dates, or spans of time, to seconds from the first; nanoseconds are subtracted as integers."""
-    import pyarrow as pa
-
-    kind = pa.duration("ns") if pa.types.is_duration(column.type) else pa.timestamp("ns")
-    if pa.types.is_timestamp(column.type) and column.type.tz:
-        column = column.cast(pa.timestamp(column.type.unit))
-    column = column.cast(kind).combine_chunks()
-    known = np.asarray(column.is_valid())
-    counts = column.cast(pa.int64()).fill_null(0).to_numpy(zero_copy_only=False)
-    start = counts[known][0] if known.any() else 0
-    return np.where(known, (counts - start) * 1e-9, np.nan)
 
 
 def _too_long(path: Path, rows: int | None) -> InputError:

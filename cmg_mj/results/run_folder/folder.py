@@ -13,6 +13,7 @@ from cmg_mj.errors import InputError, raised
 from cmg_mj.results.run_folder.lock import Busy, Lock
 from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, require_own, users_files
 from cmg_mj.results.run_folder.swap import ASIDE, recover, stage, swap_in
+from cmg_mj.results.run_folder.written_names import foreign_names
 
 Writers = Mapping[str, Callable[[Path], None]]
 """Name of a file -> what writes it to the path given."""
@@ -90,6 +91,7 @@ class RunFolder:
         Raises:
             InputError: A file cannot be written. The others are, unless it is all or none.
         """
+        assert not foreign_names(files), f"not in written_names.py: {foreign_names(files)}"
         wrong: dict[str, BaseException] = {}
         try:
             new = stage(self._folder)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from cmg_mj.errors import InputError, shown
 from cmg_mj.results.files import is_plain_file
+from cmg_mj.results.run_folder.written_names import foreign_names
 
 HIDDEN = ".cmg-mj"
 """Folder of cmg_mj's own files in a run folder: the manifest; during a run also its lock and the unfinished result."""
@@ -20,6 +21,9 @@ FILES = "files.json"
 REMOVE = f"remove {HIDDEN}, or name another folder"
 LARGEST_MANIFEST = 4_000_000
 """A manifest of more bytes is not cmg_mj's."""
+
+MADE = {"": ("new", "ready"), "new": (HIDDEN,), "ready": (HIDDEN,), f"new/{HIDDEN}": (), f"ready/{HIDDEN}": ()}
+"""Folder in `HIDDEN` -> the folders that cmg_mj makes in it."""
 
 
 @dataclass(frozen=True)
@@ -44,19 +48,22 @@ class Manifest:
         """Read a folder's manifest; empty where there is none: then nothing there is known to be cmg_mj's.
 
         Raises:
-            InputError: The manifest names what is not a file of its own folder. Somebody else has written it.
+            InputError: The manifest names a file that cmg_mj never writes, or gives one no SHA-256. Somebody else has
+                written it.
         """
         path = folder / HIDDEN / FILES
         try:
             if not is_plain_file(path) or path.stat().st_size > LARGEST_MANIFEST:
                 return Manifest()
             stored = json.loads(path.read_text(encoding="utf-8"))
-            files, complete = dict(stored["files"]), bool(stored["complete"])
-        except (OSError, ValueError, LookupError, TypeError, RecursionError):
+            files, complete = dict(stored["files"].items()), bool(stored["complete"])
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
             return Manifest()
+        for name in foreign_names(files):
+            raise InputError(f"{HIDDEN} there names {shown(name)}, which cmg-mj never writes: {REMOVE}")
         for name, digest in files.items():
-            if not _is_bare(name) or not isinstance(digest, str):
-                raise InputError(f"{HIDDEN} there names {shown(name)}, which cmg-mj never writes: {REMOVE}")
+            if not isinstance(digest, str) or not re.fullmatch("[0-9a-f]{64}", digest):
+                raise InputError(f"{HIDDEN} there gives {shown(digest)} as the SHA-256 of {shown(name)}: {REMOVE}")
         return Manifest(files, complete)
 
     def write(self, folder: Path) -> None:
@@ -86,6 +93,10 @@ def require_own(folder: Path) -> None:
     for path in (hidden, hidden / "new", hidden / "new" / HIDDEN, hidden / "ready", hidden / "ready" / HIDDEN):
         if path.is_symlink() or (path.exists() and not path.is_dir()):
             raise InputError(f"{path.relative_to(folder)} there is no folder that cmg-mj makes: {REMOVE}")
+    for parent, names in MADE.items():
+        for path in sorted((hidden / parent).glob("*")):
+            if path.is_dir() and path.name not in names:
+                raise InputError(f"{path.relative_to(folder)} there is no folder that cmg-mj makes: {REMOVE}")
     for path in (hidden / "lock", hidden / FILES, hidden / "ready" / HIDDEN / FILES):
         if path.is_symlink() or (path.exists() and not is_plain_file(path)):
             raise InputError(f"{path.relative_to(folder)} there is no file that cmg-mj writes: {REMOVE}")
@@ -109,11 +120,6 @@ def remove_result(folder: Path) -> None:
             empty.rmdir()
         except OSError:  # what holds something stays
             return
-
-
-def _is_bare(name: str) -> bool:
-    """Return whether a name leads to a file in the folder itself, on any system."""
-    return bool(name) and name not in (".", "..", HIDDEN) and not re.search(r"[/\\:\0]", name)
 
 
 def _digest(path: Path) -> str:

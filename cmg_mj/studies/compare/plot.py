@@ -109,7 +109,7 @@ class _Panel:
         for place, (stood, lost, color) in enumerate(zip(self.stood, self.lost, self.colours, strict=True)):
             self._scatter(partial(axes.scatter, color=color, alpha=0.6, linewidth=0), place, stood, "o", 9)
             self._scatter(partial(axes.scatter, color="red", linewidth=0.8), place, lost, "x", 14)
-            interval = known_interval(stood)
+            interval = known_interval(stood, KEYS[self.key].positive)
             if interval is not None:
                 axes.plot([interval.low, interval.high], [place, place], color="black", linewidth=2.0)
                 axes.plot([interval.mean], [place], "|", color="black", markersize=9)

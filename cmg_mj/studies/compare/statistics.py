@@ -107,7 +107,7 @@ def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:
         finite(
             row.summary
             | {
-                "intervals": {key: _ends(row.values(key)) for key in keys},
+                "intervals": {key: _ends(row.values(key), KEYS[key].positive) for key in keys},
                 "minus_best": {
                     key: _paired_difference(row, leader, key) for key, leader in leaders.items() if row != leader
                 },
@@ -122,8 +122,8 @@ def worlds_table(compared: Sequence[ComparedObserver]) -> pa.Table:
     return as_table(world for row in comparison_rows(compared) for world in row.entry.result.rows(row.reference))
 
 
-def _ends(values: np.ndarray) -> list[float] | None:
-    interval = known_interval(values)
+def _ends(values: np.ndarray, positive: bool = False) -> list[float] | None:
+    interval = known_interval(values, positive)
     return None if interval is None else [interval.low, interval.high]
 
 

@@ -25,7 +25,13 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
 from cmg_mj.studies.push_limits.pair_demands import PairDemands, pair_demands
-from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG, Prospects, prospects, smallest_sufficient_scale
+from cmg_mj.studies.push_limits.prospects import (
+    LOW_LIMIT_DEG,
+    NOISE_HINT,
+    Prospects,
+    prospects,
+    smallest_sufficient_scale,
+)
 from cmg_mj.studies.push_limits.simulated_push import (
     OutOfTimeError,
     SimulatedPush,
@@ -71,12 +77,19 @@ class MountResult:
         """The scenario's file."""
         return self.path.with_suffix(".toml")
 
+    @property
+    def hints(self) -> list[str]:
+        """Clauses on what is likely to make the robot fall; none on noise if it falls in MuJoCo anyway."""
+        falls = self.simulated is not None and self.simulated.falls
+        return [hint for hint in self.prospects.hints if not (falls and hint.startswith(NOISE_HINT))]
+
     def figures(self) -> dict[str, float | str | list[str] | None]:
         """Return the figures that `cmg-mj mount --json` prints."""
         simulated = self.simulated
         return {
             **self.prospects.figures(),
-            "stand_unpushed_of_10": simulated and simulated.standing,
+            "stand_unpushed": simulated and simulated.standing,
+            "stand_unpushed_of": simulated and simulated.worlds,
             "stands_push_impulse_n_m_s": simulated and simulated.impulse,
             "stands_push_torque_n_m": simulated and simulated.impulse / PUSH_S,
             "stands_push_complete": simulated and simulated.complete,
@@ -136,7 +149,7 @@ def _mount_and_write(
         if time_limit is not None:
             simulated = simulated_push(experiment, limits, request.name, time_limit)
             if math.degrees(limits.limit.tilt) < LOW_LIMIT_DEG or simulated.falls:
-                trial = model.with_name(f".{file.stem}.trial.xml")
+                trial = model.with_suffix(".trial.xml")
                 sufficient = _sufficient_scale(robot, request, trial, observer, time_limit)
         text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated)
         model.with_suffix(".toml").write_bytes(signed(text, ".toml"))

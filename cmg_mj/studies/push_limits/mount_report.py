@@ -42,7 +42,7 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
     margin = result.prospects.push_margin.median_impulse
     reduced = (
         f"by its reduced model E = {margin:.3g} N m s, a push of {margin / PUSH_S:.3g} N m, "
-        f"{result.prospects.fraction_of_limit:.0%} of that"
+        f"{result.prospects.fraction_of_limit:.0%} of any controller's"
     )
     yield f"  {result.observer}: {_simulated(result.simulated)}{reduced}"
     yield from _scale(result)
@@ -56,12 +56,22 @@ def _simulated(simulated: SimulatedPush | None) -> str:
     if simulated.standing is None:
         return f"in MuJoCo nothing found within {LONGEST_S:g} s; "
     if simulated.falls:
-        fallen = WORLDS - simulated.standing
-        return f"does not stand: in MuJoCo {fallen} of {WORLDS} worlds fall within {UNPUSHED_S:g} s, unpushed; "
+        fallen = simulated.worlds - simulated.standing
+        return (
+            f"does not stand: in MuJoCo {fallen} of {simulated.worlds} worlds fall within {UNPUSHED_S:g} s, unpushed; "
+        )
     if not simulated.impulse:
-        reason = f"not even {LEAST:.0%} of that" if simulated.complete else f"none found within {LONGEST_S:g} s"
+        reason = f"none found within {LONGEST_S:g} s"
+        if simulated.complete:
+            reason = f"not even {LEAST:.0%} of any controller's push"
         return f"stands in MuJoCo only unpushed ({reason}); "
-    more = f"and all of {OTHER_WORLDS} others" if simulated.complete else f"{LONGEST_S:g} s did not suffice for others"
+    if simulated.complete:
+        more = f"and all of {OTHER_WORLDS} others"
+    elif simulated.others_fell:
+        more = f"some of {OTHER_WORLDS} others fell with a larger one, and {LONGEST_S:g} s did not suffice to try "
+        more += "this one"
+    else:
+        more = f"{LONGEST_S:g} s did not suffice for others"
     return (
         f"stands a push of {simulated.impulse / PUSH_S:.3g} N m for {PUSH_S:g} s either way (MuJoCo, all of {WORLDS} "
         f"worlds, less a tenth; {more}); "

@@ -11,11 +11,13 @@ SPIN_UP_S = 60.0
 BEARINGS = 2
 """Bearings of a wheel."""
 FRICTION = 0.0015
-"""Coefficient of friction of deep groove ball bearings by SKF, Rolling bearings, catalogue, "Estimating the frictional
-moment": M = 0.5 mu P d, for loads P of about a tenth of the rating C and good lubrication."""
+"""Coefficient of friction of deep groove ball bearings without contact seals: M = 0.5 mu P d, for loads P of about a
+tenth of the rating C and good lubrication. SKF, catalogue Rolling bearings, chapter Friction, "Estimating the
+frictional moment", table 1."""
 BORE_M, RATING_N = 0.008, 3300.0
-"""Bore d and dynamic load rating C of a 608, whose bore fits the shaft of a wheel of the papers' size; an assumption. A
-module of scale s has bearings of s times the bore and s^2 times the rating."""
+"""Bore d and dynamic load rating C of a 608 (makers give 3.3 to 3.45 kN), which fits the shaft of a wheel of the
+papers' size. That its load, the preload, is a tenth of C is an assumption too. A module of scale s has bearings of s
+times the bore and s^2 times the rating."""
 
 
 class PairDemands(NamedTuple):

@@ -21,6 +21,12 @@ START_DEG, START_SHARE = 1.0, 0.25
 """A run starts with one degree of tilt, or with a quarter of the recoverable tilt if that is less."""
 POLE_DIFFERENCE = 0.1
 """Relative difference of the simulated pole from the reduced model's, from which the robot is unlike that model."""
+NOISY = 0.75
+"""Where the worst world of the reduced model recovers from less than this share of E, the sensors' noise alone may fell
+a robot."""
+
+NOISE_HINT = "the pair is so small that the sensors' noise alone may fell the robot"
+"""Beginning of the hint that tells so."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,11 @@ class Prospects:
         return self.push_margin.median_impulse / self.limit_push_impulse
 
     @property
+    def noisy(self) -> bool:
+        """Whether the sensors' noise alone may fell the robot, by its reduced model."""
+        return self.push_margin.worst_impulse < NOISY * self.push_margin.median_impulse
+
+    @property
     def start_tilt_deg(self) -> float:
         """The tilt that a run of the robot starts with [deg]."""
         return float(f"{min(START_DEG, START_SHARE * math.degrees(self.limit.tilt)):.3g}")
@@ -68,6 +79,12 @@ class Prospects:
             hints.append(
                 f"the robot starts to fall with a pole of {self.pole:.3g} 1/s, its reduced model's is "
                 f"{self.limit.pole:.3g}: {reason}"
+            )
+        if self.noisy:
+            share = self.push_margin.worst_impulse / self.push_margin.median_impulse
+            hints.append(
+                f"{NOISE_HINT}; with other noise it may fall of smaller pushes than it stands here (its "
+                f"reduced model's worst world recovers from {share:.0%} of E)"
             )
         if self.push_margin.median_impulse == 0.0:
             hints.append("with this controller it falls without a push")

@@ -29,7 +29,7 @@ LONGEST_AFTER_S = 12.0
 """Longest time to wait for a pushed robot to recover or fall [s]."""
 OTHER_WORLDS = 20
 AFTER_LONGER = 3.0
-"""What was found is tried on so many other worlds, each way, and so many times longer: where the ceiling is low some
+"""The result is tried on so many other worlds, each way, and so many times longer: where the ceiling is low some
 worlds stand the push and fall of the noise while the gimbals come back."""
 RESOLUTION = 0.05
 """The search ends where a push that all worlds stand and one that not all stand differ by such a share."""
@@ -84,22 +84,26 @@ class SimulatedPush(NamedTuple):
     """The push that a robot stands in MuJoCo."""
 
     standing: int | None
-    """Worlds of ten that stand 20 s without a push, from the tilt that the scenario starts with; None if the time did
-    not suffice to see it."""
+    """Worlds that stand 20 s without a push, from the tilt that the scenario starts with; None if the time did not
+    suffice to see it."""
     impulse: float = 0.0
-    """Largest impulse about the line, as a push of 0.1 s either way, that all worlds stand, less a tenth, and that
-    twenty others stand too [N m s]. 0 if it does not stand, or not the smallest push tried."""
+    """Largest impulse about the line, as a push of 0.1 s either way, that all worlds stand, less a tenth [N m s]. If
+    the search is complete, twenty others stand it too. 0 if it does not stand, or not the smallest push tried."""
     complete: bool = True
     """Whether the search came to its end within its time."""
     servo_torque: float | None = None
     """Largest torque of a gimbal servo that this push takes [N m]; None if that was not seen."""
     servo_rate: float | None = None
     """Largest rate of a gimbal that it takes [rad/s]."""
+    others_fell: bool = False
+    """Whether the time ended after some of the twenty others had fallen with a larger push than `impulse`."""
+    worlds: int = WORLDS
+    """Worlds that were tried without a push: ten, and twenty others where it is `Prospects.noisy`."""
 
     @property
     def falls(self) -> bool:
         """Whether a world falls without a push."""
-        return self.standing is not None and self.standing < WORLDS
+        return self.standing is not None and self.standing < self.worlds
 
 
 def simulated_push(
@@ -123,6 +127,15 @@ def simulated_push(
         return SimulatedPush(None, complete=False)
     if standing < WORLDS:
         return SimulatedPush(standing)
+    worlds = WORLDS
+    if limits.noisy:
+        worlds += OTHER_WORLDS
+        try:
+            standing += standing_unpushed(experiment, limits, axis, time_limit, range(WORLDS, worlds))
+        except OutOfTimeError:
+            return SimulatedPush(None, complete=False)
+        if standing < worlds:
+            return SimulatedPush(standing, worlds=worlds)
     upright = _tilted(experiment, 0.0, axis)
     poles = [pole for pole in (limits.pole, limits.limit.pole) if pole > 0.0]
     after = min(AFTER_TIME_CONSTANTS / min(poles), LONGEST_AFTER_S)
@@ -138,6 +151,7 @@ def simulated_push(
     def all_stand(impulse: float) -> bool:
         return attempt(impulse, range(WORLDS), after).all_stand
 
+    found, others_fell = 0.0, False
     try:
         if all_stand(high):
             low, high = high, expected
@@ -146,24 +160,29 @@ def simulated_push(
         while high - low > max(RESOLUTION * high, least):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if all_stand(middle) else (low, middle)
-        while (low := (1.0 - MARGIN) * low) > least:
+        while (found := (1.0 - MARGIN) * (found or low)) > least:
             longer = min(AFTER_LONGER * after, LONGEST_AFTER_S)
-            result = attempt(low, range(WORLDS, WORLDS + OTHER_WORLDS), longer)
+            result = attempt(found, range(WORLDS, WORLDS + OTHER_WORLDS), longer)
             if result.all_stand:
-                return SimulatedPush(standing, low, True, result.servo_torque, result.servo_rate)
+                return SimulatedPush(standing, found, True, result.servo_torque, result.servo_rate, worlds=worlds)
+            others_fell = True
     except OutOfTimeError:
-        return SimulatedPush(standing, (1.0 - MARGIN) * low, complete=False)
-    return SimulatedPush(standing)
+        found = found or (1.0 - MARGIN) * low
+        return SimulatedPush(standing, found, complete=False, others_fell=others_fell, worlds=worlds)
+    return SimulatedPush(standing, worlds=worlds)
 
 
-def standing_unpushed(experiment: Experiment, limits: Prospects, axis: str, time_limit: TimeLimit) -> int:
-    """Count the worlds of ten that stand without a push, from the tilt that a scenario starts with.
+def standing_unpushed(
+    experiment: Experiment, limits: Prospects, axis: str, time_limit: TimeLimit, numbers: Sequence[int] = range(WORLDS)
+) -> int:
+    """Count the worlds that stand without a push, from the tilt that a scenario starts with.
 
     Args:
         experiment: The robot and its controller.
         limits: The limits by the reduced model.
         axis: Name of the axis, if there are several.
         time_limit: The time that the search may take.
+        numbers: The worlds, ten by default.
 
     Returns:
         The number of worlds.
@@ -172,7 +191,7 @@ def standing_unpushed(experiment: Experiment, limits: Prospects, axis: str, time
         OutOfTimeError: The time is over.
     """
     start = _tilted(experiment, limits.start_tilt_deg, axis)
-    worlds = [(world, 0.0) for world in range(WORLDS)]
+    worlds = [(world, 0.0) for world in numbers]
     return _attempt(start, worlds, UNPUSHED_S, axis, time_limit, "no push", early=False).standing
 
 

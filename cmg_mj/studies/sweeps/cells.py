@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmg_mj.results.intervals import Interval, finite_values, known_interval
+from cmg_mj.results.intervals import Interval, finite_mean, known_interval
 from cmg_mj.results.summary_keys import KEYS, Figures, Summary
 from cmg_mj.studies.sweeps.failure_reasons import Reasons
 from cmg_mj.studies.sweeps.study import SweepStudy
@@ -108,7 +108,7 @@ def cells_of(trials: Trials) -> Iterator[Summary]:
             mean, low, high = share or (None, None, None)
             row |= {"fell_share": mean, "fell_low": low, "fell_high": high}
             for key, values in figures.items():
-                row |= _with_ends(key, values[number, place])
+                row |= _with_ends(key, values[number, place], KEYS[key].positive)
                 leader = best[key]
                 behind = values[number, place] - (math.nan if leader is None else values[number, leader])
                 row |= _with_ends(f"{key}_behind_best", behind)
@@ -124,13 +124,12 @@ def _best(values: np.ndarray, key: str) -> int | None:
     return int(np.nanargmin(means if KEYS[key].better == "less" else -means))
 
 
-def _with_ends(key: str, values: np.ndarray) -> Figures:
-    """Average the known values, with the mean's interval; a single value has none."""
-    interval = known_interval(values)
+def _with_ends(key: str, values: np.ndarray, positive: bool = False) -> Figures:
+    """Average the known values, with the mean's interval; too few values have none."""
+    interval = known_interval(values, positive)
     if interval is not None:
         return {key: interval.mean, f"{key}_low": interval.low, f"{key}_high": interval.high}
-    alone = finite_values(values)
-    return {key: float(alone[0]) if len(alone) else None, f"{key}_low": None, f"{key}_high": None}
+    return {key: finite_mean(values), f"{key}_low": None, f"{key}_high": None}
 
 
 def cells_schema(study: SweepStudy) -> pa.Schema:

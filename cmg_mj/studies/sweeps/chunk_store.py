@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import count
 from pathlib import Path
 
 import pyarrow as pa
@@ -137,9 +138,9 @@ class Store:
                 wrong = str(error)
             if wrong:
                 marks.pop(number, None)
-                path.replace(path.with_suffix(".damaged"))
+                aside = _set_aside(path)
                 if on_damage:
-                    on_damage(f"{path}: {wrong}; it is computed again, and kept as {path.stem}.damaged")
+                    on_damage(f"{path}: {wrong}; it is computed again, and kept as {aside.name}, which may be deleted")
         return marks
 
     @contextmanager
@@ -160,7 +161,7 @@ class Store:
                     raise InputError(f"{path}: {why}; {AGAIN}, or name another folder")
                 yield file, mark
         except (OSError, pa.ArrowException) as error:
-            raise Unreadable(f"cannot be read: {' '.join(str(error).split())}") from error
+            raise Unreadable(f"cannot be read: {' '.join(str(error).split()).rstrip('.')}") from error
 
     def left(self) -> list[int]:
         """List the numbers of the chunks that are not finished."""
@@ -226,6 +227,16 @@ def run(store: Store, on_progress: Callable[[float], None] | None = None) -> Non
 def merged(store: Store, path: Path) -> None:
     """Write all trials of a finished sweep as one file."""
     write_tables(path, schema_of(store.study), store.tables())
+
+
+def _set_aside(path: Path) -> Path:
+    """Rename a damaged file to a name that is free."""
+    names = (f"{path.stem}{'' if number == 1 else f'-{number}'}.damaged" for number in count(1))
+    aside = next(path.with_name(name) for name in names if not os.path.lexists(path.with_name(name)))
+    try:
+        return path.rename(aside)
+    except OSError as error:
+        raise InputError(f"{aside}: cannot be written: {error.strerror or error}") from error
 
 
 def release_free_memory() -> None:

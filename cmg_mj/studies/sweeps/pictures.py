@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from cmg_mj.results.intervals import Interval, finite_values, known_interval
+from cmg_mj.results.intervals import Interval, finite_mean, known_interval
 from cmg_mj.results.summary_keys import heading
 from cmg_mj.studies.sweeps.axes import is_number
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
@@ -87,7 +87,7 @@ def _error_lines(observers: Sequence[str], x: np.ndarray, values: np.ndarray) ->
     lines, marks = [], []
     for place, name in enumerate(observers):
         worlds = values[:, place]
-        intervals = [known_interval(point) or _without_interval(point) for point in worlds]
+        intervals = [known_interval(point, positive=True) or _without_interval(point) for point in worlds]
         mean = np.array([interval.mean for interval in intervals])
         lines.append(Line(x, mean, color=name, spread=_heights(intervals)))
         whole = np.isfinite(worlds).all(axis=1)
@@ -98,9 +98,9 @@ def _error_lines(observers: Sequence[str], x: np.ndarray, values: np.ndarray) ->
 
 
 def _without_interval(worlds: np.ndarray) -> Interval:
-    """Take the only world that stood, if one did, for the mean."""
-    stood = finite_values(worlds)
-    mean = float(stood[0]) if len(stood) else math.nan
+    """Average the worlds that stood, too few for an interval, if one did."""
+    known = finite_mean(worlds)
+    mean = math.nan if known is None else known
     return Interval(mean, mean, mean)
 
 

@@ -15,13 +15,19 @@ from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay import replay
 from cmg_mj.replay.alignment import Alignment
-from cmg_mj.replay.log_replay import NO_MODEL, replay_log
+from cmg_mj.replay.log_replay import NO_MODEL, misfit_of, replay_log
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.replay.model_check import model_remark
+from cmg_mj.replay.noise_remarks import noise_figures, noise_remarks
 from cmg_mj.replay.observer_inputs import ObserverInputs, observer_inputs
 from cmg_mj.replay.parameter_options import ParameterValue
 from cmg_mj.replay.reference import alignment_of, remarks_on
+from cmg_mj.results.intervals import PairedVerdict
+from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.tilt import TiltNoise
+from cmg_mj.studies.tuning.closed_loop import LoopComparison, compare_in_loop, judged
 from cmg_mj.studies.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, level_of
 from cmg_mj.studies.tuning.parameters import (
     MakeObserver,
@@ -112,9 +118,11 @@ class LogStudy:
         split: The share of each log that was fitted; the rest is scored.
         level: Tuned parameters and their scores.
         noises: Sensor noise that the observer assumed, log by log.
+        noises_by_the_logs: White noise that the logs show, as `--json` prints it, log by log.
         alignments: Lag, scale and offset of the reference, log by log.
         remarks: Remarks as in a replay, log by log.
         stretch_s: The shortest of the scored stretches [s].
+        loop: Given and tuned parameters in a scenario's closed loop; None if none was asked for.
     """
 
     kind: str
@@ -125,9 +133,33 @@ class LogStudy:
     split: float
     level: NoiseLevelResult
     noises: Sequence[TiltNoise]
+    noises_by_the_logs: Sequence[Mapping[str, SummaryValue]]
     alignments: Sequence[Alignment | None]
     remarks: Sequence[Sequence[str]]
     stretch_s: float
+    loop: LoopComparison | None = None
+
+    @property
+    def verdict(self) -> PairedVerdict | None:
+        """Compare the tuned parameters with the given ones; None if the stretches are too short for an interval.
+
+        Better is better by more than 1 % and beyond chance, over the held-out stretches. Given parameters with which
+        the observer fails are worse than any.
+        """
+        if not self.has_interval:
+            return None
+        return judged(self.level.ratio) if np.isfinite(self.level.given_rms).all() else "better"
+
+    @property
+    def limits(self) -> list[str]:
+        """Name the tuned numbers that ended at a limit of their range, with the limit."""
+        ends = []
+        for number in self.numbers:
+            if number.name in self.level.edges:
+                size = self.level.sizes[number.name]
+                lowest = size / number.low < number.high / size
+                ends.append(f"{number.name} ({'lowest' if lowest else 'highest'}, {size:.4g})")
+        return ends
 
     @property
     def has_interval(self) -> bool:
@@ -152,6 +184,7 @@ def tune_on_logs(
     parameters: Sequence[str] = (),
     ranges: Mapping[str, tuple[float, float]] | None = None,
     starts: int = 2,
+    closed_loop: Scenario | None = None,
     on_share: OnShare | None = None,
 ) -> LogStudy:
     """Fit an observer's parameters to the reference of some logs.
@@ -167,6 +200,7 @@ def tune_on_logs(
         parameters: Names to tune; by default every number of the observer.
         ranges: Number -> smallest and largest size.
         starts: Starts of a search in several dimensions.
+        closed_loop: A scenario in whose loop the tuned parameters are compared with the given ones.
         on_share: Called now and then with the completed share.
 
     Returns:
@@ -209,9 +243,18 @@ def tune_on_logs(
         split,
         level,
         [log_inputs.noise for log_inputs in inputs],
+        [noise_figures(log, log_inputs.noise) for log, log_inputs in zip(logs, inputs, strict=True)],
         alignments,
-        [remarks_on(log, aligned) for log, aligned in zip(logs, alignments, strict=True)],
+        [
+            [
+                *remarks_on(log, aligned),
+                *noise_remarks(log, of_log.noise),
+                *filter(None, [model_remark(misfit_of(log, of_log.model))]),
+            ]
+            for log, aligned, of_log in zip(logs, alignments, inputs, strict=True)
+        ],
         held_out.shortest_s,
+        closed_loop and compare_in_loop(closed_loop, kind, values, level.parameters),
     )
 
 

@@ -11,8 +11,10 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from cmg_mj.results.metrics import finite_or_none
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.studies.tuning.closed_loop import RELEVANT, LoopComparison
 from cmg_mj.studies.tuning.on_logs import SHORTEST_S, LogStudy
 from cmg_mj.studies.tuning.parameters import plain
 from cmg_mj.studies.tuning.save import level_figures, ratio_text
@@ -32,16 +34,48 @@ def figures_of_logs(study: LogStudy) -> dict[str, SummaryValue]:
         "tuned": [number.name for number in study.numbers],
         "idle": list(study.insensitive_parameters),
         "noise": [
-            {"tilt_rad": noise.tilt, "acceleration_rad_s2": noise.acceleration, "correlation": noise.correlation}
-            for noise in study.noises
+            {
+                "tilt_rad": noise.tilt,
+                "acceleration_rad_s2": noise.acceleration,
+                "correlation": noise.correlation,
+                **by_the_log,
+            }
+            for noise, by_the_log in zip(study.noises, study.noises_by_the_logs, strict=True)
         ],
         "notes": [list(log) for log in study.remarks],
         "reference": [aligned and aligned._asdict() for aligned in study.alignments],
         "held_out_stretches": len(study.level.rms),
         "held_out_stretch_s": study.stretch_s,
         **{key: value for key, value in level.items() if key not in only_of_scenarios},
-        **({} if study.has_interval else {"held_out_ratio": None, "verdict": None}),
+        **({} if study.has_interval else {"held_out_ratio": None}),
+        "verdict": study.verdict,
+        **({} if study.loop is None else {"closed_loop": _loop_figures(study.loop)}),
     }
+
+
+def _loop_figures(loop: LoopComparison) -> dict[str, SummaryValue]:
+    return {
+        "scenario": loop.scenario,
+        "duration_s": loop.duration_s,
+        "worlds": loop.worlds,
+        "given_stood": loop.stood[0],
+        "tuned_stood": loop.stood[1],
+        "given_stood_alone": loop.stood_alone[0],
+        "tuned_stood_alone": loop.stood_alone[1],
+        "tilt_rms_ratio": None if loop.ratio is None else [finite_or_none(value) for value in loop.ratio],
+        "verdict": loop.verdict,
+        "refused": loop.refused or None,
+    }
+
+
+def _verdict_in_words(study: LogStudy) -> list[str]:
+    """Say why a difference counts for none."""
+    ratio = study.level.ratio
+    if study.verdict != "tie" or not math.isfinite(ratio.mean):
+        return []
+    if ratio.low <= 1.0 <= ratio.high:
+        return ["A tie: the difference is not beyond chance."]
+    return [f"A tie: {abs(ratio.mean - 1.0):.2%} of difference, where less than {RELEVANT - 1.0:.0%} counts for none."]
 
 
 def logs_table(study: LogStudy) -> Group:
@@ -61,8 +95,13 @@ def logs_table(study: LogStudy) -> Group:
     if not study.has_interval:
         short = f"the scored stretches are {study.stretch_s:.2g} s short"
         lines.append(f"No interval: {short}; there is one from {SHORTEST_S:g} s on.")
-    if level.edges:
-        lines.append("* at a limit of its range.")
+    if study.limits:
+        lines.append(
+            f"* at a limit of its range: {', '.join(study.limits)}. Beyond it there may be better ones: --range."
+        )
+    lines += _verdict_in_words(study)
+    if study.loop is not None:
+        lines.append(study.loop.remark)
     table = Table(title=f"{', '.join(study.names)}: {study.kind}", box=box.SIMPLE_HEAD, title_justify="left")
     for heading in ("parameter", "given", "tuned"):
         table.add_column(heading, justify="left" if heading == "parameter" else "right")
@@ -72,7 +111,7 @@ def logs_table(study: LogStudy) -> Group:
     table.add_section()
     table.add_row("held out [rad/s]", f"{level.given_rms.mean():.4f}", f"{level.rms.mean():.4f}")
     table.add_row("given / tuned, 95 %", "", ratio_text(level.ratio) if study.has_interval else "-")
-    table.add_row("tuned is", "", level.verdict if study.has_interval else "-")
+    table.add_row("tuned is", "", study.verdict or "-")
     return Group(table, Text("\n".join(lines)))
 
 

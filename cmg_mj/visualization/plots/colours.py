@@ -32,7 +32,9 @@ BASELINE_COLOURS: dict[str, Colour] = {
     "true": (165, 165, 165),
     "gyro": (95, 130, 190),
     "zero": (120, 120, 120),
+    "mems_as_bought": (156, 154, 46),
     "mems_gyro": (6, 109, 61),
+    "mems_fused": (12, 191, 110),
     "floor_y1": (133, 179, 209),
     "floor_accel": (143, 83, 167),
 }

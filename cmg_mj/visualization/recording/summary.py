@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import rerun as rr
 
 from cmg_mj.results import markdown
+from cmg_mj.results.error_bounds import NOISE_ALONE
 from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, format_figure, heading
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.resolve import versions
@@ -81,7 +82,7 @@ def _estimates(branch: Branch) -> list[str]:
             for name, summary in zip(names, summaries, strict=True)
         ]
         parts.append(markdown.table(("", *map(heading, keys)), rows))
-    return parts
+    return [*parts, NOISE_ALONE] if run.references else parts
 
 
 def _by_column(branches: Sequence[Branch]) -> str:

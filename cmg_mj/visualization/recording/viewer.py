@@ -15,12 +15,14 @@ from dataclasses import dataclass
 from typing import IO
 from urllib.parse import urlsplit
 
-from cmg_mj.errors import InputError, shown
+from cmg_mj.errors import InputError, shortened
 
 LOOPBACK, PORT = "127.0.0.1", 9876
 """Address of a started viewer: rerun would listen on all interfaces. The port is rerun's default."""
 STARTS_WITHIN_S, STAYS_S = 30.0, 1.0
 """Time in which a viewer starts to listen, and time after which a listening viewer has found its screen."""
+LONGEST_PART = 63
+"""Most letters of a part of a computer's name, between dots."""
 ANSWERS_WITHIN_S = 2.0
 SCREENS = ("WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY")
 """Environment variables of which one names the screen, on Linux."""
@@ -82,10 +84,10 @@ def require_listening(address: str) -> None:
     try:
         socket.create_connection((host, port), ANSWERS_WITHIN_S).close()
     except UnicodeError as error:  # a part of the name is empty, or longer than 63 letters
-        raise InputError(f"--connect {shown(address)}: no name of a computer before the port") from error
+        raise InputError(f"--connect {shortened(address)!r}: {_wrong_part(host)}") from error
     except OSError as error:
         raise InputError(
-            f"--connect {shown(address)}: no viewer listens there ({(error.strerror or str(error)).lower()}); "
+            f"--connect {shortened(address)!r}: no viewer listens there ({(error.strerror or str(error)).lower()}); "
             f"start one with: rerun --bind {LOOPBACK} --port {port}"
         ) from error
 
@@ -100,9 +102,18 @@ def parts_of(address: str) -> tuple[str, int]:
         host, port, split = None, None, urlsplit("")
     if not host or not port or split.scheme != "rerun+http" or split.path not in ("", "/proxy"):
         raise InputError(
-            f"--connect {shown(address)}: no address of a viewer; give PORT, HOST:PORT or rerun+http://HOST:PORT/proxy"
+            f"--connect {shortened(address)!r}: no address of a viewer; give PORT, HOST:PORT or "
+            "rerun+http://HOST:PORT/proxy"
         )
     return host, port
+
+
+def _wrong_part(host: str) -> str:
+    """Say why a host cannot be the name of a computer."""
+    longest = max(map(len, host.split(".")))
+    if longest > LONGEST_PART:
+        return f"no name of a computer before the port: a part of it has {longest} letters, at most {LONGEST_PART} may"
+    return "no name of a computer before the port"
 
 
 def start_viewer(options: Sequence[str] = ()) -> Viewer:

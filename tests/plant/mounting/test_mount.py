@@ -20,6 +20,7 @@ from cmg_mj.studies.push_limits.mount_files import write_scenario
 from cmg_mj.studies.push_limits.prospects import prospects
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import EXAMPLES, ROBOTS
+from tests.studies.push_limits.robots import without_time_limit
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -216,7 +217,8 @@ def test_keyframes_of_its_own_are_kept() -> None:
 
 
 @pytest.mark.slow
-def test_the_command_prints_what_the_pair_can_do() -> None:
+def test_the_command_prints_what_the_pair_can_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    without_time_limit(monkeypatch)
     arguments = ("mount", EXAMPLES / "torso.xml", "--body", "torso", "--axis", "x")
     outcome = cmg_mj(*arguments, "-o", "a.xml", "--json")
     assert outcome.status == 0, outcome.err

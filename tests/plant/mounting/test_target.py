@@ -11,11 +11,13 @@ import mujoco
 import pytest
 
 from cmg_mj.errors import InputError
+from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.mounting.target import check_replaceable, claimed_target
 from cmg_mj.results.run_folder.lock import Lock
 from cmg_mj.results.signed_text import is_as_written, is_begun, signed
 from tests.command import HANGS_AFTER_S, cmg_mj, environment
 from tests.plant.mounting.robots import EXAMPLES
+from tests.studies.push_limits.robots import PENDULUM
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -27,9 +29,15 @@ KILLED = """
 import os, signal, sys
 from tests.command import main
 import cmg_mj.studies.push_limits.mount_files as files
-files.prospects = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+def kill(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
+{where}
 main(sys.argv[1:])
 """
+KILLED_AT = {
+    "its prospects": "files.prospects = kill",
+    "a larger scale": "files.simulated_push, files.standing_unpushed = lambda *_: files.SimulatedPush(3), kill",
+}
 
 
 def there() -> list[str]:
@@ -111,6 +119,28 @@ def test_what_comes_while_a_mount_works_is_not_replaced(monkeypatch: pytest.Monk
     assert (there(), Path("b.toml").read_text(encoding="utf-8")) == (["b.toml"], "mine")
 
 
+def test_from_python_a_mount_replaces_its_own_files_alone() -> None:
+    """Another robot's model too, so that a script can run again; the scenario beside it is not touched."""
+    mounted = mount(mujoco.MjSpec.from_string(PENDULUM), "pole")
+    Path("b.toml").write_text("mine", encoding="utf-8")
+    Path("b.xml").write_bytes(MODEL)
+    assert mounted.save("b.xml") == Path("b.xml")
+    written = Path("b.xml").read_bytes()
+    assert written != MODEL
+    mounted.save("b.xml")
+    assert (there(), Path("b.toml").read_text(encoding="utf-8")) == (["b.toml", "b.xml"], "mine")
+    for content in (written + b" ", b"mine", b""):
+        Path("b.xml").write_bytes(content)
+        with pytest.raises(InputError, match=r"b\.xml is there, not as cmg-mj mount wrote it, and would be lost"):
+            mounted.save("b.xml")
+        assert Path("b.xml").read_bytes() == content
+    Path("b.xml").unlink()
+    Path("b.xml").symlink_to("mine.xml")
+    with pytest.raises(InputError, match="would be lost"):
+        mounted.save("b.xml")
+    assert Path("b.xml").is_symlink()
+
+
 def test_two_mounts_do_not_write_the_same_files() -> None:
     with claimed_target(Path("b.xml"), overwrite=False):
         assert "-o b.xml: another mount is writing it" in cmg_mj(*GIVEN).complaint
@@ -122,7 +152,7 @@ def test_two_mounts_do_not_write_the_same_files() -> None:
 def partial(stem: str, process: int) -> list[str]:
     """The names under which a mount writes."""
     first = f".{stem}.{process}.partial"
-    names = [f"{first}.xml", f"{first}.toml", f"{first}.trial.xml"]
+    names = [f"{first}{trial}{ending}" for trial in ("", ".trial") for ending in (".xml", ".toml")]
     return [*names, *(f".{name}.{process}.partial" for name in names), f".{names[0]}.{process}.partial.xml"]
 
 
@@ -133,6 +163,13 @@ def test_what_a_killed_mount_left_is_cleared() -> None:
     with claimed_target(Path("b.xml"), overwrite=False):
         assert there() == [".b.mount.lock"]
     assert there() == []
+
+
+def test_a_mount_that_is_refused_clears_too() -> None:
+    Path("b.xml").write_bytes(MODEL)
+    Path(partial("b", ENDED)[0]).write_bytes(MODEL)
+    assert "b.xml exists" in cmg_mj(*GIVEN).complaint
+    assert there() == ["b.xml"]
 
 
 def test_what_may_be_anybody_elses_stays() -> None:
@@ -161,11 +198,13 @@ def test_what_may_be_anybody_elses_stays() -> None:
 
 
 @pytest.mark.slow
-def test_a_mount_that_was_killed_and_the_next() -> None:
-    words = [sys.executable, "-c", KILLED, *GIVEN]
+@pytest.mark.parametrize("moment", KILLED_AT)
+def test_a_mount_that_was_killed_and_the_next(moment: str) -> None:
+    words = [sys.executable, "-c", KILLED.format(where=KILLED_AT[moment]), *GIVEN]
     done = subprocess.run(words, env=environment(), capture_output=True, timeout=HANGS_AFTER_S, check=False)
     assert done.returncode == -9
     assert any(".partial." in name for name in there())
+    assert any(".trial." in name for name in there()) == (moment == "a larger scale")
     with pytest.raises(InputError), claimed_target(Path("b.xml"), overwrite=False):
         raise InputError("a mount that fails clears, too")
     assert there() == []

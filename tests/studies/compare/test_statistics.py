@@ -16,6 +16,7 @@ import pytest
 from scipy import stats
 
 from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.intervals import Interval, format_interval, in_line
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.terminal_tables import comparison_markdown
 from cmg_mj.scenario.loading import load_scenario
@@ -53,11 +54,24 @@ def student(values: list[float]) -> list[float]:
     return [low, high]
 
 
-def test_means_have_students_intervals() -> None:
+def test_means_have_students_intervals_in_the_logarithm() -> None:
     errors = [0.1, 0.13, 0.12, 0.2]
     row = rows_by_name([entry("ltv", [*errors])])["ltv"]
     assert row[ERROR] == pytest.approx(np.mean(errors))
-    assert row["intervals"][ERROR] == pytest.approx(student(errors))
+    factor = math.exp(student(errors)[1] / np.mean(errors) - 1.0)
+    assert row["intervals"][ERROR] == pytest.approx([np.mean(errors) / factor, np.mean(errors) * factor])
+
+
+def test_no_interval_of_settle_times_reaches_below_zero_but_one_of_fits_may() -> None:
+    ltv = entry("ltv", [0.1, 0.1, 0.1, 0.1])
+    settle, fits = [0.1, 0.1, 0.1, 4.0], [-0.2, 0.1, 0.3, 0.0]
+    for summary, time, fit in zip(ltv.result.summaries, settle, fits, strict=True):
+        summary |= {"settle_time_s": time, FIT: fit}
+    row = rows_by_name([ltv])["ltv"]
+    assert student(settle)[0] < 0.0 < row["intervals"]["settle_time_s"][0] < np.mean(settle)
+    assert row["intervals"][FIT] == pytest.approx(student(fits))
+    assert in_line(["1.08", *format_interval("{:.2f}", Interval(1.08, 0.05, 23.2))]) == "1.08 (0.05 to 23.20)"
+    assert in_line(["1.08", *format_interval("{:.2f}", Interval(1.08, 1.0, 1.17))]) == "1.08 ±0.08"
     assert row["minus_best"] == {}  # it is the best itself, in every figure
 
 

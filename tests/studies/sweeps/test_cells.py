@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from cmg_mj.studies.sweeps.cells import cells_in_blocks, fell_interval
+from cmg_mj.studies.sweeps.cells import _with_ends, cells_in_blocks, fell_interval
 from tests.studies.sweeps.synthetic_trials import BIAS, make_trials
 
 
@@ -23,3 +24,10 @@ def test_the_share_of_falls_is_of_those_that_fell_or_stood() -> None:
         )
     assert (none["trials"], none["stopped"]) == (4, 4)
     assert (none["fell_share"], none["fell_low"], none["fell_high"]) == (None, None, None)
+
+
+def test_cells_of_few_worlds_have_their_mean_and_no_interval() -> None:
+    """Three worlds make no interval of what cannot be negative; of what can, they do."""
+    few = _with_ends("error", np.array([1.0, np.nan, 2.0, 6.0]), positive=True)
+    assert few == {"error": 3.0, "error_low": None, "error_high": None}
+    assert _with_ends("error", np.array([1.0, np.nan, 2.0, 6.0]))["error_low"] is not None

@@ -147,11 +147,38 @@ def test_a_damaged_chunk_is_computed_again(finished: Path, trials_bytes: bytes, 
     harm(chunk)
     rerun = cmg_mj(*SWEEP, finished)
     assert rerun.status == 0
-    assert re.match(f"cmg-mj: {chunk}: ({message}); it is computed again, and kept as 000002.damaged\n", rerun.err)
+    assert re.match(
+        f"cmg-mj: {chunk}: ({message}); it is computed again, and kept as 000002.damaged, which may be deleted\n",
+        rerun.err,
+    )
     assert "8 of 12 trials are there from before" in rerun.err
     assert (finished / "trials.parquet").read_bytes() == trials_bytes
     unharmed = ("000000.parquet", "000001.parquet")
     assert {name: times(finished / "chunks")[name] for name in unharmed} == {name: before[name] for name in unharmed}
+
+
+def test_a_damaged_chunk_is_set_aside_beside_others(finished: Path, trials_bytes: bytes) -> None:
+    """Neither what is set aside already nor a folder of that name is written over."""
+    chunks = finished / "chunks"
+    (chunks / "000002.damaged").write_text("mine")
+    (chunks / "000002-2.damaged").mkdir()
+    (chunks / "000002.parquet").write_bytes(b"")
+    rerun = cmg_mj(*SWEEP, finished)
+    assert rerun.status == 0
+    line = rerun.err.splitlines()[0]
+    assert line.endswith("; it is computed again, and kept as 000002-3.damaged, which may be deleted")
+    assert ".;" not in line
+    assert (chunks / "000002.damaged").read_text() == "mine"
+    assert (chunks / "000002-3.damaged").read_bytes() == b""
+    assert (finished / "trials.parquet").read_bytes() == trials_bytes
+
+
+def test_a_damaged_chunk_that_cannot_be_set_aside(finished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    chunk = finished / "chunks" / "000002.parquet"
+    chunk.write_bytes(b"")
+    monkeypatch.setattr(Path, "rename", full)
+    complaint = cmg_mj(*SWEEP, finished).complaint
+    assert complaint == f"{chunk.with_suffix('.damaged')}: cannot be written: No space left on device"
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("nowhere", path)])

@@ -99,7 +99,8 @@ def test_one_field_makes_curves() -> None:
     assert first.spread is not None
     lower = np.asarray(first.spread)[0]
     assert lower[:2] == pytest.approx([0.0, 0.0], abs=1e-12)
-    assert lower[2] == pytest.approx(3.1824 * np.std([1, -1, 1, -1], ddof=1) * 0.01 / 2.0, rel=1e-3)
+    half_width = 3.1824 * np.std([1, -1, 1, -1], ddof=1) * 0.01 / 2.0
+    assert lower[2] == pytest.approx(0.2 * (1.0 - math.exp(-half_width / 0.2)), rel=1e-3)
     missing_points = [line for line in errors.lines if line.style == "x"]
     assert [(line.color, len(line.x)) for line in missing_points] == [("ltv", 3)]
     assert errors.x_scale == "log"

@@ -206,7 +206,9 @@ def test_an_observer_that_raises_stops_the_controller_and_nothing_else() -> None
     with session() as studio:
         run_until_failure(studio)
         state = studio.session_state()
-        assert state.stopped == "observer Fragile raised KeyError: 'gone' at t = 2.505 s"
+        assert (state.stopped or "").startswith(
+            "observer Fragile raised KeyError: 'gone' at t = 2.505 s (test_changes.py, line "
+        )
         assert studio.data.time == pytest.approx(3.5, abs=0.05)
         assert np.all(studio.data.ctrl[studio.live.plant.axis.servos] == 0.0)
         assert studio.rows[-1, TIME] < 2.51

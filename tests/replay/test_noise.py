@@ -1,0 +1,224 @@
+"""The noise that observers assume in a replay: told, else by the log itself, else the default."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj import load_scenario, prepare
+from cmg_mj.replay.log_replay import replay_log
+from cmg_mj.replay.logs import Log, ReadOptions, read_log
+from cmg_mj.replay.logs.columns import ACCELEROMETERS
+from cmg_mj.replay.noise_remarks import noise_figures, noise_remarks
+from cmg_mj.replay.observer_inputs import replay_prepared
+from cmg_mj.replay.report import table_note
+from cmg_mj.replay.user_noise import noise_in, noise_of
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
+from cmg_mj.studies.tuning import figures_of_logs, tune_on_logs
+from tests.command import cmg_mj
+from tests.replay.logs.motion import COLUMNS, DT, N, sine, write_csv
+
+PLACES = RadialTilt(0.1, 0.3)
+RUN_COLUMNS = {
+    "time": "time_s",
+    "tilt": "y1_rad",
+    "acceleration": "acceleration_rad_s2",
+    "gimbal": "y2_rad",
+    "command": "u_rad_s",
+    "rate": "x2_rad_s",
+}
+
+
+def noisy_log(folder: Path, degrees: float, options: ReadOptions | None = None, n: int = N) -> Log:
+    columns = sine()
+    columns["tilt_rad"] = columns["tilt_rad"] + np.radians(degrees) * np.random.default_rng(0).standard_normal(N)
+    path = write_csv(folder / "noisy.csv", {name: values[:n] for name, values in columns.items()})
+    return read_log(path, options or ReadOptions(COLUMNS))
+
+
+def two_accelerometers(folder: Path, density: float) -> Log:
+    """Write a log of two accelerometers at 200 Hz that swing at 0.7 Hz."""
+    random, t = np.random.default_rng(1), DT * np.arange(N)
+    w, sigma = 1.4 * np.pi, density * 1e-6 * 9.80665 * math.sqrt(100.0)
+    y, rate = 0.1 * np.sin(w * t), 0.1 * w * np.cos(w * t)
+    columns = {"t_s": t}
+    for name, r in (("inner", PLACES.r_inner), ("outer", PLACES.r_outer)):
+        columns[f"{name}_x"] = -r * w**2 * y - 9.81 * np.sin(y) + sigma * random.standard_normal(N)
+        columns[f"{name}_z"] = 9.81 * np.cos(y) - r * rate**2 + sigma * random.standard_normal(N)
+    path = write_csv(folder / "two.csv", columns)
+    names = {name: name for name in ACCELEROMETERS}
+    options = ReadOptions({"time": "t_s", **names}, units=dict.fromkeys(names, "m_s2"), radii_m=(0.1, 0.3))
+    return read_log(path, options)
+
+
+def run_scenario(density: float, seed: int, duration_s: float) -> Scenario:
+    settings = ["observer.kind=gyro_free", f"sensors.accelerometer.noise_density_ug_rthz={density}", f"seed={seed}"]
+    return load_scenario("push_recovery", [*settings, f"duration_s={duration_s}"])
+
+
+def errors_of_a_run(folder: Path, density: float, seed: int, duration_s: float) -> list[tuple[float, ...]]:
+    """Return the errors of `gyro_free` and `kalman` on a run's log: noise told, and not told."""
+    experiment = prepare(run_scenario(density, seed, duration_s))
+    trajectory = experiment.run().trajectory
+    assert trajectory is not None
+    trajectory.save(folder / "run.parquet")
+    log = read_log(folder / "run.parquet", ReadOptions(RUN_COLUMNS))
+    _, model, truth = experiment.design.constructor_arguments
+    told = {"tilt": math.degrees(truth.tilt), "acceleration": truth.acceleration}
+    results = [replay_prepared(log, ["gyro_free", "kalman"], model=model, noises=noises) for noises in (told, {})]
+    return [
+        tuple(float(figures["velocity_rms_error_rad_s"] or 0.0) for figures in list(result.summaries.values())[:2])
+        for result in results
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("density", [400.0, 600.0, 1000.0, 1500.0])
+def test_a_run_replayed_without_being_told_its_noise(density: float, tmp_path: Path) -> None:
+    """At 400 ug/rtHz the tilt's noise is 0.36 deg; the default of 0.1 deg gives 0.034 and 0.166 for 0.014 and 0.069."""
+    for seed in range(2):
+        told, by_the_log = errors_of_a_run(tmp_path, density, seed, 15.0)
+        assert by_the_log == pytest.approx(told, rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_short_run_replayed_without_being_told_its_noise(tmp_path: Path) -> None:
+    told, by_the_log = errors_of_a_run(tmp_path, 400.0, 0, 5.5)
+    assert by_the_log == pytest.approx(told, rel=0.1)
+
+
+def test_a_noise_is_told_or_else_the_logs(tmp_path: Path) -> None:
+    log = noisy_log(tmp_path, 0.36)
+    assert math.degrees(noise_of(log).tilt) == pytest.approx(0.36, rel=0.04)
+    assert replay_log(log, ["linear"]).noise == noise_of(log)
+    assert math.degrees(noise_of(log, {"tilt": 0.2}).tilt) == pytest.approx(0.2, rel=1e-12)
+    assert math.degrees(noise_of(noisy_log(tmp_path, 0.0)).tilt) == pytest.approx(0.1, rel=1e-12)
+
+
+def test_the_noise_is_printed_beside_what_was_told(tmp_path: Path) -> None:
+    log = noisy_log(tmp_path, 0.36)
+    (by_the_log,) = noise_remarks(log, noise_of(log))
+    assert by_the_log == "Noise of the tilt: 0.36 deg (0.35 to 0.371) by the log, and used."
+    (near,) = noise_remarks(log, noise_of(log, {"tilt": 0.3}))
+    assert near == "Noise of the tilt: 0.3 deg is used; the log shows 0.36 (0.35 to 0.371)."
+    (less,) = noise_remarks(log, noise_of(log, {"tilt": 0.1}))
+    assert less.endswith(
+        "(0.35 to 0.371), more by a factor of 3.6: give --noise tilt=0.36, or no tilt for the log's own."
+    )
+    (more,) = noise_remarks(log, noise_of(log, {"tilt": 0.6}))
+    assert ", less by a factor of 1.7: give --noise tilt=0.36," in more
+    (far,) = noise_remarks(log, noise_of(log, {"tilt": 3.6}))
+    assert ", less by a factor of 10: give" in far
+    fine = noisy_log(tmp_path, 0.0)
+    (untold,) = noise_remarks(fine, noise_of(fine))
+    assert untold == "Noise of the tilt: 0.1 deg is used; the log cannot tell: there is hardly any."
+
+
+def test_the_noise_of_two_accelerometers(tmp_path: Path) -> None:
+    """Tilt and acceleration as the two make them, with the model's correlation."""
+    log = two_accelerometers(tmp_path, 800.0)
+    noise, expected = noise_of(log), noise_of(log, {"accelerometer": 800.0})
+    assert noise.tilt == pytest.approx(expected.tilt, rel=0.04)
+    assert noise.acceleration == pytest.approx(expected.acceleration, rel=0.04)
+    assert noise.correlation == pytest.approx(expected.correlation, abs=0.02)
+    assert noise.gimbal == expected.gimbal
+    (remark,) = noise_remarks(log, noise)
+    assert remark.startswith("Noise of the accelerometers: 8")
+    assert remark.endswith("by the log, and used.")
+    (told,) = noise_remarks(log, noise_of(log, {"accelerometer": 400.0}))
+    assert told.startswith("Noise of the accelerometers: 400 ug/rtHz is used; the log shows 8")
+    assert "more by a factor of 2.0: give --noise accelerometer=8" in told
+
+
+@pytest.mark.parametrize("rate", [100.0, 400.0, 1000.0])
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+def test_resampled_noise_has_the_density_that_observers_assume(rate: float, jitter: float, tmp_path: Path) -> None:
+    """Below 20 Hz, where observers look; white noise of that density is larger at quicker rates."""
+    random = np.random.default_rng(0)
+    t = DT * (np.arange(N) + random.uniform(-jitter, jitter, N))
+    tilt = 0.01 * random.standard_normal(N)
+    path = write_csv(tmp_path / "log.csv", {"t_s": t, "tilt_rad": tilt})
+    log = read_log(path, ReadOptions({"time": "t_s", "tilt": "tilt_rad"}, rate_hz=rate))
+    density = np.abs(np.fft.rfft(log["y1_rad"])) ** 2 / len(log)
+    band = np.arange(len(density)) / (len(log) * log.dt) < 20.0
+    noise = noise_in(log).tilt
+    assert not isinstance(noise, str)
+    assert noise.sigma == pytest.approx(math.sqrt(float(density[band].mean())), rel=0.1)
+
+
+def test_a_told_density_is_that_of_the_rows(tmp_path: Path) -> None:
+    """A sample at a slower rate than the rows' has all of a row's noise, since nothing filters it."""
+    from dataclasses import replace
+
+    log = two_accelerometers(tmp_path, 800.0)
+    told = {"accelerometer": 800.0}
+    slow, quick = replace(log, dt=2.0 * log.dt), replace(log, dt=log.dt / 2.0)
+    assert noise_of(slow, told) == noise_of(log, told)
+    assert noise_of(quick, told).tilt == pytest.approx(math.sqrt(2.0) * noise_of(log, told).tilt, rel=1e-3)
+    for log_at_rate in (slow, quick):
+        assert noise_of(log_at_rate).tilt == pytest.approx(noise_of(log_at_rate, told).tilt, rel=0.04)
+
+
+def keys(figures: object, path: Sequence[str]) -> object:
+    for name in path:
+        assert isinstance(figures, dict)
+        figures = figures[name]
+    return figures
+
+
+def test_json_has_the_logs_noise(tmp_path: Path) -> None:
+    log = noisy_log(tmp_path, 0.36)
+    figures = noise_figures(log, noise_of(log))
+    assert keys(figures, ("noise_by_the_log", "tilt_rad", "used")) is True
+    assert keys(noise_figures(log, noise_of(log, {"tilt": 0.1})), ("noise_by_the_log", "tilt_rad", "used")) is False
+    fine = noisy_log(tmp_path, 0.0)
+    tilt = keys(noise_figures(fine, noise_of(fine)), ("noise_by_the_log", "tilt_rad"))
+    assert tilt == {"sigma": None, "reason": "there is hardly any", "used": False}
+
+
+@pytest.mark.slow
+def test_the_command_says_it(tmp_path: Path) -> None:
+    noisy_log(tmp_path, 0.36, n=1500)
+    columns = ",".join(f"{role}={name}" for role, name in COLUMNS.items())
+    arguments = (tmp_path / "noisy.csv", "--columns", columns, "--observers", "linear", "--out", tmp_path / "out")
+    table = " ".join(cmg_mj("replay", *arguments, "--noise", "tilt=0.1").out.split())
+    assert "Noise of the tilt: 0.1 deg is used; the log shows 0.3" in table
+    (figures,) = json.loads(cmg_mj("replay", *arguments, "--json").out)["logs"]
+    shown = figures["noise_by_the_log"]["tilt_rad"]
+    assert shown["low"] < shown["sigma"] == figures["noise"]["tilt_rad"] < shown["high"]
+
+
+def test_tuning_takes_the_same_noise(tmp_path: Path) -> None:
+    log = noisy_log(tmp_path, 0.36)
+    study = tune_on_logs([log], "linear", parameters=["tau"], ranges={"tau": (0.02, 0.021)})
+    assert study.noises == [noise_of(log)]
+    assert noise_remarks(log, noise_of(log))[0] in study.remarks[0]
+    (noise,) = json.loads(json.dumps(figures_of_logs(study)))["noise"]
+    assert noise["noise_by_the_log"]["tilt_rad"]["used"]
+
+
+def test_the_note_on_the_noise_gain_is_true_of_every_log(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    few = [
+        dataclasses.replace(replay_log(noisy_log(tmp_path, 0.36), ["linear"]), settle_s=settle) for settle in (1.0, 0.0)
+    ]
+    first = dataclasses.replace(few[0], log=dataclasses.replace(few[0].log, name="a"))
+    tilt = TiltNoise(math.radians(0.1), 1.0, 0.0)
+    log = dataclasses.replace(few[1].log, name="b", has=few[1].log.has | {"acceleration"})
+    second = dataclasses.replace(few[1], log=log, noise=tilt)
+    note = table_note([first, second])
+    size = "white noise of 0.36 deg in the tilt (a), 0.1 deg in the tilt and the acceleration's beside it (b) makes"
+    assert size in note
+    assert "so their mean is of no one noise." in note
+    assert "Scored from 1 s after each start on (a), from its start on (b)." in note
+    alone = table_note([first, first])
+    assert "white noise of 0.36 deg in the tilt makes of the rate" in alone
+    assert "mean" not in alone
+    assert alone.endswith("Scored from 1 s after each start on.")
