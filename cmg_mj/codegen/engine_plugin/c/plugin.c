@@ -245,21 +245,35 @@ static void advance(const mjModel *m, mjData *d, int instance)
     state[STEPS] += 1.0;
 }
 
+/* Whether another library that has registered this plugin's name is a copy of this one. */
+static int is_copy(const mjpPlugin *other)
+{
+    for (int i = 0; i < other->nattribute; ++i)
+        if (!strcmp(other->attributes[i], rig.build)) return 1;
+    return 0;
+}
+
 mjPLUGIN_LIB_INIT(cmg_mj)
 {
     mjpPlugin plugin;
+    const mjpPlugin *other;
+    const char *attributes[SETUP_KEYS + 1]; /* the last one tells copies */
     if (mj_version() != mjVERSION_HEADER) {
         mju_warning("%s: made for MuJoCo %d, and this is %d: not loaded", rig.plugin, mjVERSION_HEADER, mj_version());
         return;
     }
-    if (mjp_getPlugin(rig.plugin, NULL)) {
-        mju_warning("%s: has been loaded already, from another library, which stays in force", rig.plugin);
+    other = mjp_getPlugin(rig.plugin, NULL);
+    if (other) {
+        if (!is_copy(other))
+            mju_warning("%s: has been loaded already, from another library, which stays in force", rig.plugin);
         return;
     }
+    for (int i = 0; i < SETUP_KEYS; ++i) attributes[i] = setup_keys[i];
+    attributes[SETUP_KEYS] = rig.build;
     mjp_defaultPlugin(&plugin);
     plugin.name = rig.plugin;
-    plugin.nattribute = SETUP_KEYS;
-    plugin.attributes = setup_keys;
+    plugin.nattribute = SETUP_KEYS + 1;
+    plugin.attributes = attributes;
     plugin.capabilityflags = mjPLUGIN_SENSOR | mjPLUGIN_ACTUATOR;
     plugin.needstage = mjSTAGE_VEL;
     plugin.nstate = nstate;

@@ -133,6 +133,7 @@ static int configure(const search *in, int instance, const rig_type *type, doubl
     double density, force_counts, angle_counts;
     const char *build = mj_getPluginConfig(in->m, instance, setup_keys[KEY_BUILD]);
     const char *start = mj_getPluginConfig(in->m, instance, setup_keys[KEY_START]);
+    const char *copies = mj_getPluginConfig(in->m, instance, type->build);
     axis_places places;
     int at = HEAD;
     state[STARTS_SPINNING] = start && !strcmp(start, "spinning");
@@ -140,6 +141,8 @@ static int configure(const search *in, int instance, const rig_type *type, doubl
         return refuse(in, "<config key=\"start\" value=\"%.40s\">: must be keyframe or spinning", start);
     if (build && *build && strcmp(build, type->build))
         return refuse(in, "the model was written with another library (build %.40s, and this is %s)", build, type->build);
+    if (copies && *copies)
+        return refuse(in, "<config key=\"%s\">: must have no value", type->build);
     if (!configured(in, instance, KEY_SEED, type->seed, NOISE_LARGEST, 1, &state[SEED])) return 0;
     if (!configured(in, instance, KEY_WORLD, type->world, NOISE_LARGEST, 1, &state[WORLD])) return 0;
     if (!configured(in, instance, KEY_NOISE, unset, most, 0, &density)) return 0;
