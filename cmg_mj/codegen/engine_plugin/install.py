@@ -38,7 +38,7 @@ from cmg_mj.results.run_folder.lock import Busy, Lock
 
 LONGEST_WAIT = 60.0  # for another install [s]
 LONGEST_TRIAL = 120.0  # for a library to load [s]
-TRIAL = """\
+TRIAL = r"""
 import sys
 import mujoco
 from cmg_mj.codegen.engine_plugin.load import open_library
@@ -46,7 +46,7 @@ try:
     open_library(*sys.argv[1:])
 except Exception as error:
     sys.exit(str(error))
-print(mujoco.__version__)
+print("\nloaded by MuJoCo", mujoco.__version__)
 """
 """Loads a library as `import mujoco` will, in a process of its own."""
 
@@ -241,11 +241,14 @@ def _try(library: Path, copy: Path, name: str) -> str:
         except subprocess.TimeoutExpired as error:
             raise InputError(f"--install {library}: does not come to an end when it is loaded") from error
     if process.returncode < 0:
-        raise InputError(f"--install {library}: the process that loaded it crashed (signal {-process.returncode})")
+        raise InputError(f"--install {library}: crashed the process that loaded it (signal {-process.returncode})")
     if process.returncode:
         lines = process.stderr.replace(str(copy), str(library)).splitlines()
         raise InputError(f"--install {library}: does not load: {lines[-1] if lines else 'no message'}")
-    return process.stdout.split()[-1]
+    match = re.search(r"^loaded by MuJoCo (\S+)$", process.stdout, re.MULTILINE)
+    if match is None:
+        raise InputError(f"--install {library}: ended the process that loaded it")
+    return match[1]
 
 
 def _remove_libraries(folder: Path, name: str, but: Path | None = None) -> None:

@@ -1,15 +1,13 @@
 """Loads the installed plugins into MuJoCo: `import mujoco` calls `load`, an entry point of the group `mujoco.plugins`.
 
 Every program that imports MuJoCo comes here, also one that knows nothing of this package. For that reason nothing but
-the standard library is imported.
+the standard library is imported, and little of it while nothing is installed.
 """
 
 from __future__ import annotations
 
 import ctypes
 import errno
-import hashlib
-import json
 import os
 import re
 import stat
@@ -28,6 +26,10 @@ _WARNINGS_FROM = "<cmg_mj plugins>"  # as a file that has no lines: a warning is
 
 class Refused(Exception):
     """A plugin, or the folder with all of them, is not loaded; the message says why."""
+
+
+class Missing(Refused):
+    """A plugin's library is not there."""
 
 
 class InstalledPlugin(NamedTuple):
@@ -120,6 +122,8 @@ def read_manifest(folder: str, name: str) -> InstalledPlugin:
         Refused: It is not as this package writes it.
         OSError: It cannot be read.
     """
+    import json
+
     file = name + MANIFEST
     if not re.fullmatch(NAME, name, re.ASCII):
         raise Refused(f"{file!a} has not been written by this package")
@@ -156,11 +160,18 @@ def check_library(folder: str, plugin: InstalledPlugin, mujoco: str) -> str:
 
     Raises:
         Refused: It is not.
+        Missing: It is not there.
         OSError: It cannot be read.
     """
+    import hashlib
+
     if plugin.mujoco != mujoco:
         raise Refused(f"it is for MuJoCo {plugin.mujoco}, and this is {mujoco}")
-    if hashlib.sha256(_read(folder, plugin.library)).hexdigest() != plugin.sha256:
+    try:
+        content = _read(folder, plugin.library)
+    except FileNotFoundError:
+        raise Missing(f"its library {plugin.library} is missing") from None
+    if hashlib.sha256(content).hexdigest() != plugin.sha256:
         raise Refused(f"its library {plugin.library} has been changed (SHA-256)")
     return os.path.join(folder, plugin.library)
 
@@ -178,19 +189,18 @@ def load_plugin(folder: str, name: str, mujoco: str) -> None:
         OSError: A file cannot be read, or the library cannot be loaded.
     """
     plugin = None
-    while True:  # until nobody has installed another one meanwhile
+    while True:  # until nobody has installed another library meanwhile
         before = plugin
         try:
             plugin = read_manifest(folder, name)
         except FileNotFoundError:
             return
         try:
-            library = check_library(folder, plugin, mujoco)
-        except FileNotFoundError:
+            open_library(check_library(folder, plugin, mujoco), name)
+        except Missing:
             if plugin == before:
-                raise Refused(f"its library {plugin.library} is missing") from None
+                raise
         else:
-            open_library(library, name)
             return
 
 
@@ -220,8 +230,9 @@ def _read(folder: str, file: str, most: int = -1) -> bytes:
         if error.errno == errno.ELOOP:
             raise Refused(refusal) from None
         raise
+    status = os.fstat(descriptor)
+    if not stat.S_ISREG(status.st_mode) or status.st_uid != os.geteuid():
+        os.close(descriptor)
+        raise Refused(refusal)
     with open(descriptor, "rb") as content:
-        status = os.fstat(descriptor)
-        if not stat.S_ISREG(status.st_mode) or status.st_uid != os.geteuid():
-            raise Refused(refusal)
         return content.read(most)
