@@ -23,7 +23,7 @@ from cmg_mj import InputError
 from cmg_mj.codegen.engine_plugin import install as installing
 from cmg_mj.codegen.engine_plugin import load as loading
 from cmg_mj.codegen.engine_plugin.install import find_library, has_another, install, list_plugins, uninstall
-from cmg_mj.codegen.engine_plugin.load import VARIABLE, load, plugin_folder
+from cmg_mj.codegen.engine_plugin.load import VARIABLE, library_file, load, plugin_folder
 from tests.command import ROOT, cmg_mj, environment
 
 MUJOCO = version("mujoco")
@@ -147,6 +147,11 @@ def link(target: Callable[[Path], Path]) -> Callable[[Path], None]:
     return change
 
 
+def pad(path: Path) -> None:
+    manifest = path / "balance.json"
+    manifest.write_text(" " * 70000 + manifest.read_text("utf-8"), encoding="utf-8")
+
+
 def put_pipe(path: Path) -> None:
     (path / "balance.json").unlink()
     os.mkfifo(path / "balance.json")
@@ -168,7 +173,7 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
     "a list": (write("[]"), FORGED),
     "a number": (write("1"), FORGED),
     "JSON without end": (write("[" * 60000), FORGED),
-    "a very large file": (write(" " * 70000 + "{}"), FORGED),
+    "a very large file": (pad, FORGED),
     "a linked library": (link(library_in), "is no ordinary file"),
     "a linked manifest": (link(lambda path: path / "balance.json"), "is no ordinary file"),
     "a pipe": (put_pipe, "is no ordinary file"),
@@ -200,10 +205,14 @@ def test_a_damaged_plugin_is_a_warning_and_the_others_are_loaded(
 @pytest.mark.parametrize("name", ["a b", "a.b", "4", "ä", "x" * 41, "*", "a\nb"])
 def test_a_name_that_is_none(name: str, folder: Path, opened: list[str], tmp_path: Path) -> None:
     installed = install(make_library(tmp_path))
-    (folder / f"{name}.json").write_text("{}", encoding="utf-8")
+    library = library_file(name, installed.sha256)
+    manifest = installed._replace(plugin=f"cmg_mj.{name}", library=library)
+    (folder / f"{name}.json").write_text(json.dumps(manifest._asdict()), encoding="utf-8")
+    (folder / library).write_text("code", encoding="utf-8")
     (warning,) = load_warnings()
     assert FORGED in warning
     assert "\n" not in warning
+    assert opened == ["balance"]
     uninstall(name)  # and nothing else
     assert files_in(folder) == sorted(["balance.json", installed.library])
 
@@ -437,6 +446,11 @@ def test_command(folder: Path, tmp_path: Path) -> None:
     outcome = cmg_mj("plugin", "--install", library)
     assert (outcome.status, outcome.out.split()[:2]) == (0, ["plugin", "cmg_mj.balance"])
     assert outcome.err.endswith("Take it back: cmg-mj plugin --uninstall balance\n")
+    assert len(outcome.err.splitlines()) == 1
+    (tmp_path / "other").mkdir()
+    other = make_library(tmp_path / "other", content="another robot")
+    expected = f"cmg-mj: it takes the place of the library from {library}, whose models no longer load"
+    assert cmg_mj("plugin", "--install", other).err.splitlines()[0] == expected
     assert json.loads(cmg_mj("plugin", "--install", library, "--json").out)["mujoco"] == MUJOCO
     assert cmg_mj("plugin", "--list").out == f"balance  from {library}\n{folder}\n"
     library_in(folder).write_text("other code", encoding="utf-8")
