@@ -16,6 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
+from cmg_mj.codegen.engine_plugin import load
 from cmg_mj.codegen.engine_plugin.build import check_platform
 from cmg_mj.codegen.engine_plugin.files import library_name
 from cmg_mj.codegen.engine_plugin.load import (
@@ -39,11 +40,11 @@ from cmg_mj.results.run_folder.lock import Busy, Lock
 LONGEST_WAIT = 60.0  # for another install [s]
 LONGEST_TRIAL = 120.0  # for a library to load [s]
 TRIAL = r"""
-import sys
+import runpy, sys
 import mujoco
-from cmg_mj.codegen.engine_plugin.load import open_library
+loader, *arguments = sys.argv[1:]
 try:
-    open_library(*sys.argv[1:])
+    runpy.run_path(loader)["open_library"](*arguments)
 except Exception as error:
     sys.exit(str(error))
 print("\nloaded by MuJoCo", mujoco.__version__)
@@ -229,7 +230,7 @@ def _try(library: Path, copy: Path, name: str) -> str:
     with tempfile.TemporaryDirectory() as elsewhere:  # MuJoCo writes a log where it is
         try:
             process = subprocess.run(
-                [sys.executable, "-c", TRIAL, str(copy), name],
+                [sys.executable, "-c", TRIAL, load.__file__, str(copy), name],
                 cwd=elsewhere,
                 env={**os.environ, VARIABLE: ""},
                 capture_output=True,

@@ -172,6 +172,14 @@ def test_a_wrong_config_does_not_compile(key: str) -> None:
         assert f"{made_name()}: " in str(error.value) or "unrecognized attribute" in str(error.value)
 
 
+def test_the_key_that_tells_copies_takes_no_value() -> None:
+    text = quick().plugin.model.read_text(encoding="utf-8")
+    match = re.search(r'<config key="build" value="(\w+)"/>', text)
+    assert match
+    with pytest.raises(ValueError, match=f'<config key="{match[1]}">: must have no value'):
+        mujoco.MjModel.from_xml_string(text.replace("</instance>", f'<config key="{match[1]}" value="1"/></instance>'))
+
+
 def made_name() -> str:
     return quick().plugin.name
 
