@@ -123,12 +123,12 @@ def _install(target: str, as_json: bool) -> None:
     from cmg_mj.codegen.engine_plugin.install import find_library, install, list_plugins
 
     library = find_library(target)
-    earlier = [status.manifest for status in list_plugins()[1]]
+    manifests = [status.manifest for status in list_plugins()[1]]
     result = install(library)
     _show({"plugin": result.plugin, "library": str(library), "mujoco": result.mujoco, "sha256": result.sha256}, as_json)
     if not as_json:
         name = result.plugin.removeprefix("cmg_mj.")
-        for other in earlier:
+        for other in manifests:
             if other is not None and other.plugin == result.plugin and other.sha256 != result.sha256:
                 note(f"it takes the place of the library from {other.source}, whose models no longer load")
         note(f"installed: `import mujoco` loads it from now on. Take it back: cmg-mj plugin --uninstall {name}")

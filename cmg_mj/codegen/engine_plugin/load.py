@@ -190,7 +190,7 @@ def load_plugin(folder: str, name: str, mujoco: str) -> None:
     """
     plugin = None
     while True:  # until nobody has installed another library meanwhile
-        before = plugin
+        previous = plugin
         try:
             plugin = read_manifest(folder, name)
         except FileNotFoundError:
@@ -198,7 +198,7 @@ def load_plugin(folder: str, name: str, mujoco: str) -> None:
         try:
             open_library(check_library(folder, plugin, mujoco), name)
         except Missing:
-            if plugin == before:
+            if plugin == previous:
                 raise
         else:
             return
