@@ -167,7 +167,7 @@ def test_a_name_that_is_none(name: str, folder: Path, open_names: list[str], tmp
 
 
 def test_a_library_that_cannot_be_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It was installed, so that it did load; here it is open_names in earnest."""
+    """It was installed, so that it did load; here it is opened in earnest."""
     monkeypatch.setitem(sys.modules, "mujoco", SimpleNamespace(__version__=MUJOCO))
     install(make_library(tmp_path))
     (warning,) = load_warnings()
