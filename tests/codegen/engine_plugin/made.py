@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
@@ -14,11 +15,12 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
+from cmg_mj.plant.plugin_model import plugin_mjcf
 from cmg_mj.plant.plugin_state import set_world
 from cmg_mj.plant.tilt_line import apply_torques
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.simulation.plugin import Plugin, make_plugin, plugin
+from cmg_mj.simulation.plugin import Plugin, plugin
 from tests.codegen.export.compiled import COMPILER
 
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")
@@ -82,13 +84,17 @@ def make(kind: str, *settings: str, scenario: str = "push_recovery") -> Made:
 
 
 def variant(made: Made, settings: Mapping[str, str | float]) -> Made:
-    """The same rig with settings that leave its C the same, such as the integrator with its step: one library."""
+    """The same library with a model of other settings, such as the integrator's, that leave its C as it is."""
     experiment = made.experiment.with_settings(settings)
-    name = made.plugin.name.removeprefix("cmg_mj.")
-    texts = make_plugin(experiment, name)
-    assert texts.code.build in made.plugin.model.read_text(encoding="utf-8")
-    model = mujoco.MjModel.from_xml_string(texts.texts[f"{name}.xml"])
-    return Made(experiment, made.plugin, model)
+    text = plugin_mjcf(experiment.plant, made.plugin.name, {"start": "keyframe", "build": build_of(made)})
+    return Made(experiment, made.plugin, mujoco.MjModel.from_xml_string(text))
+
+
+def build_of(made: Made) -> str:
+    """The fingerprint of the library in the model's <config>."""
+    match = re.search(r'key="build" value="(\w+)"', made.plugin.model.read_text(encoding="utf-8"))
+    assert match is not None
+    return match[1]
 
 
 def torques_at(experiment: Experiment, step: int) -> list[float]:
