@@ -62,8 +62,8 @@ def constants_of(controller: Controller) -> Constants:
 
 def _of_law(law: Law) -> list[Constant]:
     limit = Constant("rate_limit", float(law.rate_limit), "largest gimbal rate [rad/s]")
-    if type(law) is not StateFeedback:
-        return [limit]
+    if type(law) is not StateFeedback:  # its other numbers are in its formulas
+        return [limit._replace(meaning=f"{limit.meaning}; the law's formulas have it too, if it knows it")]
     k1, k2, k3, k4 = law.gains
     return [
         Constant("period", law.dt, "from one update to the next [s]"),
