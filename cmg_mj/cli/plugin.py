@@ -54,10 +54,11 @@ def plugin(
       NAME_example.py, NAME_example.c, Makefile, and the C of the library
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.simulation.experiment import prepare
-    from cmg_mj.simulation.plugin import find_tools, make_plugin, plugin_files, write_plugin
+    from cmg_mj.simulation.plugin import find_tools, make_plugin, plugin_files, require_stable_periods, write_plugin
 
     find_tools()
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
+    require_stable_periods(experiment)
     note_hints(experiment.hints)
     made = make_plugin(experiment, name, sensors=not no_sensors, start=start)
     with claim_output(out, f"plugin-{made.name}", plugin_files(made)) as folder:
