@@ -78,7 +78,10 @@ def test_two_axes_otherwise(settings: tuple[str, ...]) -> None:
 OWN_LAWS = "tests.codegen.export.own_laws:"
 
 
-@pytest.mark.parametrize("kind", ["lqg", "examples.own_law:Leaning", f"{OWN_LAWS}Elaborate", f"{OWN_LAWS}Memoryless"])
+@pytest.mark.parametrize(
+    "kind",
+    ["lqg", "examples.own_law:Leaning", *(f"{OWN_LAWS}{name}" for name in ("Elaborate", "InADict", "Memoryless"))],
+)
 def test_other_laws(kind: str) -> None:
     check("kalman", f"controller.kind={kind}")
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
+import mujoco
 import pytest
 
 from cmg_mj import InputError, load_scenario, plugin
-from tests.codegen.engine_plugin.made import needs_compiler
+from cmg_mj.plant.mujoco_state import quiet
+from tests.codegen.engine_plugin.made import make, needs_compiler
 from tests.command import cmg_mj
 
 pytestmark = needs_compiler
@@ -41,6 +44,19 @@ def test_one_line_and_nothing_written(arguments: list[str], words: str) -> None:
     complaint = cmg_mj("plugin", *arguments, "--out", "balance").err.splitlines()[-1]
     assert words in complaint
     assert not Path("balance").exists()
+
+
+@pytest.mark.slow
+def test_an_infinite_command_stops_the_gimbals() -> None:
+    """Of a law that commands it when the rig hangs; the runner ends such a run."""
+    made = make("linear", "controller.kind=tests.codegen.export.own_laws:Overflows", "push=[]")
+    data, (axis,) = made.start(), made.experiment.plant.axes
+    mujoco.mj_step(made.model, data, 5)
+    assert abs(data.sensor("balance/command").data) == made.experiment.law.rate_limit
+    data.qpos[made.model.jnt_qposadr[axis.line.joint]] += math.pi
+    with quiet():
+        mujoco.mj_step(made.model, data, 5)
+    assert data.sensor("balance/command").data == 0.0
 
 
 def test_in_python_too(tmp_path: Path) -> None:
