@@ -84,10 +84,11 @@ def plugin(
         raise InputError("plugin: name an OBSERVER to make a plugin, or give --install, --uninstall or --list")
     from cmg_mj.codegen.engine_plugin.install import has_another
     from cmg_mj.simulation.experiment import prepare
-    from cmg_mj.simulation.plugin import find_tools, make_plugin, plugin_files, write_plugin
+    from cmg_mj.simulation.plugin import find_tools, make_plugin, plugin_files, require_stable_periods, write_plugin
 
     find_tools()
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
+    require_stable_periods(experiment)
     note_hints(experiment.hints)
     made = make_plugin(experiment, name, sensors=not no_sensors, start=start)
     with claim_output(out, f"plugin-{made.name}", plugin_files(made)) as folder:

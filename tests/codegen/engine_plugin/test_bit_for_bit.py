@@ -6,6 +6,7 @@ import pytest
 
 from cmg_mj.observers import OBSERVERS
 from tests.codegen.engine_plugin.made import (
+    ALL_IMPERFECTIONS,
     SENSORS,
     check_against_runner,
     compare,
@@ -16,6 +17,8 @@ from tests.codegen.engine_plugin.made import (
 )
 
 pytestmark = [needs_compiler, pytest.mark.slow]
+
+INTEGRATORS = ("RK4", "implicitfast", "Euler")
 
 
 def check(kind: str, *settings: str, scenario: str = "push_recovery") -> None:
@@ -85,13 +88,28 @@ def test_two_axes_otherwise(settings: tuple[str, ...]) -> None:
     check("homogeneous", *settings, scenario="two_axes")
 
 
-@pytest.mark.parametrize("kind", ["lqg", "examples.own_law:Leaning"])
+OWN_LAWS = "tests.codegen.export.own_laws:"
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["lqg", "examples.own_law:Leaning", *(f"{OWN_LAWS}{name}" for name in ("Elaborate", "InADict", "Memoryless"))],
+)
 def test_other_laws(kind: str) -> None:
     check("kalman", f"controller.kind={kind}")
 
 
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_another_law_with_all_else(integrator: str) -> None:
+    """Its integrator is trimmed, its angles are estimated, its rate is the gyro's."""
+    words = ("kind=tests.codegen.export.own_laws:Elaborate", "bias_trim_s=0.52", "angle_source=estimated")
+    settings = [f"controller.{word}" for word in (*words, "feedback=fog")]
+    check("adaptive", *settings, f"plant.integrator={integrator}", *ALL_IMPERFECTIONS)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("feedback", ["fog", "truth"])
 @pytest.mark.parametrize("scenario", ["push_recovery", "two_axes"])
-def test_another_rate_fed_back(feedback: str, scenario: str) -> None:
+def test_another_rate_fed_back(feedback: str, scenario: str, integrator: str) -> None:
     fog = ("sensors.fog.rate_hz=1000", "sensors.fog.latency_s=0.002", "sensors.fog.bias_deg_h=20")
-    check("kalman", f"controller.feedback={feedback}", *fog, scenario=scenario)
+    check("kalman", f"controller.feedback={feedback}", f"plant.integrator={integrator}", *fog, scenario=scenario)

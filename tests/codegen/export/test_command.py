@@ -140,7 +140,10 @@ def test_files_of_the_users_stay_and_an_earlier_export_is_replaced() -> None:
         (["linear", "--set", "observer.tau=0"], "observer.tau = 0: must be a number greater than 0"),
         (["linear", "--set", "controller.bias_trim_s=1"], "needs an observer in the loop that estimates the bias"),
         (["linear", "--set", "controller.feedback=fog"], "set controller.feedback=observer"),
-        (["linear", "--set", "controller.kind=lqg"], "law Lqg: cannot be exported: C has the law (8) alone; set"),
+        (
+            ["linear", "--set", "controller.kind=tests.codegen.export.own_laws:Branches"],
+            "law Branches: cannot be exported: a branch on a value (",
+        ),
         ([], "Missing argument 'OBSERVER'"),
     ],
 )

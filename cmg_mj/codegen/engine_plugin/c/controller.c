@@ -61,10 +61,11 @@ int controller_decide(
     for (int i = 3; i < controller->estimates; ++i) x[i] = estimate[i];
     result->x_e = controller->integrator < 0 ? (double)NAN : law[controller->integrator];
     controller->law_step(law, y, x, held, &result->u);
+    const int is_command = isfinite(result->u); /* an infinite one is none, and not the limit */
     result->u = clip(result->u, -controller->rate_limit, controller->rate_limit);
     memory[places->u] = result->u;
     memory[places->decisions] += 1.0;
-    return are_finite(estimate, controller->estimates) && are_finite(law, controller->law) && isfinite(result->u) &&
+    return are_finite(estimate, controller->estimates) && are_finite(law, controller->law) && is_command &&
            are_finite(memory + places->observer, controller->observer);
 }
 
