@@ -118,6 +118,8 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None
         actuator.gainprm[:] = model.actuator_gainprm[actuator.id]
         actuator.biasprm[:] = model.actuator_biasprm[actuator.id]
     start = plant.new_data()
+    for key in [key for key in spec.keys if key.name == START_KEY]:
+        spec.delete(key)
     for key in spec.keys:
         if key.name == EQUILIBRIUM_KEY:
             key.qvel, key.ctrl = model.key_qvel[plant.key], model.key_ctrl[plant.key]

@@ -27,7 +27,7 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.plugin import Plugin, find_tools
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
-from cmg_mj.studies.push_limits.mount_plugin import claimed_plugin, write_mounted_plugin
+from cmg_mj.studies.push_limits.mount_plugin import check_plugin, claimed_plugin, write_mounted_plugin
 from cmg_mj.studies.push_limits.pair_demands import PairDemands, pair_demands
 from cmg_mj.studies.push_limits.prospects import (
     LOW_LIMIT_DEG,
@@ -145,7 +145,7 @@ def mount_and_write(
         find_tools()
     with (
         claimed_target(file, overwrite=overwrite),
-        claimed_plugin(file, overwrite=overwrite) if with_plugin else nullcontext() as folder,
+        claimed_plugin(file, expanded(robot, "ROBOT"), overwrite=overwrite) if with_plugin else nullcontext() as folder,
     ):
         return _mount_and_write(
             robot, request, file, observer, overwrite=overwrite, time_limit=time_limit, folder=folder
@@ -167,6 +167,8 @@ def _mount_and_write(
     with with_scenario(file) as model:
         mounted.save(model)
         experiment = write_scenario(model, mounted.path, observer, axis=request.name)
+        if folder:
+            check_plugin(experiment, file)
         limits = prospects(experiment, request.name)
         simulated = sufficient = plugin = None
         if time_limit is not None:

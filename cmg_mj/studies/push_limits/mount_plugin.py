@@ -12,6 +12,7 @@ from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE
 from cmg_mj.codegen.export.c_identifiers import RESERVED
 from cmg_mj.codegen.export.names import LONGEST
 from cmg_mj.errors import InputError, listed
+from cmg_mj.inputs.includes import check_files
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, users_files
 from cmg_mj.simulation.experiment import Experiment
@@ -34,11 +35,12 @@ def plugin_name(target: Path) -> str:
 
 
 @contextmanager
-def claimed_plugin(target: Path, *, overwrite: bool) -> Iterator[RunFolder]:
+def claimed_plugin(target: Path, robot: Path, *, overwrite: bool) -> Iterator[RunFolder]:
     """Claim the folder of a plugin, by the rules that hold for the mounted model.
 
     Args:
         target: The model's file.
+        robot: The robot's own file.
         overwrite: Whether the plugin of an earlier mount is replaced, if nobody has changed it since.
 
     Yields:
@@ -48,6 +50,9 @@ def claimed_plugin(target: Path, *, overwrite: bool) -> Iterator[RunFolder]:
         InputError: Another command writes there, or what is there may not be replaced.
     """
     folder, name = plugin_folder(target), plugin_name(target)
+    originals = check_files(robot) if robot.is_file() else []
+    if any(folder.resolve() in file.resolve().parents for file in originals):
+        raise InputError(f"-o {target}: {folder} holds the robot's own file, or one that it names; give another name")
     try:
         _check_replaceable(target, overwrite=overwrite)
         own = [f"libcmg_mj_{name}.so", f"{name}.xml", f"{name}_example.py", f"{name}_example.c", "Makefile", "rig.c"]
@@ -59,6 +64,15 @@ def claimed_plugin(target: Path, *, overwrite: bool) -> Iterator[RunFolder]:
         raise InputError(message.replace("name another folder", "give another name")) from error
     with claim:
         yield claim
+
+
+def check_plugin(experiment: Experiment, target: Path) -> None:
+    """Generate a plugin as `write_mounted_plugin` does, before what takes a minute.
+
+    Raises:
+        InputError: Something in use cannot be exported.
+    """
+    make_plugin(experiment, plugin_name(target), start="spinning")
 
 
 def write_mounted_plugin(experiment: Experiment, target: Path, folder: RunFolder) -> Plugin:
