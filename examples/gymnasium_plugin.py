@@ -1,8 +1,7 @@
 """A robot in stock Gymnasium under random actions: a plugin balances it, and nothing of cmg_mj is imported.
 
 cmg-mj mount inverted_pendulum.xml --body pole --axis hinge --release slider --plugin
-python gymnasium_plugin.py InvertedPendulum-v5 balanced_plugin/balanced.xml (or, without the plugin, balanced.xml)
-Two numbers behind it are the noise of a reset and the share of the robot's own actions: 0.001 0.01
+python gymnasium_plugin.py InvertedPendulum-v5 balanced_plugin/balanced.xml [NOISE_OF_RESET SHARE_OF_ACTIONS]
 """
 
 import sys
@@ -12,9 +11,10 @@ import gymnasium
 import mujoco
 import numpy as np
 
-ANY = (-np.inf, np.inf)  # flywheels turn at 314 rad/s; on a free joint a robot's height is in the place of its angle
-FREED = {"healthy_z_range": ANY, "healthy_angle_range": (0.7, np.inf)}
-KEYWORDS = {"Hopper-v5": {**FREED, "healthy_state_range": ANY}, "Walker2d-v5": FREED}
+FREED = {"healthy_z_range": (-np.inf, np.inf), "healthy_angle_range": (0.7, np.inf)}  # qpos[2] is the height
+KEYWORDS = {"Hopper-v5": {**FREED, "healthy_state_range": (-np.inf, np.inf)}, "Walker2d-v5": FREED}  # 314 rad/s
+if len(sys.argv) not in (3, 5):
+    sys.exit(__doc__)
 name, path = sys.argv[1], Path(sys.argv[2]).resolve()
 noise, share = map(float, sys.argv[3:] or (0.001, 0.01))
 for library in path.parent.glob("libcmg_mj_*.so"):
