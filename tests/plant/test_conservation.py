@@ -81,6 +81,7 @@ def test_free_motion_conserves_energy_and_momenta(gravity: bool, momentum_bound:
     assert np.all(worst[1:] < momentum_bound)
 
 
+@pytest.mark.daily_cases("True")
 @pytest.mark.parametrize("gravity", [False, True])
 def test_drifts_shrink_with_the_fourth_power_of_the_step(gravity: bool) -> None:
     """Orders of root mean squares over worlds and a common grid; a maximum jumps between instants.

@@ -77,6 +77,7 @@ def test_a_users_own_observer(tmp_path: Path) -> None:
 
 
 @needs_compiler
+@pytest.mark.daily_cases("*-watcher")
 @pytest.mark.parametrize(
     ("cls", "arguments", "name"),
     [("Größe", [], "grosse"), ("Double", [], "double_observer"), ("观测器", ["--name", "watcher"], "watcher")],

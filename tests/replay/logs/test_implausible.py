@@ -114,6 +114,7 @@ def test_noise_alone_says_nothing(tmp_path: Path) -> None:
         assert read_log(path, ReadOptions(SECOND, units={"acceleration": "rad_s2"})).notes == ()
 
 
+@pytest.mark.daily_cases("push_recovery", "single_gimbal", "bias_estimation", "luenberger_fails")
 @pytest.mark.parametrize(
     "scenario", ["push_recovery", "bias_estimation", "single_gimbal", "observer_tuning", "luenberger_fails"]
 )

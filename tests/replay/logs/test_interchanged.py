@@ -40,6 +40,7 @@ def notes(path: Path, columns: dict[str, str]) -> list[str]:
     return list(log.notes)
 
 
+@pytest.mark.daily_cases("0.02", "0.2")
 @pytest.mark.parametrize("swing", [0.02, 0.1, 0.2])
 def test_a_known_motion(swing: float, tmp_path: Path) -> None:
     for seed in range(5):
@@ -54,6 +55,7 @@ def test_noise_alone_says_nothing(tmp_path: Path) -> None:
         assert notes(path, INNER_FIRST) == notes(path, OUTER_FIRST) == []
 
 
+@pytest.mark.daily_cases("bias_estimation-True", "single_gimbal-True", "luenberger_fails-False")
 @pytest.mark.parametrize(
     ("scenario", "suspicion"),
     [
