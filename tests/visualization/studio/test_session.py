@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from mujoco.studio import messages
@@ -12,6 +14,7 @@ from cmg_mj.visualization.studio.settings import FEEDBACK, NOISE, OBSERVER
 from tests.visualization.studio.session import as_rows, session
 
 
+@cache
 def runner_rows(*settings: str, scenario: str = "push_recovery") -> np.ndarray:
     trajectory = prepare(load_scenario(scenario, list(settings))).run().trajectory
     assert trajectory is not None
