@@ -89,6 +89,7 @@ def assert_saved_alike(long: ReplayResult, whole: ReplayResult, folder: Path) ->
         np.testing.assert_array_equal(read[name], values)
 
 
+@pytest.mark.slow
 def test_a_long_log_is_drawn_and_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = log_file(tmp_path, "uneven")
     in_stretches(monkeypatch, 256)

@@ -177,6 +177,7 @@ def test_a_temporary_folder_that_is_full(monkeypatch: pytest.MonkeyPatch) -> Non
     assert not Path("board").exists()
 
 
+@pytest.mark.daily_cases("'-No closing quotation", "* -c 0-*")
 @pytest.mark.parametrize(
     ("cc", "words"),
     [

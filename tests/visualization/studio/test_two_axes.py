@@ -162,6 +162,7 @@ def test_a_law_is_the_runners_on_both_axes_from_the_start() -> None:
         same(studio.rows[:200], as_rows(trajectory))
 
 
+@pytest.mark.slow
 def test_what_is_refused_changes_no_axis() -> None:
     with session(scenario="two_axes") as studio:
         studio.run(0.5)
