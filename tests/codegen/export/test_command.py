@@ -77,6 +77,7 @@ def test_a_users_own_observer(tmp_path: Path) -> None:
 
 
 @needs_compiler
+@pytest.mark.daily_cases("*-watcher")
 @pytest.mark.parametrize(
     ("cls", "arguments", "name"),
     [("Größe", [], "grosse"), ("Double", [], "double_observer"), ("观测器", ["--name", "watcher"], "watcher")],
@@ -179,6 +180,7 @@ def test_a_temporary_folder_that_is_full(monkeypatch: pytest.MonkeyPatch) -> Non
     assert not Path("board").exists()
 
 
+@pytest.mark.daily_cases("'-No closing quotation", "* -c 0-*")
 @pytest.mark.parametrize(
     ("cc", "words"),
     [
