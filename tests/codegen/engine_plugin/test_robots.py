@@ -21,6 +21,7 @@ ROBOTS: dict[str, tuple[str, dict[str, Any]]] = {
     "held pendulum": ("inverted_pendulum.xml", {"body": "pole", "axis": "hinge"}),
     "pendulum on a free cart": ("inverted_pendulum.xml", {"body": "pole", "axis": "hinge", "release": ["slider"]}),
     "hopper": ("hopper.xml", {"body": "torso", "axis": "x", "base": "free"}),
+    "humanoid": ("humanoid.xml", {"body": "torso", "axis": "y", "scale": 2.2}),
 }
 SCENARIO = """\
 duration_s = 6.0
