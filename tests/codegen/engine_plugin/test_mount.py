@@ -107,6 +107,7 @@ def test_what_is_there_already() -> None:
 
 def test_nothing_is_begun_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("robot.xml").write_text(PENDULUM, encoding="utf-8")
+    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files._mount_and_write", None)
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
     assert "there is no C compiler" in cmg_mj(*MOUNT).complaint
