@@ -13,7 +13,8 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -56,28 +57,30 @@ class Count:
         return [self.cell(compare(rig), duration) for rig in variants]
 
 
-def headings(sensors: Sequence[str]) -> list[str]:
-    """Print a heading a column of sensors x integrators."""
-    return ["", *(f"{name}, {quality}" for quality in sensors for name in INTEGRATORS)]
+TRUE_RATE = "controller.feedback=truth"
 
 
-def observers(count: Count, scenario: str, names: Sequence[str], duration: float) -> str:
-    """Compare observers x sensors x integrators; where a rig falls, also on the true rate, on which it stands."""
+def tables(count: Count, rigs: Mapping[str, Callable[..., Made]], duration: float) -> str:
+    """Compare rigs x sensors x integrators; where a rig falls, also on the true rate."""
     rows, fallen = [], []
-    for name in names:
-        row = [f"`{name}`"]
+    for name, make_rig in rigs.items():
+        row = [name]
         for sensors, settings in SENSORS.items():
-            settings = (f"duration_s={duration}", *settings)
-            cells = count.cells(make(name, *settings, scenario=scenario), duration)
+            cells = count.cells(make_rig(*settings), duration)
             row += cells
             if any("fell" in cell for cell in cells):
-                standing = make(name, *settings, "controller.feedback=truth", scenario=scenario)
-                fallen.append([f"`{name}`, {sensors}", *count.cells(standing, duration)])
+                fallen.append([f"{name}, {sensors}", *count.cells(make_rig(*settings, TRUE_RATE), duration)])
         rows.append(row)
-    result = table(headings(list(SENSORS)), rows)
+    result = table(["", *(f"{name}, {sensors}" for sensors in SENSORS for name in INTEGRATORS)], rows)
     if fallen:
         result += f"\n\nWhat fell, on the true rate:\n\n{table(['', *INTEGRATORS], fallen)}"
     return result
+
+
+def observers(count: Count, scenario: str, names: Sequence[str], duration: float) -> str:
+    """Compare observers on a rig."""
+    rigs = {f"`{name}`": partial(make, name, f"duration_s={duration}", scenario=scenario) for name in names}
+    return tables(count, rigs, duration)
 
 
 def worlds(count: Count, duration: float) -> str:
@@ -93,19 +96,17 @@ def worlds(count: Count, duration: float) -> str:
 
 
 def robots(count: Count, duration: float) -> str:
-    """Compare robots x sensors x integrators, with `gyro_free`."""
-    rows = []
-    for robot in ROBOTS:
-        if is_missing(robot):
-            print(f"{robot}: left out, gymnasium is not installed", file=sys.stderr)
-            continue
-        cells = []
-        for settings in SENSORS.values():
-            with tempfile.TemporaryDirectory() as folder:
-                made = make("gyro_free", *settings, scenario=write_robot(robot, Path(folder), duration))
-                cells += count.cells(made, duration)
-        rows.append([robot, *cells])
-    return table(headings(list(SENSORS)), rows)
+    """Compare robots, with `gyro_free`."""
+    rigs = {}
+    with tempfile.TemporaryDirectory() as place:
+        for robot in ROBOTS:
+            if is_missing(robot):
+                print(f"{robot}: left out, gymnasium is not installed", file=sys.stderr)
+                continue
+            folder = Path(place) / robot
+            folder.mkdir()
+            rigs[robot] = partial(make, "gyro_free", scenario=write_robot(robot, folder, duration))
+        return tables(count, rigs, duration)
 
 
 def main() -> None:

@@ -15,13 +15,14 @@ ROBOTS: dict[str, tuple[str, dict[str, Any]]] = {
     "bicycle": ("examples/robots/bicycle.xml", {"body": "frame", "axis": "x", "position": (0.0, 0.0, 0.3)}),
     "held pendulum": ("inverted_pendulum.xml", {"body": "pole", "axis": "hinge"}),
     "pendulum on a free cart": ("inverted_pendulum.xml", {"body": "pole", "axis": "hinge", "release": ["slider"]}),
-    "hopper": ("hopper.xml", {"body": "torso", "axis": "x", "base": "free"}),
+    "hopper": ("hopper.xml", {"body": "torso", "axis": "x", "base": "free", "scale": 2.0}),
     "humanoid": ("humanoid.xml", {"body": "torso", "axis": "y", "scale": 2.2}),
 }
 SCENARIO = """\
 push = [{ start_s = 3.0, duration_s = 0.1, torque_n_m = 2.0 }]
 [plant]
 model = "robot.xml"
+equilibrium_bias_deg = 0.0
 initial_tilt_deg = 0.5
 [controller]
 gains = "scaled"
