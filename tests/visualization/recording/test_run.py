@@ -503,8 +503,8 @@ def test_a_users_observer_may_have_any_name(run: Run, experiment: Experiment, tm
     assert color != static(path, f"/{part}/rate_estimate/1_homogeneous", "SeriesLines:colors")
 
 
-@pytest.mark.daily_cases("name2")
-@pytest.mark.parametrize("name", ["my_lab.observers:Kalman", "a/b (c) é", "x" * 300])
+@pytest.mark.daily_cases("long")
+@pytest.mark.parametrize("name", ["my_lab.observers:Kalman", "a/b (c) é", "x" * 300], ids=["class", "odd", "long"])
 def test_rerun_does_not_complain_of_a_name(
     run: Run, experiment: Experiment, tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str
 ) -> None:
