@@ -26,6 +26,10 @@ class NoiseStream(IntEnum):
     """The gyro about the vertical, which a plant of several axes has once."""
     MEMS_PART = 6
     """The signs of the cheap gyro's offset and drift: which part was bought."""
+    PIVOT = 7
+    """The acceleration of the pivot; its motions have the streams that axes would have."""
+    VIBRATION = 8
+    """The accelerometers' vibration."""
 
     def on_axis(self, axis: int) -> int:
         """Return the number of the stream of one axis of several."""
