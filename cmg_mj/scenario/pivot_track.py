@@ -74,7 +74,7 @@ def _read_track(path: Path, column: str | None, _changed_ns: int, _size: int) ->
     except csv.Error as error:
         raise InputError(f"{path}: no CSV: {error} (line {rows.line_num})") from error
     if len(lines) < 2:
-        raise InputError(f"{path}: {len(lines)} samples; a track has at least two")
+        raise InputError(f"{path}: too few samples ({len(lines)}); a track has at least two")
     numbers = np.array([_numbers(path, line, row, number) for line, row in lines])
     times, accelerations = numbers.T
     back = np.flatnonzero(np.diff(times) <= 0.0)
@@ -101,7 +101,9 @@ def _column(path: Path, heading: list[str], column: str | None) -> int:
     names = heading[1:]
     if column is None:
         if len(names) > 1:
-            raise InputError(f"{path}: has the columns {shown(', '.join(names))}: which is the acceleration? see column")
+            raise InputError(
+                f"{path}: has the columns {shown(', '.join(names))}: which is the acceleration? see column"
+            )
         return 1
     if column not in names:
         raise InputError(f"{path}: no column {shown(column)}; {nearest(column, names)}")

@@ -1,0 +1,20 @@
+"""Names what of a real rig is in a scenario, and in neither the reduced model nor anything computed from it."""
+
+from __future__ import annotations
+
+from cmg_mj.scenario.schema import Scenario
+
+
+def left_out(scenario: Scenario) -> dict[str, str]:
+    """Find what the reduced model, the loop's margins, the ceiling and the floor of y1 with its acceleration leave out.
+
+    Args:
+        scenario: The scenario of one axis.
+
+    Returns:
+        Field -> what it is, in words.
+    """
+    clauses = {}
+    if scenario.pivot:
+        clauses["pivot"] = "the pivot's acceleration"
+    return clauses
