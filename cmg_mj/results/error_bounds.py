@@ -157,19 +157,20 @@ class Floors:
     Args:
         noises: Noise of one sample of y1 and its acceleration, a world each.
         dt: Sample period [s].
-        noise_alone: Whether the accelerometers err by their noise alone; otherwise there is no floor of y1 with its
-            acceleration.
+        has_acceleration: Which worlds have a floor of y1 with its acceleration, (n_worlds,); None: all. It is no floor
+            where a pivot moves, or where accelerometers vibrate or are off their radii.
     """
 
-    def __init__(self, noises: Sequence[TiltNoise], dt: float, *, noise_alone: bool = True) -> None:
+    def __init__(self, noises: Sequence[TiltNoise], dt: float, has_acceleration: Sequence[bool] | None = None) -> None:
         self._y1 = TiltFloor(dt, len(noises))
-        self._acceleration = [acceleration_floor(noise, dt) for noise in noises] if noise_alone else []
+        self._acceleration = [acceleration_floor(noise, dt) for noise in noises]
+        self._has_acceleration = has_acceleration or [True] * len(noises)
         self.add = self._y1.add
 
     def errors(self, world: int) -> dict[str, tuple[float | None, float | None]]:
         """Compute each floor's RMS error in the whole run and in the push windows of one world [rad/s]."""
         floors = {FLOOR_Y1: self._y1.errors(world)}
-        if self._acceleration:
+        if self._has_acceleration[world]:
             floors[FLOOR_ACCELERATION] = self._acceleration[world], self._acceleration[world]
         return floors
 

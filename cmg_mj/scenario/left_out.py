@@ -17,4 +17,9 @@ def left_out(scenario: Scenario) -> dict[str, str]:
     clauses = {}
     if scenario.pivot:
         clauses["pivot"] = "the pivot's acceleration"
+    accelerometer = scenario.sensors.accelerometer
+    if accelerometer.vibration_mg:
+        clauses["sensors.accelerometer.vibration_mg"] = "the accelerometers' vibration"
+    if any(accelerometer.wheel_harmonics_mg):
+        clauses["sensors.accelerometer.wheel_harmonics_mg"] = "the flywheels' tones in the accelerometers"
     return clauses

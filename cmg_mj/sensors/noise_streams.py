@@ -29,7 +29,9 @@ class NoiseStream(IntEnum):
     PIVOT = 7
     """The acceleration of the pivot; its motions have the streams that axes would have."""
     VIBRATION = 8
-    """The accelerometers' vibration."""
+    """The accelerometers' broadband vibration."""
+    WHEEL_TONES = 9
+    """The phases of the tones that flywheels make in the accelerometers."""
 
     def on_axis(self, axis: int) -> int:
         """Return the number of the stream of one axis of several."""
