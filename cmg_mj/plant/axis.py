@@ -44,6 +44,7 @@ class Axis:
         gyro: Address in sensordata of the gyro along the line.
         bias: Equilibrium bias e [rad].
         initial_tilt: Tilt from the equilibrium at the start [rad].
+        misplaced: Whether an accelerometer sits elsewhere than the tilt estimate knows.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Axis:
     gyro: int
     bias: float = 0.0
     initial_tilt: float = 0.0
+    misplaced: bool = False
 
     @property
     def prefix(self) -> str:

@@ -22,4 +22,8 @@ def left_out(scenario: Scenario) -> dict[str, str]:
         clauses["sensors.accelerometer.vibration_mg"] = "the accelerometers' vibration"
     if any(accelerometer.wheel_harmonics_mg):
         clauses["sensors.accelerometer.wheel_harmonics_mg"] = "the flywheels' tones in the accelerometers"
+    for which in ("inner", "outer"):
+        field = f"accelerometer_{which}_misplaced_mm"
+        if getattr(scenario.plant, field):
+            clauses[f"plant.{field}"] = f"the {which} accelerometer's misplacement"
     return clauses

@@ -146,7 +146,9 @@ class _Simulation:
         dt, limit, sensors = controller.law.dt, controller.law.rate_limit, controller.sensors
         noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
         y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
-        has_acceleration = [not (self.pivots or sensor.accelerometer.vibrates) for _, sensor in pairs]
+        has_acceleration = [
+            not (self.pivots or sensor.accelerometer.vibrates or plant.axis.misplaced) for plant, sensor in pairs
+        ]
         floors = Floors(noises, y1_period, has_acceleration)
         # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
         tilt_sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]

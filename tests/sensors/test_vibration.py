@@ -185,6 +185,7 @@ def test_a_world_without_vibration_has_the_floor_and_the_others_do_not() -> None
     assert [row["velocity_rms_error_rad_s"] is None for row in table if row["observer"] == "floor_accel"] == [0, 1]
 
 
+@pytest.mark.slow
 def test_four_mg_cost_gyro_free_what_as_much_noise_costs() -> None:
     """4 mg behind no low-pass are to samples at 200 Hz as white as 400 ug/rtHz are: the error grows by root two."""
     still, shaken = (
