@@ -46,6 +46,7 @@ def act(env: ScissoredPairEnv, seed: int, **options: Any) -> tuple[list[Tick], l
     return ticks, infos, total
 
 
+@pytest.mark.daily_cases("push", "uneven", "fall")
 @pytest.mark.parametrize(
     ("scenario", "settings", "seed", "world"),
     [
