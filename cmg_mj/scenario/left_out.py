@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from cmg_mj.scenario.schema import Scenario
 
+IN_THE_MODEL = ("plant.accelerometer_inner_misplaced_mm", "plant.accelerometer_outer_misplaced_mm")
+"""Those of them that the plant's MuJoCo model itself has, whoever steps it."""
+
 
 def left_out(scenario: Scenario) -> dict[str, str]:
     """Find what the reduced model, the loop's margins, the ceiling and the floor of y1 with its acceleration leave out.
