@@ -131,6 +131,7 @@ class Plant:
                 bias=math.radians(axis_settings.equilibrium_bias_deg),
                 initial_tilt=math.radians(axis_settings.initial_tilt_deg),
                 radial_tilt=place_accelerometers(self.model, axis_settings, axis, self.path),
+                misplaced=axis_settings.has_misplaced,
             )
             if speed is not None:
                 modules = with_flywheel_speed(self.model, self.key, axis.modules, speed, self.path)

@@ -9,6 +9,7 @@ from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.errors import TomlValue
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
+from cmg_mj.scenario.left_out import left_out
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
@@ -56,6 +57,10 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
         *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
     rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
+    rows += [("pivot", pivot.words) for pivot in scenario.pivot]
+    missing = list(left_out(scenario).values())
+    if missing:
+        rows.append(("left out", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
     return lines(
         f"{name}{f', axis {axis}' if axis else ''}: valid",
         [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))],
