@@ -27,6 +27,7 @@ from cmg_mj.inputs.messages import complaint
 from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
+from cmg_mj.plant.bend import longest_step_of_bend, require_suitable
 from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse_drawn
@@ -73,7 +74,7 @@ class Plant:
     ) -> None:
         self.path = path
         locked, lock = settings.locked_axes, settings.lock_thrust_bearing
-        self.model, modules, self.hints = load_rig(path, lock=lock, locked_axes=locked)
+        self.model, modules, self.hints = load_rig(path, lock=lock, locked_axes=locked, bend=settings)
         self._as_filed = self.model
         self.key = element_id(self.model, "key", EQUILIBRIUM_KEY)
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in self.joint_names else None
@@ -114,6 +115,8 @@ class Plant:
     def is_of_same_file(self, settings: PlantSettings) -> bool:
         """Return whether `changed` can take these settings: the same model file with the same locks."""
         names = ("model", "lock_thrust_bearing", "locked_axes")
+        if settings.bends or self.settings.bends:
+            names += ("bend_frequency_hz", "bend_damping_ratio", "bend_share", "bend_beyond")
         return all(getattr(self.settings, name) == getattr(settings, name) for name in names)
 
     def _apply_settings(
@@ -144,7 +147,8 @@ class Plant:
         vary(self.model, settings, self.path, self.axes, held)
         speeds = [abs(module.speed) for axis in self.axes for module in axis.modules]
         shaken = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
-        self.largest_step = largest_step(self.model, self.key, float(self.model.opt.timestep), shaken)
+        own_step = longest_step_of_bend(settings, float(self.model.opt.timestep))
+        self.largest_step = largest_step(self.model, self.key, own_step, shaken)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
@@ -153,6 +157,7 @@ class Plant:
         self.model.opt.timestep = (
             grid.physics_step(self.largest_step) if grid else settings.timestep_s or self.largest_step
         )
+        require_suitable(settings, self.timestep, self.path)
         if not survives_first_steps(self.model, self.new_data()):
             raise InputError(
                 f"{self._error_source}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, "

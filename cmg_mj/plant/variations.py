@@ -13,7 +13,7 @@ import numpy as np
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.mujoco_state import at_keyframe
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Module, element_id
+from cmg_mj.plant.parts import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.sensors.tilt import RadialTilt
@@ -68,7 +68,7 @@ def vary(
     _vary_servos(model, settings, path, modules)
     shifts = [bias_shift(model, axis, axis.bias, path) for axis in axes if axis.bias]
     for axis, shift in zip([axis for axis in axes if axis.bias], shifts, strict=True):
-        model.body_ipos[axis.frame] += shift
+        model.body_ipos[frame_bodies(model, axis)] += shift
     if settings.flywheel_imbalance_kg_m:
         for module in modules:
             body = int(model.dof_bodyid[module.flywheel_dof])
@@ -229,7 +229,14 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
     centre = to_frame @ (data.subtree_com[all_that_tilts] - data.xpos[frame]) - axis.point
     radial = centre - (centre @ axis.direction) * axis.direction
     turned = math.cos(bias) * radial + math.sin(bias) * np.cross(axis.direction, radial)
-    return model.body_subtreemass[all_that_tilts] / model.body_mass[frame] * (turned - radial)
+    own = sum(float(model.body_mass[body]) for body in frame_bodies(model, axis))
+    return model.body_subtreemass[all_that_tilts] / own * (turned - radial)
+
+
+def frame_bodies(model: mujoco.MjModel, axis: Axis) -> list[int]:
+    """The frame, and the part of it beyond a bend if there is one."""
+    part = element_id(model, "body", BEND_JOINT)
+    return [axis.frame, *([part] if part >= 0 else [])]
 
 
 def _hinge(axis: Axis, path: Path) -> int:
