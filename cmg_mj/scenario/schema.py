@@ -81,6 +81,8 @@ class ControllerSettings(BaseModel):
     """Several axes: whether the gimbals also turn against what a turn about the vertical couples."""
     bias_trim_s: Instant = 0.0
     """For so long from the start the integrator is held where the observer's bias estimate asks for it."""
+    notch_hz: Annotated[NonNegative, WhateverTheLaw()] = 0.0
+    """The middle of a notch on the law's command, for a frame that bends; 0: none."""
 
     @model_validator(mode="after")
     def _one_source_of_gains(self) -> ControllerSettings:
