@@ -28,6 +28,7 @@ from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
 from cmg_mj.plant.bend import longest_step_of_bend, require_suitable
+from cmg_mj.plant.bend_model import bend_model
 from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse_drawn
@@ -341,8 +342,10 @@ class Plant:
     def parameters(self) -> PlantParameters:
         """Parameters from which a scenario's controller and observers are made."""
         names = tuple(module.name for module in self.axis.modules)
+        bend = bend_model(self.model, self.key, self.axis, self.settings)
+        steps = self.timestep, self.largest_step
         return PlantParameters(
-            self.path, names, self.reduced, self.radial_tilt, self.gravity, self.timestep, self.largest_step, self.hints
+            self.path, names, self.reduced, self.radial_tilt, self.gravity, *steps, self.hints, bend
         )
 
     def initialise(self, data: mujoco.MjData) -> None:
