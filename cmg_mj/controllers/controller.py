@@ -146,7 +146,9 @@ class Controller:
         self.trimmed_until = steps_until(bias_trim_s, timestep)
         self.notch_hz = notch_hz
         if notch_hz * law.dt >= 0.5:
-            raise InputError(f"controller.notch_hz = {notch_hz:g}: must be below {0.5 / law.dt:g} Hz, half the control rate")
+            raise InputError(
+                f"controller.notch_hz = {notch_hz:g}: must be below {0.5 / law.dt:g} Hz, half the control rate"
+            )
         self.reset()
 
     @property

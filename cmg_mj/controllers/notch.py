@@ -6,8 +6,8 @@ import math
 
 from cmg_mj.elementwise import Scalar, clip
 
-DEPTH_DAMPING, WIDTH_DAMPING = 0.05, 0.5
-"""Damping ratios of the notch's zeros and poles: a tenth of the command is left at its middle."""
+DEPTH_DAMPING, WIDTH_DAMPING = 0.02, 0.5
+"""Damping ratios of the notch's zeros and poles: a 25th of the command is left at its middle."""
 
 
 class Notch:

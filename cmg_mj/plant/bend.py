@@ -53,7 +53,7 @@ def bend_frame(
     if len(axes) > 1:
         last = list(axes)[-1]
         raise InputError(
-            f'{setting} tilts about several axes, and a bend takes one; lock the others, as with '
+            f"{setting} tilts about several axes, and a bend takes one; lock the others, as with "
             f'--set plant.locked_axes=["{last}"]'
         )
     if element_id(rigid, "joint", BEND_JOINT) >= 0 or element_id(rigid, "body", BEND_JOINT) >= 0:
@@ -62,7 +62,9 @@ def bend_frame(
     (name, modules), *_ = axes.items()
     axis = find_axis(rigid, key, name, modules)
     if not isinstance(axis.line, HingeLine) or int(rigid.jnt_bodyid[axis.line.joint]) != axis.frame:
-        raise InputError(f"{setting} does not tilt about a hinge of the body that carries its sensors; a bend takes one")
+        raise InputError(
+            f"{setting} does not tilt about a hinge of the body that carries its sensors; a bend takes one"
+        )
     part = _leaf_part(rigid, key, axis.frame, axis.line, settings, path)
     frame = next(body for body in spec.bodies if body.name == rigid.body(axis.frame).name)
     leaf = frame.add_body(name=BEND_JOINT)
@@ -78,7 +80,7 @@ def bend_frame(
     if settings.bend_beyond != "both":
         _move_sites(spec, rigid, leaf, axis.prefix)
     _extend_keyframes(spec)
-    inertia = reduced_inertia(spec.compile(), key)
+    inertia = reduced_inertia(spec.compile(), key, axis.line)
     omega = 2.0 * math.pi * settings.bend_frequency_hz
     joint.stiffness[0] = inertia * omega**2
     joint.damping[0] = 2.0 * settings.bend_damping_ratio * inertia * omega
@@ -123,14 +125,13 @@ def require_suitable(settings: PlantSettings, timestep: float, path: Path) -> No
             )
 
 
-def reduced_inertia(model: mujoco.MjModel, key: int) -> float:
-    """The inertia that the spring of a bend feels with all joints free: J_1 J_2/(J_1 + J_2) [kg m^2]."""
+def reduced_inertia(model: mujoco.MjModel, key: int, line: HingeLine) -> float:
+    """The inertia that the spring of a bend feels with the tilt's hinge free: J_1 J_2/(J_1 + J_2) [kg m^2]."""
     data = at_keyframe(model, key)
-    dof = int(model.joint(BEND_JOINT).dofadr[0])
-    unit, answer = np.zeros((1, model.nv)), np.zeros((1, model.nv))
-    unit[0, dof] = 1.0
-    mujoco.mj_solveM(model, data, answer, unit)
-    return float(1.0 / answer[0, dof])
+    dense = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, dense)
+    dofs = [line.dof, int(model.joint(BEND_JOINT).dofadr[0])]
+    return float(1.0 / np.linalg.inv(dense[np.ix_(dofs, dofs)])[1, 1])
 
 
 def _leaf_part(
@@ -151,7 +152,7 @@ def _leaf_part(
     if own <= 0.0:
         raise InputError(
             f"plant.bend_share: {path}: the body {rigid.body(frame).name!r} has no mass of its own to share (give the "
-            'model\'s compiler fusestatic="true", so that the modules\' halves become part of it)'
+            "model's compiler fusestatic=\"true\", so that the modules' halves become part of it)"
         )
     most = RIGID_SHARE * own / whole
     limit = f"at most {most:.3f}" if is_mast else f"at least {1.0 - most:.3f}"

@@ -344,9 +344,7 @@ class Plant:
         names = tuple(module.name for module in self.axis.modules)
         bend = bend_model(self.model, self.key, self.axis, self.settings)
         steps = self.timestep, self.largest_step
-        return PlantParameters(
-            self.path, names, self.reduced, self.radial_tilt, self.gravity, *steps, self.hints, bend
-        )
+        return PlantParameters(self.path, names, self.reduced, self.radial_tilt, self.gravity, *steps, self.hints, bend)
 
     def initialise(self, data: mujoco.MjData) -> None:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.controllers.laws.protocol import feedback_state
 from cmg_mj.controllers.notch import Notch
-from cmg_mj.observers.protocol import Measurement
+from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.linear_rig import BendModel, Response
 
@@ -100,22 +100,20 @@ def _transfer(design: Design, answers: Response, frequencies: np.ndarray, dt: fl
     turn = np.exp(2j * np.pi * frequencies * dt)
     now = size.astype(complex)
     outputs, inputs = np.empty((steps, len(frequencies))), np.empty((steps, len(frequencies)), complex)
-    state = law_state = None
     with np.errstate(all="ignore"):
         for k in range(steps):
             y = Measurement((now * y1).real, (now * y2).real, (now * acceleration).real)
             if k == 0:
-                state, law_state = observer.init(y), law.init(y)
-                estimate = (y.y1, 0.0 * y.y1, y.y2)
+                held, state, law_state = 0.0 * y.y1, observer.init(y), law.init(y)
+                estimate = Estimate(y.y1, held, y.y2)
             else:
-                state, estimate = observer.step(state, y, before)
+                state, estimate = observer.step(state, y, held)
             x1, x2, x3 = (y.y1, estimate[1], y.y2) if settings.angle_source == "measured" else estimate[:3]
             if settings.feedback != "observer":
                 x2 = (now * rates[settings.feedback]).real
-            law_state, u = law.step(law_state, y, feedback_state(x1, x2, x3, tuple(estimate[3:])), before if k else 0.0 * x2)
+            law_state, u = law.step(law_state, y, feedback_state(x1, x2, x3, tuple(estimate[3:])), held)
             outputs[k], inputs[k] = u if notch is None else notch(u), now
-            before = now.real
-            now = now * turn
+            held, now = now.real, now * turn
     return -_fitted(outputs[steps // 2 :], inputs[steps // 2 :])
 
 

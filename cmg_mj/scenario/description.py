@@ -7,8 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.errors import TomlValue
+from cmg_mj.scenario.bend_cures import NEAR, Trial, cure_among, is_near, loop_of, trials
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
+from cmg_mj.scenario.linear_rig import rk4_energy_loss
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
@@ -56,6 +58,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
         *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
     rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
+    rows += _bend_rows(scenario, rig)
     return lines(
         f"{name}{f', axis {axis}' if axis else ''}: valid",
         [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))],
@@ -64,6 +67,51 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
 
 def _about(torque: Push | Swing) -> str:
     return "" if torque.axis is None else f" about {torque.axis}"
+
+
+def _bend_rows(scenario: Scenario, rig: PlantParameters) -> Iterator[tuple[str, str]]:
+    """The mode of a frame that bends, the loop around it, and what cures that if it needs a cure."""
+    if rig.bend is None:
+        return
+    plant, bend = scenario.plant, rig.bend
+    loss, numerical = bend.energy_loss, rk4_energy_loss(bend.frequency_hz, rig.timestep)
+    yield (
+        "bend",
+        f"{bend.frequency_hz:g} Hz, damping ratio {bend.damping_ratio:g}, beyond it {plant.bend_share:g} of the inertia",
+    )
+    yield (
+        "",
+        {
+            "sensors": "with the sensors; the modules, whose tilt and rate count as true, are before it",
+            "modules": "with the modules, whose tilt and rate count as true; the sensors are before it",
+            "both": "with the modules, whose tilt and rate count as true, and the sensors",
+        }[plant.bend_beyond],
+    )
+    yield "", f"loses {100.0 * loss:.3g} % of its energy a second, and {100.0 * numerical:.2g} % to the physics steps"
+    yield "", "the reduced model, the closed loop above, the ceiling and the floors leave it out"
+    loop = loop_of(scenario, rig)
+    if loop is None:
+        yield "", "its loop is not computed for code of your own"
+        return
+    yield "", f"the loop with it, feedback from the {scenario.controller.feedback}: {Trial((), loop).words}"
+    if not is_near(loop):
+        return
+    tried = trials(scenario, rig)
+    for trial in tried:
+        yield "tried", f"{' '.join(trial.settings)}: {trial.words}"
+    cure = cure_among(tried)
+    if cure is None or (loop.is_stable and cure.loop.distance <= loop.distance):
+        yield (
+            "cure",
+            "none of these: the mode is too near the loop's bandwidth; take a stiffer frame or another observer",
+        )
+        return
+    little = "" if cure.loop.distance >= NEAR else ", with little margin"
+    yield "cure", f"{' '.join(f'--set {_quoted(setting)}' for setting in cure.settings)}{little}"
+
+
+def _quoted(setting: str) -> str:
+    return f"'{setting}'" if " " in setting else setting
 
 
 def _law_rows(

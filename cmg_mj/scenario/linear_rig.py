@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -76,3 +77,19 @@ class BendModel(NamedTuple):
     damping_ratio: float
     bending: LinearRig
     rigid: LinearRig
+
+    @property
+    def energy_loss(self) -> float:
+        """Share of the mode's energy that its damping takes in a second: 1 - exp(-2 zeta omega)."""
+        return -math.expm1(-4.0 * math.pi * self.damping_ratio * self.frequency_hz)
+
+
+def rk4_energy_loss(frequency_hz: float, step: float) -> float:
+    """Share of an undamped mode's energy that RK4 takes in a second: of z = omega h, |R(iz)|^2 = 1 - z^6/72 + z^8/576.
+
+    Args:
+        frequency_hz: The mode's [Hz].
+        step: The physics step h [s].
+    """
+    z = 2.0 * math.pi * frequency_hz * step
+    return -math.expm1(math.log1p(-(z**6) / 72.0 + z**8 / 576.0) / step)

@@ -44,7 +44,7 @@ class PlantSettings:
         flywheel_speed_rad_s: At which all flywheels turn, each in its own direction [rad/s]. The controller knows it.
         flywheel_imbalance_kg_m: Static imbalance of each flywheel, mass times offset [kg m].
         bend_frequency_hz: The frame bends: the undamped frequency of its torsional mode about the tilt axis with the
-            hinge free, wheels at rest and without gravity; 0 of a rigid frame [Hz].
+            hinge free, all else at rest and no gravity; 0 of a rigid frame [Hz].
         bend_damping_ratio: Damping ratio of that mode.
         bend_share: Share of the inertia about the tilt axis that lies beyond the bend, seen from the pivot.
         bend_beyond: Beyond the bend are the `sensors` (on a mast; the modules are before it), the `modules` (the
