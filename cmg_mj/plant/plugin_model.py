@@ -50,6 +50,7 @@ def plugin_mjcf(plant: Plant, plugin: str, config: Mapping[str, str], sensors: b
         spec = mujoco.MjSpec.from_string(as_mjcf(drawn, plant.path))
         _locate_files(spec, plant.path.parent)
         _take_over(spec, compile_model(spec, plant.path), plant)
+        _take_out_of_frames(spec, plant.model)
         compile_model(spec, plant.path)
         text = as_mjcf(spec, plant.path)
         different = differences(plant.model, mujoco.MjModel.from_xml_string(text))
@@ -84,6 +85,17 @@ def _locate_files(spec: mujoco.MjSpec, folder: Path) -> None:
         spec.meshdir, spec.texturedir = (str((folder / part).resolve()) for part in (spec.meshdir, spec.texturedir))
 
 
+def _take_out_of_frames(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+    """Place bodies without their frames, where these hold nothing else: each reading of a frame rounds again."""
+    others = [*spec.geoms, *spec.sites, *spec.joints, *spec.cameras, *spec.lights, *spec.frames]
+    for frame in spec.frames:
+        if frame.frame is None and not any(element.frame is frame for element in others):
+            frame.pos, frame.quat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+            for body in spec.bodies:
+                if body.frame is frame:
+                    body.pos, body.quat = model.body_pos[body.id], model.body_quat[body.id]
+
+
 def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None:
     """Give a parsed model, as its file has it, what the plant's settings change: see `plant.variations`."""
     model = plant.model
@@ -106,6 +118,8 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None
         actuator.gainprm[:] = model.actuator_gainprm[actuator.id]
         actuator.biasprm[:] = model.actuator_biasprm[actuator.id]
     start = plant.new_data()
+    for key in [key for key in spec.keys if key.name == START_KEY]:
+        spec.delete(key)
     for key in spec.keys:
         if key.name == EQUILIBRIUM_KEY:
             key.qvel, key.ctrl = model.key_qvel[plant.key], model.key_ctrl[plant.key]

@@ -61,12 +61,16 @@ def assert_same_numbers(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
             assert ours[name] == (None if value is None else pytest.approx(value, rel=1e-12)), name
 
 
+@pytest.mark.daily_cases("gyro_free", "homogeneous", "homogeneous_adaptive", "kalman", "ltv")
 @pytest.mark.parametrize("kind", sorted(OBSERVERS))
 def test_batch_equals_single_runs(kind: str) -> None:
     setup = experiment(f"observer.kind={kind}")
     assert_same(setup.run_many(3), [setup.run(world=i) for i in range(3)])
 
 
+@pytest.mark.daily_cases(
+    "rates", "imperfect accelerometers", "gyro, estimated angles", "open_loop_observers", "single gimbal"
+)
 @pytest.mark.parametrize(
     "settings",
     [
@@ -85,6 +89,7 @@ def test_batch_equals_single_runs_in_every_setting(settings: tuple[str, ...]) ->
     assert_same(setup.run_many(3), [setup.run(world=i) for i in range(3)])
 
 
+@pytest.mark.daily_cases("homogeneous-21.2")
 @pytest.mark.parametrize(("kind", "fall_angle_deg"), [("homogeneous", 21.2), ("ltv", 7.85), ("linear", 7.2)])
 def test_worlds_that_fall_midway_leave_the_others_alone(kind: str, fall_angle_deg: float) -> None:
     """A push that ends near the angle that counts as a fall: the noise decides which worlds fall, and when."""
@@ -110,6 +115,7 @@ def with_bias(setup: Experiment, bias_deg: float) -> Experiment:
     return replace(setup, plant=load_plant(**{**fields, "equilibrium_bias_deg": bias_deg}))
 
 
+@pytest.mark.daily_cases("homogeneous")
 @pytest.mark.parametrize("kind", ["homogeneous", "ltv"])
 def test_each_world_may_have_its_own_rig(kind: str) -> None:
     """Large biases fall at once and at different times; in the batch each world keeps its own model."""
