@@ -44,6 +44,7 @@ class Axis:
         gyro: Address in sensordata of the gyro along the line.
         bias: Equilibrium bias e [rad].
         initial_tilt: Tilt from the equilibrium at the start [rad].
+        misplaced: Whether an accelerometer sits elsewhere than the tilt estimate knows.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Axis:
     gyro: int
     bias: float = 0.0
     initial_tilt: float = 0.0
+    misplaced: bool = False
 
     @property
     def prefix(self) -> str:
@@ -85,6 +87,10 @@ class Axis:
         return itemgetter(*self.encoders) if others else lambda sensordata: (sensordata[only],)
 
     @cached_property
+    def _spins(self) -> list[int]:
+        return [module.flywheel_dof for module in self.modules]
+
+    @cached_property
     def _gimbals(self) -> list[tuple[int, float, float]]:
         """Address, share of x3 and zero of each gimbal."""
         n = len(self.modules)
@@ -105,7 +111,8 @@ class Axis:
             forces, encoders = self._forces_of(sensordata), self._encoders_of(sensordata)
         else:
             forces, encoders = sensordata[self.forces], [sensordata[address] for address in self.encoders]
-        return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel)))
+        wheels = [qvel[dof] for dof in self._spins]
+        return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel), wheels))
 
     def gimbal_angle(self, qpos: Addressed) -> Scalar:
         """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""

@@ -86,35 +86,34 @@ def bend_frame(
     joint.damping[0] = 2.0 * settings.bend_damping_ratio * inertia * omega
 
 
-def longest_step_of_bend(settings: PlantSettings, step: float) -> float:
-    """The longest physics step that follows the mode, at most a given one [s]."""
-    omega = 2.0 * math.pi * settings.bend_frequency_hz
-    return min(step, STEP_SHARE / omega) if omega else step
-
-
-def require_suitable(settings: PlantSettings, timestep: float, path: Path) -> None:
-    """Refuse a bend with a physics step that does not follow it, or with settings that mean another body.
+def step_for_bend(settings: PlantSettings, step: float, path: Path) -> float:
+    """The longest physics step that follows the mode, and settings that go together with it.
 
     Args:
         settings: The plant's settings.
-        timestep: The physics step [s].
+        step: The longest step without a bend [s].
         path: The model's file, for messages.
 
+    Returns:
+        The step; of a rigid frame the one that was given [s].
+
     Raises:
-        InputError: There is such a setting.
+        InputError: A step is named that does not follow the mode, an integrator that does not, or friction of a tilt
+            joint that is beyond the bend.
     """
     if not settings.bends:
-        return
-    longest = longest_step_of_bend(settings, math.inf)
-    if timestep > longest * (1.0 + 1e-9):
+        return step
+    hz = f"{settings.bend_frequency_hz:g}"
+    longest = STEP_SHARE / (2.0 * math.pi * settings.bend_frequency_hz)
+    if settings.timestep_s is not None and settings.timestep_s > longest * (1.0 + 1e-9):
         raise InputError(
-            f"plant.timestep_s = {timestep:g}: does not follow a bend of {settings.bend_frequency_hz:g} Hz, which takes "
-            f"at most {longest:.3g} s (omega h <= {STEP_SHARE:g}); leave it out"
+            f"plant.timestep_s = {settings.timestep_s:g}: does not follow a bend of {hz} Hz, which takes at most "
+            f"{longest:.3g} s (omega h <= {STEP_SHARE:g}); leave it out"
         )
     if settings.integrator != "RK4":
         raise InputError(
-            f"plant.integrator = {settings.integrator!r}: follows no bend (plant.bend_frequency_hz = "
-            f"{settings.bend_frequency_hz:g}) to 0.1 %; take RK4"
+            f"plant.integrator = {settings.integrator!r}: follows no bend (plant.bend_frequency_hz = {hz}) to 0.1 %; "
+            "take RK4"
         )
     for name in ("tilt_friction_n_m", "tilt_damping_n_m_s"):
         value = getattr(settings, name)
@@ -123,6 +122,7 @@ def require_suitable(settings: PlantSettings, timestep: float, path: Path) -> No
                 f"plant.{name} = {value:g}: {path}: acts on the part with the modules, which lies beyond the bend with "
                 f"plant.bend_beyond = {settings.bend_beyond!r}; leave it out, or take plant.bend_beyond = 'sensors'"
             )
+    return min(step, longest)
 
 
 def reduced_inertia(model: mujoco.MjModel, key: int, line: HingeLine) -> float:

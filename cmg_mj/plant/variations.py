@@ -135,12 +135,12 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
 
     Args:
         model: The model, as its file has it.
-        settings: Their distances from the tilt axis; what is left out stays.
+        settings: Their distances from the tilt axis, what is left out stays; and how far off these they sit.
         axis: The axis, as its file has it.
         path: The model's file, for messages.
 
     Returns:
-        The tilt estimate for their new places.
+        The tilt estimate for their new places, as far as it knows them.
 
     Raises:
         InputError: The outer one is no farther out than the inner one.
@@ -150,22 +150,29 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
         "accelerometer_inner": (settings.accelerometer_inner_m, as_filed.r_inner),
         "accelerometer_outer": (settings.accelerometer_outer_m, as_filed.r_outer),
     }
-    if all(to is None for to, _ in distances.values()):
+    if all(to is None for to, _ in distances.values()) and not settings.has_misplaced:
         return as_filed
-    inner, outer = (was if to is None else to for to, was in distances.values())
-    if not inner < outer:
-        changed = ", ".join(f"plant.{name}_m = {to:g}" for name, (to, _) in distances.items() if to is not None)
+    known = [was if to is None else to for to, was in distances.values()]
+    off = {
+        "accelerometer_inner": settings.accelerometer_inner_misplaced_mm,
+        "accelerometer_outer": settings.accelerometer_outer_misplaced_mm,
+    }
+    inner, outer = (at + 1e-3 * error for at, error in zip(known, off.values(), strict=True))
+    if not (known[0] < known[1] and 0.0 < inner < outer):
+        changes = {f"plant.{name}_m": to for name, (to, _) in distances.items() if to is not None}
+        changes |= {f"plant.{name}_misplaced_mm": error for name, error in off.items() if error}
+        changed = ", ".join(f"{name} = {value:g}" for name, value in changes.items())
         raise InputError(
             f"{changed}: the inner accelerometer must lie nearer to the tilt axis than the outer one, and they are "
             f"{inner:g} and {outer:g} m away ({path})"
         )
-    for name, (to, was) in distances.items():
-        if to is not None:
+    for (name, (set_to, was)), to in zip(distances.items(), (inner, outer), strict=True):
+        if set_to is not None or off[name]:
             site = int(model.sensor_objid[element_id(model, "sensor", axis.prefix + name)])
             arm = model.site_pos[site] - axis.point
             model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (to / was - 1.0)
             model.site_sameframe[site] = 0  # should it have stood where the body's frame does
-    return RadialTilt(inner, outer)
+    return RadialTilt(*known)
 
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:

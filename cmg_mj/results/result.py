@@ -93,13 +93,14 @@ class Result:
         """
         summaries: Sequence[Mapping[str, SummaryValue]] = self.summaries
         if estimator is not None:
-            others = open_loop_figures(self.summaries[0])
+            others = self._open_loop_names
             if estimator not in others:
                 raise InputError(f"{estimator!r}: no open-loop observer of this run; {nearest(estimator, others)}")
-            summaries = [open_loop_figures(summary)[estimator] for summary in summaries]
-        if key not in summaries[0]:
-            raise InputError(f"{key!r}: not in the summary; {nearest(key, summaries[0])}")
-        figures = [summary[key] for summary in summaries]
+            summaries = [open_loop_figures(summary).get(estimator, {}) for summary in summaries]
+        known = dict.fromkeys(name for summary in summaries for name in summary)
+        if key not in known:
+            raise InputError(f"{key!r}: not in the summary; {nearest(key, known)}")
+        figures = [summary.get(key) for summary in summaries]
         numbers = np.array([math.nan if figure is None else figure for figure in figures], dtype=float)
         return np.where(self.stood, numbers, math.nan)
 
@@ -108,6 +109,11 @@ class Result:
         values = self.values(key, estimator)
         known = values[np.isfinite(values)]
         return statistics.fmean(known) if len(known) else None
+
+    @property
+    def _open_loop_names(self) -> list[str]:
+        """Names of the open-loop observers, then of the baselines; a world may lack a floor."""
+        return list(dict.fromkeys(name for summary in self.summaries for name in open_loop_figures(summary)))
 
     def rows(self, estimator: str | None = None) -> list[Summary]:
         """Make the rows of `table` of one estimator.
@@ -133,7 +139,7 @@ class Result:
                 **{key: value for key, value in figures.items() if key not in NESTED},
             }
             for world, outcome, summary in zip(worlds, self.outcomes, self.summaries, strict=True)
-            for figures in [open_loop_figures(summary)[estimator] if estimator else summary]
+            for figures in [open_loop_figures(summary).get(estimator, {}) if estimator else summary]
         ]
 
     def table(self) -> pa.Table:
@@ -143,7 +149,7 @@ class Result:
             Columns `observer`, `in_loop_of`, `world`, `seed`, `outcome`, `stood`, `end_time_s`, `reason`, then
             every figure of the summary, null where there is none. Where `stood` is false they are those until the end.
         """
-        estimators = [None, *open_loop_figures(self.summaries[0])]
+        estimators = [None, *self._open_loop_names]
         return as_table(row for estimator in estimators for row in self.rows(estimator))
 
     def split(self, count: int) -> list[Result]:

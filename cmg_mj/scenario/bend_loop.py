@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from cmg_mj.controllers.laws.protocol import feedback_state
 from cmg_mj.controllers.notch import Notch
-from cmg_mj.observers.protocol import Estimate, Measurement
+from cmg_mj.elementwise import Scalar
+from cmg_mj.observers.protocol import Measurement
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.linear_rig import BendModel, Response
 
@@ -101,25 +103,31 @@ def _transfer(design: Design, answers: Response, frequencies: np.ndarray, dt: fl
     now = size.astype(complex)
     outputs, inputs = np.empty((steps, len(frequencies))), np.empty((steps, len(frequencies)), complex)
     with np.errstate(all="ignore"):
+        y = _shown(now, y1, y2, acceleration)
+        held: Scalar = 0.0 * y.y1
+        state, law_state = observer.init(y), law.init(y)
+        estimate: Sequence[Scalar] = (y.y1, held, y.y2)
         for k in range(steps):
-            y = Measurement((now * y1).real, (now * y2).real, (now * acceleration).real)
-            if k == 0:
-                held, state, law_state = 0.0 * y.y1, observer.init(y), law.init(y)
-                estimate = Estimate(y.y1, held, y.y2)
-            else:
+            if k:
+                y = _shown(now, y1, y2, acceleration)
                 state, estimate = observer.step(state, y, held)
             x1, x2, x3 = (y.y1, estimate[1], y.y2) if settings.angle_source == "measured" else estimate[:3]
             if settings.feedback != "observer":
-                x2 = (now * rates[settings.feedback]).real
+                x2 = np.real(now * rates[settings.feedback])
             law_state, u = law.step(law_state, y, feedback_state(x1, x2, x3, tuple(estimate[3:])), held)
             outputs[k], inputs[k] = u if notch is None else notch(u), now
-            held, now = now.real, now * turn
+            held, now = np.real(now), now * turn
     return -_fitted(outputs[steps // 2 :], inputs[steps // 2 :])
+
+
+def _shown(now: np.ndarray, y1: np.ndarray, y2: np.ndarray, acceleration: np.ndarray) -> Measurement:
+    """The measurement while the command is the real part of `now`."""
+    return Measurement(*(np.real(now * answer) for answer in (y1, y2, acceleration)))
 
 
 def _fitted(outputs: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     """Fit Re(g input) and a constant to what was answered, least squares, a frequency each: g, (n_frequencies,)."""
-    basis = np.stack([inputs.real, -inputs.imag, np.ones_like(outputs)], axis=-1).transpose(1, 0, 2)
+    basis = np.stack([np.real(inputs), -np.imag(inputs), np.ones_like(outputs)], axis=-1).transpose(1, 0, 2)
     square = basis.transpose(0, 2, 1) @ basis
     real, imaginary, _ = np.linalg.solve(square, basis.transpose(0, 2, 1) @ outputs.T[:, :, None])[:, :, 0].T
     return real + 1j * imaginary

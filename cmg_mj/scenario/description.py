@@ -10,11 +10,19 @@ from cmg_mj.errors import TomlValue
 from cmg_mj.scenario.bend_cures import NEAR, Trial, cure_among, is_near, loop_of, trials
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
+from cmg_mj.scenario.left_out import left_out
 from cmg_mj.scenario.linear_rig import rk4_energy_loss
 from cmg_mj.scenario.plant_parameters import PlantParameters
+from cmg_mj.scenario.plant_settings import BendBeyond
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.scenario.stability_check import closed_loop, hints
+
+BEYOND: dict[BendBeyond, str] = {
+    "sensors": "with the sensors; the modules, whose tilt and rate count as true, are before it",
+    "modules": "with the modules, whose tilt and rate count as true; the sensors are before it",
+    "both": "with the modules, whose tilt and rate count as true, and the sensors",
+}
 
 
 def description(name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "") -> str:
@@ -58,6 +66,10 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
         *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
     rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
+    rows += [("pivot", pivot.words) for pivot in scenario.pivot]
+    missing = list(left_out(scenario).values())
+    if missing:
+        rows.append(("left out", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
     rows += _bend_rows(scenario, rig)
     return lines(
         f"{name}{f', axis {axis}' if axis else ''}: valid",
@@ -75,20 +87,10 @@ def _bend_rows(scenario: Scenario, rig: PlantParameters) -> Iterator[tuple[str, 
         return
     plant, bend = scenario.plant, rig.bend
     loss, numerical = bend.energy_loss, rk4_energy_loss(bend.frequency_hz, rig.timestep)
-    yield (
-        "bend",
-        f"{bend.frequency_hz:g} Hz, damping ratio {bend.damping_ratio:g}, beyond it {plant.bend_share:g} of the inertia",
-    )
-    yield (
-        "",
-        {
-            "sensors": "with the sensors; the modules, whose tilt and rate count as true, are before it",
-            "modules": "with the modules, whose tilt and rate count as true; the sensors are before it",
-            "both": "with the modules, whose tilt and rate count as true, and the sensors",
-        }[plant.bend_beyond],
-    )
+    mode = f"{bend.frequency_hz:g} Hz, damping ratio {bend.damping_ratio:g}"
+    yield "bend", f"{mode}, beyond it {plant.bend_share:g} of the inertia"
+    yield "", BEYOND[plant.bend_beyond]
     yield "", f"loses {100.0 * loss:.3g} % of its energy a second, and {100.0 * numerical:.2g} % to the physics steps"
-    yield "", "the reduced model, the closed loop above, the ceiling and the floors leave it out"
     loop = loop_of(scenario, rig)
     if loop is None:
         yield "", "its loop is not computed for code of your own"
@@ -103,7 +105,7 @@ def _bend_rows(scenario: Scenario, rig: PlantParameters) -> Iterator[tuple[str, 
     if cure is None or (loop.is_stable and cure.loop.distance <= loop.distance):
         yield (
             "cure",
-            "none of these: the mode is too near the loop's bandwidth; take a stiffer frame or another observer",
+            "none of these: the mode is too near the loop's bandwidth; a stiffer frame or another observer may",
         )
         return
     little = "" if cure.loop.distance >= NEAR else ", with little margin"

@@ -53,7 +53,7 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
     scenario = parse_scenario(fields, " ".join([name, *(["with"] if changes else []), *changes]))
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in overrides):
         scenario = find_model(scenario, path.parent)
-    return scenario
+    return find_tracks(scenario, path.parent)
 
 
 def _take_observer(fields: dict[str, Any], observer: str) -> None:
@@ -112,3 +112,21 @@ def find_model(scenario: Scenario, beside: Path) -> Scenario:
     with scenario.named_in_errors():
         model = find("models", scenario.plant.model, ".xml", "plant.model =", beside)
     return scenario.model_copy(update={"plant": dataclasses.replace(scenario.plant, model=str(model))})
+
+
+def find_tracks(scenario: Scenario, beside: Path) -> Scenario:
+    """The same with the whole paths of the pivot's tracks, which a scenario file names relative to itself."""
+    pivots = []
+    for pivot in scenario.pivot:
+        if pivot.file is not None:
+            paths = [path for path in (beside / pivot.file, Path(pivot.file)) if _is_file(path)]
+            pivot = dataclasses.replace(pivot, file=str(paths[0].resolve()) if paths else pivot.file)
+        pivots.append(pivot)
+    return scenario.model_copy(update={"pivot": pivots}) if pivots else scenario
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that is too long
+        return False

@@ -13,6 +13,11 @@ from cmg_mj.inputs.field_types import STRICT, Batched, NonNegative, PerAxis, Pos
 FINEST_STEP_S = 1e-6
 """The smallest physics step [s]."""
 Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
+COMPILED_FIELDS = (
+    *("model", "lock_thrust_bearing", "locked_axes"),
+    *("bend_frequency_hz", "bend_damping_ratio", "bend_share", "bend_beyond"),
+)
+"""Settings on which it depends what is compiled; the others change the compiled model."""
 BendBeyond = Literal["sensors", "modules", "both"]
 
 
@@ -39,6 +44,9 @@ class PlantSettings:
         accelerometer_inner_m: The inner accelerometer's distance from the tilt axis on the radial line [m]. The tilt
             estimate knows it.
         accelerometer_outer_m: The outer accelerometer's [m].
+        accelerometer_inner_misplaced_mm: So much farther out the inner accelerometer sits than the tilt estimate
+            knows [mm].
+        accelerometer_outer_misplaced_mm: The outer accelerometer likewise [mm].
         tilt_friction_n_m: Dry friction of the tilt joint [N m].
         tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
         flywheel_speed_rad_s: At which all flywheels turn, each in its own direction [rad/s]. The controller knows it.
@@ -67,6 +75,8 @@ class PlantSettings:
     servo_damping_n_m_s_rad: Annotated[NonNegative | None, Batched()] = None
     accelerometer_inner_m: Annotated[Positive | None, Batched(), PerAxis()] = None
     accelerometer_outer_m: Annotated[Positive | None, Batched(), PerAxis()] = None
+    accelerometer_inner_misplaced_mm: Annotated[float, Batched(), PerAxis()] = 0.0
+    accelerometer_outer_misplaced_mm: Annotated[float, Batched(), PerAxis()] = 0.0
     tilt_friction_n_m: Annotated[NonNegative | None, Batched()] = None
     tilt_damping_n_m_s: Annotated[NonNegative | None, Batched()] = None
     flywheel_speed_rad_s: Positive | None = None
@@ -89,5 +99,13 @@ class PlantSettings:
 
     def changes_of_physics(self) -> dict[str, float]:
         """Return those of the `changes` that move masses or make torques."""
-        others = ("accelerometer_inner_m", "accelerometer_outer_m", "gimbal_backlash_arcmin")
-        return {name: value for name, value in self.changes().items() if name not in others}
+        return {
+            name: value
+            for name, value in self.changes().items()
+            if not name.startswith("accelerometer") and name != "gimbal_backlash_arcmin"
+        }
+
+    @property
+    def has_misplaced(self) -> bool:
+        """Whether an accelerometer sits elsewhere than the tilt estimate knows."""
+        return bool(self.accelerometer_inner_misplaced_mm or self.accelerometer_outer_misplaced_mm)

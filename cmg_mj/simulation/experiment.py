@@ -25,6 +25,7 @@ from cmg_mj.results.result import Driver, Result
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import base_of
+from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.stability_check import hints
@@ -36,10 +37,11 @@ from cmg_mj.simulation.batch import (
     batched,
     batched_interface,
     hashable,
+    once,
     require_same_structure,
     varied_settings,
 )
-from cmg_mj.simulation.prepare import check_axes, plant_on_grid
+from cmg_mj.simulation.prepare import check_scenario, plant_on_grid
 from cmg_mj.simulation.simulate import SimulationOptions, simulate
 
 
@@ -222,6 +224,7 @@ class Experiment:
         plant: Plant | Sequence[Plant],
         controller: AnyController,
         pushes: Sequence[Push] | None = None,
+        pivots: Sequence[Pivot] | None = None,
         driver: Driver = "native",
         **options: Unpack[SimulationOptions],
     ) -> Result:
@@ -231,6 +234,7 @@ class Experiment:
             plant: The rig, or one a world.
             controller: A fresh one.
             pushes: Instead of the scenario's.
+            pivots: Likewise.
             driver: What calls the controller.
             **options: Those of `simulate`.
 
@@ -245,6 +249,7 @@ class Experiment:
             observers={name: part.observer_names for name, part in zip(self.plant.axis_names, self.parts, strict=True)},
             pushes=scenario.push if pushes is None else pushes,
             swings=scenario.swing,
+            pivots=scenario.pivot if pivots is None else pivots,
             settings=scenario.metrics,
             driver=driver,
             **options,
@@ -338,7 +343,7 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
     with scenario.named_in_errors():
         grid = time_grid(scenario)
         plant = plant or plant_on_grid(scenario, grid, like)
-        check_axes(scenario, plant)
+        check_scenario(scenario, plant)
     if len(plant.axes) == 1 and not scenario.axes:
         return Experiment(scenario, plant, design(scenario, plant.parameters))
     parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
@@ -367,14 +372,13 @@ def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **option
         part = key.first_difference(other.batch_key)
         if part:
             raise InputError(f"run_many: {part} differs, which worlds of one batch must have in common")
-    plants, controller, pushes = batch_inputs(experiments, worlds)
-    return first.simulate(plants, controller, pushes, **options)
+    return first.simulate(*batch_inputs(experiments, worlds), **options)
 
 
 def batch_inputs(
     experiments: Sequence[Experiment], worlds: Sequence[int], observer: Observer | None = None
-) -> tuple[list[Plant], AnyController, Sequence[Push]]:
-    """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, the pushes of all worlds.
+) -> tuple[list[Plant], AnyController, Sequence[Push], Sequence[Pivot]]:
+    """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, what moves all worlds.
 
     Args:
         experiments: One a world.
@@ -382,19 +386,12 @@ def batch_inputs(
         observer: The observer of all worlds instead of the first experiment's.
     """
     first, plants = experiments[0], [experiment.plant for experiment in experiments]
-    controllers, pushes = [], ()
+    controllers, pushes, pivots = [], (), ()
     for i, part in enumerate(first.parts):
         parts = [experiment.parts[i] for experiment in experiments]
-        law, sensors, pushes = batched(
-            [(one.design.fresh_law(), one.scenario.sensors, tuple(one.scenario.push)) for one in parts]
-        )
+        law, sensors, pushes, pivots = batched([(one.design.fresh_law(), one.scenario) for one in parts])
         interface = batched_interface(part.plant, plants, i)
         controllers.append(
             part.design.controller(interface, worlds=worlds, axis=i, observer=observer, law=law, sensors=sensors)
         )
-    return plants, first.of_axes(controllers), pushes
-
-
-def once(experiments: Sequence[Experiment]) -> list[Experiment]:
-    """Each of some experiments once."""
-    return list({id(experiment): experiment for experiment in experiments}.values())
+    return plants, first.of_axes(controllers), pushes, pivots

@@ -7,6 +7,7 @@ import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 import tomli_w
@@ -100,7 +101,7 @@ def hash_of_study(fields: StudyFields) -> str:
 
 
 def hash_of_models(study: SweepStudy) -> str:
-    """Hash the files of the study's model, or of those that it varies, with all that they include.
+    """Hash the files of the study's model, or of those that it varies, with all that they include, and its tracks.
 
     Raises:
         InputError: A file cannot be read.
@@ -116,6 +117,15 @@ def hash_of_models(study: SweepStudy) -> str:
                     f"plant.model = {model!r}: {path} cannot be read: {error.strerror or error}"
                 ) from error
             digest.update(f"{path.name} {len(content)}\n".encode() + content)
+    for i, pivot in enumerate(study.scenario.pivot):
+        if pivot.file is not None:
+            try:
+                content = Path(pivot.file).read_bytes()
+            except OSError as error:
+                raise InputError(
+                    f"pivot.{i}.file = {pivot.file!r}: cannot be read: {error.strerror or error}"
+                ) from error
+            digest.update(f"track {i} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 

@@ -23,6 +23,8 @@ VARIATIONS = {
     "servo_damping_n_m_s_rad": 1.0,
     "accelerometer_inner_m": 0.1,
     "accelerometer_outer_m": 0.5,
+    "accelerometer_inner_misplaced_mm": 3.0,
+    "accelerometer_outer_misplaced_mm": -3.0,
     "tilt_friction_n_m": 0.01,
     "tilt_damping_n_m_s": 0.01,
     "flywheel_speed_rad_s": 200.0,
