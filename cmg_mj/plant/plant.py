@@ -27,7 +27,6 @@ from cmg_mj.inputs.messages import complaint
 from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
-from cmg_mj.plant.bend import step_for_bend
 from cmg_mj.plant.bend_model import bend_model
 from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
@@ -146,8 +145,7 @@ class Plant:
         vary(self.model, settings, self.path, self.axes, held)
         speeds = [abs(module.speed) for axis in self.axes for module in axis.modules]
         shaken = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
-        own_step = step_for_bend(settings, self.timestep, self.path)
-        self.largest_step = largest_step(self.model, self.key, own_step, shaken)
+        self.largest_step = largest_step(self.model, self.key, float(self.model.opt.timestep), shaken)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "

@@ -12,6 +12,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import Axis
+from cmg_mj.plant.bend import step_for_bend
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.tilt_line import HingeLine
@@ -43,7 +44,7 @@ def vary(
 
     Raises:
         InputError: The body that tilts has no mass of its own to move or no joint for friction, or a servo is none that
-            has what is to differ.
+            has what is to differ; or a bend does not go together with the rest.
     """
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
@@ -73,6 +74,8 @@ def vary(
         for module in modules:
             body = int(model.dof_bodyid[module.flywheel_dof])
             model.body_ipos[body, 0] += settings.flywheel_imbalance_kg_m / model.body_mass[body]
+    if settings.bends:
+        model.opt.timestep = step_for_bend(settings, model.opt.timestep, path)
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
 
 
