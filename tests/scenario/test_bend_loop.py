@@ -100,9 +100,9 @@ def test_the_cure_is_the_first_with_a_margin() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hz", [10, 15, 40])
+@pytest.mark.parametrize("hz", [10, 40])
 @pytest.mark.parametrize("place", ["sensors", "both"])
-@pytest.mark.parametrize("rate", ["fog", "truth", "homogeneous", "kalman", "gyro_free"])
+@pytest.mark.parametrize("rate", ["fog", "homogeneous", "gyro_free"])
 @pytest.mark.parametrize("cured", [False, True])
 def test_its_verdict_is_that_of_the_simulation(hz: float, place: str, rate: str, cured: bool) -> None:
     settings = [f"plant.bend_frequency_hz={hz}", f"plant.bend_beyond={place}", "plant.bend_share=0.5"]
