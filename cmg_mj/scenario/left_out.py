@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from cmg_mj.scenario.schema import Scenario
 
-IN_THE_MODEL = ("plant.bend_frequency_hz",)
+IN_THE_MODEL = (
+    "plant.accelerometer_inner_misplaced_mm",
+    "plant.accelerometer_outer_misplaced_mm",
+    "plant.bend_frequency_hz",
+)
 """Those of them that the plant's MuJoCo model itself has, whoever steps it."""
 
 

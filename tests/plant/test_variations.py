@@ -220,10 +220,11 @@ def test_what_they_feel_of_a_turn_grows_with_the_distance() -> None:
 
 def test_misplaced_they_feel_what_is_there_and_the_estimate_knows_the_old_places() -> None:
     """At rest nothing shows; a turn shows in y1, and its acceleration by the wrong distance."""
-    off = {"accelerometer_inner_misplaced_mm": 3.0, "accelerometer_outer_misplaced_mm": -5.0}
-    plant = load_plant(accelerometer_inner_m=INNER, accelerometer_outer_m=OUTER, lock_thrust_bearing=True, **off)
+    off = PlantSettings(accelerometer_inner_misplaced_mm=3.0, accelerometer_outer_misplaced_mm=-5.0)
+    assert load_plant(off).radial_tilt == load_plant().radial_tilt
+    places = {"accelerometer_inner_m": INNER, "accelerometer_outer_m": OUTER}
+    plant = load_plant(replace(off, **places, lock_thrust_bearing=True))
     assert plant.radial_tilt == RadialTilt(INNER, OUTER)
-    assert load_plant(**off).radial_tilt == load_plant().radial_tilt
     data = plant.new_data()
     span, rate = OUTER - INNER - 0.008, 3.0
     data.qpos[plant.tilt], data.qvel[plant.tilt] = plant.tilt_zero + 0.2, rate

@@ -32,9 +32,8 @@ def readings(
 ) -> np.ndarray:
     """n samples of accelerometers at rest, weightless and otherwise perfect."""
     pair, _, _ = sampled_sensors(Sensors(Accelerometer(**{**SILENT, **fields})), h, 0, worlds)
-    many = not isinstance(worlds, int)
-    forces = np.zeros((4, len(worlds))) if many else (0.0,) * 4
-    wheels = [np.full(len(worlds), rate) if many else rate for rate in rates]
+    forces = (0.0,) * 4 if isinstance(worlds, int) else np.zeros((4, len(worlds)))
+    wheels = [rate if isinstance(worlds, int) else np.full(len(worlds), rate) for rate in rates]
     taken = []
     for k in range(n):
         pair.sample(k, IdealReading(forces, [0.0], 0.0, 0.0, wheels))
@@ -103,7 +102,7 @@ def test_a_low_pass_takes_off_what_lies_beyond_it() -> None:
     def power(f: np.ndarray) -> np.ndarray:
         return (f * 350.0) ** 2 / ((45000.0 - f * f) ** 2 + (f * 350.0) ** 2)
 
-    aliased = sum(power(np.abs(f + 1000.0 * k)) for k in fold)
+    aliased = np.sum([power(np.abs(f + 1000.0 * k)) for k in fold], axis=0)
     t = math.tan(math.pi * 44.0 / 1000.0)
     passed = 1.0 / (1.0 + (np.tan(math.pi * f / 1000.0) / t) ** 4)
     expected = math.sqrt(float((aliased * passed).sum() / aliased.sum()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -15,9 +16,11 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.pivot_signals import PivotSignals
 from cmg_mj.sensors.ideal import IdealReading
+from cmg_mj.simulation.callback import control
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.physics import OneWorld
 from cmg_mj.simulation.schedule import sampling_instants, with_moving_pivot
+from tests.command import cmg_mj
 from tests.simulation.driven_base import DrivenBase
 
 NOISE = 'pivot=[{kind="noise", acceleration_m_s2=0.3, corner_hz=5.0}]'
@@ -156,6 +159,40 @@ def test_the_callback_sees_the_same() -> None:
     assert called is not None
     for name, column in native.columns.items():
         np.testing.assert_array_equal(called[name], column, name)
+
+
+def test_a_users_own_loop_moves_it_as_the_docs_say() -> None:
+    rig = experiment(NOISE, "duration_s=0.3")
+    expected = rig.run().trajectory
+    plant, pivots = with_own_model(rig.plant), rig.scenario.pivot
+    pivot = PivotSignals(pivots, pivot_directions(plant, pivots), seed=0, worlds=0)
+    still = plant.model.opt.gravity.copy()
+    controller, data = rig.controller(), plant.new_data()
+    tilts = []
+    for k in range(60):
+        tilts.append(plant.axis.line.lean(data.qpos) + plant.bias)
+        plant.model.opt.gravity[:] = still - pivot.mean(k * 0.005, (k + 1) * 0.005)
+        control(plant, controller, data)
+        mujoco.mj_step(plant.model, data)
+    assert expected is not None
+    np.testing.assert_array_equal(tilts, expected["x1_rad"])
+
+
+def test_it_runs_again_from_its_own_folder_and_check_says_what_is_left_out(tmp_path: Path) -> None:
+    scenario, track = tmp_path / "mine.toml", tmp_path / "walk.csv"
+    track.write_text("t,a\n0,0.1\n0.2,-0.2\n", encoding="utf-8")
+    scenario.write_text(
+        "duration_s = 0.3\n[[pivot]]\nkind = 'track'\nfile = 'walk.csv'\n[[pivot]]\nkind = 'step'\n"
+        "acceleration_m_s2 = 0.1\ndirection = 'vertical'\n",
+        encoding="utf-8",
+    )
+    first = cmg_mj("run", scenario, "--json", "--out", tmp_path / "one")
+    again = cmg_mj("run", tmp_path / "one" / "scenario.toml", "--json", "--out", tmp_path / "two")
+    assert first.status == again.status == 0
+    assert first.out == again.out
+    checked = cmg_mj("check", scenario).out
+    assert f"pivot       track, {track}, times 1, across, from 0 s" in checked
+    assert "left out    the pivot's acceleration: not in the reduced model, its loop, the ceiling" in checked
 
 
 def test_figures_do_not_depend_on_the_physics_step() -> None:

@@ -83,7 +83,7 @@ def not_ours(there: ChunkFingerprint | None, ours: ChunkFingerprint) -> str | No
     if there is None or there.study != ours.study:
         return "holds no trials of this study"
     if there.model != ours.model:
-        return "was computed with a model file that has changed since"
+        return "was computed with a model file or a track that has changed since"
     return None if there.chunk == ours.chunk else f"is chunk {there.chunk}, in the place of {ours.chunk}"
 
 

@@ -16,6 +16,7 @@ ROBOTS: dict[str, tuple[str, dict[str, Any]]] = {
     "held pendulum": ("inverted_pendulum.xml", {"body": "pole", "axis": "hinge"}),
     "pendulum on a free cart": ("inverted_pendulum.xml", {"body": "pole", "axis": "hinge", "release": ["slider"]}),
     "hopper": ("hopper.xml", {"body": "torso", "axis": "x", "base": "free"}),
+    "humanoid": ("humanoid.xml", {"body": "torso", "axis": "y", "scale": 2.2}),
 }
 SCENARIO = """\
 push = [{ start_s = 3.0, duration_s = 0.1, torque_n_m = 2.0 }]

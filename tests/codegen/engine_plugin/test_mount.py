@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -18,6 +19,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.results.run_folder import RunFolder
+from cmg_mj.results.run_folder.folder import write_text
 from cmg_mj.studies.push_limits.mount_plugin import claimed_plugin, plugin_folder, plugin_name
 from tests.codegen.engine_plugin.made import needs_compiler
 from tests.command import HANGS_AFTER_S, ROOT, cmg_mj, environment
@@ -73,7 +75,7 @@ def test_what_is_there_already() -> None:
 
     def write(*names: str) -> None:
         with RunFolder(folder) as claim:
-            claim.write({name: lambda path: path.write_bytes(b"1") and None for name in names})
+            claim.write({name: partial(write_text, text="1") for name in names})
 
     with claimed_plugin(target, robot, overwrite=False):
         assert refused() == f"-o b.xml: {folder}: another run is writing to it"
@@ -105,6 +107,7 @@ def test_what_is_there_already() -> None:
 
 def test_nothing_is_begun_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("robot.xml").write_text(PENDULUM, encoding="utf-8")
+    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files._mount_and_write", None)
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
     assert "there is no C compiler" in cmg_mj(*MOUNT).complaint

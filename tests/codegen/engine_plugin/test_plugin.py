@@ -326,24 +326,32 @@ def test_other_sensors_of_a_model_are_those_without_a_plugin() -> None:
 
 @pytest.mark.filterwarnings("ignore:Attach conflict")
 def test_two_rigs_in_one_model() -> None:
-    """Each is attached with a prefix and has an instance: both are the one that stands alone."""
+    """Each is attached with a prefix and has an instance and a seed: each is the one that stands alone with it."""
     made = quick()
-    spec, prefixes = mujoco.MjSpec(), ("a/", "b_")
+    spec, prefixes = mujoco.MjSpec(), {"a/": 5, "b_": 6}
+    text = made.plugin.model.read_text(encoding="utf-8")
     spec.option.timestep, spec.option.integrator = made.model.opt.timestep, made.model.opt.integrator
     spec.option.disableflags = made.model.opt.disableflags
     for prefix in prefixes:
-        rig = mujoco.MjSpec.from_file(str(made.plugin.model))
+        seed = f'<config key="seed" value="{prefixes[prefix]}"/></instance>'
+        rig = mujoco.MjSpec.from_string(text.replace("</instance>", seed))
         spec.attach(rig, prefix=prefix, frame=spec.worldbody.add_frame())
     model = spec.compile()
-    data, alone = mujoco.MjData(model), made.start()
-    for start, target in ((alone.qpos, data.qpos), (alone.qvel, data.qvel), (alone.act, data.act)):
-        target[:] = [*start, *start]
+    data, single = mujoco.MjData(model), [made.start() for _ in prefixes]
+    for name in ("qpos", "qvel", "act"):
+        getattr(data, name)[:] = np.concatenate([getattr(alone, name) for alone in single])
+    for seed, alone in zip(prefixes.values(), single, strict=True):
+        set_world(made.model, alone, seed, 0)
     for _ in range(100):
         mujoco.mj_step(model, data)
-        mujoco.mj_step(made.model, alone)
-    for prefix in prefixes:
-        shown = data.sensor(f"{prefix}balance/estimate").data
-        np.testing.assert_array_equal(shown, alone.sensor("balance/estimate").data)
+        for alone, prefix in zip(single, prefixes, strict=True):
+            mujoco.mj_step(made.model, alone)
+            for quantity in ("estimate", "command", "acceleration"):
+                shown = data.sensor(f"{prefix}balance/{quantity}").data
+                np.testing.assert_array_equal(shown, alone.sensor(f"balance/{quantity}").data)
+        np.testing.assert_array_equal(data.qpos, np.concatenate([alone.qpos for alone in single]))
+        np.testing.assert_array_equal(data.qvel, np.concatenate([alone.qvel for alone in single]))
+    assert single[0].sensor("balance/command").data != single[1].sensor("balance/command").data
 
 
 @pytest.mark.parametrize("name", sorted(NAMES_IN_USE))

@@ -13,13 +13,15 @@ import numpy as np
 import pytest
 
 from cmg_mj.codegen.export import check, export
+from cmg_mj.controllers import laws
 from cmg_mj.errors import InputError, RunStopped
 from tests.codegen.export import own_laws
 from tests.codegen.export.compiled import Compiled, compile_c, controller, needs_compiler, record
 from tests.command import cmg_mj
 
 OWN = "tests.codegen.export.own_laws:"
-LAWS = ["lqg", "examples.own_law:Leaning", *(f"{OWN}{name}" for name in ("Memoryless", "Elaborate", "InADict"))]
+LAWS = [kind for kind in laws.LAWS if kind != "state_feedback"]
+LAWS += ["examples.own_law:Leaning", *(f"{OWN}{name}" for name in ("Memoryless", "Elaborate", "InADict"))]
 SETTINGS = {
     "trimmed": ("controller.bias_trim_s=0.52",),
     "estimated angles": ("controller.angle_source=estimated", "controller.rate_hz=400"),

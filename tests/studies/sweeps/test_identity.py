@@ -80,7 +80,17 @@ def test_an_edited_model_is_another(tmp_path: Path, model_copy: Path, name: str)
     assert cmg_mj(*sweep).status == 0
     with (tmp_path / name).open("a", encoding="utf-8") as file:
         file.write("<!-- edited -->\n")
-    complaint = "was computed with a model file that has changed since"
+    complaint = "was computed with a model file or a track that has changed since"
+    assert cmg_mj(*sweep).complaint == f"{tmp_path / 'out' / 'chunks' / '000000.parquet'}: {complaint}{CURE}"
+
+
+def test_an_edited_track_is_another(tmp_path: Path) -> None:
+    track = tmp_path / "track.csv"
+    track.write_text("t,a\n0,0.1\n1,0.2\n", encoding="utf-8")
+    sweep = [*SWEEP[:-1], "--set", f"pivot=[{{kind='track', file='{track}'}}]", "--out", tmp_path / "out"]
+    assert cmg_mj(*sweep).status == 0
+    track.write_text("t,a\n0,0.1\n1,0.3\n", encoding="utf-8")
+    complaint = "was computed with a model file or a track that has changed since"
     assert cmg_mj(*sweep).complaint == f"{tmp_path / 'out' / 'chunks' / '000000.parquet'}: {complaint}{CURE}"
 
 
