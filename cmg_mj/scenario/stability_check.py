@@ -163,8 +163,8 @@ def _bend_hint(scenario: Scenario, rig: PlantParameters) -> str | None:
         return None
     fault = f"comes within {loop.distance:.2f} of -1" if loop.is_stable else "is unstable"
     return (
-        f"plant.bend_frequency_hz = {rig.bend.frequency_hz:g}: around a frame that bends so the loop {fault}; "
-        "`cmg-mj check` tries what may cure it"
+        f"plant.bend_frequency_hz = {rig.bend.frequency_hz:g}: with that bend the loop {fault}; `cmg-mj check` "
+        "tries what may cure it"
     )
 
 

@@ -52,16 +52,23 @@ def bend(hz: float, place: str) -> list[str]:
 
 def rows(worlds: int) -> list[tuple[str, list[tuple[Sequence[str], int]]]]:
     """All rows of the tables, each a head and its cells."""
-    result = [("rigid", [(rate, worlds) for rate in RATES.values()]), ("rigid, no rate", [(NO_RATE, worlds)])]
+    result: list[tuple[str, list[tuple[Sequence[str], int]]]] = [
+        ("rigid", [(rate, worlds) for rate in RATES.values()]),
+        ("rigid, no rate", [(NO_RATE, worlds)]),
+    ]
     for place in PLACES:
         for hz in FREQUENCIES_HZ:
             for cure, settings in CURES.items():
                 changes = [setting.replace("{hz}", f"{hz:g}") for setting in settings]
-                cells = [([*bend(hz, place), *rate, *changes], worlds) for rate in RATES.values()]
+                cells: list[tuple[Sequence[str], int]] = [
+                    ([*bend(hz, place), *rate, *changes], worlds) for rate in RATES.values()
+                ]
                 result.append((f"{place} {hz:g} Hz, {cure}", cells))
     for hz in (10.0, 20.0):
-        cells = [([*bend(hz, "mast"), *RATES["gyro_free"], f"controller.notch_hz={hz * off:g}"], worlds) for off in OFF]
-        result.append((f"mast {hz:g} Hz, gyro_free, notch off by {', '.join(f'{off:g}' for off in OFF)}", cells))
+        row: list[tuple[Sequence[str], int]] = [
+            ([*bend(hz, "mast"), *RATES["gyro_free"], f"controller.notch_hz={hz * off:g}"], worlds) for off in OFF
+        ]
+        result.append((f"mast {hz:g} Hz, gyro_free, notch off by {', '.join(f'{off:g}' for off in OFF)}", row))
     return result
 
 
