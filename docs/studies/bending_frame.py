@@ -32,7 +32,7 @@ CURES = {
     "lower bandwidth": [SOFTER],
     "notch": ["controller.notch_hz={hz}"],
 }
-FREQUENCIES_HZ = (5.0, 10.0, 20.0, 40.0)
+FREQUENCIES_HZ = {"mast": (5.0, 10.0, 20.0, 40.0), "base": (5.0, 10.0)}
 OFF = (0.85, 0.92, 1.0, 1.08, 1.15)
 """A notch's middle over the mode's frequency."""
 
@@ -50,25 +50,28 @@ def bend(hz: float, place: str) -> list[str]:
     return [f"plant.bend_frequency_hz={hz:g}", *PLACES[place]]
 
 
-def rows(worlds: int) -> list[tuple[str, list[tuple[Sequence[str], int]]]]:
-    """All rows of the tables, each a head and its cells."""
-    result: list[tuple[str, list[tuple[Sequence[str], int]]]] = [
-        ("rigid", [(rate, worlds) for rate in RATES.values()]),
-        ("rigid, no rate", [(NO_RATE, worlds)]),
-    ]
-    for place in PLACES:
-        for hz in FREQUENCIES_HZ:
+Row = tuple[str, list[tuple[Sequence[str], int]]]
+"""A head, and the cells: their settings and the number of worlds."""
+
+
+def row(head: str, cells: Sequence[Sequence[str]], worlds: int) -> Row:
+    """A row of the tables."""
+    return head, [(settings, worlds) for settings in cells]
+
+
+def rows(worlds: int) -> list[Row]:
+    """All rows of the tables."""
+    result = [row("rigid", list(RATES.values()), worlds), row("rigid, no rate", [NO_RATE], worlds)]
+    for place, frequencies in FREQUENCIES_HZ.items():
+        for hz in frequencies:
             for cure, settings in CURES.items():
                 changes = [setting.replace("{hz}", f"{hz:g}") for setting in settings]
-                cells: list[tuple[Sequence[str], int]] = [
-                    ([*bend(hz, place), *rate, *changes], worlds) for rate in RATES.values()
-                ]
-                result.append((f"{place} {hz:g} Hz, {cure}", cells))
+                cells = [[*bend(hz, place), *rate, *changes] for rate in RATES.values()]
+                result.append(row(f"{place} {hz:g} Hz, {cure}", cells, worlds))
     for hz in (10.0, 20.0):
-        row: list[tuple[Sequence[str], int]] = [
-            ([*bend(hz, "mast"), *RATES["gyro_free"], f"controller.notch_hz={hz * off:g}"], worlds) for off in OFF
-        ]
-        result.append((f"mast {hz:g} Hz, gyro_free, notch off by {', '.join(f'{off:g}' for off in OFF)}", row))
+        cells = [[*bend(hz, "mast"), *RATES["gyro_free"], f"controller.notch_hz={hz * off:g}"] for off in OFF]
+        head = f"mast {hz:g} Hz, gyro_free, notch off by {', '.join(f'{off:g}' for off in OFF)}"
+        result.append(row(head, cells, worlds))
     return result
 
 
