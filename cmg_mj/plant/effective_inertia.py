@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.plant.mujoco_state import at_keyframe
-from cmg_mj.plant.parts import ON_A_JOINT
+from cmg_mj.plant.parts import BEND_JOINT, ON_A_JOINT, element_id
 from cmg_mj.plant.tilt_line import HingeLine, Line
 
 SMALL = 1e-9
@@ -67,8 +67,8 @@ def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, joint: int, speed
 
 
 def _free_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
-    """Degrees of freedom that neither a constraint nor a servo holds, flywheels and gimbals left out."""
-    held = set()
+    """Degrees of freedom that neither a constraint, a servo nor the spring of a bend holds."""
+    held = {int(model.jnt_dofadr[joint]) for joint in [element_id(model, "joint", BEND_JOINT)] if joint >= 0}
     for constraint in np.flatnonzero((model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (data.eq_active == 1)):
         held.add(int(model.jnt_dofadr[model.eq_obj1id[constraint]]))
     for actuator in range(model.nu):

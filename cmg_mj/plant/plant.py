@@ -27,6 +27,7 @@ from cmg_mj.inputs.messages import complaint
 from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
+from cmg_mj.plant.bend_model import bend_model
 from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse_drawn
@@ -36,7 +37,7 @@ from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
 from cmg_mj.scenario.plant_parameters import PlantParameters
-from cmg_mj.scenario.plant_settings import FINEST_STEP_S, PlantSettings
+from cmg_mj.scenario.plant_settings import COMPILED_FIELDS, FINEST_STEP_S, PlantSettings
 from cmg_mj.scenario.schema import ObserverSettings
 from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
@@ -73,7 +74,7 @@ class Plant:
     ) -> None:
         self.path = path
         locked, lock = settings.locked_axes, settings.lock_thrust_bearing
-        self.model, modules, self.hints = load_rig(path, lock=lock, locked_axes=locked)
+        self.model, modules, self.hints = load_rig(path, lock=lock, locked_axes=locked, bend=settings)
         self._as_filed = self.model
         self.key = element_id(self.model, "key", EQUILIBRIUM_KEY)
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in self.joint_names else None
@@ -95,7 +96,7 @@ class Plant:
         """The same rig with other settings, without compiling its file again.
 
         Args:
-            settings: Settings with the same model file, which lock the thrust bearing and axes alike.
+            settings: Settings with the same model file, the same locks and the same bend.
             grid: The times that whole physics steps must fill.
             of_axes: The settings of axes that have their own.
 
@@ -112,9 +113,8 @@ class Plant:
         return other
 
     def is_of_same_file(self, settings: PlantSettings) -> bool:
-        """Return whether `changed` can take these settings: the same model file with the same locks."""
-        names = ("model", "lock_thrust_bearing", "locked_axes")
-        return all(getattr(self.settings, name) == getattr(settings, name) for name in names)
+        """Return whether `changed` can take these settings: the same model file, locks and bend."""
+        return all(getattr(self.settings, name) == getattr(settings, name) for name in COMPILED_FIELDS)
 
     def _apply_settings(
         self, settings: PlantSettings, grid: TimeGrid | None, of_axes: Mapping[str, PlantSettings]
@@ -151,9 +151,8 @@ class Plant:
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
                 f"{FINEST_STEP_S:g} s; soften it, or set plant.timestep_s"
             )
-        self.model.opt.timestep = (
-            grid.physics_step(self.largest_step) if grid else settings.timestep_s or self.largest_step
-        )
+        step = grid.physics_step(self.largest_step) if grid else settings.timestep_s
+        self.model.opt.timestep = step or self.largest_step
         if not survives_first_steps(self.model, self.new_data()):
             raise InputError(
                 f"{self._error_source}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, "
@@ -163,8 +162,8 @@ class Plant:
     @property
     def _error_source(self) -> str:
         """Culprit if the physics fails: the settings that change it, or without such settings the file."""
-        changes = [f"plant.{name} = {value:g}" for name, value in self.settings.changes_of_physics().items()]
-        return ", ".join(changes) or str(self.path)
+        changes = self.settings.changes_of_physics()
+        return ", ".join(f"plant.{name} = {value:g}" for name, value in changes.items()) or str(self.path)
 
     @cached_property
     def drawn_model(self) -> mujoco.MjModel:
@@ -337,9 +336,9 @@ class Plant:
     def parameters(self) -> PlantParameters:
         """Parameters from which a scenario's controller and observers are made."""
         names = tuple(module.name for module in self.axis.modules)
-        return PlantParameters(
-            self.path, names, self.reduced, self.radial_tilt, self.gravity, self.timestep, self.largest_step, self.hints
-        )
+        numbers = self.reduced, self.radial_tilt, self.gravity, self.timestep, self.largest_step
+        bend = bend_model(self.model, self.key, self.axis, self.settings)
+        return PlantParameters(self.path, names, *numbers, self.hints, bend)
 
     def initialise(self, data: mujoco.MjData) -> None:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""

@@ -12,8 +12,9 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import Axis
+from cmg_mj.plant.bend import step_for_bend
 from cmg_mj.plant.mujoco_state import at_keyframe
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Module, element_id
+from cmg_mj.plant.parts import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.sensors.tilt import RadialTilt
@@ -43,7 +44,7 @@ def vary(
 
     Raises:
         InputError: The body that tilts has no mass of its own to move or no joint for friction, or a servo is none that
-            has what is to differ.
+            has what is to differ; or a bend does not go together with the rest.
     """
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
@@ -68,11 +69,13 @@ def vary(
     _vary_servos(model, settings, path, modules)
     shifts = [bias_shift(model, axis, axis.bias, path) for axis in axes if axis.bias]
     for axis, shift in zip([axis for axis in axes if axis.bias], shifts, strict=True):
-        model.body_ipos[axis.frame] += shift
+        model.body_ipos[frame_bodies(model, axis)] += shift
     if settings.flywheel_imbalance_kg_m:
         for module in modules:
             body = int(model.dof_bodyid[module.flywheel_dof])
             model.body_ipos[body, 0] += settings.flywheel_imbalance_kg_m / model.body_mass[body]
+    if settings.bends:
+        model.opt.timestep = step_for_bend(settings, model.opt.timestep, path)
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
 
 
@@ -236,7 +239,14 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
     centre = to_frame @ (data.subtree_com[all_that_tilts] - data.xpos[frame]) - axis.point
     radial = centre - (centre @ axis.direction) * axis.direction
     turned = math.cos(bias) * radial + math.sin(bias) * np.cross(axis.direction, radial)
-    return model.body_subtreemass[all_that_tilts] / model.body_mass[frame] * (turned - radial)
+    own = sum(float(model.body_mass[body]) for body in frame_bodies(model, axis))
+    return model.body_subtreemass[all_that_tilts] / own * (turned - radial)
+
+
+def frame_bodies(model: mujoco.MjModel, axis: Axis) -> list[int]:
+    """The frame, and the part of it beyond a bend if there is one."""
+    part = element_id(model, "body", BEND_JOINT)
+    return [axis.frame, *([part] if part >= 0 else [])]
 
 
 def _hinge(axis: Axis, path: Path) -> int:

@@ -7,13 +7,22 @@ from collections.abc import Iterable, Iterator, Mapping
 from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.errors import TomlValue
+from cmg_mj.scenario.bend_cures import NEAR, Trial, cure_among, is_near, loop_of, trials
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.left_out import left_out
+from cmg_mj.scenario.linear_rig import rk4_energy_loss
 from cmg_mj.scenario.plant_parameters import PlantParameters
+from cmg_mj.scenario.plant_settings import BendBeyond
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.scenario.stability_check import closed_loop, hints
+
+BEYOND: dict[BendBeyond, str] = {
+    "sensors": "with the sensors; the modules, whose tilt and rate count as true, are before it",
+    "modules": "with the modules, whose tilt and rate count as true; the sensors are before it",
+    "both": "with the modules, whose tilt and rate count as true, and the sensors",
+}
 
 
 def description(name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "") -> str:
@@ -61,6 +70,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
     missing = list(left_out(scenario).values())
     if missing:
         rows.append(("left out", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
+    rows += _bend_rows(scenario, rig)
     return lines(
         f"{name}{f', axis {axis}' if axis else ''}: valid",
         [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))],
@@ -69,6 +79,41 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
 
 def _about(torque: Push | Swing) -> str:
     return "" if torque.axis is None else f" about {torque.axis}"
+
+
+def _bend_rows(scenario: Scenario, rig: PlantParameters) -> Iterator[tuple[str, str]]:
+    """The mode of a frame that bends, the loop around it, and what cures that if it needs a cure."""
+    if rig.bend is None:
+        return
+    plant, bend = scenario.plant, rig.bend
+    loss, numerical = bend.energy_loss, rk4_energy_loss(bend.frequency_hz, rig.timestep)
+    mode = f"{bend.frequency_hz:g} Hz, damping ratio {bend.damping_ratio:g}"
+    yield "bend", f"{mode}, beyond it {plant.bend_share:g} of the inertia"
+    yield "", BEYOND[plant.bend_beyond]
+    yield "", f"loses {100.0 * loss:.3g} % of its energy a second, and {100.0 * numerical:.2g} % to the physics steps"
+    loop = loop_of(scenario, rig)
+    if loop is None:
+        yield "", "its loop is not computed for code of your own"
+        return
+    yield "", f"the loop with it, feedback from the {scenario.controller.feedback}: {Trial((), loop).words}"
+    if not is_near(loop):
+        return
+    tried = trials(scenario, rig)
+    for trial in tried:
+        yield "tried", f"{' '.join(trial.settings)}: {trial.words}"
+    cure = cure_among(tried)
+    if cure is None or (loop.is_stable and cure.loop.distance <= loop.distance):
+        yield (
+            "cure",
+            "none of these: the mode is too near the loop's bandwidth; a stiffer frame or another observer may",
+        )
+        return
+    little = "" if cure.loop.distance >= NEAR else ", with little margin"
+    yield "cure", f"{' '.join(f'--set {_quoted(setting)}' for setting in cure.settings)}{little}"
+
+
+def _quoted(setting: str) -> str:
+    return f"'{setting}'" if " " in setting else setting
 
 
 def _law_rows(

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from cmg_mj.scenario.schema import Scenario
 
-IN_THE_MODEL = ("plant.accelerometer_inner_misplaced_mm", "plant.accelerometer_outer_misplaced_mm")
+IN_THE_MODEL = (
+    "plant.accelerometer_inner_misplaced_mm",
+    "plant.accelerometer_outer_misplaced_mm",
+    "plant.bend_frequency_hz",
+)
 """Those of them that the plant's MuJoCo model itself has, whoever steps it."""
 
 
@@ -29,4 +33,6 @@ def left_out(scenario: Scenario) -> dict[str, str]:
         field = f"accelerometer_{which}_misplaced_mm"
         if getattr(scenario.plant, field):
             clauses[f"plant.{field}"] = f"the {which} accelerometer's misplacement"
+    if scenario.plant.bends:
+        clauses["plant.bend_frequency_hz"] = "the frame's bend"
     return clauses

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.scenario.linear_rig import BendModel
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 
@@ -24,6 +25,7 @@ class PlantParameters(NamedTuple):
         timestep: The physics step [s].
         largest_step: The largest physics step that is accurate enough [s].
         hints: Clauses on what the reduced model does not know of the plant.
+        bend: The plant with its bend, linearised; None if its frame is rigid.
     """
 
     path: Path
@@ -34,6 +36,7 @@ class PlantParameters(NamedTuple):
     timestep: float
     largest_step: float
     hints: tuple[str, ...]
+    bend: BendModel | None = None
 
     def noise(self, sensors: Sensors) -> TiltNoise:
         """The noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""

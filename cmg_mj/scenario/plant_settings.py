@@ -13,6 +13,12 @@ from cmg_mj.inputs.field_types import STRICT, Batched, NonNegative, PerAxis, Pos
 FINEST_STEP_S = 1e-6
 """The smallest physics step [s]."""
 Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
+COMPILED_FIELDS = (
+    *("model", "lock_thrust_bearing", "locked_axes"),
+    *("bend_frequency_hz", "bend_damping_ratio", "bend_share", "bend_beyond"),
+)
+"""Settings on which it depends what is compiled; the others change the compiled model."""
+BendBeyond = Literal["sensors", "modules", "both"]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -45,6 +51,12 @@ class PlantSettings:
         tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
         flywheel_speed_rad_s: At which all flywheels turn, each in its own direction [rad/s]. The controller knows it.
         flywheel_imbalance_kg_m: Static imbalance of each flywheel, mass times offset [kg m].
+        bend_frequency_hz: The frame bends: the undamped frequency of its torsional mode about the tilt axis with the
+            hinge free, all else at rest and no gravity; 0 of a rigid frame [Hz].
+        bend_damping_ratio: Damping ratio of that mode.
+        bend_share: Share of the inertia about the tilt axis that lies beyond the bend, seen from the pivot.
+        bend_beyond: Beyond the bend are the `sensors` (on a mast; the modules are before it), the `modules` (the
+            sensors are before it, on the base) or `both` (on the base there is neither).
     """
 
     model: str = "scissored_pair.xml"
@@ -69,9 +81,18 @@ class PlantSettings:
     tilt_damping_n_m_s: Annotated[NonNegative | None, Batched()] = None
     flywheel_speed_rad_s: Positive | None = None
     flywheel_imbalance_kg_m: Annotated[float, Batched()] = 0.0
+    bend_frequency_hz: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
+    bend_damping_ratio: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.01
+    bend_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
+    bend_beyond: BendBeyond = "sensors"
+
+    @property
+    def bends(self) -> bool:
+        """Whether the frame bends."""
+        return self.bend_frequency_hz > 0.0
 
     def changes(self) -> dict[str, float]:
-        """Return the changed settings of gimbals, servos, accelerometers, tilt and flywheels: field -> value."""
+        """Return the changed numbers of gimbals, servos, accelerometers, tilt and flywheels: field -> value."""
         prefixes = ("gimbal", "servo", "accelerometer", "tilt", "flywheel")
         fields = [field for field in dataclasses.fields(self) if field.name.startswith(prefixes)]
         return {field.name: value for field in fields if (value := getattr(self, field.name)) != field.default}

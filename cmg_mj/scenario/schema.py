@@ -82,11 +82,19 @@ class ControllerSettings(BaseModel):
     """Several axes: whether the gimbals also turn against what a turn about the vertical couples."""
     bias_trim_s: Instant = 0.0
     """For so long from the start the integrator is held where the observer's bias estimate asks for it."""
+    notch_hz: Annotated[NonNegative, WhateverTheLaw()] = 0.0
+    """The middle of a notch on the law's command, for a frame that bends; 0: none."""
 
     @model_validator(mode="after")
     def _one_source_of_gains(self) -> ControllerSettings:
         if self.gains is not None and self.lqr is not None:
             raise ValueError("give either gains or lqr, not both")
+        return self
+
+    @model_validator(mode="after")
+    def _notch_below_half_the_rate(self) -> ControllerSettings:
+        if self.notch_hz >= 0.5 * self.rate_hz:
+            raise ValueError(f"notch_hz = {self.notch_hz:g}: must be below {0.5 * self.rate_hz:g} Hz, half of rate_hz")
         return self
 
     @property

@@ -10,6 +10,7 @@ import numpy as np
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.errors import InputError, shown
 from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
+from cmg_mj.scenario.bend_cures import is_near, loop_of
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
@@ -152,7 +153,19 @@ def hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]
     """
     law = design.law
     loop = closed_loop(scenario, law, rig.reduced).hint if isinstance(law, StateFeedback) else None
-    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *([loop] if loop else [])]
+    bend = _bend_hint(scenario, rig)
+    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *(hint for hint in (loop, bend) if hint)]
+
+
+def _bend_hint(scenario: Scenario, rig: PlantParameters) -> str | None:
+    loop = loop_of(scenario, rig)
+    if rig.bend is None or loop is None or not is_near(loop):
+        return None
+    fault = f"comes within {loop.distance:.2f} of -1" if loop.is_stable else "is unstable"
+    return (
+        f"plant.bend_frequency_hz = {rig.bend.frequency_hz:g}: with that bend the loop {fault}; `cmg-mj check` "
+        "tries what may cure it"
+    )
 
 
 def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:

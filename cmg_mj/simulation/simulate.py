@@ -147,7 +147,8 @@ class _Simulation:
         noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
         y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
         has_acceleration = [
-            not (self.pivots or sensor.accelerometer.vibrates or plant.axis.misplaced) for plant, sensor in pairs
+            not (self.pivots or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.settings.bends)
+            for plant, sensor in pairs
         ]
         floors = Floors(noises, y1_period, has_acceleration)
         # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.

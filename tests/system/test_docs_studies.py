@@ -95,3 +95,14 @@ def test_the_table_of_gymnasium() -> None:
     row = r"\| InvertedPendulum-v5, cart held \| +0.001 \| +10 of 10 \| +10 of 10 \| +0 of 10 \(\d+ to \d+ steps\) \|"
     assert re.search(row, process.stdout)
     assert re.search(row, (STUDIES.parent / "plugin.md").read_text(encoding="utf-8"))
+
+
+@pytest.mark.slow
+def test_a_cell_of_the_bending_frames_table() -> None:
+    study = importlib.import_module("bending_frame")
+    settings = [*study.bend(10.0, "mast"), *study.RATES["gyro_free"]]
+    assert study.cell((settings, 2)) == "2 fall"
+    assert float(study.cell(([*settings, "controller.notch_hz=10"], 2))) < 0.6
+    heads = [head for head, _ in study.rows(1)]
+    page = (STUDIES.parent / "real_rigs.md").read_text(encoding="utf-8")
+    assert all(f"| {head} |" in page for head in heads if "off by" not in head)
