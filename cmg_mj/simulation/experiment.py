@@ -22,6 +22,7 @@ from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.result import Driver, Result
+from cmg_mj.results.wire import WireReport
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import base_of
@@ -131,9 +132,13 @@ class Experiment:
 
     def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
-        from cmg_mj.codegen.board import Board
+        from cmg_mj.codegen.board import Board, WiredBoard
 
         result = self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
+        if isinstance(processor, WiredBoard):
+            rates = () if result.trajectory is None else result.trajectory["x2_rad_s"].tolist()
+            wire = WireReport(processor.name, processor.figures(), processor.log(rates))
+            return dataclasses.replace(result, driver="board", wire=wire)
         return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result
 
     def run_many(
@@ -303,10 +308,19 @@ class Experiment:
             bundled = prepare(base)
         return law_change | differences(bundled.resolved(), self.resolved())
 
-    def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
-        """The resolved scenario: running it again gives the same run; its head says if that needs options."""
+    def as_toml(self, driver: Driver = "native", world: int = 0, port: str = "") -> str:
+        """The resolved scenario: running it again gives the same run; its head says if that needs options.
+
+        Args:
+            driver: Who calls the controller, or is it.
+            world: Number of the world.
+            port: Port of a real board, if one decides.
+        """
         why, command = "", "cmg-mj run scenario.toml"
-        if driver == "board":
+        if port:
+            why += f"Run on a board at {port} (docs/board.md): to the same numbers as long as no tick is lost. "
+            command += f" --driver board --port {port}"
+        elif driver == "board":
             why += "Run on the emulated board (docs/board.md), whose numbers are not quite the host's. "
             command += " --driver board"
         if world:

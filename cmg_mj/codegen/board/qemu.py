@@ -30,7 +30,7 @@ STATUSES = {
     101: "its processor met a fault",
     102: "its stack is full",
 }
-"""Exit status -> the reason, as firmware/machine.h numbers them."""
+"""Exit status -> the reason, as firmware/port.h numbers them."""
 
 NOT_FINITE = {1: "a reading was not finite", 2: "its state, estimate or command was not finite"}
 """Status of an update -> the reason why the controller has stopped, as the exported header numbers them."""
