@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cmg_mj.cli.arguments import Command, all_of
+from cmg_mj.cli.arguments import Command, RunArguments, all_of
 from cmg_mj.cli.terminal import note
 from cmg_mj.errors import InputError
 
@@ -104,8 +104,13 @@ def wire_options(command: Command) -> Command:
 
     @functools.wraps(command)
     def with_options(
-        port: str | None, baud: int | None, deadline_ms: float | None, max_lost: int | None, **others: Any
+        *arguments: RunArguments,
+        port: str | None,
+        baud: int | None,
+        deadline_ms: float | None,
+        max_lost: int | None,
+        **others: Any,
     ) -> None:
-        command(wire=WireOptions(port, baud, deadline_ms, max_lost), **others)
+        command(*arguments, wire=WireOptions(port, baud, deadline_ms, max_lost), **others)
 
     return _OPTIONS(with_options)

@@ -318,7 +318,7 @@ class Experiment:
         """
         why, command = "", "cmg-mj run scenario.toml"
         if port:
-            why += f"Run on a board at {port} (docs/board.md): to the same numbers as long as no tick is lost. "
+            why += f"Run on a board at {port} (docs/board.md), where ticks may be lost. "
             command += f" --driver board --port {port}"
         elif driver == "board":
             why += "Run on the emulated board (docs/board.md), whose numbers are not quite the host's. "

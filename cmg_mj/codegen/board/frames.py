@@ -32,7 +32,7 @@ class Frame(NamedTuple):
         return START_BYTE + body + checksum(body)
 
 
-def checksum(body: bytes) -> bytes:
+def checksum(body: bytes | bytearray) -> bytes:
     """Compute the CRC-16/CCITT, low byte first."""
     return struct.pack("<H", binascii.crc_hqx(body, 0xFFFF))
 

@@ -127,8 +127,18 @@ def read_identity(frame: Frame, place: str) -> Identity:
         rate = float(fields["rate_hz"])
         if not (0.0 < inner < outer and rate > 0.0):
             raise ValueError
-        names = (fields[name] for name in ("firmware", "version", "observer", "precision"))
-        return Identity(*names, rate, fields["code"], (inner, outer), gimbals, fields.get("board", ""), cycles)
+        return Identity(
+            firmware=fields["firmware"],
+            version=fields["version"],
+            observer=fields["observer"],
+            precision=fields["precision"],
+            rate_hz=rate,
+            code=fields["code"],
+            radii_m=(inner, outer),
+            gimbals=gimbals,
+            board=fields.get("board", ""),
+            cycles_per_second=cycles,
+        )
     except (struct.error, LookupError, ValueError):
         raise InputError(
             f"{place}: what introduces itself there is no firmware of {FIRMWARE_NAME}: {shortened(text)!r}"

@@ -17,7 +17,7 @@ NEVER_RUN = ("stm32f746",)
 HOW_TO_RUN = {
     "mps2": f"""emulate: $(NAME).elf
 \t{EMULATOR} -M mps2-an500 -nodefaults -nographic -monitor none -semihosting-config enable=on,target=native \\
-\t  -serial tcp:localhost:$(PORT),server=on -kernel $<
+\t  -serial tcp:localhost:$(PORT),server=on,nodelay=on -kernel $<
 """,
     "stm32f746": """flash: $(NAME).elf
 \topenocd -f board/stm32f746g-disco.cfg -c "program $< verify reset exit"

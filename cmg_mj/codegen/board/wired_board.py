@@ -39,7 +39,7 @@ class WireCounts:
     """What has gone over a wire during a run.
 
     Attributes:
-        sent_again: Number of ticks whose sample was sent a second time.
+        sent_again: Number of samples that were sent again.
         lost: Number of ticks without an answer in time.
         lost_in_a_row: Largest number of these in a row.
         late_or_doubled: Number of answers that nobody waited for any more.
@@ -60,9 +60,8 @@ class WireCounts:
 class WiredBoard:
     """A board behind a port that takes the control decisions; see `wired_board`.
 
-    A sample whose answer has not come by half of the deadline, or came damaged to the board, is sent once more under
-    the same number; the board does not execute it again. Without an answer by the deadline the tick is lost: the last
-    command is held.
+    A sample that has no answer after `again_s`, or came damaged to the board, is sent again under the same number; the
+    board does not execute it again. Without an answer by the deadline the tick is lost: the last command is held.
 
     Args:
         port: The open port.
@@ -70,6 +69,7 @@ class WiredBoard:
         expected: The firmware and controller that the scenario asks for.
         estimates: Parts of an estimate.
         deadline_s: Time from a sample to its answer [s].
+        again_s: Time after which a sample is sent again; None for half of the deadline, so that it is sent twice [s].
         most_lost: Number of ticks lost in a row that ends the run.
 
     Attributes:
@@ -82,9 +82,17 @@ class WiredBoard:
     """
 
     def __init__(
-        self, port: Port, name: str, expected: Identity, estimates: int, deadline_s: float, most_lost: int = MOST_LOST
+        self,
+        port: Port,
+        name: str,
+        expected: Identity,
+        estimates: int,
+        deadline_s: float,
+        again_s: float | None = None,
+        most_lost: int = MOST_LOST,
     ) -> None:
         self.name, self.deadline_s, self.most_lost = name, deadline_s, most_lost
+        self._again_s = 0.5 * deadline_s if again_s is None else again_s
         self._port, self._reader, self._number = port, FrameReader(), 0
         self._waiting: list[Frame] = []
         self._answer = struct.Struct(f"<{2 + estimates}f")
@@ -145,18 +153,20 @@ class WiredBoard:
         return self._decision
 
     def _exchange(self, frame: Frame, question: bytes) -> Frame | None:
-        """Send a sample, once more if need be, and return its answer; None if there is none by the deadline."""
-        begun = time.perf_counter()
-        self._send(question)
-        answer = self._await(frame, begun + 0.5 * self.deadline_s, until_refused=True)
-        if answer is None:
-            self.counts.sent_again += 1
+        """Send a sample, again if need be, and return its answer; None if there is none by the deadline."""
+        begun = now = time.perf_counter()
+        deadline, first = begun + self.deadline_s, True
+        while now < deadline:
+            if not first:
+                self.counts.sent_again += 1
+                self._waiting += self._reader.resync()
             self._send(question)
-            self._waiting += self._reader.resync()
-            answer = self._await(frame, begun + self.deadline_s)
-        if answer is not None:
-            self.counts.round_trips_s.append(time.perf_counter() - begun)
-        return answer
+            answer = self._await(frame, min(now + self._again_s, deadline), until_refused=first)
+            now, first = time.perf_counter(), False
+            if answer is not None:
+                self.counts.round_trips_s.append(now - begun)
+                return answer
+        return None
 
     def _lose(self) -> None:
         self._lost_now += 1
@@ -164,9 +174,8 @@ class WiredBoard:
         self.counts.lost_in_a_row = max(self.counts.lost_in_a_row, self._lost_now)
         if self._lost_now >= self.most_lost:
             ticks = f"{self._lost_now} ticks" if self._lost_now > 1 else "a tick"
-            raise RunStopped(
-                f"{self.name}: the board has not answered for {ticks} in a row, within {1e3 * self.deadline_s:g} ms each"
-            )
+            within = f"{1e3 * self.deadline_s:g} ms"
+            raise RunStopped(f"{self.name}: the board has not answered for {ticks} in a row, within {within} each")
 
     def _await(self, frame: Frame, until: float, *, until_refused: bool = False) -> Frame | None:
         """Return the answer to a frame; None if none comes in time, or if the board has refused it."""
@@ -285,6 +294,7 @@ def wired_board(
     *,
     baud: int | None = None,
     deadline_s: float | None = None,
+    again_s: float | None = None,
     most_lost: int = MOST_LOST,
 ) -> Iterator[WiredBoard]:
     """Connect to a board that runs a controller, and check that it is this one.
@@ -294,6 +304,7 @@ def wired_board(
         port: The name of a serial port, such as /dev/ttyACM0, or tcp:HOST:PORT.
         baud: Baud rate of a serial port; None for `BAUD`.
         deadline_s: Time from a sample to its answer; None for the control period [s].
+        again_s: Time after which a sample is sent again; None for half of the deadline [s].
         most_lost: Number of ticks lost in a row that ends a run.
 
     Yields:
@@ -316,7 +327,7 @@ def wired_board(
     expected = expected_identity(controller)
     line = open_port(port, baud)
     try:
-        yield WiredBoard(line, port, expected, estimates, deadline_s, most_lost)
+        yield WiredBoard(line, port, expected, estimates, deadline_s, again_s, most_lost)
     finally:
         line.close()
 
