@@ -82,11 +82,11 @@ class WireOptions:
         """Connect to the board until the command ends; None without a port."""
         if self.port is None:
             return None
-        from cmg_mj.codegen.board import wired_board
+        from cmg_mj.codegen.board import on_a_wire
         from cmg_mj.codegen.board.wired_board import MOST_LOST
 
         controller = experiment.axis_controller()
-        connection = wired_board(
+        connection = on_a_wire(
             controller,
             self.port,
             baud=self.baud,

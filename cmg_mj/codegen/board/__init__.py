@@ -2,12 +2,12 @@
 
 with on_a_board(controller) as board:
     decision = board.update(accelerations, encoders)
-with wired_board(controller, "/dev/ttyACM0") as board:
+with on_a_wire(controller, "/dev/ttyACM0") as board:
     ...
 """
 
 from cmg_mj.codegen.board.deploy import on_a_board
 from cmg_mj.codegen.board.qemu import Board, Cost
-from cmg_mj.codegen.board.wired_board import WiredBoard, wired_board
+from cmg_mj.codegen.board.wired_board import WiredBoard, on_a_wire
 
-__all__ = ["Board", "Cost", "WiredBoard", "on_a_board", "wired_board"]
+__all__ = ["Board", "Cost", "WiredBoard", "on_a_board", "on_a_wire"]

@@ -58,7 +58,7 @@ class WireCounts:
 
 
 class WiredBoard:
-    """A board behind a port that takes the control decisions; see `wired_board`.
+    """A board behind a port that takes the control decisions; see `on_a_wire`.
 
     A sample that has no answer after `again_s`, or came damaged to the board, is sent again under the same number; the
     board does not execute it again. Without an answer by the deadline the tick is lost: the last command is held.
@@ -288,7 +288,7 @@ class WiredBoard:
 
 
 @contextmanager
-def wired_board(
+def on_a_wire(
     controller: Controller,
     port: str,
     *,
