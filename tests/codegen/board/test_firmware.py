@@ -14,7 +14,7 @@ import pytest
 
 from cmg_mj.codegen.board.frames import Frame, FrameReader
 from cmg_mj.codegen.board.identity import read_identity
-from cmg_mj.codegen.board.image import FIRMWARE, MACHINES, build
+from cmg_mj.codegen.board.image import FIRMWARE, MACHINES
 from cmg_mj.codegen.board.project import project_files
 from cmg_mj.codegen.board.qemu import emulator_command
 from cmg_mj.codegen.board.tools import available
@@ -52,8 +52,7 @@ class RawLine:
 
 @pytest.fixture
 def line(tmp_path: Path) -> Iterator[RawLine]:
-    toy(tmp_path)
-    image = build("toy", tmp_path, identity=TOY.text()).path
+    image = toy(tmp_path, identity=TOY.text())
     host, board = socket.socketpair()
     with board:
         process = subprocess.Popen(emulator_command(image), stdin=board.fileno(), stdout=board.fileno())
@@ -140,8 +139,7 @@ def test_a_port_layer_is_six_functions_and_two_constants(machine: str, tmp_path:
 
 def test_the_flashed_image_lies_where_the_chip_begins(tmp_path: Path) -> None:
     """Vectors first in the flash, the stack's end and `reset` in them; what is written lies in the 64 kB of DTCM."""
-    toy(tmp_path)
-    elf = build("toy", tmp_path, machine="stm32f746", identity=TOY.text()).path
+    elf = toy(tmp_path, machine="stm32f746", identity=TOY.text())
     binary = tmp_path / "toy.bin"
     subprocess.run(["arm-none-eabi-objcopy", "-O", "binary", elf, binary], check=True)
     stack, reset = struct.unpack_from("<2I", binary.read_bytes())
