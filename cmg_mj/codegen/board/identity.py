@@ -15,6 +15,8 @@ from cmg_mj.sensors.gimbal_angle import GimbalAngle
 FIRMWARE_NAME = "cmg_mj"
 FIRMWARE_VERSION = 2
 """Version of the firmware's messages: raised whenever a host and a board of different versions misunderstand."""
+LONGEST_TEXT = 215
+"""Longest introduction: a frame less two numbers and the board's own name [characters]."""
 HELLO = "h"
 """Kind of the frame in which a board introduces itself."""
 _FIELDS = re.compile(r"(\w+)=(\S*)")
@@ -49,13 +51,23 @@ class Identity:
     cycles_per_second: int = 0
 
     def text(self) -> str:
-        """Write it as the firmware's IDENTITY; the board adds its own name."""
-        turns = ",".join(f"{d:+g}@{z:.9g}" for d, z in zip(self.gimbals.directions, self.gimbals.zeros, strict=True))
-        radii = ",".join(f"{radius:.9g}" for radius in self.radii_m)
-        return (
+        """Write it as the firmware's IDENTITY; the board adds its own name.
+
+        Raises:
+            InputError: It is too long for a frame.
+        """
+        turns = ",".join(f"{d:+g}@{z:.8g}" for d, z in zip(self.gimbals.directions, self.gimbals.zeros, strict=True))
+        radii = ",".join(f"{radius:.8g}" for radius in self.radii_m)
+        text = (
             f"firmware={self.firmware} version={self.version} observer={self.observer} precision={self.precision} "
             f"rate_hz={self.rate_hz:.9g} code={self.code} radii={radii} gimbals={turns}"
         )
+        if len(text) > LONGEST_TEXT:
+            raise InputError(
+                f"firmware: its introduction has {len(text)} characters, a frame has room for {LONGEST_TEXT}: take a "
+                f"shorter name than {self.observer}, or fewer gimbals than {len(self.gimbals.zeros)}"
+            )
+        return text
 
     def require(self, expected: Identity, place: str) -> None:
         """Refuse another firmware or controller than the expected one.

@@ -32,8 +32,8 @@ pytest.importorskip("serial")
 pytestmark = needs_board
 
 needs_export = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
-PATIENT = {"deadline_s": 300.0, "again_s": 0.05}
-"""On a busy machine too no tick is lost: a sample is sent again until it is answered."""
+PATIENCE_S, AGAIN_S = 300.0, 0.05
+"""On a busy machine too no tick is lost: a sample is sent again until it is answered [s]."""
 
 
 @pytest.fixture(autouse=True)
@@ -60,13 +60,14 @@ def same(a: Result, b: Result) -> bool:
 def test_a_toy_behind_a_pty(tmp_path: Path) -> None:
     """Bytes that are lost, doubled, delayed: each sample is executed once. u is the angle and 100 an update."""
     image = toy(tmp_path, identity=TOY.text())
-    with PtyWire(image, Faults(1, lose=0.004, double=0.004, delay=0.004, delay_s=0.001)) as wire:
+    faults = Faults(1, lose=0.004, double=0.004, delay=0.004, delay_s=0.001)
+    with PtyWire(image, faults) as wire:
         port = open_port(wire.name)
-        board = WiredBoard(port, wire.name, TOY, 4, 300.0, 0.05)
+        board = WiredBoard(port, wire.name, TOY, 4, PATIENCE_S, AGAIN_S)
         board.start()
         commands = [board.update((0.0, 9.8, 0.0, 9.8), (0.0, 0.0)).u for _ in range(60)]
         port.close()
-        assert min(wire.faults.made.values()) > 0  # type: ignore[union-attr]
+        assert min(faults.made.values()) > 0
     assert commands == [100.0 * (i + 1) for i in range(60)]
     assert board.counts.sent_again > 0
 
@@ -79,7 +80,7 @@ def test_a_minute_over_a_bad_line_is_the_minute_over_a_good_one(tmp_path: Path) 
     faults = Faults(7, lose=1e-4, double=1e-4, delay=1e-4, delay_s=0.002)
     with (
         wire_to(experiment, tmp_path, faults) as wire,
-        on_a_wire(experiment.axis_controller(), wire.name, **PATIENT) as board,
+        on_a_wire(experiment.axis_controller(), wire.name, deadline_s=PATIENCE_S, again_s=AGAIN_S) as board,
     ):
         wired = experiment.run_on(board)
     assert wired.wire is not None

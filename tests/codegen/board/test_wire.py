@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import socket
 import struct
 import threading
@@ -191,6 +192,23 @@ def test_a_controller_that_has_stopped_is_said() -> None:
     board.answers = lambda frame, answer: [Frame("u", frame.number, struct.pack("<3I5f", 7, 0, 1, *[0.0] * 5))]
     with pytest.raises(RunStopped, match=r"^the controller on the board has stopped: a reading was not finite$"):
         update(wired, 1.0)
+
+
+def test_a_number_that_is_not_finite_is_not_taken() -> None:
+    board = PythonBoard()
+    wired = connect(board)
+    board.answers = lambda frame, answer: [Frame("u", frame.number, struct.pack("<3I5f", 7, 0, 0, *[math.nan] * 5))]
+    with pytest.raises(RunStopped, match=r"^the port: the board answered a number that is not finite$"):
+        update(wired, 1.0)
+
+
+def test_an_introduction_that_is_too_long_is_refused() -> None:
+    long = dataclasses.replace(TOY, observer="o" * 40, gimbals=GimbalAngle((1.0,) * 6, (1.5707963,) * 6))
+    with pytest.raises(
+        InputError, match=r"its introduction has 2.. characters, a frame has room for 215: take a shorter"
+    ):
+        long.text()
+    assert dataclasses.replace(long, gimbals=GimbalAngle((-1.0,) * 4, (-1.5707963,) * 4)).text()
 
 
 def test_its_log_has_the_frames_and_the_rates() -> None:

@@ -47,6 +47,8 @@ static const uint8_t *message; /* what it carries */
 static uint8_t answer[LONGEST];
 static uint32_t answered; /* bytes of it */
 
+enum { BOARDS_NAME = 24 }; /* longest */
+enum { IT_IS_SHORT = 1 / (2 * sizeof(uint32_t) + sizeof IDENTITY " board=" + BOARDS_NAME <= LONGEST) };
 enum { IT_FITS = 1 / (3 * sizeof(uint32_t) + (2 + ESTIMATES) * sizeof(real) <= LONGEST) };
 
 /* ---- What a piece of work takes ---- */

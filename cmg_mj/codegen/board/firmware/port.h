@@ -8,7 +8,7 @@
 /* Why a board starts again: port_init returns it, the host is told. The first is the power, or the reset button. */
 enum { NOBODY_TALKS = 0, FAULT = 101, STACK_FULL = 102 };
 
-extern const char port_name[];              /* the board's name: letters, digits, _ and - */
+extern const char port_name[];              /* the board's name: at most 24 letters, digits, _ and - */
 extern const uint32_t port_cycles_a_second; /* the rate at which port_cycles counts */
 
 int port_init(void);                                      /* once, before the rest: clock, line, counters */
