@@ -50,9 +50,14 @@ class RawLine:
         return frames[:-1]
 
 
+@pytest.fixture(scope="module")
+def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The toy's, which the tests here share."""
+    return toy(tmp_path_factory.mktemp("toy"), identity=TOY.text())
+
+
 @pytest.fixture
-def line(tmp_path: Path) -> Iterator[RawLine]:
-    image = toy(tmp_path, identity=TOY.text())
+def line(image: Path) -> Iterator[RawLine]:
     host, board = socket.socketpair()
     with board:
         process = subprocess.Popen(emulator_command(image), stdin=board.fileno(), stdout=board.fileno())

@@ -130,6 +130,15 @@ def test_a_frame_is_sent_again_under_its_number_and_executed_once(loss: str) -> 
     assert len(counts.round_trips_s) == 3
 
 
+def test_a_length_that_came_damaged_does_not_swallow_the_answers() -> None:
+    """It asks for 255 bytes; what lies behind its first is looked through when the sample is sent again."""
+    board = PythonBoard()
+    wired = connect(board)
+    board.noise = b"\xa5u\x04\xff"
+    assert [update(wired, angle) for angle in (1.0, 2.0)] == [1.0, 3.0]
+    assert (wired.counts.sent_again, wired.figures()["damaged_from_board"]) == (1, 1)
+
+
 def test_a_tick_that_is_lost_holds_the_command() -> None:
     late: list[Frame] = []
 

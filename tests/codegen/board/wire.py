@@ -34,12 +34,16 @@ class PythonBoard:
         identity: Who it says it is.
         answers: (frame, answer) -> what is sent.
         executed: First encoder of each sample that was executed.
+        received: Frames that have come.
+        noise: Bytes that come before the next answer.
+        gone: Whether the cable is pulled.
     """
 
     identity: Identity = TOY
     answers: Callable[[Frame, Frame], list[Frame]] = lambda frame, answer: [answer]
     executed: list[float] = field(default_factory=list)
     received: list[Frame] = field(default_factory=list)
+    noise: bytes = b""
     gone: bool = False
     _out: bytearray = field(default_factory=bytearray)
     _reader: FrameReader = field(default_factory=FrameReader)
@@ -62,7 +66,8 @@ class PythonBoard:
             if self._last is None or frame != self._last[0]:
                 self._last = frame, Frame(frame.kind, frame.number, self._execute(frame))
             for sent in self.answers(frame, self._last[1]):
-                self._out += sent.encode()
+                self._out += self.noise + sent.encode()
+                self.noise = b""
 
     def close(self) -> None:
         self.gone = True
