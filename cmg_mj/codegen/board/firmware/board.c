@@ -23,7 +23,8 @@
  *
  * A message that comes again (the same number and check as the last one) is answered again and not executed again: the
  * answer may have been lost. A 'u' whose number lies behind the last one is neither. After bytes that were lost or damaged
- * the board looks for the next message in what it has already received.
+ * the board looks for the next message in what it has already received. It waits for the rest of a message as long as it
+ * takes: whoever sends again brings it.
  *
  * A cost is two uint32: counts of port_cycles, and bytes of stack. */
 #include <string.h>
@@ -39,7 +40,7 @@
 #endif
 
 enum { FIRST = 0xa5, LONGEST = 255, AROUND = 6, PAINT = 0x5aa5c33c };
-enum { HALF_A_MESSAGE_US = 100000 }; /* the rest of a message comes sooner, or never */
+enum { A_WHILE_US = 1000000 };
 
 static ITS(_controller) controller;
 static ITS(_state) observer;
@@ -332,11 +333,9 @@ int main(void)
     ITS(_start)(&controller);
     reply('!', 0, &why, why ? 1 : 0);
     for (;;) {
-        if (port_read(line + held, held ? HALF_A_MESSAGE_US : QUIET_US ? QUIET_US : 1000000u)) {
+        if (port_read(line + held, QUIET_US ? QUIET_US : A_WHILE_US)) {
             held++;
             deal();
-        } else if (held) {
-            held = 0;
         } else if (QUIET_US) {
             port_reset(NOBODY_TALKS);
         }
