@@ -49,6 +49,13 @@ def run_toy(toy: pytest.Pytester, *arguments: str) -> list[str]:
     return re.findall(r"^(\S+) PASSED", result.stdout.str(), flags=re.MULTILINE)
 
 
+@pytest.mark.daily_cases(
+    "-tiers_run0",
+    "not papers-tiers_run1",
+    "slow-tiers_run5",
+    "slow or papers-tiers_run7",
+    "daily or slow or papers-tiers_run10",
+)
 @pytest.mark.parametrize(
     ("expression", "tiers_run"),
     [
@@ -85,6 +92,18 @@ def test_a_test_of_the_papers_is_not_marked_slow(toy: pytest.Pytester) -> None:
     toy.makepyfile(**{"papers/test_b": "import pytest\npytestmark = pytest.mark.slow\ndef test_claim(): pass"})
     result = toy.runpytest_inprocess("-p", "tests.tiers", "-m", "papers")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
+
+
+def test_cases_are_slow_but_those_named_daily(toy: pytest.Pytester) -> None:
+    marks = "@pytest.mark.daily_cases('{}')\n@pytest.mark.parametrize('case', 'pqr')"
+    code = f"import pytest\n{marks}\ndef test_it(case): pass"
+    toy.makepyfile(test_a=code.format("[pr]"))
+    assert run_toy(toy) == ["test_a.py::test_it[p]", "test_a.py::test_it[r]"]
+    assert run_toy(toy, "-m", "slow") == ["test_a.py::test_it[q]"]
+    assert run_toy(toy, "test_a.py::test_it[q]") == ["test_a.py::test_it[q]"]
+    toy.makepyfile(test_a=code.format("s"))
+    result = toy.runpytest_inprocess("-p", "tests.tiers")
+    result.stderr.fnmatch_lines(["*daily_cases names cases that there are not: test_a.py::test_it[[]s]"])
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -35,9 +36,36 @@ def tier(item: pytest.Item) -> str:
         pytest.UsageError: It would be in two.
     """
     is_papers = PAPERS in item.path.parents
-    if is_papers and item.get_closest_marker("slow"):
+    is_slow = item.get_closest_marker("slow") is not None or not is_daily_case(item)
+    if is_papers and is_slow:
         raise pytest.UsageError(f"{item.nodeid}: is of the papers, and cannot be slow as well")
-    return "papers" if is_papers else "slow" if item.get_closest_marker("slow") else "daily"
+    return "papers" if is_papers else "slow" if is_slow else "daily"
+
+
+def case_name(item: pytest.Item) -> str:
+    """Return the name of a case, as it stands in brackets after the test's."""
+    return item.callspec.id if isinstance(item, pytest.Function) and hasattr(item, "callspec") else ""
+
+
+def is_daily_case(item: pytest.Item) -> bool:
+    """Return whether a test is a case that `daily_cases` names, or has no such mark."""
+    mark = item.get_closest_marker("daily_cases")
+    return mark is None or any(fnmatchcase(case_name(item), pattern) for pattern in mark.args)
+
+
+def check_daily_cases(items: list[pytest.Item]) -> None:
+    """Check that the cases that `daily_cases` names exist.
+
+    Raises:
+        pytest.UsageError: One does not.
+    """
+    unmatched: dict[str, set[str]] = {}
+    for item in items:
+        if mark := item.get_closest_marker("daily_cases"):
+            patterns = unmatched.setdefault(item.nodeid.partition("[")[0], set(mark.args))
+            patterns -= {pattern for pattern in patterns if fnmatchcase(case_name(item), pattern)}
+    if missing := sorted(f"{test}[{pattern}]" for test, patterns in unmatched.items() for pattern in patterns):
+        raise pytest.UsageError(f"daily_cases names cases that there are not: {', '.join(missing)}")
 
 
 def named_tests(config: pytest.Config) -> list[tuple[Path, str]]:
@@ -51,6 +79,12 @@ def is_named(item: pytest.Item, tests: list[tuple[Path, str]]) -> bool:
     own_name = item.nodeid.partition("::")[2]
     return any(
         path.resolve() == item.path and own_name.partition("[")[0] == name.partition("[")[0] for path, name in tests
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line(
+        "markers", "daily_cases(*patterns): all cases of this test are slow but those of these names"
     )
 
 
@@ -68,6 +102,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Mark each test with its tier, before pytest reads `-m`; drop those whose tier nobody named."""
     tier_names = {"daily", *named_tiers(config.option.markexpr)}
     tests = named_tests(config)
+    if not tests:
+        check_daily_cases(items)
     deselected = []
     for item in items:
         its_tier = tier(item)

@@ -101,6 +101,12 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     help="Replace the joints of the robot's root by a free joint.",
 )
 @observer_option(default="gyro_free")
+@click.option(
+    "--plugin",
+    "with_plugin",
+    is_flag=True,
+    help="Write a plugin of MuJoCo too, into FILE_plugin: the controller as a library, and the model that names it.",
+)
 @click.option("--quick", is_flag=True, help="Print E of the reduced model, and try nothing in MuJoCo (up to a minute).")
 @json_option()
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount; not what has changed since.")
@@ -109,6 +115,7 @@ def mount(
     robot: str,
     out: str,
     observer: str,
+    with_plugin: bool,
     quick: bool,
     as_json: bool,
     overwrite: bool,
@@ -128,9 +135,18 @@ def mount(
     with CtrlC() as ctrl_c, nullcontext() if quick else progress("no push", LONGEST_S, ctrl_c) as on_progress:
         time_limit = None if quick else TimeLimit(on_progress=on_progress)
         result = mount_and_write(
-            robot, MountRequest(**options), out, observer, overwrite=overwrite, time_limit=time_limit
+            robot,
+            MountRequest(**options),
+            out,
+            observer,
+            overwrite=overwrite,
+            time_limit=time_limit,
+            with_plugin=with_plugin,
         )
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:
         note_hints(result.hints)
         note(f"wrote {result.path} and {result.scenario_path}; try: cmg-mj run {result.scenario_path}")
+        if result.plugin:
+            example = result.plugin.model.with_name(f"{result.plugin.model.stem}_example.py")
+            note(f"wrote {result.plugin.model.parent}; try: python {example}")

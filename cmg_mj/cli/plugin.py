@@ -5,16 +5,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
-from cmg_mj.cli.terminal import note_hints, say_written, show, users_code
+from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
+from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.simulation.plugin import Start
 
 
 @click.command(short_help="Compile the controller into MuJoCo: a library, and a model.")
-@click.argument("observer", callback=lambda context, parameter, name: check_observer("OBSERVER", name))
+@click.argument(
+    "observer",
+    required=False,
+    callback=lambda context, parameter, name: None if name is None else check_observer("OBSERVER", name),
+)
 @out_option()
 @click.option("--name", metavar="NAME", help="The plugin's name behind cmg_mj.  [default: OBSERVER's name]")
 @click.option(
@@ -33,16 +39,26 @@ if TYPE_CHECKING:
     help="What sets the flywheels going: the program, with the model's keyframe, or the plugin.",
 )
 @click.option("--no-sensors", is_flag=True, help="Leave the plugin's own sensors out of the model.")
+@click.option(
+    "--install",
+    metavar="PATH",
+    help="Have `import mujoco` load a plugin made before: its folder or library, or its name in runs/.",
+)
+@click.option("--uninstall", metavar="NAME", help="Take an installed plugin back.")
+@click.option("--list", "lists", is_flag=True, help="List the installed plugins, and those that do not load.")
 @json_option()
 @users_code()
 def plugin(
-    observer: str,
+    observer: str | None,
     out: str | None,
     name: str | None,
     scenario: str,
     settings: tuple[str, ...],
     start: Start,
     no_sensors: bool,
+    install: str | None,
+    uninstall: str | None,
+    lists: bool,
     as_json: bool,
 ) -> None:
     """Compile OBSERVER, a name or your own as package.module:Class, with sensors and law as a plugin of MuJoCo.
@@ -52,12 +68,27 @@ def plugin(
       libcmg_mj_NAME.so   the library
       NAME.xml            the scenario's model, which names it; its keyframe is "start"
       NAME_example.py, NAME_example.c, Makefile, and the C of the library
+
+    Nothing loads the library by itself until --install copies it into a folder of yours.
     """  # noqa: D301  (click wants the character itself)
+    if install is not None or uninstall is not None or lists:
+        _check_alone()
+        if install is not None:
+            _install(install, as_json)
+        elif uninstall is not None:
+            _uninstall(uninstall, as_json)
+        else:
+            _list(as_json)
+        return
+    if observer is None:
+        raise InputError("plugin: name an OBSERVER to make a plugin, or give --install, --uninstall or --list")
+    from cmg_mj.codegen.engine_plugin.install import has_another
     from cmg_mj.simulation.experiment import prepare
-    from cmg_mj.simulation.plugin import find_tools, make_plugin, plugin_files, write_plugin
+    from cmg_mj.simulation.plugin import find_tools, make_plugin, plugin_files, require_stable_periods, write_plugin
 
     find_tools()
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
+    require_stable_periods(experiment)
     note_hints(experiment.hints)
     made = make_plugin(experiment, name, sensors=not no_sensors, start=start)
     with claim_output(out, f"plugin-{made.name}", plugin_files(made)) as folder:
@@ -68,6 +99,71 @@ def plugin(
         "model": result.model.name,
         "build": made.code.build,
     }
-    show(figures, "\n".join(f"{key:<8} {value}" for key, value in figures.items()), as_json)
+    _show(figures, as_json)
     place = result.library.parent
     say_written(folder, place, f"Try it: python {place / made.name}_example.py", as_json)
+    if has_another(result.library):
+        note(f"hint: {result.name} is installed from another library: cmg-mj plugin --install {result.library}")
+
+
+def _check_alone() -> None:
+    """Refuse what --install, --uninstall and --list do not go with."""
+    context = click.get_current_context()
+    options = [
+        parameter.opts[0] if isinstance(parameter, click.Option) else parameter.human_readable_name
+        for parameter in context.command.params
+        if parameter.name and context.get_parameter_source(parameter.name) == ParameterSource.COMMANDLINE
+    ]
+    first = next(option for option in options if option in ("--install", "--uninstall", "--list"))
+    others = [option for option in options if option not in (first, "--json")]
+    if others:
+        raise InputError(f"plugin: {first} goes without {', '.join(others)}")
+
+
+def _install(target: str, as_json: bool) -> None:
+    from cmg_mj.codegen.engine_plugin.install import find_library, install, list_plugins
+
+    library = find_library(target)
+    manifests = [status.manifest for status in list_plugins()[1]]
+    result = install(library)
+    _show({"plugin": result.plugin, "library": str(library), "mujoco": result.mujoco, "sha256": result.sha256}, as_json)
+    if not as_json:
+        name = result.plugin.removeprefix("cmg_mj.")
+        for other in manifests:
+            if other is not None and other.plugin == result.plugin and other.sha256 != result.sha256:
+                note(f"it takes the place of the library from {other.source}, whose models no longer load")
+        note(f"installed: `import mujoco` loads it from now on. Take it back: cmg-mj plugin --uninstall {name}")
+
+
+def _uninstall(name: str, as_json: bool) -> None:
+    from cmg_mj.codegen.engine_plugin.install import uninstall
+
+    _show({"uninstalled": uninstall(name)}, as_json)
+
+
+def _list(as_json: bool) -> None:
+    from cmg_mj.codegen.engine_plugin.install import list_plugins
+
+    folder, plugins = list_plugins()
+    figures = [
+        {
+            "name": plugin.name,
+            "mujoco": plugin.manifest and plugin.manifest.mujoco,
+            "sha256": plugin.manifest and plugin.manifest.sha256,
+            "source": plugin.manifest and plugin.manifest.source,
+            "problem": plugin.problem or None,
+        }
+        for plugin in plugins
+    ]
+    lines = [
+        f"{plugin.name}  "
+        + (f"not loaded: {plugin.problem}" if plugin.problem else f"from {plugin.manifest and plugin.manifest.source}")
+        for plugin in plugins
+    ]
+    place = folder or "CMG_MJ_PLUGINS is empty: no plugin is loaded"
+    show({"folder": folder, "plugins": figures}, "\n".join([*(lines or ["no plugin is installed"]), place]), as_json)
+
+
+def _show(figures: dict[str, str], as_json: bool) -> None:
+    width = max(map(len, figures)) + 1
+    show(figures, "\n".join(f"{key:<{width}}{value}" for key, value in figures.items()), as_json)

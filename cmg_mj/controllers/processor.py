@@ -21,7 +21,7 @@ class Decision(NamedTuple):
     u: float
     """Gimbal rate [rad/s]."""
     x_e: float
-    """The integrator before it [rad s], which went into it unless it is being trimmed."""
+    """The integrator before it [rad s], which went into it unless it is being trimmed; NaN if the law has none."""
     estimate: Sequence[float]
     """The observer's: x1, x2, x3, its extra signals."""
 
@@ -106,9 +106,12 @@ class ProcessorController(Controller):
         except RunStopped as error:
             raise RunStopped(f"{error}, at t = {step * self.timestep:g} s") from error
         self._remote.estimate = decision.estimate
+        is_first = self.tick is None
         tick = super().decide(step, forces, encoders, fog, rate)
         trimmed = step < self.trimmed_until
         x_e = self.trim_gain * decision.estimate[self.trim_part] if trimmed else decision.x_e
+        if is_first and not trimmed and tick.x_e:  # the processor's law has begun in this update
+            x_e = tick.x_e
         self.tick = tick._replace(
             u=decision.u, x_e=x_e, estimates=[as_estimate(decision.estimate), *tick.estimates[1:]]
         )

@@ -16,6 +16,16 @@ from cmg_mj.plant.mujoco_state import quiet, set_control_callback
 from cmg_mj.plant.parts import EQUILIBRIUM_KEY
 from cmg_mj.plant.plant import Plant
 
+Framed = (
+    mujoco.MjsBody
+    | mujoco.MjsSite
+    | mujoco.MjsJoint
+    | mujoco.MjsGeom
+    | mujoco.MjsCamera
+    | mujoco.MjsLight
+    | mujoco.MjsFrame
+)
+KINDS = {mujoco.MjsBody: "body", mujoco.MjsSite: "site", mujoco.MjsGeom: "geom", mujoco.MjsCamera: "cam"}
 INSTANCE = "balance"
 """Name of the plugin's instance; of an attached rig the prefix stands before it."""
 START_KEY = "start"
@@ -46,10 +56,12 @@ def plugin_mjcf(plant: Plant, plugin: str, config: Mapping[str, str], sensors: b
     """
     with set_control_callback(None), quiet(), _exact_numbers():
         drawn = plant.drawn_spec()
-        compile_model(drawn, plant.path)
+        drawn_model = compile_model(drawn, plant.path)
         spec = mujoco.MjSpec.from_string(as_mjcf(drawn, plant.path))
         _locate_files(spec, plant.path.parent)
-        _take_over(spec, compile_model(spec, plant.path), plant)
+        filed = compile_model(spec, plant.path)
+        _take_out_of_frames(spec, drawn_model)
+        _take_over(spec, filed, drawn_model, plant)
         compile_model(spec, plant.path)
         text = as_mjcf(spec, plant.path)
         different = differences(plant.model, mujoco.MjModel.from_xml_string(text))
@@ -84,8 +96,50 @@ def _locate_files(spec: mujoco.MjSpec, folder: Path) -> None:
         spec.meshdir, spec.texturedir = (str((folder / part).resolve()) for part in (spec.meshdir, spec.texturedir))
 
 
-def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None:
-    """Give a parsed model, as its file has it, what the plant's settings change: see `plant.variations`."""
+def _take_out_of_frames(spec: mujoco.MjSpec, drawn: mujoco.MjModel) -> None:
+    """Place what frames hold where a model has it, without the frames: each reading of a frame rounds again.
+
+    A frame with a mesh in it stays, whose place MuJoCo takes otherwise.
+    """
+    staying = [frame for geom in spec.geoms if _is_placed_otherwise(geom) for frame in _frames_around(geom)]
+    for frame in spec.frames:
+        if not any(outer in staying for outer in (frame, *_frames_around(frame))):
+            frame.pos, frame.quat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+    for element in (*spec.bodies, *spec.sites, *spec.joints, *spec.geoms, *spec.cameras, *spec.lights):
+        frames = _frames_around(element)
+        if not frames or any(frame in staying for frame in frames):
+            continue
+        if isinstance(element, mujoco.MjsJoint):
+            element.pos, element.axis = drawn.jnt_pos[element.id], drawn.jnt_axis[element.id]
+        elif isinstance(element, mujoco.MjsLight):
+            element.pos, element.dir = drawn.light_pos[element.id], drawn.light_dir[element.id]
+        else:
+            kind = KINDS[type(element)]
+            element.pos, element.quat = (getattr(drawn, f"{kind}_{name}")[element.id] for name in ("pos", "quat"))
+
+
+def _is_placed_otherwise(geom: mujoco.MjsGeom) -> bool:
+    return bool(geom.meshname) or not np.isnan(geom.fromto[0])
+
+
+def _frames_around(element: Framed) -> list[mujoco.MjsFrame]:
+    """List the frames that an element is in, the innermost first."""
+    frames = []
+    while (frame := element.frame) is not None:
+        frames.append(frame)
+        element = frame
+    return frames
+
+
+def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, drawn: mujoco.MjModel, plant: Plant) -> None:
+    """Give a parsed model what the plant's settings change: see `plant.variations`.
+
+    Args:
+        spec: The model, which is changed; of what was written it has read `filed`.
+        filed: The same, compiled.
+        drawn: The model before it was written.
+        plant: The plant.
+    """
     model = plant.model
     spec.option.timestep, spec.option.integrator = model.opt.timestep, model.opt.integrator
     spec.option.disableflags = model.opt.disableflags
@@ -100,12 +154,14 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, plant: Plant) -> None
         joint.armature, joint.frictionloss = model.dof_armature[dof], model.dof_frictionloss[dof]
         joint.damping[0] = model.dof_damping[dof]
     for site in spec.sites:
-        if not np.array_equal(filed.site_pos[site.id], model.site_pos[site.id]):
+        if not np.array_equal(drawn.site_pos[site.id], model.site_pos[site.id]):
             site.pos = model.site_pos[site.id]
     for actuator in spec.actuators:
         actuator.gainprm[:] = model.actuator_gainprm[actuator.id]
         actuator.biasprm[:] = model.actuator_biasprm[actuator.id]
     start = plant.new_data()
+    for key in [key for key in spec.keys if key.name == START_KEY]:
+        spec.delete(key)
     for key in spec.keys:
         if key.name == EQUILIBRIUM_KEY:
             key.qvel, key.ctrl = model.key_qvel[plant.key], model.key_ctrl[plant.key]

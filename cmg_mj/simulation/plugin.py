@@ -18,6 +18,7 @@ from cmg_mj.codegen.engine_plugin.generate import PluginCode, generate_plugin
 from cmg_mj.codegen.engine_plugin.rig import PluginAxis, PluginModule, PluginRig
 from cmg_mj.codegen.export import check_installed
 from cmg_mj.codegen.export.names import name_of
+from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.plant.plant import Plant
@@ -25,6 +26,7 @@ from cmg_mj.plant.plugin_model import plugin_mjcf
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.run_folder.folder import claimed, write_text
 from cmg_mj.scenario.schema import Scenario
+from cmg_mj.scenario.stability_check import require_stable_period
 from cmg_mj.simulation.experiment import Experiment, prepare
 
 LIBRARY_MODE = 0o755
@@ -97,6 +99,22 @@ def find_tools() -> list[str]:
     return compiler
 
 
+def require_stable_periods(experiment: Experiment) -> None:
+    """Refuse a control period so long that (8) does not hold an axis, as `cmg-mj export` does.
+
+    Raises:
+        InputError: An axis would fall.
+    """
+    for part in experiment.parts:
+        if not isinstance(part.law, StateFeedback):
+            continue
+        try:
+            require_stable_period(part.law, part.plant.reduced)
+        except InputError as error:
+            name = part.plant.axis.name
+            raise InputError(f"axis {name}: {error}" if name else str(error)) from error
+
+
 def make_plugin(
     experiment: Experiment,
     name: str | None = None,
@@ -164,11 +182,12 @@ def plugin(
         What was written.
 
     Raises:
-        InputError: Something in use cannot be exported, there is no compiler, CasADi is missing, or the folder holds
-            files of the user's that would be overwritten.
+        InputError: Something in use cannot be exported, the control period is too long, there is no compiler, CasADi is
+            missing, or the folder holds files of the user's that would be overwritten.
     """
     find_tools()
     experiment = scenario if isinstance(scenario, Experiment) else prepare(scenario)
+    require_stable_periods(experiment)
     return write_plugin(make_plugin(experiment, name, sensors=sensors, start=start), out)
 
 

@@ -16,6 +16,7 @@ from tests.acceptance.cases import BAND, GROUP, STANDING, closed_loop_figures
 from tests.acceptance.test_acceptance import BOUNDS, SEED
 
 
+@pytest.mark.daily_cases("*-0")
 @pytest.mark.parametrize("world", [0, 1])
 @pytest.mark.parametrize("observer", STANDING)
 def test_figures_of_one_world(observer: str, world: int) -> None:

@@ -13,7 +13,7 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.save import report_run, save_run
-from tests.command import cmg_mj
+from tests.command import CommandOutcome, cmg_mj
 
 SHORT = ("duration_s=2", "push.0.start_s=1", "push.1.start_s=1")
 
@@ -22,6 +22,23 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
 
 def two_axes(*settings: str) -> Experiment:
     return prepare(load_scenario("two_axes", [*SHORT, *settings]))
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("runs") / "it"
+
+
+@pytest.fixture(scope="module")
+def run_outcome(run_folder: Path) -> CommandOutcome:
+    """What the command line says of a run, which is then in the folder."""
+    options = [part for setting in SHORT for part in ("--set", setting)]
+    return cmg_mj("run", "two_axes", *options, "--out", str(run_folder))
+
+
+@pytest.fixture(scope="module")
+def run_summary(run_folder: Path, run_outcome: CommandOutcome) -> dict[str, Any]:
+    return json.loads((run_folder / "summary.json").read_text(encoding="utf-8"))
 
 
 def test_an_axis_has_what_it_is_given_and_the_rest_of_what_holds_for_all() -> None:
@@ -125,14 +142,13 @@ def test_the_true_rate_is_used_throughout_where_it_is_fed_back() -> None:
         np.testing.assert_array_equal(first[name], second[name], err_msg=name)
 
 
-def test_replay_of_several_axes_is_refused_for_what_it_is(tmp_path: Path) -> None:
-    experiment = two_axes()
-    place = save_run(tmp_path / "run", report_run(experiment, experiment.run()))
-    assert "about several axes (roll, pitch)" in cmg_mj("replay", str(place)).complaint
+def test_replay_of_several_axes_is_refused_for_what_it_is(run_folder: Path, run_outcome: CommandOutcome) -> None:
+    assert run_outcome.status == 0, run_outcome
+    assert "about several axes (roll, pitch)" in cmg_mj("replay", str(run_folder)).complaint
 
 
-def test_the_rigs_figures_are_the_worst_of_its_axes() -> None:
-    summary: dict[str, Any] = two_axes().run().summaries[0]
+def test_the_rigs_figures_are_the_worst_of_its_axes(run_summary: dict[str, Any]) -> None:
+    summary = run_summary
     axes = list(summary[AXES].values())
     for key, description in KEYS.items():
         if key in summary and None not in (values := [axis[key] for axis in axes]):
@@ -168,15 +184,11 @@ def test_check_says_what_each_axis_amounts_to() -> None:
     assert "push        1 N m about pitch from 6 s to 6.1 s" in outcome.out
 
 
-def test_the_command_prints_each_axis(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    options = [part for setting in SHORT for part in ("--set", setting)]
-    outcome = cmg_mj("run", "two_axes", *options, "--out", "it")
-    assert outcome.status == 0, outcome
-    assert "roll" in outcome.out
-    assert "Open loop, pitch" in outcome.out
-    summary = json.loads((tmp_path / "it" / "summary.json").read_text())
-    assert list(summary["axes"]) == ["roll", "pitch"]
+def test_the_command_prints_each_axis(run_outcome: CommandOutcome, run_summary: dict[str, Any]) -> None:
+    assert run_outcome.status == 0, run_outcome
+    assert "roll" in run_outcome.out
+    assert "Open loop, pitch" in run_outcome.out
+    assert list(run_summary["axes"]) == ["roll", "pitch"]
 
 
 @pytest.mark.parametrize(

@@ -179,6 +179,9 @@ def law_option(law: type) -> list[str]:
     return ["--set", f"controller.kind={law_path(law)}"]
 
 
+@pytest.mark.daily_cases(
+    "run-*", "compare-made", "compare-text", "compare-trimmed", "check-init", "check-None", "check-needs"
+)
 @table(
     ("made", FailsWhenMade, f"law {__name__}:FailsWhenMade: RuntimeError: no licence for this"),
     ("made without dt", TakesNoPeriod, "TakesNoPeriod: TypeError: ", "unexpected keyword argument 'dt'"),
@@ -282,6 +285,7 @@ def test_gains_reach_a_law_of_ones_own_that_takes_them() -> None:
     assert law == Typed(0.005, 4.7, 30.0, (1.0, 2.0, 3.0, 4.0))
 
 
+@pytest.mark.daily_cases("a function for floats", "in place")
 @table(
     (
         "a function for floats",
@@ -312,6 +316,7 @@ def test_a_law_that_changes_what_it_is_given_changes_no_record() -> None:
     assert "raised ValueError: output array is read-only" in result.outcomes[0].reason
 
 
+@pytest.mark.daily_cases("native-raises", "native-NaN", "callback-raises", "callback-text")
 @table(
     (
         "raises",

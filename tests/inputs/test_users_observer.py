@@ -126,6 +126,15 @@ class OwesASignal(Mine):
 RETURN = "step(state, y, u) must return"
 
 
+@pytest.mark.daily_cases(
+    "in the loop-*",
+    "compared-made",
+    "compared-None",
+    "compared-signals",
+    "open loop-init",
+    "open loop-no estimate",
+    "open loop-signature",
+)
 @table(
     (
         "made",
@@ -168,6 +177,7 @@ def test_an_observer_that_cannot_work(wrong_input: type, fragments: list[str], p
     assert list(Path().iterdir()) == []
 
 
+@pytest.mark.daily_cases("a function for floats")
 @table(
     ("a function for floats", ForOneWorld, "step(state, y, u) raised TypeError: only", "use operators and cmg_mj.elem"),
     ("a number for all", ForgetsWorlds, f"{RETURN} an array of 2 numbers for x2, not 0.0; many worlds come at once"),
@@ -180,6 +190,7 @@ def test_an_observer_for_one_world_among_many(quick: str, wrong_input: type, fra
     assert not Path("compared").exists()
 
 
+@pytest.mark.daily_cases("native-raises", "native-NaN", "callback-infinity")
 @table(
     (
         "raises",

@@ -92,6 +92,7 @@ def replay(estimator: Adaptive, y1: Signal, y2: Signal, u: Signal) -> np.ndarray
     return np.array(rows)
 
 
+@pytest.mark.daily_cases("-1.5")
 @pytest.mark.parametrize("e_deg", [-1.5, 0.3, 2.0])
 def test_finds_the_bias(e_deg: float) -> None:
     """Without noise; what is left is sin(y1 + e) less sin y1 + e cos y1, 1e-4 of e."""

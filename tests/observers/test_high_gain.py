@@ -69,6 +69,7 @@ CASES = [
 ]
 
 
+@pytest.mark.daily_cases("defaults", "linear", "a rig whose gain moves")
 @pytest.mark.parametrize(("parameters", "model"), CASES)
 def test_follows_the_printed_observer_at_200_hz(parameters: dict, model: ReducedModel) -> None:
     y1, y2, u = rough_signals(150)

@@ -65,6 +65,7 @@ def test_one_sample_is_the_printed_equation(parameters: dict, model: ReducedMode
         assert estimate.x3 == next_sample.y2
 
 
+@pytest.mark.daily_cases("Table 2-60", "another rig-60", "k1-60")
 @pytest.mark.parametrize("samples", [60, pytest.param(200, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("parameters", "model"), CASES)
 def test_follows_the_continuous_observer_at_200_hz(parameters: dict, model: ReducedModel, samples: int) -> None:

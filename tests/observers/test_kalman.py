@@ -157,6 +157,7 @@ def test_settles_at_the_linear_filter() -> None:
         np.testing.assert_allclose(estimate, gain[:, column] * 1e-9, rtol=1e-5, atol=1e-16)
 
 
+@pytest.mark.daily_cases("0.005")
 @pytest.mark.parametrize("dt", [0.001, 0.005, 0.02])
 def test_covariance_stays_a_covariance(dt: float) -> None:
     """Over 20,000 samples of signals that no rig makes, from a start that knows next to nothing."""
@@ -231,6 +232,7 @@ def test_errors_are_as_large_as_the_covariance_says() -> None:
         assert low < mean < high, label
 
 
+@pytest.mark.daily_cases("gimbal_white-2.0", "torque_white-0.5", "torque_start-2.0")
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 @pytest.mark.parametrize("name", ["torque_white", "gimbal_white", "torque_start"])
 def test_a_filter_that_expects_another_noise_is_found_out(name: str, factor: float) -> None:

@@ -121,6 +121,7 @@ CASES = [
 ]
 
 
+@pytest.mark.daily_cases("Table 2", "another rig", "Q2")
 @pytest.mark.parametrize(("parameters", "model"), CASES)
 def test_follows_the_continuous_observer(parameters: dict, model) -> None:
     y1, y2, u = rough_signals(100)
@@ -217,6 +218,7 @@ def test_riccati_matrix_stays_positive_definite(dt: float, weights: tuple[float,
             assert state.h33 > 0.0
 
 
+@pytest.mark.daily_cases("0.005-weights0", "0.005-weights1", "0.05-weights2")
 @pytest.mark.parametrize(
     ("dt", "weights"),
     [(0.005, (1.0, 1e9, 1.0)), (0.005, (1e4, 1e9, 1e4)), (0.05, (1.0, 5e6, 1.0)), (0.05, (100.0, 1e6, 9.0))],
@@ -245,6 +247,7 @@ def test_riccati_matrix_is_exact_while_the_gimbal_stands(dt: float, weights: tup
         assert relative_errors(riccati_matrix(state), H) < 1e-8
 
 
+@pytest.mark.daily_cases("0.1-weights2")
 @pytest.mark.parametrize(
     ("dt", "weights"), [(0.005, (1e6, 5e6, 1.0)), (0.005, (1.0, 1e12, 1.0)), (0.1, (1.0, 5e6, 1.0))]
 )

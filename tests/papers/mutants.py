@@ -70,7 +70,7 @@ MUTANTS = [
            "command.py::test_general_claims_and_those_without_data"),
     Mutant("a condition is left out as said before at its first place", "sentences.py", "if first_place == place:",
            "if first_place != place:", "sentences.py::test_what_was_said_is_not_said_again"),
-    Mutant("a verdict that does not follow", "claim.py", 'if depends_on_us else "reproduced"',
+    Mutant("a verdict that does not follow", "claim.py", 'if self.assumes or self.conditions else "reproduced"',
            'if self.otherwise else "reproduced"', "command.py::test_the_verdict_follows_from_what_was_found"),
     Mutant("one scale a picture, not one for all", "scales.py", "_range([panel for panel in panels if",
            "_range([panel for panel in panels[:6] if", LOOP + "test_the_three_pictures_share_their_scales"),

@@ -19,7 +19,7 @@ from cmg_mj.papers.report import report_text
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 from tests.command import cmg_mj
 
-PICTURE = Picture("a-fig-1", "a Fig. 1", [Panel("tilt [deg]", [Line([0.0, 1.0], [0.0, 2.0], "true")])])
+PICTURE = Picture("sokolov2019-fig-1", "a Fig. 1", [Panel("tilt [deg]", [Line([0.0, 1.0], [0.0, 2.0], "true")])])
 GOOD = Claim(
     place="Fig. 1",
     statement="it falls | or not",
@@ -101,11 +101,11 @@ def test_all_papers_make_one_report() -> None:
     assert "### Section V: not reproduced" in report
     assert "**Why not:** The noise is another." in report
     assert "**Conditions:** It is above 100 Hz." in report
-    assert "![a Fig. 1](a-fig-1.png)" in report
+    assert "![a Fig. 1](sokolov2019-fig-1.png)" in report
     assert "1 beside them, not the papers': 1 does not hold." in report
     assert "### On the rig: does not hold" in report
     assert "**Ours:** it stands" in report
-    assert (folder / "a-fig-1.png").read_bytes().startswith(b"\x89PNG")
+    assert (folder / "sokolov2019-fig-1.png").read_bytes().startswith(b"\x89PNG")
     assert f"Read {folder / 'report.md'}" in run.err
 
 
@@ -141,7 +141,7 @@ def test_one_papers_figures_as_json() -> None:
     (claim,) = figures["papers"]["aranovskiy2020"]["claims"]
     assert claim["figures"] == {"time_s": 3.0}
     assert claim["verdict"] == "reproduced"
-    assert claim["pictures"] == ["a-fig-1.png"]
+    assert claim["pictures"] == ["sokolov2019-fig-1.png"]
     assert {"cmg_mj", "mujoco", "numpy", "scipy", "python"} == set(figures["versions"])
 
 

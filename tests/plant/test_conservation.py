@@ -72,6 +72,7 @@ def free_motion(duration_s: float, timestep_s: float, *, gravity: bool, seed: in
     return drifts(Motion(*(samples[:, ::stride] for samples in run)), plant, gravity=gravity)
 
 
+@pytest.mark.daily_cases("False-1e-07-2.0")
 @pytest.mark.parametrize("duration_s", slow_but([2.0, 10.0], 2.0))
 @pytest.mark.parametrize(("gravity", "momentum_bound"), [(False, 1e-7), (True, 3e-6)])
 def test_free_motion_conserves_energy_and_momenta(gravity: bool, momentum_bound: float, duration_s: float) -> None:
@@ -81,6 +82,7 @@ def test_free_motion_conserves_energy_and_momenta(gravity: bool, momentum_bound:
     assert np.all(worst[1:] < momentum_bound)
 
 
+@pytest.mark.daily_cases("True")
 @pytest.mark.parametrize("gravity", [False, True])
 def test_drifts_shrink_with_the_fourth_power_of_the_step(gravity: bool) -> None:
     """Orders of root mean squares over worlds and a common grid; a maximum jumps between instants.

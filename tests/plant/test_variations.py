@@ -253,6 +253,7 @@ SETTINGS: dict[str, Any] = {
 }
 
 
+@pytest.mark.daily_cases("accelerometer_inner_m", "servo_stiffness_n_m_rad", "gimbal_backlash_arcmin")
 @pytest.mark.parametrize("name", SETTINGS)
 def test_it_stands_in_the_resolved_scenario(name: str) -> None:
     experiment = prepare(load_scenario("push_recovery", [f"plant.{name}={SETTINGS[name]}"]))

@@ -93,7 +93,7 @@ def test_several_logs() -> None:
     errors = [log["observers"]["linear"]["velocity_rms_error_rad_s"] for log in result["logs"]]
     mean = result["mean"]["linear"]["velocity_rms_error_rad_s"]
     assert mean["mean"] == pytest.approx(np.mean(errors))
-    assert mean["interval"][0] <= min(errors)
+    assert mean["interval"] is None  # of fewer than four positive numbers
     assert files("it") == [
         "plot-sine-2.png",
         "plot-sine.png",

@@ -23,13 +23,15 @@ GAIN = math.sin(OMEGA * DT / 2.0) / (OMEGA * DT / 2.0)
 """A difference over DT is the rate in the middle of it, by that much smaller."""
 
 
-def replay_sine(tmp_path: Path) -> ReplayResult:
-    return replay_log(read_log(write_csv(tmp_path / "sine.csv", sine()), ReadOptions(COLUMNS)), settle_s=1.0)
+@pytest.fixture(scope="module")
+def sine_replay(tmp_path_factory: pytest.TempPathFactory) -> ReplayResult:
+    path = write_csv(tmp_path_factory.mktemp("sine") / "sine.csv", sine())
+    return replay_log(read_log(path, ReadOptions(COLUMNS)), settle_s=1.0)
 
 
-def test_the_difference_of_a_sine(tmp_path: Path) -> None:
+def test_the_difference_of_a_sine(sine_replay: ReplayResult) -> None:
     """Error |1 - GAIN exp(-i w dt/2)| of the motion, lag half a sample, noise gain sqrt(2)/dt."""
-    result = replay_sine(tmp_path).summaries["finite_difference"]
+    result = sine_replay.summaries["finite_difference"]
     off = abs(1.0 - GAIN * np.exp(-0.5j * OMEGA * DT))
     assert result["velocity_rms_rad_s"] == pytest.approx(PEAK / math.sqrt(2.0), rel=1e-9)
     assert result["velocity_rms_error_rad_s"] == pytest.approx(off * PEAK / math.sqrt(2.0), rel=1e-9)
@@ -38,9 +40,9 @@ def test_the_difference_of_a_sine(tmp_path: Path) -> None:
     assert result["noise_gain_1_s"] == pytest.approx(math.sqrt(2.0) / DT, rel=0.03)
 
 
-def test_the_linear_differentiator_of_a_sine(tmp_path: Path) -> None:
+def test_the_linear_differentiator_of_a_sine(sine_replay: ReplayResult) -> None:
     """s/(tau s + 1)^2 at i w; of white noise the root of the sum of its impulse response's squares."""
-    result = replay_sine(tmp_path).summaries["linear"]
+    result = sine_replay.summaries["linear"]
     response = 1.0 / (1.0 + 0.02j * OMEGA) ** 2
     assert result["lag_s"] == pytest.approx(-np.angle(response) / OMEGA, rel=2e-3)
     assert result["velocity_fit"] == pytest.approx(1.0 - abs(1.0 - response), abs=2e-3)
@@ -50,8 +52,8 @@ def test_the_linear_differentiator_of_a_sine(tmp_path: Path) -> None:
     assert result["noise_gain_1_s"] == pytest.approx(math.sqrt(np.sum(response**2)), rel=0.03)
 
 
-def test_zero_has_a_fit_of_zero_and_no_lag(tmp_path: Path) -> None:
-    result = replay_sine(tmp_path).summaries["zero"]
+def test_zero_has_a_fit_of_zero_and_no_lag(sine_replay: ReplayResult) -> None:
+    result = sine_replay.summaries["zero"]
     assert result["velocity_rms_error_rad_s"] == result["velocity_rms_rad_s"]
     assert (result["velocity_fit"], result["lag_s"], result["noise_gain_1_s"]) == (0.0, None, 0.0)
 

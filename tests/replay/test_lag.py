@@ -23,6 +23,7 @@ def make_delayed_pair(
     return signal / signal.std(), delayed_signal / signal.std()
 
 
+@pytest.mark.daily_cases("0.005-1.0", "0.01-40.0")
 @pytest.mark.parametrize(("dt", "corner_hz"), [(0.005, 1.0), (0.005, 20.0), (0.01, 20.0), (0.01, 40.0)])
 def test_known_delays(dt: float, corner_hz: float) -> None:
     """To a hundredth of a sample, up to signals that are almost white."""

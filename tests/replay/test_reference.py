@@ -37,6 +37,7 @@ def test_a_tilt_that_freezes_is_offered_no_cure(tmp_path: Path) -> None:
     assert "--" not in remark
 
 
+@pytest.mark.daily_cases("True-0.0", "True-0.02", "False-0.02", "False-0.1")
 @pytest.mark.parametrize("noise", [0.0, 0.02, 0.1])
 @pytest.mark.parametrize("is_white", [True, False])
 def test_a_cure_is_offered_from_the_criterion_on(noise: float, is_white: bool, tmp_path: Path) -> None:
@@ -54,6 +55,7 @@ def test_a_cure_is_offered_from_the_criterion_on(noise: float, is_white: bool, t
     assert ("--scale rate=" in remark) == (is_white or fit.correlation >= AGREES)
 
 
+@pytest.mark.daily_cases("0.05")
 @pytest.mark.parametrize("noise", [0.05, 0.1])
 def test_a_faultless_log_is_not_blamed_for_its_noise(noise: float, tmp_path: Path) -> None:
     """By chance one of a hundred is: here at most one of ten."""

@@ -278,6 +278,7 @@ def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
     np.testing.assert_allclose(study.level.given_rms, [np.sqrt(np.mean(s**2)) for s in stretches], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_every_log_is_tuned_with_its_own_noise(run: Path) -> None:
     run_log = read_log(run)
     plain = read_log(run / "trajectory.parquet", ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))

@@ -53,6 +53,7 @@ def log_file(folder: Path, kind: str) -> Path:
     return path
 
 
+@pytest.mark.daily_cases("uneven")
 @pytest.mark.parametrize("kind", ["even", "uneven"])
 def test_stretches_give_what_the_whole_gives(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, options = log_file(tmp_path, kind), ReadOptions(columns=COLUMNS)
@@ -88,6 +89,7 @@ def assert_saved_alike(long: ReplayResult, whole: ReplayResult, folder: Path) ->
         np.testing.assert_array_equal(read[name], values)
 
 
+@pytest.mark.slow
 def test_a_long_log_is_drawn_and_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = log_file(tmp_path, "uneven")
     in_stretches(monkeypatch, 256)
@@ -134,6 +136,7 @@ def test_dates_are_read_piece_by_piece(tmp_path: Path, last: str) -> None:
     assert np.array_equal(log["y1_rad"], [float(row.split(",")[1]) for row in rows])
 
 
+@pytest.mark.daily_cases("False-0.0005-*", "True-0.002-0.0001-*")
 @pytest.mark.parametrize("jitter", [0.0, 1e-5, 9e-5, 1.1e-4, 1e-3])
 @pytest.mark.parametrize("rounded_s", [0.0, 1e-4, 1e-3])
 @pytest.mark.parametrize("drift", [0.0, 5e-4, 2e-3])

@@ -81,6 +81,7 @@ def test_the_matched_filter_reaches_the_floor_with_acceleration() -> None:
     assert abs(squares.mean() - floor) < 4.0 * standard_error(squares) < 0.04 * floor
 
 
+@pytest.mark.daily_cases("noise1")
 @pytest.mark.parametrize(
     "noise", [TiltNoise(NOISE.tilt, NOISE.acceleration, 0.0), TiltNoise(NOISE.tilt, 2.0 * NOISE.acceleration, 0.89)]
 )

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from cmg_mj.codegen.engine_plugin.build import COMMON_HEADERS, COMMON_SOURCES
+from cmg_mj.codegen.engine_plugin.files import library_name
 from cmg_mj.codegen.export.names import export_files
 from cmg_mj.errors import InputError
 from cmg_mj.papers.report import REPORT_FILES
@@ -343,6 +345,14 @@ def test_what_the_commands_write_is_listed() -> None:
         "replay": files_of_replay(["ein Log", "b-2"]),
         "reproduce": REPORT_FILES,
         "export": export_files("my_observer"),
+        "plugin": plugin_files("my_rig", "my_rig_roll"),
     }
     assert not [(command, name) for command, files in names.items() for name in foreign_names(files)]
     assert foreign_names(export_files("mine")[:3]) == export_files("mine")[:3]
+    assert foreign_names([*plugin_files("mine", "mine"), "thesis.c"]) == ["thesis.c"]
+    assert foreign_names(plugin_files("mine", "mine")[1:]) == plugin_files("mine", "mine")[1:]
+
+
+def plugin_files(name: str, axis: str) -> list[str]:
+    own = [library_name(name), f"{name}.xml", f"{name}_example.c", f"{name}_example.py", "Makefile", "rig.c"]
+    return [*own, f"{axis}.h", f"{axis}.c", f"{axis}_controller.c", *COMMON_HEADERS, *COMMON_SOURCES]

@@ -43,6 +43,7 @@ def share_that_holds(mean: float, samples: np.ndarray) -> float:
     return float(np.mean([interval is not None and interval.low <= mean <= interval.high for interval in result]))
 
 
+@pytest.mark.daily_cases("chi-squared", "with falls")
 @pytest.mark.parametrize("kind", ["normal", "uniform", "chi-squared", "with falls"])
 def test_intervals_of_a_known_mean_cover_it(kind: str) -> None:
     """95 % intervals of 100 worlds, of a mean of 1: squared errors are skewed, and some worlds fall."""
@@ -96,6 +97,7 @@ def covered(mean: float, intervals: list[Interval]) -> float:
     return float(np.mean([low <= mean <= high for _, low, high in intervals]))
 
 
+@pytest.mark.daily_cases("lognormal-6-0.04", "half are zero-20-0.01")
 @pytest.mark.parametrize(("n_worlds", "gain"), [(6, 0.04), (20, 0.01)])
 @pytest.mark.parametrize("kind", SKEWED)
 def test_intervals_of_what_is_positive_and_skewed_cover_better_than_students(

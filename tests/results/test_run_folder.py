@@ -64,6 +64,7 @@ def quick(**fields: object) -> str:
 USERS = {"notes.txt": "mine", "plot.png": "a picture", "trajectory-mine.parquet": "rows", "sub/deep.txt": "deep"}
 
 
+@pytest.mark.daily_cases("folders change names-True", "files are moved-True")
 @pytest.mark.parametrize("with_folders", [False, True])
 def test_a_users_files_survive_every_command(swap_method: str, with_folders: bool) -> None:
     user_files = {name: text for name, text in USERS.items() if with_folders or "/" not in name}

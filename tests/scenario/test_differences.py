@@ -91,6 +91,7 @@ def test_a_users_version_of_a_bundled_one() -> None:
     assert differences_of(name="push_recovery.toml") == expected
 
 
+@pytest.mark.daily_cases("command0")
 @pytest.mark.parametrize("command", [["run"], ["compare", "--observers", "linear,homogeneous", "--worlds", 1]])
 def test_folder_title_and_summary_tell(command: list[Any]) -> None:
     settings = [*SHORT, "--set", "plant.equilibrium_bias_deg=1.0"]

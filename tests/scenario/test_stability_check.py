@@ -33,6 +33,7 @@ def loop(*overrides: str, name: str = "push_recovery") -> Loop:
     return closed_loop(experiment.scenario, experiment.law, experiment.plant.reduced)
 
 
+@pytest.mark.daily_cases("push_recovery", "two_axes", "single_gimbal")
 @pytest.mark.parametrize("name", bundled("scenarios"))
 def test_the_bundled_scenarios_give_no_hint(name: str) -> None:
     assert loop(name=name).hint is None
@@ -52,6 +53,7 @@ def test_an_lqr_keeps_its_distance() -> None:
     assert loop("controller.lqr.state_cost=[1, 1, 1, 1]", "controller.rate_hz=1000").distance > 0.9
 
 
+@pytest.mark.daily_cases("0.04-0.0005")
 @pytest.mark.parametrize("h", [5e-4, pytest.param(1e-4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("latency", [0.04, 0.06])
 def test_stable_is_what_the_loop_step_by_step_is(latency: float, h: float) -> None:

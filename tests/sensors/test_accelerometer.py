@@ -174,6 +174,7 @@ def test_the_loop_meets_the_older_instant(
 # --- low-pass ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.daily_cases("5.0", "94.0", "400.0")
 @pytest.mark.parametrize("bandwidth_hz", [5.0, 44.0, 94.0, 184.0, 400.0])
 def test_noise_after_the_low_pass(bandwidth_hz: float) -> None:
     """The closed form against the sum of the squared impulse response, and against what is delivered."""

@@ -149,6 +149,7 @@ def test_encoder_without_resolution_is_ideal() -> None:
 # --- fibre-optic gyro --------------------------------------------------------------------------------------
 
 
+@pytest.mark.daily_cases("0.02-200.0")
 @pytest.mark.parametrize(("walk_deg_rth", "rate_hz"), [(0.02, 200.0), (0.1, 1000.0)])
 def test_fog_angle_walks_randomly(walk_deg_rth: float, rate_hz: float) -> None:
     """The integral of a still gyro has the variance N^2 t: 400 gyros of 0.5 s each."""

@@ -61,12 +61,16 @@ def assert_same_numbers(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
             assert ours[name] == (None if value is None else pytest.approx(value, rel=1e-12)), name
 
 
+@pytest.mark.daily_cases("gyro_free", "homogeneous", "homogeneous_adaptive", "kalman", "ltv")
 @pytest.mark.parametrize("kind", sorted(OBSERVERS))
 def test_batch_equals_single_runs(kind: str) -> None:
     setup = experiment(f"observer.kind={kind}")
     assert_same(setup.run_many(3), [setup.run(world=i) for i in range(3)])
 
 
+@pytest.mark.daily_cases(
+    "rates", "imperfect accelerometers", "gyro, estimated angles", "open_loop_observers", "single gimbal"
+)
 @pytest.mark.parametrize(
     "settings",
     [
@@ -85,6 +89,7 @@ def test_batch_equals_single_runs_in_every_setting(settings: tuple[str, ...]) ->
     assert_same(setup.run_many(3), [setup.run(world=i) for i in range(3)])
 
 
+@pytest.mark.daily_cases("homogeneous-21.2")
 @pytest.mark.parametrize(("kind", "fall_angle_deg"), [("homogeneous", 21.2), ("ltv", 7.85), ("linear", 7.2)])
 def test_worlds_that_fall_midway_leave_the_others_alone(kind: str, fall_angle_deg: float) -> None:
     """A push that ends near the angle that counts as a fall: the noise decides which worlds fall, and when."""
@@ -110,6 +115,7 @@ def with_bias(setup: Experiment, bias_deg: float) -> Experiment:
     return replace(setup, plant=load_plant(**{**fields, "equilibrium_bias_deg": bias_deg}))
 
 
+@pytest.mark.daily_cases("homogeneous")
 @pytest.mark.parametrize("kind", ["homogeneous", "ltv"])
 def test_each_world_may_have_its_own_rig(kind: str) -> None:
     """Large biases fall at once and at different times; in the batch each world keeps its own model."""
@@ -196,12 +202,12 @@ def peak_bytes(duration_s: float, n_worlds: int | None, keep_trajectory: bool) -
 @pytest.mark.slow
 @pytest.mark.parametrize("n_worlds", [None, 4])
 def test_memory_does_not_grow_with_the_duration_unless_the_trajectory_is_kept(n_worlds: int | None) -> None:
-    """Once the first 256 ticks have become a piece. The first run fills caches."""
+    """Once two pieces of 256 ticks have been made: the second is made beside the first. The first run fills caches."""
     _, short, long, full = (
         peak_bytes(duration, n_worlds, keep)
-        for duration, keep in ((0.1, False), (1.4, False), (6.0, False), (6.0, True))
+        for duration, keep in ((0.1, False), (2.8, False), (6.0, False), (6.0, True))
     )
-    print(f"{n_worlds} worlds: {short / 1e3:.0f} kB for 1.4 s, {long / 1e3:.0f} for 6 s, {full / 1e3:.0f} if kept")
+    print(f"{n_worlds} worlds: {short / 1e3:.0f} kB for 2.8 s, {long / 1e3:.0f} for 6 s, {full / 1e3:.0f} if kept")
     assert long < 1.05 * short + 20_000
     assert full > long + 100_000  # 920 ticks more, of 26 columns
 

@@ -127,6 +127,18 @@ def assert_same_run(rows: list[tuple], trajectory: Trajectory) -> None:
 # --- one trajectory ------------------------------------------------------------------------------------
 
 
+@pytest.mark.daily_cases(
+    "adaptive",
+    "gyro_free",
+    "homogeneous",
+    "ltv",
+    "Euler",
+    "sensors at other rates",
+    "latency",
+    "gyro",
+    "half the step",
+    "single gimbal",
+)
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_callback_in_the_runner_equals_the_runner(settings: tuple[str, ...]) -> None:
     trajectory = experiment(settings).run(driver="callback").trajectory
@@ -136,11 +148,35 @@ def test_callback_in_the_runner_equals_the_runner(settings: tuple[str, ...]) -> 
         np.testing.assert_allclose(trajectory[name], values, rtol=0.0, atol=1e-9, err_msg=name)
 
 
+@pytest.mark.daily_cases(
+    "adaptive",
+    "gyro_free",
+    "homogeneous",
+    "ltv",
+    "Euler",
+    "sensors at other rates",
+    "latency",
+    "gyro",
+    "half the step",
+    "single gimbal",
+)
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_a_users_loop_equals_the_runner(settings: tuple[str, ...]) -> None:
     assert_same_run(Loop(experiment(settings)).by_control().rows, native(settings))
 
 
+@pytest.mark.daily_cases(
+    "adaptive",
+    "gyro_free",
+    "homogeneous",
+    "ltv",
+    "Euler",
+    "sensors at other rates",
+    "latency",
+    "gyro",
+    "half the step",
+    "single gimbal",
+)
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_the_callback_in_a_users_loop_equals_the_runner(settings: tuple[str, ...]) -> None:
     """From fresh data at the keyframe, without a forward pass: MuJoCo's accelerometers then still show zero."""
@@ -184,6 +220,7 @@ def test_a_forward_pass_before_the_first_step_changes_nothing() -> None:
     assert_same_run(loop.rows, native())
 
 
+@pytest.mark.daily_cases("RK4-2", "RK4-123", "Euler-2", "Euler-123")
 @pytest.mark.parametrize("steps", [2, 3, 5, 7, 123])
 @pytest.mark.parametrize("integrator", ["RK4", "Euler"])
 def test_resetting_the_time_restarts_the_controller(integrator: str, steps: int) -> None:
@@ -243,6 +280,7 @@ def count_steps(*settings: str) -> tuple[Experiment, Controller, Counter[str]]:
     return setup, controller, observer.calls
 
 
+@pytest.mark.daily_cases("RK4-1000", "RK4-40", "Euler-200", "implicitfast-200", "implicit-200", "discrete-200")
 @pytest.mark.parametrize("rate_hz", [1000, 200, 40])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_observer_advances_once_a_control_period(integrator: str, rate_hz: int) -> None:

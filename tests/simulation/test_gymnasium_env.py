@@ -45,6 +45,7 @@ def act(env: ScissoredPairEnv, seed: int, **options: Any) -> tuple[list[Tick], l
     return ticks, infos, total
 
 
+@pytest.mark.daily_cases("push", "uneven", "fall")
 @pytest.mark.parametrize(
     ("scenario", "settings", "seed", "world"),
     [

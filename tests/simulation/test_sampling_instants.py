@@ -29,6 +29,7 @@ def perfect(*settings: str) -> Experiment:
     return prepare(load_scenario("push_recovery", [*PERFECT, *settings]))
 
 
+@pytest.mark.daily_cases("native-0.25", "native-2.5", "callback-1.0", "callback-5.0")
 @pytest.mark.parametrize("step_ms", STEPS_MS)
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_perfect_sensors_show_the_present_state_at_every_tick(driver: str, step_ms: float) -> None:
@@ -42,6 +43,7 @@ def test_perfect_sensors_show_the_present_state_at_every_tick(driver: str, step_
     np.testing.assert_allclose(run["fog_rad_s"], run["x2_rad_s"], rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.daily_cases("0.0031-1-0.5", "0.005-1-1.0", "0.0069-2-0.5", "0.0069-2-2.5", "0.005-1-5.0")
 @pytest.mark.parametrize("step_ms", [0.5, 1.0, 2.5, 5.0])
 @pytest.mark.parametrize(("latency_s", "ticks"), [(0.0031, 1), (0.005, 1), (0.0069, 2)])
 def test_latency_is_a_time_and_not_a_number_of_steps(step_ms: float, latency_s: float, ticks: int) -> None:

@@ -98,6 +98,7 @@ def assert_alike(stream_path: Path, file_path: Path) -> None:
             assert stream[key] == rows, key
 
 
+@pytest.mark.daily_cases("fall")
 @pytest.mark.parametrize(
     ("scenario", "settings"),
     [
@@ -143,6 +144,7 @@ def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: 
     assert_received(Path("received.rrd"))
 
 
+@pytest.mark.daily_cases("(0.052, 0.07)-64")
 @pytest.mark.parametrize("ticks", slow_but([1, 2, 3, 64], 64))
 @pytest.mark.parametrize("push", [(0.05, 0.05), (0.051, 0.001), (0.052, 0.07)], ids=str)
 def test_wherever_it_is_cut_into_pieces(ticks: int, push: tuple[float, float]) -> None:

@@ -71,6 +71,7 @@ KINDS: dict[str, Callable[[], list[str]]] = {
 }
 
 
+@pytest.mark.daily_cases("every observer", "a user's observer", "a user's model")
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_written_scenario_reruns_to_the_same_bits(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """From another folder, where other files may lie about; twice is the same run, too."""

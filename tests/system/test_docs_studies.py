@@ -85,3 +85,13 @@ def test_a_study_file_can_be_run(study: str) -> None:
     outcome = cmg_mj("sweep", STUDIES / study, "--dry-run")
     assert outcome.status == 0, outcome.err
     assert " trials in " in outcome.out
+
+
+@pytest.mark.slow
+def test_the_table_of_gymnasium() -> None:
+    pytest.importorskip("imageio", reason='imageio is not installed: python -m pip install "gymnasium[mujoco]"')
+    command = [sys.executable, STUDIES / "gymnasium_plugin.py", "cart held"]
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    row = r"\| InvertedPendulum-v5, cart held \| +0.001 \| +10 of 10 \| +10 of 10 \| +0 of 10 \(\d+ to \d+ steps\) \|"
+    assert re.search(row, process.stdout)
+    assert re.search(row, (STUDIES.parent / "plugin.md").read_text(encoding="utf-8"))

@@ -149,10 +149,9 @@ class WiredBoard:
         self.counts.counts.append(counts)
         if status:
             raise RunStopped(f"the controller on the board has stopped: {NOT_FINITE.get(status, f'status {status}')}")
-        numbers = self._answer.unpack_from(answer.payload, _COST.size)
-        if not all(map(math.isfinite, numbers)):
+        u, x_e, *estimate = self._answer.unpack_from(answer.payload, _COST.size)
+        if not all(map(math.isfinite, (u, *estimate))):  # a law without an integrator has none
             raise RunStopped(f"{self.name}: the board answered a number that is not finite")
-        u, x_e, *estimate = numbers
         self._decision = Decision(u, x_e, tuple(estimate))
         return self._decision
 

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import copy
 import hashlib
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from cmg_mj.codegen.engine_plugin.build import COMMON_SOURCES, common_files
 from cmg_mj.codegen.engine_plugin.rig import PluginRig
 from cmg_mj.codegen.engine_plugin.tables import format_controller, format_rig
 from cmg_mj.codegen.export import generate_code
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.errors import InputError
-
-if TYPE_CHECKING:
-    from cmg_mj.codegen.export.traced_law import TracedLaw
-
 
 NAMES_IN_USE = frozenset(
     [
@@ -87,9 +82,7 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
         controller = axis.controller
         code = generate_code(_exportable(controller), "double", own)
         files |= {file: text for file, text in code.files.items() if file in (f"{own}.h", f"{own}.c")}
-        files[f"{own}_controller.c"] = format_controller(
-            own, controller, code.figures["numbers_in_state"], _law(controller)
-        )
+        files[f"{own}_controller.c"] = format_controller(own, controller, code.figures["numbers_in_state"], code.law)
         sources.append(f"{own}_controller.c")
         names.append(own)
     files["rig.c"] = format_rig(rig, names, "")
@@ -99,21 +92,7 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
 
 
 def _exportable(controller: Controller) -> Controller:
-    """Copy a controller as one that the export takes: on its observer's rate, with the law (8) for another one.
-
-    The plugin's own C chooses the rate, and has the other law.
-    """
-    result, law = copy.copy(controller), controller.law
+    """Copy a controller as one that the export takes: on its observer's rate. The plugin's own C chooses the rate."""
+    result = copy.copy(controller)
     result.feedback = "observer"
-    if type(law) is not StateFeedback:
-        result.law, result.bias_trim_s, result.trimmed_until = StateFeedback(law.dt, rate_limit=law.rate_limit), 0.0, 0
     return result
-
-
-def _law(controller: Controller) -> TracedLaw | None:
-    """Trace a law that is not (8)."""
-    if type(controller.law) is StateFeedback:
-        return None
-    from cmg_mj.codegen.export.traced_law import trace_law  # imports CasADi
-
-    return trace_law(controller.law, len(controller.extra_signals[0]))

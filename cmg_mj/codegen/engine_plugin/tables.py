@@ -23,7 +23,7 @@ from cmg_mj.codegen.engine_plugin.sensor_numbers import (
 from cmg_mj.controllers.controller import Controller
 
 if TYPE_CHECKING:
-    from cmg_mj.codegen.export.traced_law import TracedLaw
+    from cmg_mj.codegen.export.law_code import LawPrinter
 
 Number = int | float
 Struct = Delivery | Pair | Encoders | FogNumbers | TurnGyro | Settings
@@ -32,25 +32,25 @@ Value = Number | str | Sequence[Number]
 FEEDBACK = {"observer": "FEEDBACK_OBSERVER", "fog": "FEEDBACK_FOG", "truth": "FEEDBACK_TRUTH"}
 
 
-def format_controller(name: str, controller: Controller, observer_numbers: int, law: TracedLaw | None) -> str:
+def format_controller(name: str, controller: Controller, observer_numbers: int, law: LawPrinter) -> str:
     """Print NAME_controller.c, which joins an exported controller to the plugin.
 
     Args:
         name: Name of the export.
         controller: The controller.
         observer_numbers: Numbers in the exported observer's state.
-        law: Its law, if that is not (8), which the export has.
+        law: The printer of its law.
 
     Returns:
         The text.
     """
-    n, gap = name, float(controller.backlash)
+    n, gap, formulas = name, float(controller.backlash), law.law
     trimmed = -(-controller.trimmed_until // controller.period)
     fields = {
         "estimates": 3 + len(controller.extra_signals[0]),
         "observer": max(1, observer_numbers),
-        "law": 1 if law is None else max(1, len(law.paths)),
-        "integrator": 0 if law is None else law.integrator,
+        "law": max(1, formulas.numbers),
+        "integrator": formulas.numbers - 1 if formulas.has_integrator else -1,
         "trimmed": trimmed,
         "trim_part": controller.trim_part if trimmed else 0,
         "trim_gain": controller.trim_gain if trimmed else 0.0,
@@ -101,21 +101,30 @@ const controller_type {n}_controller_type = {{
 """
 
 
-def _law_functions(law: TracedLaw | None) -> str:
-    """Print law_init and law_step; None: of the exported law (8)."""
-    note = "" if law is None else "/* The law; that of the exported code is another one and not used. */\n"
-    init = ["memory[0] = 0.0 * y[0];"] if law is None else law.c_init()
-    step = ["law(x[0], x[1], x[2], memory, u);"] if law is None else law.c_step()
-    first, second = ("".join(f"    {line}\n" for line in lines) for lines in (init, step))
-    return f"""{note}static void law_init(double *memory, const double y[3])
+def _law_functions(law: LawPrinter) -> str:
+    """Print law_init and law_step, which call the exported law."""
+    formulas, memory = law.law, "memory"
+    if formulas.state:
+        memory = f"&memory[{len(formulas.state)}]"
+    places = {name: f"y[{i}]" for i, name in enumerate(("y1", "y2", "acceleration"))}
+    init = "memory[0] = 0.0 * y[0];" if formulas.is_state_feedback else law.init_call(places, "&state", memory)
+    places |= {name: f"x[{i}]" for i, name in enumerate(("x1", "x2", "x3"))} | {"estimate": "x", "held": "held"}
+    step = law.step_call(places, "&state", memory, "u")
+    state, load, store = f"{law.name}_law_state state", "memcpy(&state, memory, sizeof state);", ""
+    if formulas.state:
+        store = "    memcpy(memory, &state, sizeof state);\n"
+        init, step = f"{state} = {{0}};\n    {init}", f"{state};\n    {load}\n    {step}"
+    return f"""static void law_init(double *memory, const double y[3])
 {{
     (void)memory, (void)y;
-{first}}}
+    {init}
+{store}}}
 
 static void law_step(double *memory, const double y[3], const double *x, double held, double *u)
 {{
     (void)memory, (void)y, (void)x, (void)held;
-{second}}}
+    {step}
+{store}}}
 """
 
 

@@ -10,13 +10,12 @@ import casadi
 
 from cmg_mj.codegen.export.c_code import Precision, body, literal
 from cmg_mj.codegen.export.constants import Constant, Constants
-from cmg_mj.codegen.export.header_comment import format_header_comment
+from cmg_mj.codegen.export.formulas import MEASURED
+from cmg_mj.codegen.export.header_comment import class_path, format_header_comment
+from cmg_mj.codegen.export.law_code import LawPrinter, function_head
 from cmg_mj.codegen.export.names import estimate_places
-from cmg_mj.codegen.export.trace import MEASURED, Traced
+from cmg_mj.codegen.export.trace import Traced
 from cmg_mj.controllers.controller import Controller
-
-WIDEST = 110
-"""Longest line [characters]."""
 
 TYPES = {"double": "double", "single": "float"}
 
@@ -56,6 +55,13 @@ class CodePrinter:
         """Names in C of an estimate's parts."""
         return estimate_places(self.controller.extra_signals[0])
 
+    @cached_property
+    def law(self) -> LawPrinter:
+        """The printer of the law's part."""
+        law = self.traced.law
+        names = _names(self.constants.of_law) if law.is_state_feedback else []
+        return LawPrinter(law, self.name, class_path(self.controller.law), names)
+
     def header(self) -> str:
         """Print NAME.h."""
         n, N, real = self.name, self.name.upper(), f"{self.name}_real"
@@ -93,10 +99,10 @@ typedef enum {{
 typedef struct {{
 {members}}} {n}_state;
 
-/* The whole controller's state. */
+{self.law.state_type}/* The whole controller's state. */
 typedef struct {{
     {n}_state observer;
-    {real} x_e; /* integrator [rad s] */
+{self.law.member}    {real} x_e; /* {self.law.integrator_comment} */
     {real} u; /* last command [rad/s] */
     int started;
     {n}_status status; /* of the last update */
@@ -140,9 +146,15 @@ extern "C" {{
         state = [f"state->{member}" for member in traced.state]
         estimate = [f"estimate[{i}]" for i in range(len(self.places))]
         results = [
-            f"controller->{x}" for x in (*(f"observer.{member}" for member in traced.state), "x_e", "u")
+            f"controller->{x}"
+            for x in (*(f"observer.{member}" for member in traced.state), *self.law.finite_members, "u")
         ] + estimate
         x1, x3 = ("y1", "y2") if self.controller.angle_source == "measured" else (estimate[0], estimate[2])
+        here = {name: name for name in (*MEASURED, "estimate")}
+        here |= {"x1": x1, "x2": estimate[1], "x3": x3, "held": "controller->u"}
+        law_state = ("&controller->law", "&controller->x_e")
+        law_call = self.law.step_call(here, *law_state, "&controller->u")
+        init_call = self.law.init_call(here, *law_state)
         start = ["0", "y2", *["0"] * (len(estimate) - 3)]
         first = "".join(f"            {place} = {x};\n" for place, x in zip(estimate, ["y1", *start], strict=True))
         trim = f"""        if (controller->updates < {constants.trimmed}) {{ /* while the bias is still being found */
@@ -171,11 +183,7 @@ static int is_finite({real} x)
 {{
 {self._body(traced.measure, raw + _names(constants.of_measure), [f"*{name}" for name in measured])}}}
 
-/* u = -K_e [x1, x2, x3, x_e], limited; then a step of the integrator, unless it would wind up. */
-{self._declaration("law")}
-{{
-{self._body(traced.law, ["x1", "x2", "x3", "*x_e", *_names(constants.of_law)], ["*u", "*x_e"])}}}
-
+{self.law.functions(self._body)}
 {self._declaration("init")}
 {{
     (void)state, (void)y1, (void)y2, (void)acceleration;
@@ -188,7 +196,7 @@ static int is_finite({real} x)
 
 {self._declaration("start")}
 {{
-    controller->x_e = 0;
+    controller->x_e = {"0" if traced.law.has_integrator else "NAN"};
     controller->u = 0;
     controller->started = 0;
     controller->status = {N}_OK;
@@ -209,12 +217,12 @@ static int is_finite({real} x)
             {n}_step(&controller->observer, y1, y2, acceleration, controller->u, estimate);
         }} else {{
             {n}_init(&controller->observer, y1, y2, acceleration);
-{first}            controller->started = 1;
+{f"            {init_call}" + chr(10) if init_call else ""}{first}            controller->started = 1;
         }}
-{trim if constants.trimmed else ""}        law({x1}, {estimate[1]}, {x3}, &controller->x_e, &controller->u);
+{trim if constants.trimmed else ""}        {law_call}
         if (!({_are_finite(results)}))
             controller->status = {N}_RESULT_NOT_FINITE;
-    }}
+{self.law.limit("        ")}    }}
     if (controller->status != {N}_OK) {{
         for (i = 0; i < {N}_ESTIMATES; ++i) estimate[i] = 0;
         controller->u = 0;
@@ -240,13 +248,8 @@ static int is_finite({real} x)
             "init": (f"void {n}_init", (state, *y)),
             "step": (f"void {n}_step", (state, *y, f"{real} u", estimate)),
             "measure": ("static void measure", (*raw, *(f"{real} *{name}" for name in MEASURED))),
-            "law": (
-                "static void law",
-                (*(f"{real} {name}" for name in ("x1", "x2", "x3")), f"{real} *x_e", f"{real} *u"),
-            ),
         }[function]
-        text = f"{head}({', '.join(parameters)})"
-        return text if len(text) <= WIDEST else f"{head}(\n    {(',' + chr(10) + '    ').join(parameters)})"
+        return function_head(head, parameters)
 
     def _numbers(self) -> str:
         """Print the constants with their meanings."""

@@ -17,8 +17,12 @@ import numpy as np
 
 from cmg_mj.codegen.export.c_code import Precision
 from cmg_mj.codegen.export.constants import Constants
+from cmg_mj.codegen.export.source_location import LawNotExportable
 from cmg_mj.codegen.export.trace import Traced
+from cmg_mj.codegen.export.traced_law import law_arguments
 from cmg_mj.controllers.controller import Controller
+from cmg_mj.controllers.laws import StateFeedback
+from cmg_mj.elementwise import clip
 from cmg_mj.errors import InputError, RunStopped
 
 TICKS = 400
@@ -64,7 +68,7 @@ def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
     """Compute the estimates and u by the controller, (n, 4 + extra signals)."""
     fresh = Controller(
         copy.deepcopy(controller.observer),
-        controller.law,
+        copy.deepcopy(controller.law),
         controller.sensors,
         controller.plant._replace(backlash=0.0),
         angle_source=controller.angle_source,
@@ -82,36 +86,47 @@ def in_casadi(controller: Controller, traced: Traced, constants: Constants, samp
 
     Raises:
         InputError: A number of the state is not finite.
+        LawNotExportable: A number of the law's state is not finite.
     """
 
     def values(function: casadi.Function, *arguments: float) -> list[float]:
         return [float(value) for value in function.call(arguments)]
 
     measure_constants = [constant.value for constant in constants.of_measure]
-    law_constants = [constant.value for constant in constants.of_law]
+    law, limit = traced.law, constants.of_law[-1].value
+    law_constants = [constant.value for constant in constants.of_law] if law.is_state_feedback else []
+    arguments, law_state = law_arguments(len(controller.extra_signals[0])), [*law.state, "x_e"][: law.numbers]
     width = 3 + len(controller.extra_signals[0])
     state: list[float] | None = None
-    u = x_e = 0.0
+    memory: list[float] = []
+    u = 0.0
     rows = []
     for k, row in enumerate(samples.tolist()):
         y = values(traced.measure, *row, *measure_constants)
         if state is None:
-            state = values(traced.init, *y)
+            state, memory = values(traced.init, *y), law.first(y)
             estimate = [y[0], 0.0, y[1], *[0.0] * (width - 3)]
         else:
             result = values(traced.step, *state, *y, u)
             state, estimate = result[: len(state)], result[len(state) :]
         for place, value in zip(traced.state, state, strict=True):
             if not math.isfinite(value):  # and the estimate is: Python has gone on
-                raise InputError(
-                    f"its state holds {value} ({place}) at sample {k}, where the C stops: hold numbers that are finite"
-                )
+                raise InputError(_not_finite(place, value, k))
         if k < constants.trimmed:
-            x_e = constants.trim_gain.value * estimate[constants.trim_part]
+            memory[-1] = constants.trim_gain.value * estimate[constants.trim_part]
         x1, x3 = (y[0], y[1]) if controller.angle_source == "measured" else (estimate[0], estimate[2])
-        u, x_e = values(traced.law, x1, estimate[1], x3, x_e, *law_constants)
+        inputs = dict(zip(arguments, [*y, x1, estimate[1], x3, *estimate[3:], u], strict=True))
+        u, memory = law.decide(inputs, memory, law_constants)
+        u = clip(u, -limit, limit)
+        for place, value in zip(law_state, memory, strict=True):
+            if not math.isfinite(value):
+                raise LawNotExportable(_not_finite(place, value, k))
         rows.append([*estimate, u])
     return np.array(rows)
+
+
+def _not_finite(place: str, value: float, sample: int) -> str:
+    return f"its state holds {value} ({place}) at sample {sample}, where the C stops: hold numbers that are finite"
 
 
 def columns(controller: Controller) -> list[str]:
@@ -144,6 +159,7 @@ def check_trace(controller: Controller, traced: Traced, constants: Constants, se
 
     Raises:
         InputError: The formulas and Python differ by more than is allowed, or the state does not stay finite.
+        LawNotExportable: The law is to blame for that.
     """
     largest = 0.0
     for seed in seeds:
@@ -151,20 +167,30 @@ def check_trace(controller: Controller, traced: Traced, constants: Constants, se
         try:
             expected = in_python(controller, samples)
         except RunStopped as error:
-            raise InputError(f"it cannot be compared on random signals: {error}") from error
-        if not np.array_equal(in_python(controller, samples), expected):
-            raise InputError("in Python it is not twice the same on the same signals, so that nothing can be compared")
+            fault = LawNotExportable if str(error).startswith("law ") else InputError
+            raise fault(f"it cannot be compared on random signals: {error}") from error
+        differs = in_python(controller, samples) != expected
+        if differs.any():
+            raise _refusal(controller, np.argwhere(differs)[0, 1])(
+                "in Python it is not twice the same on the same signals, so that nothing can be compared"
+            )
         off = np.abs(in_casadi(controller, traced, constants, samples) - expected)
         share = off / np.maximum(allowed(controller, samples, expected, "double"), np.finfo(float).tiny)
         if not np.all(share <= 1.0):
             tick, part = np.argwhere(~(share <= 1.0))[0]
             name = columns(controller)[part]
-            raise InputError(
+            raise _refusal(controller, part)(
                 f"traced, it is not what Python runs: on random signals {name} is off by {off[tick, part]:.3g} at "
                 f"sample {tick}. Does it look at the type of a number, or remember something outside of its state?"
             )
         largest = max(largest, float(off.max()))
     return largest
+
+
+def _refusal(controller: Controller, part: int) -> type[InputError]:
+    """Return the error for the first column that is off: u alone is the law's fault, unless that is (8)."""
+    is_command = part == len(columns(controller)) - 1
+    return LawNotExportable if is_command and type(controller.law) is not StateFeedback else InputError
 
 
 def find_compiler() -> list[str] | None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.laws import StateFeedback
+from cmg_mj.controllers.laws import Law, StateFeedback
 
 
 class Constant(NamedTuple):
@@ -21,7 +21,7 @@ class Constants(NamedTuple):
 
     Attributes:
         of_measure: Radii, then the gimbals' directions, then their zeros.
-        of_law: The period, the gains, the limit.
+        of_law: The period, the gains, the limit; of a law that is not (8) the limit alone.
         trimmed: Number of updates during which the integrator is trimmed.
         trim_gain: Gain of the trim; see `integrator_trim`.
         trim_part: Index of the part of the estimate that trims the integrator.
@@ -43,9 +43,7 @@ class Constants(NamedTuple):
 
 def constants_of(controller: Controller) -> Constants:
     """Collect the constants of a controller."""
-    tilt, law = controller.tilt, cast("StateFeedback", controller.law)
-    k1, k2, k3, k4 = law.gains
-    gimbals = controller.gimbal_angle
+    tilt, gimbals = controller.tilt, controller.gimbal_angle
     numbered = list(enumerate(zip(gimbals.directions, gimbals.zeros, strict=True), 1))
     return Constants(
         of_measure=[
@@ -54,16 +52,24 @@ def constants_of(controller: Controller) -> Constants:
             *(Constant(f"direction_{i}", sign, f"sign of u that gimbal {i} is given") for i, (sign, _) in numbered),
             *(Constant(f"zero_{i}", zero, f"encoder {i} at a gimbal angle of 0 [rad]") for i, (_, zero) in numbered),
         ],
-        of_law=[
-            Constant("period", law.dt, "from one update to the next [s]"),
-            Constant("gain_x1", k1, "on the tilt [1/s]"),
-            Constant("gain_x2", k2, "on the tilt rate"),
-            Constant("gain_x3", k3, "on the gimbal angle [1/s]"),
-            Constant("gain_x_e", k4, "on the integrator [1/s^2]"),
-            Constant("rate_limit", law.rate_limit, "largest gimbal rate [rad/s]"),
-        ],
+        of_law=_of_law(controller.law),
         trimmed=-(-controller.trimmed_until // controller.period),
         trim_gain=Constant("trim_gain", controller.trim_gain, "from the bias to the integrator [s]"),
         trim_part=controller.trim_part,
         gimbals=len(gimbals.directions),
     )
+
+
+def _of_law(law: Law) -> list[Constant]:
+    limit = Constant("rate_limit", float(law.rate_limit), "largest gimbal rate [rad/s]")
+    if type(law) is not StateFeedback:  # its other numbers are in its formulas
+        return [limit._replace(meaning=f"{limit.meaning}; the law's formulas have it too, if it knows it")]
+    k1, k2, k3, k4 = law.gains
+    return [
+        Constant("period", law.dt, "from one update to the next [s]"),
+        Constant("gain_x1", k1, "on the tilt [1/s]"),
+        Constant("gain_x2", k2, "on the tilt rate"),
+        Constant("gain_x3", k3, "on the gimbal angle [1/s]"),
+        Constant("gain_x_e", k4, "on the integrator [1/s^2]"),
+        limit,
+    ]

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 from cmg_mj.codegen.export.c_code import Precision
 from cmg_mj.controllers.controller import Controller
+from cmg_mj.controllers.laws import LAW_CLASSES, Law, StateFeedback
+from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.observers.protocol import Observer
 
@@ -32,27 +34,43 @@ def format_header_comment(name: str, controller: Controller, precision: Precisio
     Returns:
         A valid comment in C, whatever a user's docstring contains.
     """
-    observer = controller.observer
-    cls = type(observer)
-    first = (inspect.getdoc(cls) or "").split("\n\n")[0]
-    bench_parameters = OBSERVER_CLASSES.bench_parameters
-    parameters = [parameter for parameter in inspect.signature(cls).parameters if parameter not in bench_parameters]
+    observer, law = controller.observer, controller.law
     lines = [
         f"{name}: observer and control law, {precision} precision; by cmg_mj {version('cmg_mj')}.",
         "",
-        f"{cls.__module__}:{cls.__qualname__}",
-        *textwrap.wrap(first, WIDTH),
+        *_first_words(observer),
         "",
-        f"Made for a period of {controller.law.dt:g} s with these parameters of the observer:",
-        *(f"    {line}" for line in describe_parameters(observer, parameters) or ["none"]),
+        f"Made for a period of {law.dt:g} s with these parameters of the observer:",
+        *_choices(observer, OBSERVER_CLASSES),
     ]
     for attribute, words in (("model", "this reduced model of the rig"), ("noise", "this noise of the measurement")):
         value = getattr(observer, attribute, None)
         if dataclasses.is_dataclass(value) and not isinstance(value, type):
             fields = [field.name for field in dataclasses.fields(value)]
             lines += [f"and {words}:", *(f"    {line}" for line in describe_parameters(value, fields))]
-    lines += ["What belongs to the law and the sensors stands at the top of the .c file."]
+    if type(law) is StateFeedback:
+        lines += ["What belongs to the law and the sensors stands at the top of the .c file."]
+    else:
+        lines += ["", *_first_words(law), "", "It is the law, with these parameters:", *_choices(law, LAW_CLASSES)]
+        lines += ["Its limit and what belongs to the sensors stand at the top of the .c file."]
     return "/* " + "\n".join(f" * {_harmless(line)}".rstrip() for line in lines)[3:] + "\n */"
+
+
+def class_path(instance: Observer | Law) -> str:
+    """Name the class of an observer or a law, as `package.module:Class`."""
+    return f"{type(instance).__module__}:{type(instance).__qualname__}"
+
+
+def _first_words(instance: Observer | Law) -> list[str]:
+    """Name an observer or a law, and quote the first words of its docstring."""
+    first = (inspect.getdoc(type(instance)) or "").split("\n\n")[0]
+    return [class_path(instance), *textwrap.wrap(first, WIDTH)]
+
+
+def _choices(instance: Observer | Law, kind: UserClassKind) -> list[str]:
+    """Describe the parameters of an observer or a law that are a user's choice."""
+    names = [name for name in inspect.signature(type(instance)).parameters if name not in kind.bench_parameters]
+    return [f"    {line}" for line in describe_parameters(instance, names) or ["none"]]
 
 
 def _harmless(line: str) -> str:
@@ -60,7 +78,7 @@ def _harmless(line: str) -> str:
     return line.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").rstrip("\\")
 
 
-def describe_parameters(instance: Observer | DataclassInstance, names: list[str]) -> list[str]:
+def describe_parameters(instance: Observer | Law | DataclassInstance, names: list[str]) -> list[str]:
     """Describe the parameters of an object, as in `tau = 0.02  Time constant [s]`.
 
     Args:

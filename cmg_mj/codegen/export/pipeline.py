@@ -9,7 +9,7 @@ import shlex
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple, TypedDict
+from typing import NamedTuple, TypedDict, TypeVar
 
 import numpy as np
 
@@ -18,20 +18,25 @@ from cmg_mj.codegen.export.c_code import Precision, operations
 from cmg_mj.codegen.export.c_files import CodePrinter
 from cmg_mj.codegen.export.constants import constants_of
 from cmg_mj.codegen.export.example import format_example, format_test_vector
+from cmg_mj.codegen.export.law_code import LawPrinter
 from cmg_mj.codegen.export.names import export_files, name_of
+from cmg_mj.codegen.export.source_location import LawNotExportable
 from cmg_mj.codegen.export.trace import trace
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.dry_run import dry_run_observer
+from cmg_mj.controllers.dry_run import dry_run_law, dry_run_observer
 from cmg_mj.controllers.laws import Law, StateFeedback
 from cmg_mj.errors import InputError, TomlValue, raised, shown
+from cmg_mj.observers.protocol import Observer
 from cmg_mj.results.run_folder.folder import write_text
+
+Part = TypeVar("Part", Observer, Law)
 
 EXPORTED_OPTIONS = ("angle_source", "bias_trim_s")
 """Options of a `Controller` that its C has."""
 SIMULATION_OPTIONS = ("seed", "worlds", "axis", "open_loop_observers")
 """Options that concern the simulation around a controller alone."""
 EXPORTED_LAW_FIELDS = ("dt", "gains", "rate_limit")
-"""Fields of the law that its C has."""
+"""Fields of the law (8) that its C has; another law is traced whole."""
 REASONS = {"feedback": "what is exported has the observer's rate alone"}
 """Option of a `Controller` -> why its C has none, where that is known."""
 
@@ -56,10 +61,12 @@ class Code(NamedTuple):
     Attributes:
         files: Name -> text.
         figures: The figures of the export.
+        law: The printer of the law's part, for C that is joined to it.
     """
 
     files: dict[str, str]
     figures: Figures
+    law: LawPrinter
 
 
 def generate_code(controller: Controller, precision: Precision, name: str | None = None) -> Code:
@@ -68,28 +75,25 @@ def generate_code(controller: Controller, precision: Precision, name: str | None
     cls = type(controller.observer)
     try:
         return _generate(controller, precision, name_of(controller.observer, name))
+    except LawNotExportable as error:
+        raise InputError(f"law {type(controller.law).__name__}: cannot be exported: {error}") from error
     except InputError as error:
         raise InputError(f"{cls.__module__}:{cls.__qualname__} cannot be exported: {error}") from error
 
 
 def _refuse_unexported(controller: Controller) -> None:
-    """Refuse a law, and every field of it and option of the controller, that C does not have and that is in use."""
+    """Refuse every option of the controller, and every field of (8), that C does not have and that is in use."""
     law = controller.law
-    if type(law) is not StateFeedback:
-        raise InputError(
-            f"law {type(law).__name__}: cannot be exported: C has the law (8) alone; set controller.kind=state_feedback"
-        )
     option_defaults = {
         option.name: None if option.default is option.empty else option.default
         for cls in type(controller).__mro__
         for option in inspect.signature(cls.__init__).parameters.values()
         if option.kind is option.KEYWORD_ONLY and option.name not in EXPORTED_OPTIONS + SIMULATION_OPTIONS
     }
-    field_defaults = {
-        field.name: _default_of(field) for field in dataclasses.fields(law) if field.name not in EXPORTED_LAW_FIELDS
-    }
     _refuse_in_use(controller, option_defaults)
-    _refuse_in_use(law, field_defaults)
+    if type(law) is StateFeedback:
+        fields = [field for field in dataclasses.fields(law) if field.name not in EXPORTED_LAW_FIELDS]
+        _refuse_in_use(law, {field.name: _default_of(field) for field in fields})
 
 
 def _default_of(field: dataclasses.Field[TomlValue]) -> TomlValue:
@@ -119,16 +123,25 @@ def _refuse_in_use(part: Controller | Law, defaults: Mapping[str, TomlValue]) ->
         raise InputError(f"{setting} = {shown(value)}: cannot be exported: {reason}")
 
 
-def _generate(controller: Controller, precision: Precision, name: str) -> Code:
+def _copied(part: Part, refusal: type[InputError]) -> Part:
     try:
-        for_dry_run, for_trace = copy.deepcopy(controller.observer), copy.deepcopy(controller.observer)
+        return copy.deepcopy(part)
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # a user's observer may hold anything
-        raise InputError(f"it cannot be copied: {raised(error)}") from error
+    except BaseException as error:  # a user's observer or law may hold anything
+        raise refusal(f"it cannot be copied: {raised(error)}") from error
+
+
+def _generate(controller: Controller, precision: Precision, name: str) -> Code:
+    for_dry_run, for_trace = (_copied(controller.observer, InputError) for _ in range(2))
+    law_for_dry_run, law_for_trace = (_copied(controller.law, LawNotExportable) for _ in range(2))
     dry_run_observer(for_dry_run, None)
+    try:
+        dry_run_law(law_for_dry_run, len(controller.extra_signals[0]), None)
+    except InputError as error:
+        raise LawNotExportable(str(error)) from error
     constants = constants_of(controller)
-    traced = trace(for_trace, constants)
+    traced = trace(for_trace, law_for_trace, constants)
     off = check.check_trace(controller, traced, constants, seeds=(1, 2, 3))
 
     printer = CodePrinter(controller, traced, constants, precision, name)
@@ -146,7 +159,11 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
         "precision": precision,
         "files": list(files),
         "numbers_in_state": len(traced.state),
-        "operations": {part: operations(getattr(traced, part)) for part in ("measure", "step", "law")},
+        "operations": {
+            "measure": operations(traced.measure),
+            "step": operations(traced.step),
+            "law": operations(traced.law.step),
+        },
         "trace_off_by": off,
         "compiler": None if compiler is None else shlex.join(compiler),
         "c_off_by": None,
@@ -163,7 +180,7 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
             off_by = figures["c_off_by"] = check.check_c(folder, name, compiler)
         bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
-    return Code(files, figures)
+    return Code(files, figures, printer.law)
 
 
 def export_table(figures: Figures) -> str:

@@ -23,6 +23,10 @@ class NotExportable(InputError):
     """An operation that no formula can express."""
 
 
+class LawNotExportable(InputError):
+    """A control law that cannot be exported; all else is the observer's."""
+
+
 def here() -> str:
     """Locate the running line, the innermost one outside this package: `(own.py, line 12: if y1 > 0.1:)`."""
     frame: FrameType | None = sys._getframe(1)

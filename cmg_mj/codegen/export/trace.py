@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import casadi
 
 from cmg_mj.codegen.export.c_identifiers import identifiers
 from cmg_mj.codegen.export.constants import Constants
+from cmg_mj.codegen.export.formulas import (
+    MEASURED,
+    MOST_NUMBERS,
+    as_written,
+    call_traced,
+    function_of,
+    needed_numbers,
+    symbols_named,
+)
 from cmg_mj.codegen.export.pytree import form, numbers, rebuild
-from cmg_mj.codegen.export.source_location import NotExportable, raised_at
-from cmg_mj.codegen.export.symbol import Symbol, expression
-from cmg_mj.controllers.laws.state_feedback import StateFeedback
-from cmg_mj.errors import raised
-from cmg_mj.observers.protocol import Measurement, Observer
+from cmg_mj.codegen.export.source_location import NotExportable
+from cmg_mj.codegen.export.symbol import expression
+from cmg_mj.codegen.export.traced_law import TracedLaw, trace_law
+from cmg_mj.controllers.laws.protocol import Law
+from cmg_mj.observers.protocol import Measurement, Observer, extra_signals
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from cmg_mj.sensors.tilt import RadialTilt
-
-Result = TypeVar("Result")
-
-MEASURED = ("y1", "y2", "acceleration")
-"""Names of an observer's measurements."""
-
-MOST_NUMBERS = 1000
-"""Largest state: 4 kB on a board in single precision. More is not meant for a board, and takes CasADi minutes."""
 
 
 class Traced(NamedTuple):
@@ -36,21 +35,22 @@ class Traced(NamedTuple):
         measure: (raw accelerations, encoders, constants) -> y1, y2, acceleration.
         init: (y1, y2, acceleration) -> state.
         step: (state, y1, y2, acceleration, u) -> state, estimate.
-        law: (x1, x2, x3, x_e, constants) -> u, the next x_e.
+        law: The law's formulas.
     """
 
     state: tuple[str, ...]
     measure: casadi.Function
     init: casadi.Function
     step: casadi.Function
-    law: casadi.Function
+    law: TracedLaw
 
 
-def trace(observer: Observer, constants: Constants) -> Traced:
+def trace(observer: Observer, law: Law, constants: Constants) -> Traced:
     """Trace a controller's formulas.
 
     Args:
         observer: The observer. Do not use it again: it may remember symbols.
+        law: The law. Do not use it again either.
         constants: The constants of measurement and law, which keep their names.
 
     Returns:
@@ -58,20 +58,11 @@ def trace(observer: Observer, constants: Constants) -> Traced:
 
     Raises:
         NotExportable: A formula cannot express what the observer does.
+        LawNotExportable: A formula cannot express what the law does.
     """
     with as_written():
-        return Traced(*_trace_observer(observer, _measure(constants)), _law(constants))
-
-
-@contextmanager
-def as_written() -> Iterator[None]:
-    """Turn CasADi's simplifications off: a simplified formula may round otherwise."""
-    before = casadi.GlobalOptions.getSimplificationOnTheFly()
-    casadi.GlobalOptions.setSimplificationOnTheFly(False)
-    try:
-        yield
-    finally:
-        casadi.GlobalOptions.setSimplificationOnTheFly(before)
+        observer_formulas = _trace_observer(observer, _measure(constants))
+        return Traced(*observer_formulas, trace_law(law, constants, len(extra_signals(observer))))
 
 
 def _trace_observer(
@@ -98,55 +89,6 @@ def _trace_observer(
     return tuple(names), measure, init, step
 
 
-def needed_numbers(
-    symbols: Sequence[Symbol], next_state: Sequence[casadi.SX], outputs: Sequence[casadi.SX]
-) -> list[int]:
-    """Find the numbers of a state that an estimate depends on, now or later; a state may hold unused measurements."""
-    place = {symbol.sx.name(): i for i, symbol in enumerate(symbols)}
-    needed: set[int] = set()
-    waiting = list(outputs)
-    while waiting:
-        for symbol in casadi.symvar(waiting.pop()):
-            i = place.get(symbol.name())
-            if i is not None and i not in needed:
-                needed.add(i)
-                waiting.append(next_state[i])
-    return sorted(needed)
-
-
-def symbols_named(names: Sequence[str]) -> list[Symbol]:
-    """Make a symbol for each name."""
-    return [Symbol(casadi.SX.sym(name)) for name in names]
-
-
-def function_of(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX]) -> casadi.Function:
-    """Make a function of symbols.
-
-    Raises:
-        NotExportable: The outputs depend on other symbols.
-    """
-    arguments = [symbol.sx for symbol in inputs]
-    function = casadi.Function(name, arguments, casadi.cse(list(outputs)) if outputs else [], {"allow_free": True})
-    if function.has_free():
-        raise NotExportable(
-            "it remembers something outside of its state, in self or elsewhere, which C would not have: make it a part "
-            "of the state that step returns"
-        )
-    return function
-
-
-def call_traced(name: str, function: Callable[[], Result]) -> Result:
-    """Call a user's code with symbols."""
-    try:
-        return function()
-    except NotExportable:
-        raise
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        raise NotExportable(f"{name} raised {raised(error)} {raised_at(error.__traceback__)}") from error
-
-
 def _measure(constants: Constants) -> casadi.Function:
     """Trace the measurement by the controller's formulas."""
     forces = symbols_named(["inner_x", "inner_z", "outer_x", "outer_z"])
@@ -157,12 +99,3 @@ def _measure(constants: Constants) -> casadi.Function:
     tilt, gimbal_angle = RadialTilt(inner, outer), GimbalAngle(directions, zeros)  # type: ignore[arg-type]
     y = (tilt(*forces), gimbal_angle(encoders), tilt.acceleration(forces[0], forces[2]))
     return function_of("measure", [*forces, *encoders, *parameters], [expression(part) for part in y])
-
-
-def _law(constants: Constants) -> casadi.Function:
-    """Trace the law by the controller's formula."""
-    parameters = symbols_named([constant.name for constant in constants.of_law])
-    dt, k1, k2, k3, k4, limit = parameters
-    inputs = symbols_named(["x1", "x2", "x3", "x_e"])
-    law = StateFeedback(dt, (k1, k2, k3, k4), limit)  # type: ignore[arg-type]
-    return function_of("law", [*inputs, *parameters], [expression(part) for part in law(*inputs)])

@@ -27,12 +27,16 @@ NAMES = (
     r"figures\.json",
     r"(andrieu2009|aranovskiy2020|beyond|dao2023|sokolov2019)-[a-z0-9-]+\.png",
 )
-"""Patterns of the names, but for those of an export."""
+"""Patterns of the names, but for those of an export and of a plugin."""
 EXPORT = ("{}.h", "{}.c", "{}_example.c", "{}_test_vector.h")
 """The files of an export, which the user names; all four are always written together."""
 FIRMWARE = ("board.c", "its.h", "port.h", "startup.c", "Makefile")
 PORT_LAYERS = (("mps2.c", "mps2.ld"), ("stm32f746.c", "stm32f746.ld"))
 """The files of a firmware around an export; all of them, and a port layer's, are always written together."""
+PLUGIN = ("libcmg_mj_{}.so", "{}.xml", "{}_example.c", "{}_example.py", "Makefile", "plugin.c", "rig.c")
+"""Files of an engine plugin, which the user names; all are always written together."""
+PLUGIN_CODE = r"(noise|sensors|gyros|controller|state|setup)\.[ch]|(ziggurat|rig)\.h|{}(_\w+)?(\.h|\.c|_controller\.c)"
+"""Pattern of the other files that stand with them: what all plugins have in common, and an axis' controller."""
 
 
 def foreign_names(names: Iterable[str]) -> list[str]:
@@ -57,7 +61,19 @@ def foreign_names(names: Iterable[str]) -> list[str]:
         for layer in PORT_LAYERS:
             if set(FIRMWARE + layer) <= set(names):
                 code |= {*FIRMWARE, *layer}
+    code |= {file for name in names for file in _plugin_files(name, names)}
     return [name for name in names if name not in code and not _is_listed(name)]
+
+
+def _plugin_files(library: str, names: list[str]) -> list[str]:
+    """List those of the names that are of the plugin with this library."""
+    match = re.fullmatch(r"libcmg_mj_([A-Za-z][A-Za-z0-9_]*)\.so", library)
+    if match is None:
+        return []
+    files = [form.format(match[1]) for form in PLUGIN]
+    if not set(files) <= set(names):
+        return []
+    return files + [name for name in names if re.fullmatch(PLUGIN_CODE.format(match[1]), name, re.ASCII)]
 
 
 def _is_listed(name: str) -> bool:

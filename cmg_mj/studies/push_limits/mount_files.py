@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,10 +21,13 @@ from cmg_mj.plant.mounting.request import MountRequest
 from cmg_mj.plant.mounting.target import check_replaceable, claimed_target
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
+from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.signed_text import signed
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.simulation.plugin import Plugin, find_tools
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
+from cmg_mj.studies.push_limits.mount_plugin import check_plugin, claimed_plugin, write_mounted_plugin
 from cmg_mj.studies.push_limits.pair_demands import PairDemands, pair_demands
 from cmg_mj.studies.push_limits.prospects import (
     LOW_LIMIT_DEG,
@@ -61,6 +65,7 @@ class MountResult:
         demands: Demands of the pair on the robot.
         sufficient_scale: A scale that was tried, with which the robot stands and the ceiling is `LOW_LIMIT_DEG` or
             more; None if the pair's own suffices, or if none was found that does.
+        plugin: The plugin beside the model; None if there is none.
     """
 
     mounted: MountedRobot
@@ -71,6 +76,7 @@ class MountResult:
     simulated: SimulatedPush | None
     demands: PairDemands
     sufficient_scale: float | None
+    plugin: Plugin | None = None
 
     @property
     def scenario_path(self) -> Path:
@@ -100,6 +106,7 @@ class MountResult:
             "model": str(self.path),
             "held": list(self.mounted.held),
             "scale_that_suffices": self.sufficient_scale,
+            **({"plugin_model": str(self.plugin.model)} if self.plugin else {}),
         }
 
 
@@ -111,6 +118,7 @@ def mount_and_write(
     *,
     overwrite: bool = False,
     time_limit: TimeLimit | None = None,
+    with_plugin: bool = False,
 ) -> MountResult:
     """Mount a pair on a robot, find its limits, and write the model with a scenario beside it.
 
@@ -122,6 +130,7 @@ def mount_and_write(
         overwrite: Whether the files of an earlier mount are replaced. Others never are.
         time_limit: The time to try in MuJoCo what the robot stands, and a larger scale if it does not; None to leave
             that out.
+        with_plugin: Whether a plugin of MuJoCo is written too, into a folder beside the model.
 
     Returns:
         The robot, its files and its limits.
@@ -132,31 +141,50 @@ def mount_and_write(
     robot, file = Path(robot), expanded(target, "-o")
     OBSERVER_CLASSES.find(observer)
     check_target(file, expanded(robot, "ROBOT"))
-    with claimed_target(file, overwrite=overwrite):
-        return _mount_and_write(robot, request, file, observer, overwrite=overwrite, time_limit=time_limit)
+    if with_plugin:
+        find_tools()
+    with (
+        claimed_target(file, overwrite=overwrite),
+        claimed_plugin(file, expanded(robot, "ROBOT"), overwrite=overwrite) if with_plugin else nullcontext() as folder,
+    ):
+        return _mount_and_write(
+            robot, request, file, observer, overwrite=overwrite, time_limit=time_limit, folder=folder
+        )
 
 
 def _mount_and_write(
-    robot: Path, request: MountRequest, file: Path, observer: str, *, overwrite: bool, time_limit: TimeLimit | None
+    robot: Path,
+    request: MountRequest,
+    file: Path,
+    observer: str,
+    *,
+    overwrite: bool,
+    time_limit: TimeLimit | None,
+    folder: RunFolder | None,
 ) -> MountResult:
     """See `mount_and_write`; the files are claimed."""
     mounted = _mount(robot, request)
     with with_scenario(file) as model:
         mounted.save(model)
         experiment = write_scenario(model, mounted.path, observer, axis=request.name)
+        if folder:
+            check_plugin(experiment, file)
         limits = prospects(experiment, request.name)
-        simulated = sufficient = None
+        simulated = sufficient = plugin = None
         if time_limit is not None:
             simulated = simulated_push(experiment, limits, request.name, time_limit)
             if math.degrees(limits.limit.tilt) < LOW_LIMIT_DEG or simulated.falls:
                 trial = model.with_suffix(".trial.xml")
                 sufficient = _sufficient_scale(robot, request, trial, observer, time_limit)
+        pushed = write_scenario(model, mounted.path, observer, limits, request.name, simulated) if folder else None
         text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated)
         model.with_suffix(".toml").write_bytes(signed(text, ".toml"))
         check_replaceable(file, overwrite=overwrite)  # also what has come meanwhile
+        if folder and pushed:
+            plugin = write_mounted_plugin(pushed, file, folder)
     plant = experiment.plant.single_axis(request.name)
     demands = pair_demands(plant, experiment.law.rate_limit, request.scale)
-    return MountResult(mounted, file, plant, observer, limits, simulated, demands, sufficient)
+    return MountResult(mounted, file, plant, observer, limits, simulated, demands, sufficient, plugin)
 
 
 def _mount(robot: Path, request: MountRequest) -> MountedRobot:

@@ -160,6 +160,25 @@ def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "law", ["lqg", *(f"tests.codegen.export.own_laws:{law}" for law in ("Elaborate", "Memoryless"))]
+)
+def test_another_law_closes_the_loop(law: str) -> None:
+    """Its integrator too, which of one of them does not begin at zero, and which another one does not have."""
+    experiment = short("kalman", *NO_COUNTS, f"controller.kind={law}")
+    with exported(experiment.axis_controller()) as files:
+        assert double_precision_names(build(files.observer, files.folder).path) == []
+    host, board = experiment.run(), experiment.run(driver="board")
+    assert board.outcomes == host.outcomes
+    assert host.trajectory is not None
+    assert board.trajectory is not None
+    for name in ("x1_rad", "x2_rad_s", "u_rad_s", "x_e_rad_times_s", "estimate/kalman/x2_rad_s"):
+        np.testing.assert_allclose(board.trajectory[name], host.trajectory[name], atol=1e-4, err_msg=name)
+    assert not np.array_equal(board.trajectory["u_rad_s"], host.trajectory["u_rad_s"])
+    assert np.isnan(board.trajectory["x_e_rad_times_s"]).all() == law.endswith("Memoryless")
+
+
+@pytest.mark.slow
 def test_open_loop_observers_run_on_the_host() -> None:
     experiment = short("linear", "open_loop_observers=['ltv']")
     host, board = experiment.run(), experiment.run(driver="board")

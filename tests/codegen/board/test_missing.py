@@ -53,6 +53,7 @@ def test_without_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not Path("runs").exists()
 
 
+@pytest.mark.daily_cases("qemu-system-arm")
 @pytest.mark.skipif(bool(missing()), reason=f"not installed: {', '.join(missing())}")
 @pytest.mark.parametrize("program", [COMPILER, EMULATOR])
 def test_a_program_that_is_none(tmp_path: Path, program: str, monkeypatch: pytest.MonkeyPatch) -> None:

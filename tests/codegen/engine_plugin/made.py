@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import re
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +15,8 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
+from cmg_mj.plant.plugin_model import plugin_mjcf
+from cmg_mj.plant.plugin_state import set_world
 from cmg_mj.plant.tilt_line import apply_torques
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.experiment import Experiment
@@ -45,6 +48,19 @@ EXACT = (
 )
 
 
+QUANTITIES = {
+    "tilt": "y1_rad",
+    "gimbal_angle": "y2_rad",
+    "acceleration": "acceleration_rad_s2",
+    "command": "u_rad_s",
+    "integrator": "x_e_rad_times_s",
+}
+"""Sensor of the plugin -> column of a run."""
+
+
+SENSORS = {"exact": EXACT, "default": (), "all": ALL_IMPERFECTIONS}
+
+
 class Made(NamedTuple):
     """A plugin with its experiment, loaded."""
 
@@ -65,6 +81,20 @@ def make(kind: str, *settings: str, scenario: str = "push_recovery") -> Made:
     made = plugin(experiment, Path(_folder.name) / str(number), name=f"test_{number}")
     mujoco.mj_loadPluginLibrary(str(made.library))
     return Made(experiment, made, mujoco.MjModel.from_xml_path(str(made.model)))
+
+
+def variant(made: Made, settings: Mapping[str, str | float]) -> Made:
+    """The same library with a model of other settings, such as the integrator's, that leave its C as it is."""
+    experiment = made.experiment.with_settings(settings)
+    text = plugin_mjcf(experiment.plant, made.plugin.name, {"start": "keyframe", "build": build_of(made)})
+    return Made(experiment, made.plugin, mujoco.MjModel.from_xml_string(text))
+
+
+def build_of(made: Made) -> str:
+    """The fingerprint of the library in the model's <config>."""
+    match = re.search(r'key="build" value="(\w+)"', made.plugin.model.read_text(encoding="utf-8"))
+    assert match is not None
+    return match[1]
 
 
 def torques_at(experiment: Experiment, step: int) -> list[float]:
@@ -102,22 +132,68 @@ def columns(trajectory: Trajectory, names: Sequence[str]) -> np.ndarray:
     return np.stack([trajectory[name] for name in names], axis=1)
 
 
-def check_against_runner(made: Made, rows: dict[str, np.ndarray], trajectory: Trajectory, observer: str) -> None:
-    """Every number at every control tick is the runner's, bit for bit."""
-    np.testing.assert_array_equal(rows["qpos"], columns(trajectory, trajectory.layout.positions()))
-    np.testing.assert_array_equal(rows["qvel"], columns(trajectory, trajectory.layout.rates()))
+def pairs(
+    made: Made, rows: dict[str, np.ndarray], trajectory: Trajectory, observer: str
+) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+    """What the plugin's program and the runner have of every quantity at every control tick."""
+    yield "qpos", rows["qpos"], columns(trajectory, trajectory.layout.positions())
+    yield "qvel", rows["qvel"], columns(trajectory, trajectory.layout.rates())
     for axis in made.experiment.plant.axis_names:
         own = trajectory.along(axis) if trajectory.axes else trajectory
         prefix = f"balance/{axis}/" if axis else "balance/"
         parts = ["x1_rad", "x2_rad_s", "x3_rad", *own.extra_signals(observer)]
-        estimate = columns(own, [f"estimate/{observer}/{part}" for part in parts])
-        np.testing.assert_array_equal(rows[f"{prefix}estimate"], estimate)
-        for quantity, column in {
-            "tilt": "y1_rad",
-            "gimbal_angle": "y2_rad",
-            "acceleration": "acceleration_rad_s2",
-            "command": "u_rad_s",
-            "integrator": "x_e_rad_times_s",
-        }.items():
-            np.testing.assert_array_equal(rows[prefix + quantity][:, 0], own[column], err_msg=prefix + quantity)
-        np.testing.assert_array_equal(rows[f"{prefix}sample"][:, 0], range(len(estimate)))
+        yield (
+            f"{prefix}estimate",
+            rows[f"{prefix}estimate"],
+            columns(own, [f"estimate/{observer}/{part}" for part in parts]),
+        )
+        for quantity, column in QUANTITIES.items():
+            yield prefix + quantity, rows[prefix + quantity][:, 0], own[column]
+        yield f"{prefix}sample", rows[f"{prefix}sample"][:, 0], np.arange(float(len(trajectory)))
+
+
+def bits(numbers: np.ndarray) -> np.ndarray:
+    """Numbers as their 64 bits: -0 is not 0."""
+    return np.ascontiguousarray(numbers, dtype=float).view(np.uint64)
+
+
+def check_against_runner(made: Made, rows: dict[str, np.ndarray], trajectory: Trajectory, observer: str) -> None:
+    """Every number at every control tick is the runner's, bit for bit."""
+    for name, plugin_numbers, runner_numbers in pairs(made, rows, trajectory, observer):
+        np.testing.assert_array_equal(plugin_numbers, runner_numbers, err_msg=name)
+        np.testing.assert_array_equal(bits(plugin_numbers), bits(runner_numbers), err_msg=f"{name}, bits")
+
+
+class Comparison(NamedTuple):
+    """Numbers of a run beside the runner's.
+
+    Attributes:
+        differing: How many differ in any bit.
+        numbers: How many there are.
+        seconds: Until when the run went [s].
+    """
+
+    differing: int
+    numbers: int
+    seconds: float
+
+
+def compare(made: Made, seed: int | None = None, world: int = 0) -> Comparison:
+    """Compare every number with the runner's.
+
+    Args:
+        made: The plugin.
+        seed: Seed of the noise; None: the scenario's.
+        world: World whose noise it is.
+    """
+    experiment, data = made.experiment, made.start()
+    if seed is not None:
+        experiment = experiment.with_settings({"seed": seed})
+    set_world(made.model, data, experiment.scenario.seed, world)
+    trajectory = experiment.run(world=world).trajectory
+    assert trajectory is not None
+    rows = run(made, data, len(trajectory))
+    both = list(pairs(made, rows, trajectory, experiment.scenario.observer.kind))
+    differing = sum(int((bits(a) != bits(b)).sum()) for _, a, b in both)
+    period = experiment.controller().period * experiment.plant.timestep
+    return Comparison(differing, sum(b.size for _, _, b in both), len(trajectory) * period)

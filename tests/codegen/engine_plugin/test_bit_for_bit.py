@@ -5,11 +5,20 @@ from __future__ import annotations
 import pytest
 
 from cmg_mj.observers import OBSERVERS
-from tests.codegen.engine_plugin.made import ALL_IMPERFECTIONS, EXACT, check_against_runner, make, needs_compiler, run
+from tests.codegen.engine_plugin.made import (
+    ALL_IMPERFECTIONS,
+    SENSORS,
+    check_against_runner,
+    compare,
+    make,
+    needs_compiler,
+    run,
+    variant,
+)
 
 pytestmark = [needs_compiler, pytest.mark.slow]
 
-SENSORS = {"exact": EXACT, "default": (), "all imperfections": ALL_IMPERFECTIONS}
+INTEGRATORS = ("RK4", "implicitfast", "Euler")
 
 
 def check(kind: str, *settings: str, scenario: str = "push_recovery") -> None:
@@ -26,9 +35,14 @@ def test_every_observer(kind: str, sensors: str) -> None:
 
 
 @pytest.mark.parametrize("sensors", SENSORS)
-@pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
-def test_every_integrator(integrator: str, sensors: str) -> None:
-    check("gyro_free", f"plant.integrator={integrator}", *SENSORS[sensors])
+@pytest.mark.parametrize("kind", OBSERVERS)
+def test_every_integrator(kind: str, sensors: str) -> None:
+    """Over a push, with the library of the test above; docs/studies/plugin_table.py runs 15 s of each."""
+    for integrator in ("implicitfast", "Euler"):
+        made = variant(
+            make(kind, *SENSORS[sensors]), {"plant.integrator": integrator, "duration_s": 4.0, "push.0.start_s": 1.0}
+        )
+        assert compare(made).differing == 0
 
 
 @pytest.mark.parametrize(
@@ -74,13 +88,28 @@ def test_two_axes_otherwise(settings: tuple[str, ...]) -> None:
     check("homogeneous", *settings, scenario="two_axes")
 
 
-@pytest.mark.parametrize("kind", ["lqg", "examples.own_law:Leaning"])
+OWN_LAWS = "tests.codegen.export.own_laws:"
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["lqg", "examples.own_law:Leaning", *(f"{OWN_LAWS}{name}" for name in ("Elaborate", "InADict", "Memoryless"))],
+)
 def test_other_laws(kind: str) -> None:
     check("kalman", f"controller.kind={kind}")
 
 
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_another_law_with_all_else(integrator: str) -> None:
+    """Its integrator is trimmed, its angles are estimated, its rate is the gyro's."""
+    words = ("kind=tests.codegen.export.own_laws:Elaborate", "bias_trim_s=0.52", "angle_source=estimated")
+    settings = [f"controller.{word}" for word in (*words, "feedback=fog")]
+    check("adaptive", *settings, f"plant.integrator={integrator}", *ALL_IMPERFECTIONS)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("feedback", ["fog", "truth"])
 @pytest.mark.parametrize("scenario", ["push_recovery", "two_axes"])
-def test_another_rate_fed_back(feedback: str, scenario: str) -> None:
+def test_another_rate_fed_back(feedback: str, scenario: str, integrator: str) -> None:
     fog = ("sensors.fog.rate_hz=1000", "sensors.fog.latency_s=0.002", "sensors.fog.bias_deg_h=20")
-    check("kalman", f"controller.feedback={feedback}", *fog, scenario=scenario)
+    check("kalman", f"controller.feedback={feedback}", f"plant.integrator={integrator}", *fog, scenario=scenario)

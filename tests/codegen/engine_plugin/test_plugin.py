@@ -17,13 +17,16 @@ from cmg_mj import InputError, load_scenario, prepare
 from cmg_mj.codegen.engine_plugin.build import FLAGS, common_files
 from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE, generate_plugin
 from cmg_mj.plant.mujoco_state import quiet
-from cmg_mj.plant.plugin_state import initial_states, set_world
+from cmg_mj.plant.plugin_state import FAILED, initial_states, set_world
 from cmg_mj.simulation.plugin import describe_rig
 from tests.codegen.engine_plugin.made import Made, check_against_runner, make, needs_compiler, run
 
 pytestmark = needs_compiler
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2")
+SEED, WORLD, STATUS, STEPS, PER_INSTANT, TIMESTEP, IS_PENDING, STARTS_SPINNING, IS_SPINNING_UP, CHECK = range(10)
+CONSTANTS = range(CHECK, CHECK + 14)
+"""Places in the state, as state.h numbers them; the constants are where sensors and drives are, and the settings."""
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
@@ -155,9 +158,32 @@ WRONG_MODELS = {
     "another accelerometer": ("<accelerometer ", "<velocimeter ", "sensor 'accelerometer_inner' is of another kind"),
     "a late accelerometer": ("<accelerometer ", '<accelerometer delay="0.01" nsample="3" ', "has a delay or a history"),
     "a servo that steps first": ('dyntype="integrator"', 'dyntype="integrator" actearly="true"', "has actearly"),
+    "actuation off": ("<flag ", '<flag actuation="disable" ', "holds its drives"),
+    "drives switched off": ("<option ", '<option actuatorgroupdisable="0" ', "'cube1/gimbal_servo' is in a group"),
+    "a servo elsewhere": ('servo" joint="cube1/gimbal"', 'servo" joint="yaw"', "must drive joint 'cube1/gimbal'"),
+    "a motor elsewhere": ('motor" joint="cube2/flywheel"', 'motor" joint="yaw"', "must drive joint 'cube2/flywheel'"),
+    "a motor with a memory": ('biastype="affine" (gainprm="0.01")', r'dyntype="filter" \1', "must be a <velocity>"),
+    "an encoder elsewhere": ('<jointpos joint="cube2/gimbal"', '<jointpos joint="yaw"', "of joint 'cube2/gimbal'"),
+    "a gimbal that slides": ('name="cube1/gimbal" axis', r'type="slide" \g<0>', "joint 'cube1/gimbal' must be a hinge"),
     "a sensor of nothing": ("balance/tilt", "balance/tilted", "sensor 'balance/tilted': must be named"),
     "a sensor of nobody": ('"balance/command"', '"command"', "sensor 'command': must be named 'balance/'"),
 }
+
+
+OTHER_SENSORS = """
+<gyro name="turning" site="accelerometer_outer"/>
+<accelerometer name="acceleration" site="accelerometer_outer"/>
+<accelerometer name="late" site="accelerometer_outer" delay="0.007" nsample="9" interp="linear"/>
+<accelerometer name="often" site="accelerometer_inner" nsample="5" interp="cubic"/>
+<accelerometer name="seldom" site="accelerometer_inner" nsample="3" interval="0.015 -0.005"/>
+<force name="push" site="accelerometer_outer"/>
+<framelinacc name="frame" objtype="site" objname="accelerometer_outer"/>
+<jointactuatorfrc name="torque" joint="cube1/gimbal"/>
+<actuatorfrc name="drive" actuator="cube1/flywheel_motor"/>
+<subtreeangmom name="momentum" body="frame"/>
+<e_kinetic name="energy"/>
+<clock name="clock"/>
+"""
 
 
 @pytest.mark.parametrize("key", WRONG_CONFIGS)
@@ -170,6 +196,14 @@ def test_a_wrong_config_does_not_compile(key: str) -> None:
                 text.replace("</instance>", f'<config key="{key}" value="{value}"/></instance>')
             )
         assert f"{made_name()}: " in str(error.value) or "unrecognized attribute" in str(error.value)
+
+
+def test_the_key_that_tells_copies_takes_no_value() -> None:
+    text = quick().plugin.model.read_text(encoding="utf-8")
+    match = re.search(r'<config key="build" value="(\w+)"/>', text)
+    assert match
+    with pytest.raises(ValueError, match=f'<config key="{match[1]}">: must have no value'):
+        mujoco.MjModel.from_xml_string(text.replace("</instance>", f'<config key="{match[1]}" value="1"/></instance>'))
 
 
 def made_name() -> str:
@@ -214,37 +248,110 @@ def test_a_step_that_is_changed_stops_the_gimbals() -> None:
     assert data.sensor("balance/command").data != 0.0
 
 
-@pytest.mark.parametrize("written", [np.nan, -1.0, 1e300, np.inf, 0.5])
-def test_whatever_a_program_writes_into_the_state(written: float) -> None:
-    """No crash; what it does then is its own affair."""
-    model = quick().model
+@pytest.fixture
+def messages() -> Iterator[list[str]]:
+    """What MuJoCo warns of."""
+    result: list[str] = []
+    mujoco.set_mju_user_warning(result.append)
+    yield result
+    mujoco.set_mju_user_warning(None)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, -1.0, 1e300, 2.0**54 + 4.0])
+def test_whatever_a_program_writes_into_the_state(number: float, messages: list[str]) -> None:
+    """It stops with one warning, or takes the number for its memory; what it drives is never another actuator."""
+    made = quick()
+    model, data, before = made.model, mujoco.MjData(made.model), made.start()
+    mujoco.mj_step(model, before, 7)
+    state = np.empty(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, before, state, STATE)
+    servos = [model.actuator(f"{module.name}/gimbal_servo").actadr[0] for module in made.experiment.plant.axis.modules]
+    stopped = []
     for place in range(model.npluginstate):
-        data = quick().start()
-        mujoco.mj_step(model, data, 2)
-        data.plugin_state[place] = written
-        mujoco.mj_step(model, data, 2)
+        messages.clear()
+        mujoco.mj_setState(model, data, state, STATE)
+        data.plugin_state[place] = number
+        mujoco.mj_step(model, data, 8)
+        if data.plugin_state[STATUS] == FAILED:
+            stopped.append(place)
+            assert len(messages) == 1
+            assert re.fullmatch(rf"{re.escape(made.plugin.name)}: .*; u = 0 from now on", messages[0])
+            assert not data.sensor("balance/command").data.any()
+            assert not data.act_dot[servos].any()
+        else:
+            assert messages == []
+            assert np.isfinite(data.sensordata).all()
+            assert abs(data.sensor("balance/command").data) <= made.experiment.law.rate_limit
+    assert {SEED, WORLD, STATUS, STEPS, PER_INSTANT, TIMESTEP, STARTS_SPINNING, *CONSTANTS} <= set(stopped)
+    if not np.isfinite(number):  # but for what every step writes
+        assert model.npluginstate - len(stopped) < 20
+
+
+def test_a_state_of_zeros_and_one_of_another_step(messages: list[str]) -> None:
+    """A program that sets a state without the plugin's, and one that resets at a step that does not fit."""
+    model, data = copy.copy(quick().model), quick().start()
+    data.plugin_state[:] = 0.0
+    mujoco.mj_step(model, data, 50)
+    assert [message.partition(": ")[2] for message in messages] == [
+        "a program has overwritten its state; u = 0 from now on"
+    ]
+    model.opt.timestep = 0.003
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_step(model, data, 50)
+    assert len(messages) == 2
+    assert messages[1].endswith(": a physics step of 0.003 s: must divide 0.005 s; nothing is controlled")
+
+
+def test_other_sensors_of_a_model_are_those_without_a_plugin() -> None:
+    """The plugin computes accelerations a second time: no sensor shows it, nor any history or warm start."""
+    made = quick()
+    text = made.plugin.model.read_text(encoding="utf-8").replace("</sensor>", f"{OTHER_SENSORS}</sensor>")
+    bare = re.sub(r"<extension>.*</extension>|<plugin name=.*?/>", "", text, flags=re.DOTALL)
+    models = [mujoco.MjModel.from_xml_string(each) for each in (text, bare)]
+    data, other = (mujoco.MjData(model) for model in models)
+    for model, start in zip(models, (data, other), strict=True):
+        mujoco.mj_resetDataKeyframe(model, start, model.key("start").id)
+    names = [models[1].sensor(i).name for i in range(models[1].nsensor)]
+    assert {"fog", "late", "often", "acceleration", "push"} <= set(names)
+    for _ in range(60):
+        mujoco.mj_step(models[0], data)
+        for module in made.experiment.plant.axis.modules:
+            other.actuator(f"{module.name}/gimbal_servo").ctrl = module.direction * data.sensor("balance/command").data
+        mujoco.mj_step(models[1], other)
+        for name in names:
+            np.testing.assert_array_equal(data.sensor(name).data, other.sensor(name).data, err_msg=name)
+        for name in ("qpos", "qvel", "qacc", "act", "qacc_warmstart", "history", "actuator_force"):
+            np.testing.assert_array_equal(getattr(data, name), getattr(other, name), err_msg=name)
 
 
 @pytest.mark.filterwarnings("ignore:Attach conflict")
 def test_two_rigs_in_one_model() -> None:
-    """Each is attached with a prefix and has an instance: both are the one that stands alone."""
+    """Each is attached with a prefix and has an instance and a seed: each is the one that stands alone with it."""
     made = quick()
-    spec, prefixes = mujoco.MjSpec(), ("a/", "b_")
+    spec, prefixes = mujoco.MjSpec(), {"a/": 5, "b_": 6}
+    text = made.plugin.model.read_text(encoding="utf-8")
     spec.option.timestep, spec.option.integrator = made.model.opt.timestep, made.model.opt.integrator
     spec.option.disableflags = made.model.opt.disableflags
     for prefix in prefixes:
-        rig = mujoco.MjSpec.from_file(str(made.plugin.model))
+        seed = f'<config key="seed" value="{prefixes[prefix]}"/></instance>'
+        rig = mujoco.MjSpec.from_string(text.replace("</instance>", seed))
         spec.attach(rig, prefix=prefix, frame=spec.worldbody.add_frame())
     model = spec.compile()
-    data, alone = mujoco.MjData(model), made.start()
-    for start, target in ((alone.qpos, data.qpos), (alone.qvel, data.qvel), (alone.act, data.act)):
-        target[:] = [*start, *start]
+    data, single = mujoco.MjData(model), [made.start() for _ in prefixes]
+    for name in ("qpos", "qvel", "act"):
+        getattr(data, name)[:] = np.concatenate([getattr(alone, name) for alone in single])
+    for seed, alone in zip(prefixes.values(), single, strict=True):
+        set_world(made.model, alone, seed, 0)
     for _ in range(100):
         mujoco.mj_step(model, data)
-        mujoco.mj_step(made.model, alone)
-    for prefix in prefixes:
-        shown = data.sensor(f"{prefix}balance/estimate").data
-        np.testing.assert_array_equal(shown, alone.sensor("balance/estimate").data)
+        for alone, prefix in zip(single, prefixes, strict=True):
+            mujoco.mj_step(made.model, alone)
+            for quantity in ("estimate", "command", "acceleration"):
+                shown = data.sensor(f"{prefix}balance/{quantity}").data
+                np.testing.assert_array_equal(shown, alone.sensor(f"balance/{quantity}").data)
+        np.testing.assert_array_equal(data.qpos, np.concatenate([alone.qpos for alone in single]))
+        np.testing.assert_array_equal(data.qvel, np.concatenate([alone.qvel for alone in single]))
+    assert single[0].sensor("balance/command").data != single[1].sensor("balance/command").data
 
 
 @pytest.mark.parametrize("name", sorted(NAMES_IN_USE))

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
+import cmg_mj
+from cmg_mj import load_scenario, prepare
 from cmg_mj.codegen.engine_plugin.build import find_mujoco
 from tests.codegen.engine_plugin.made import ALL_IMPERFECTIONS, Made, make, needs_compiler
 from tests.codegen.export.compiled import COMPILER
@@ -55,11 +60,11 @@ def compile_strictly(made: Made, folder: Path, *flags: str) -> tuple[Path, Path]
 
 
 def run_program(
-    made: Made, library: Path, program: Path, steps: int, cycles: int, *before: str
+    model: Path, library: Path, program: Path, steps: int, cycles: int, *before: str
 ) -> tuple[np.ndarray, int]:
     """Return qpos after each step, and the growth [kB]."""
     process = subprocess.run(
-        [*before, str(program), str(library), str(made.plugin.model), str(steps), str(cycles)],
+        [*before, str(program), str(library), str(model), str(steps), str(cycles)],
         capture_output=True,
         text=True,
         timeout=600,
@@ -83,19 +88,58 @@ def test_a_users_own_observer_without_python(tmp_path: Path) -> None:
     made = make("tests.codegen.export.own:Elaborate", "push=[]")
     trajectory = made.experiment.run().trajectory
     assert trajectory is not None
-    rows, growth = run_program(made, *compile_strictly(made, tmp_path, "-O2"), 3000, 1000)
+    rows, growth = run_program(made.plugin.model, *compile_strictly(made, tmp_path, "-O2"), 3000, 1000)
     positions = np.stack([trajectory[name] for name in trajectory.layout.positions()], axis=1)
     np.testing.assert_array_equal(rows[:-1], positions[1:])
     assert growth < 500
 
 
+@pytest.fixture
+def readmes_observer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """The class that README shows, letter by letter, in the file that it names there."""
+    readme = (Path(cmg_mj.__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    code = re.search(r"```python\n(# my_observers\.py\n.*?)```", readme, re.DOTALL)
+    assert code is not None
+    (tmp_path / "my_observers.py").write_text(code[1], encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    sys.modules.pop("my_observers", None)
+    yield f"my_observers:{re.findall(r'^class (.*):', code[1], re.MULTILINE)[0]}"
+    del sys.modules["my_observers"]
+
+
+def test_the_readmes_observer_without_python(readmes_observer: str, tmp_path: Path) -> None:
+    """One library, linked with no Python; the model says seed and world."""
+    made = make(readmes_observer, "push=[]")
+    library, program = compile_strictly(made, tmp_path, "-O2")
+    for path in (library, program):
+        assert "libpython" not in subprocess.run(["ldd", path], check=True, capture_output=True, text=True).stdout
+    model, ends = tmp_path / "model.xml", set()
+    for seed, world in ((0, 0), (1, 0), (0, 1), (12345678901, 7)):
+        experiment = prepare(load_scenario("push_recovery", ("push=[]", f"seed={seed}"), readmes_observer))
+        trajectory = experiment.run(world=world).trajectory
+        assert trajectory is not None
+        config = f'<config key="seed" value="{seed}"/><config key="world" value="{world}"/></instance>'
+        text = made.plugin.model.read_text(encoding="utf-8")
+        model.write_text(text.replace("</instance>", config), encoding="utf-8")
+        rows, _ = run_program(model, library, program, len(trajectory), 0)
+        positions = np.stack([trajectory[name] for name in trajectory.layout.positions()], axis=1)
+        np.testing.assert_array_equal(rows[:-1], positions[1:])
+        ends.add(tuple(rows[-1]))
+    assert len(ends) == 4
+
+
 @pytest.mark.parametrize(
     ("scenario", "settings"),
-    [("push_recovery", ALL_IMPERFECTIONS), ("two_axes", (*ALL_IMPERFECTIONS, "controller.feedback=fog"))],
+    [
+        ("push_recovery", ALL_IMPERFECTIONS),
+        ("two_axes", (*ALL_IMPERFECTIONS, "controller.feedback=fog")),
+        ("push_recovery", ("controller.kind=lqg",)),
+        ("push_recovery", ("controller.kind=tests.codegen.export.own_laws:Elaborate",)),
+    ],
 )
 def test_sanitizers(scenario: str, settings: tuple[str, ...], tmp_path: Path) -> None:
     made = make("gyro_free", *settings, "push=[]", scenario=scenario)
-    rows, _ = run_program(made, *compile_strictly(made, tmp_path, *SANITIZERS), 2000, 20)
+    rows, _ = run_program(made.plugin.model, *compile_strictly(made, tmp_path, *SANITIZERS), 2000, 20)
     np.testing.assert_array_equal(rows, expected(made, 2000))
 
 
@@ -104,5 +148,5 @@ def test_valgrind(tmp_path: Path) -> None:
     made = make("gyro_free", "push=[]")
     library, program = compile_strictly(made, tmp_path, "-g", "-O1")
     valgrind = ("valgrind", "-q", "--error-exitcode=9", "--track-origins=no")
-    rows, _ = run_program(made, library, program, 100, 2, *valgrind)
+    rows, _ = run_program(made.plugin.model, library, program, 100, 2, *valgrind)
     np.testing.assert_array_equal(rows, expected(made, 100))

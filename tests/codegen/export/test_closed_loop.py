@@ -28,6 +28,7 @@ def test_double_precision_is_bit_for_bit(kind: str, tmp_path: Path) -> None:
     assert export.output.splitlines()[-1] == "as in cmg_mj"
 
 
+@pytest.mark.daily_cases("adaptive")
 @pytest.mark.parametrize("kind", ["linear", "adaptive"])
 def test_a_second_is_bit_for_bit(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Besides, the export itself compares on few signals here."""

@@ -77,6 +77,7 @@ def test_a_users_own_observer(tmp_path: Path) -> None:
 
 
 @needs_compiler
+@pytest.mark.daily_cases("*-watcher")
 @pytest.mark.parametrize(
     ("cls", "arguments", "name"),
     [("Größe", [], "grosse"), ("Double", [], "double_observer"), ("观测器", ["--name", "watcher"], "watcher")],
@@ -140,7 +141,10 @@ def test_files_of_the_users_stay_and_an_earlier_export_is_replaced() -> None:
         (["linear", "--set", "observer.tau=0"], "observer.tau = 0: must be a number greater than 0"),
         (["linear", "--set", "controller.bias_trim_s=1"], "needs an observer in the loop that estimates the bias"),
         (["linear", "--set", "controller.feedback=fog"], "set controller.feedback=observer"),
-        (["linear", "--set", "controller.kind=lqg"], "law Lqg: cannot be exported: C has the law (8) alone; set"),
+        (
+            ["linear", "--set", "controller.kind=tests.codegen.export.own_laws:Branches"],
+            "law Branches: cannot be exported: a branch on a value (",
+        ),
         ([], "Missing argument 'OBSERVER'"),
     ],
 )
@@ -176,6 +180,7 @@ def test_a_temporary_folder_that_is_full(monkeypatch: pytest.MonkeyPatch) -> Non
     assert not Path("board").exists()
 
 
+@pytest.mark.daily_cases("'-No closing quotation", "* -c 0-*")
 @pytest.mark.parametrize(
     ("cc", "words"),
     [

@@ -172,6 +172,7 @@ def test_the_example_sees_a_check_that_is_missing(tmp_path: Path, monkeypatch: p
         export(controller("linear"), tmp_path / "board")
 
 
+@pytest.mark.daily_cases("single-False")
 @needs_compiler
 @pytest.mark.parametrize(("precision", "refused"), [("double", True), ("single", False)])
 def test_a_compiler_whose_double_has_32_bits(precision: Any, refused: bool, tmp_path: Path) -> None:
@@ -213,6 +214,7 @@ def test_cpp_reads_the_header_and_calls_it(tmp_path: Path) -> None:
     assert subprocess.run([tmp_path / "user"], check=False).returncode == 0
 
 
+@pytest.mark.daily_cases("12.5-False", "10.0-True")
 @pytest.mark.usefixtures("elsewhere")
 @pytest.mark.parametrize(("rate_hz", "refused"), [(0.1, True), (10.0, True), (12.5, False)])
 def test_a_period_at_which_the_loop_is_unstable_is_refused(rate_hz: float, refused: bool) -> None:

@@ -114,6 +114,7 @@ def test_drivers_and_batch_are_one(kind: str) -> None:
         np.testing.assert_array_equal(batch_column if batch_column.ndim == 1 else batch_column[:, 0], column, name)
 
 
+@pytest.mark.daily_cases("state_feedback")
 @pytest.mark.parametrize("kind", EVERY)
 def test_worlds_of_other_limits_share_a_batch(kind: str) -> None:
     settings = ["plant.initial_tilt_deg=6.0", f"controller.kind={kind}"]

@@ -41,6 +41,7 @@ def open_experiment(scenario: str) -> Experiment:
     return prepare(load_scenario(scenario, PUSH_SETTINGS))
 
 
+@pytest.mark.daily_cases("bicycle")
 def test_the_callback_and_a_batch_give_the_runners_trajectory(scenario: str) -> None:
     experiment = open_experiment(scenario)
     native, callback = (experiment.run(driver) for driver in ("native", "callback"))
@@ -54,6 +55,7 @@ def test_the_callback_and_a_batch_give_the_runners_trajectory(scenario: str) -> 
         np.testing.assert_array_equal(many.trajectory.world(0)[name], values, err_msg=name)
 
 
+@pytest.mark.daily_cases("bicycle")
 def test_studio_gives_it_too(scenario: str) -> None:
     studio = Session(lambda _: open_experiment(scenario))
     try:
@@ -69,6 +71,7 @@ def test_studio_gives_it_too(scenario: str) -> None:
     same(rows, as_rows(trajectory))
 
 
+@pytest.mark.daily_cases("bicycle")
 def test_the_environment_gives_it_too(scenario: str) -> None:
     env = ScissoredPairEnv(scenario, PUSH_SETTINGS, in_rad_s=True)
     ticks, infos, _ = act(env, 0)
@@ -79,6 +82,7 @@ def test_the_environment_gives_it_too(scenario: str) -> None:
         np.testing.assert_array_equal([info[name] for info in infos[:-1]], trajectory[name])
 
 
+@pytest.mark.daily_cases("inverted_double_pendulum, its joint held")
 def test_a_sweep(scenario: str) -> None:
     result = sweep(
         load_scenario(scenario, PUSH_SETTINGS), {"push.0.torque_n_m": [1.0, 200.0]}, ["homogeneous"], worlds=2

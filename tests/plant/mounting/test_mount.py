@@ -59,6 +59,7 @@ def everything(model: mujoco.MjModel) -> dict[str, np.ndarray]:
     return {name: values for name in names if isinstance(values := getattr(model, name), np.ndarray)}
 
 
+@pytest.mark.daily_cases("bicycle", "humanoid")
 @pytest.mark.parametrize("name", ["bicycle", "walker2d, freed", "humanoid"])
 def test_the_file_is_the_spec(name: str) -> None:
     """MuJoCo writes six digits."""
@@ -140,6 +141,7 @@ def test_the_line_on_the_floor_is_a_hinge_in_its_place() -> None:
         assert getattr(free.reduced, name) == pytest.approx(expected, rel=1e-5, abs=1e-6 * hinge_axis.reduced.J1), name
 
 
+@pytest.mark.daily_cases("link", "robot", "sibling")
 @pytest.mark.parametrize("folder", ["robot", "sibling", ".", "far/away/from/it", "link"])
 def test_meshes_are_found_from_any_folder(tmp_path: Path, folder: str) -> None:
     """By paths that stay right when all is moved, but behind a symbolic link, where no relative one is."""

@@ -85,6 +85,13 @@ def test_it_recovers_from_what_the_reduced_model_says(mounting: tuple[Experiment
     assert not surviving_worlds(experiment, 1.8 * torque, 8.0).any()
 
 
+@pytest.mark.daily_cases(
+    "inverted_pendulum on its free cart",
+    "inverted_double_pendulum, its joint held",
+    "hopper, freed",
+    "humanoid",
+    "bicycle",
+)
 def test_it_starts_to_fall_as_its_reduced_model_does(robot_at_rest: tuple[Experiment, RecoverableLimit, str]) -> None:
     """Nothing controlled, the simulated robot leans as cosh(lambda t): inertia, gravity and the line are right.
 

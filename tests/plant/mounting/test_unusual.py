@@ -14,6 +14,7 @@ from cmg_mj.plant.mounting import MountedRobot, mount
 from cmg_mj.plant.mounting.fall_check import simulated_pole
 from cmg_mj.plant.plant import Plant, load_plant
 from tests.studies.push_limits.robots import CART_POLE, RAIL, bicycle
+from tests.tiers import slow_but
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -76,6 +77,7 @@ def same(result: Plant, expected: Plant) -> None:
         assert getattr(result.reduced, name) == pytest.approx(getattr(expected.reduced, name), rel=1e-4), name
 
 
+@pytest.mark.daily_cases("dense-named", "sparse-unnamed")
 @pytest.mark.parametrize("name", ['name="head"', ""], ids=["named", "unnamed"])
 @pytest.mark.parametrize("option", ["", 'jacobian="sparse"'], ids=["dense", "sparse"])
 def test_a_ball_that_is_held_is_rigid(plain: Plant, name: str, option: str) -> None:
@@ -147,7 +149,7 @@ def test_a_joint_is_held_already_by_what_holds_it(plain: Plant, equality: str, h
     same(load_plant(model=str(result.save("rig.xml"))), plain)
 
 
-@pytest.mark.parametrize("hold", ["servos", "constraints"])
+@pytest.mark.parametrize("hold", slow_but(["servos", "constraints"], "servos"))
 @pytest.mark.parametrize(
     ("servo", "setpoint", "state"),
     [
@@ -255,6 +257,7 @@ FLAT = 0.01, 0.003
 """Half of the width of flat tyres [m]."""
 
 
+@pytest.mark.daily_cases("0.01-0.003-0.15", "0.003-0.003-0.0")
 @pytest.mark.parametrize("ahead", [0.0, 0.15])
 @pytest.mark.parametrize("beside", [0.0, 0.003])
 @pytest.mark.parametrize("half_width", FLAT)

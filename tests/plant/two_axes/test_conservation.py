@@ -69,6 +69,7 @@ def free_motion(duration_s: float, timestep_s: float, *, gravity: bool, seed: in
     return drifts(Motion(*(samples[:, ::stride] for samples in run)), gravity=gravity)
 
 
+@pytest.mark.daily_cases("True-1e-05-2.5")
 @pytest.mark.parametrize("duration_s", slow_but([2.5, 5.0], 2.5))
 @pytest.mark.parametrize(("gravity", "momentum_bound"), [(False, 1e-7), (True, 1e-5)])
 def test_free_motion_conserves_energy_and_momenta(gravity: bool, momentum_bound: float, duration_s: float) -> None:
@@ -78,6 +79,7 @@ def test_free_motion_conserves_energy_and_momenta(gravity: bool, momentum_bound:
     assert np.all(worst[1:] < momentum_bound)
 
 
+@pytest.mark.daily_cases("True")
 @pytest.mark.parametrize("gravity", [False, True])
 def test_drifts_shrink_with_the_fourth_power_of_the_step(gravity: bool) -> None:
     steps_s = (1e-3, 5e-4, 2.5e-4)

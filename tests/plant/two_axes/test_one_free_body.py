@@ -51,6 +51,7 @@ def pushed(model: Path, **torques: float) -> Experiment:
     return prepare(load_scenario("two_axes", [*SET, f"plant.model={model}", f"push=[{pushes}]"]))
 
 
+@pytest.mark.daily_cases("roll-pitch")
 @pytest.mark.parametrize(("axis", "other"), [("roll", "pitch"), ("pitch", "roll")])
 def test_a_push_about_either_axis_is_felt_there(model: Path, axis: str, other: str) -> None:
     without = pushed(model)

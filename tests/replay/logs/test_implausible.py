@@ -11,6 +11,7 @@ from cmg_mj import ReadOptions, load_scenario, prepare, read_log
 from cmg_mj.replay.logs.columns import ACCELEROMETERS
 from tests.replay.logs.motion import AMPLITUDE, DT, OMEGA, sine, write_csv
 from tests.replay.logs.test_interchanged import INNER_FIRST, readings
+from tests.tiers import slow_but
 
 SECOND = {"time": "t_s", "tilt": "tilt_rad", "acceleration": "a"}
 
@@ -105,8 +106,9 @@ def test_a_given_acceleration(size: float, scale: float, message: str | None, tm
         assert note.endswith(message)
 
 
-def test_noise_alone_says_nothing(tmp_path: Path) -> None:
-    for seed in range(20):
+@pytest.mark.parametrize("first", slow_but(range(0, 21, 7), 0))
+def test_noise_alone_says_nothing(tmp_path: Path, first: int) -> None:
+    for seed in range(first, first + 7):
         noise = np.random.default_rng(seed).standard_normal((2, 2000))
         log = {"t_s": DT * np.arange(2000), "tilt_rad": 1e-3 * noise[0], "a": noise[1]}
         log["a"] += (0.0, 0.95, -0.95)[seed % 3] * 20.0 * noise[0]
@@ -114,6 +116,7 @@ def test_noise_alone_says_nothing(tmp_path: Path) -> None:
         assert read_log(path, ReadOptions(SECOND, units={"acceleration": "rad_s2"})).notes == ()
 
 
+@pytest.mark.daily_cases("push_recovery", "single_gimbal", "bias_estimation", "luenberger_fails")
 @pytest.mark.parametrize(
     "scenario", ["push_recovery", "bias_estimation", "single_gimbal", "observer_tuning", "luenberger_fails"]
 )

@@ -12,6 +12,7 @@ from cmg_mj.replay.logs.acceleration_checks import SWAPPED, TiltMotion, intercha
 from cmg_mj.replay.logs.columns import ACCELEROMETERS
 from cmg_mj.sensors.tilt import RadialTilt
 from tests.replay.logs.motion import DT, write_csv
+from tests.tiers import slow_but
 
 PLACES = RadialTilt(0.1, 0.3)
 INNER_FIRST: dict[str, str] = dict(zip(ACCELEROMETERS, ("a_x", "a_z", "b_x", "b_z"), strict=True))
@@ -40,6 +41,7 @@ def notes(path: Path, columns: dict[str, str]) -> list[str]:
     return list(log.notes)
 
 
+@pytest.mark.daily_cases("0.02", "0.2")
 @pytest.mark.parametrize("swing", [0.02, 0.1, 0.2])
 def test_a_known_motion(swing: float, tmp_path: Path) -> None:
     for seed in range(5):
@@ -48,12 +50,14 @@ def test_a_known_motion(swing: float, tmp_path: Path) -> None:
         assert notes(path, OUTER_FIRST) == [SWAPPED]
 
 
-def test_noise_alone_says_nothing(tmp_path: Path) -> None:
-    for seed in range(20):
+@pytest.mark.parametrize("first", slow_but(range(0, 20, 4), 0))
+def test_noise_alone_says_nothing(tmp_path: Path, first: int) -> None:
+    for seed in range(first, first + 4):
         path = write_csv(tmp_path / "log.csv", readings(seed, 1e-5))
         assert notes(path, INNER_FIRST) == notes(path, OUTER_FIRST) == []
 
 
+@pytest.mark.daily_cases("bias_estimation-True", "single_gimbal-True", "luenberger_fails-False")
 @pytest.mark.parametrize(
     ("scenario", "suspicion"),
     [

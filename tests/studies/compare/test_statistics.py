@@ -20,6 +20,7 @@ from cmg_mj.results.intervals import Interval, format_interval, in_line
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.terminal_tables import comparison_markdown
 from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.compare.comparison import ComparedObserver, compare, prepare_comparison
 from cmg_mj.studies.compare.plot import _Panel
 from cmg_mj.studies.compare.statistics import best_observer, comparison_rows, standings, worlds_table
@@ -39,10 +40,15 @@ def entry(
         Outcome("fell" if i in fallen_worlds else "done", 3.0 if i in fallen_worlds else 9.0)
         for i in range(len(errors))
     ]
-    (experiment,) = prepare_comparison(load_scenario("push_recovery", ["seed=7"]), [kind])
     return ComparedObserver(
-        experiment, Result(outcomes, summaries, observers=[kind], seed=7), Result(outcomes, summaries)
+        experiment_with(kind), Result(outcomes, summaries, observers=[kind], seed=7), Result(outcomes, summaries)
     )
+
+
+@cache
+def experiment_with(kind: str) -> Experiment:
+    (experiment,) = prepare_comparison(load_scenario("push_recovery", ["seed=7"]), [kind])
+    return experiment
 
 
 def rows_by_name(observers: Sequence[ComparedObserver]) -> dict[str, dict[str, Any]]:

@@ -110,6 +110,7 @@ def fast(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
     return write_scenario(model, model, "homogeneous")
 
 
+@pytest.mark.daily_cases("observer")
 @pytest.mark.parametrize(
     "feedback",
     [{}, {"controller.feedback": "truth"}, {"observer": {"kind": "gyro_free"}}],

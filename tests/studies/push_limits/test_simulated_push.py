@@ -205,14 +205,26 @@ def pendulum(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     ("simulated", "text"),
     [
         (SimulatedPush(10, 0.3), "gyro_free: stands a push of 3 N m for 0.1 s either way (MuJoCo, all of 10 worlds, "),
-        (SimulatedPush(10, 0.3, complete=False), "less a tenth; 60 s did not suffice for others)"),
+        pytest.param(
+            SimulatedPush(10, 0.3, complete=False),
+            "less a tenth; 60 s did not suffice for others)",
+            marks=pytest.mark.slow,
+        ),
         (
             SimulatedPush(10, 0.3, complete=False, others_fell=True),
             "some of 20 others fell with a larger one, and 60 s did not suffice to try this one)",
         ),
         (SimulatedPush(10, 0.0), "gyro_free: stands in MuJoCo only unpushed (not even 2% of any controller's push)"),
-        (SimulatedPush(10, 0.0, complete=False), "stands in MuJoCo only unpushed (none found within 60 s)"),
-        (SimulatedPush(3), "gyro_free: does not stand: in MuJoCo 7 of 10 worlds fall within 20 s, unpushed; by its"),
+        pytest.param(
+            SimulatedPush(10, 0.0, complete=False),
+            "stands in MuJoCo only unpushed (none found within 60 s)",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            SimulatedPush(3),
+            "gyro_free: does not stand: in MuJoCo 7 of 10 worlds fall within 20 s, unpushed; by its",
+            marks=pytest.mark.slow,
+        ),
         (
             SimulatedPush(28, worlds=30),
             "gyro_free: does not stand: in MuJoCo 2 of 30 worlds fall within 20 s, unpushed",

@@ -18,6 +18,7 @@ from cmg_mj.results import files
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.studies.sweeps import chunk_store as store
 from tests.command import cmg_mj
+from tests.tiers import slow_but
 
 SWEEP = ["sweep", "push_recovery", "--vary", "plant.equilibrium_bias_deg=0,1", "--worlds", "2", "--set", "push=[]"]
 SWEEP += ["--set", "duration_s=0.2", "--observers", "linear,gyro_free,high_gain", "--out"]
@@ -41,6 +42,12 @@ def whole_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def trials_bytes(whole_folder: Path) -> bytes:
     return (whole_folder / "trials.parquet").read_bytes()
+
+
+@pytest.fixture
+def finished(tmp_path: Path, whole_folder: Path) -> Path:
+    """A folder of a finished sweep."""
+    return Path(shutil.copytree(whole_folder, tmp_path / "out"))
 
 
 def times(folder: Path) -> dict[str, int]:
@@ -96,13 +103,12 @@ def test_a_folder_that_may_not_be_written(tmp_path: Path) -> None:
         tmp_path.chmod(0o700)
 
 
-def test_two_sweeps_in_one_folder(tmp_path: Path) -> None:
-    assert cmg_mj(*SWEEP, tmp_path).status == 0
-    before, trials = times(tmp_path), (tmp_path / "trials.parquet").read_bytes()
-    with RunFolder(tmp_path):
-        assert cmg_mj(*SWEEP, tmp_path).complaint == f"--out {tmp_path}: another run is writing to it"
-    assert times(tmp_path) == before
-    assert (tmp_path / "trials.parquet").read_bytes() == trials
+def test_two_sweeps_in_one_folder(finished: Path) -> None:
+    before, trials = times(finished), (finished / "trials.parquet").read_bytes()
+    with RunFolder(finished):
+        assert cmg_mj(*SWEEP, finished).complaint == f"--out {finished}: another run is writing to it"
+    assert times(finished) == before
+    assert (finished / "trials.parquet").read_bytes() == trials
 
 
 def flip_bit(chunk: Path) -> None:
@@ -133,13 +139,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
-@pytest.fixture
-def finished(tmp_path: Path, whole_folder: Path) -> Path:
-    """A folder of a finished sweep."""
-    return Path(shutil.copytree(whole_folder, tmp_path / "out"))
-
-
-@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("damage", slow_but(DAMAGES, "the first bytes alone", "a value", "one trial less"))
 def test_a_damaged_chunk_is_computed_again(finished: Path, trials_bytes: bytes, damage: str) -> None:
     harm, message = DAMAGES[damage]
     chunk = finished / "chunks" / "000002.parquet"

@@ -73,6 +73,7 @@ def model_copy(tmp_path: Path) -> Path:
     return tmp_path / "scissored_pair.xml"
 
 
+@pytest.mark.daily_cases("cube.xml")
 @pytest.mark.parametrize("name", ["scissored_pair.xml", "cube.xml"])
 def test_an_edited_model_is_another(tmp_path: Path, model_copy: Path, name: str) -> None:
     sweep = [*SWEEP[:-1], "--set", f"plant.model={model_copy}", "--out", tmp_path / "out"]

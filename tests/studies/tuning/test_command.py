@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from pathlib import Path
 
@@ -11,15 +12,29 @@ from pydantic import TypeAdapter
 from cmg_mj.cli.tune import tune as tune_command
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.tuning import tune
-from tests.command import cmg_mj
+from tests.command import CommandOutcome, cmg_mj
 from tests.studies.tuning.user_observer import USER_OBSERVER
 
 
 @pytest.fixture
 def quick(elsewhere: None) -> str:
     """A short scenario with a push, in an empty folder."""
-    Path("quick.toml").write_text("title = 'Quick'\nduration_s = 0.6\n[[push]]\nstart_s = 0.2")
+    write_quick()
     return "quick.toml"
+
+
+def write_quick() -> None:
+    Path("quick.toml").write_text("title = 'Quick'\nduration_s = 0.6\n[[push]]\nstart_s = 0.2")
+
+
+@pytest.fixture(scope="module")
+def two_levels(tmp_path_factory: pytest.TempPathFactory) -> tuple[CommandOutcome, Path]:
+    """What tuning at two levels of noise says, and the folder in which it ran."""
+    folder = tmp_path_factory.mktemp("two-levels")
+    with contextlib.chdir(folder):
+        write_quick()
+        arguments = ("--observer", "linear", "--worlds", 3, "--noise-levels", "200,400", "--json")
+        return cmg_mj("tune", "quick.toml", *arguments), folder
 
 
 def test_command_prints_a_table_and_writes_what_reruns(quick: str) -> None:
@@ -36,8 +51,8 @@ def test_command_prints_a_table_and_writes_what_reruns(quick: str) -> None:
     assert cmg_mj("run", "tuned/scenario.toml", "--json").status == 0
 
 
-def test_json_has_every_figure(quick: str) -> None:
-    outcome = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--noise-levels", "200,400", "--json")
+def test_json_has_every_figure(two_levels: tuple[CommandOutcome, Path]) -> None:
+    outcome, folder = two_levels
     figures = json.loads(outcome.out)
     assert figures["tuned"] == ["tau"]
     assert figures["worlds_fitted"] == 3
@@ -51,16 +66,14 @@ def test_json_has_every_figure(quick: str) -> None:
         assert mean == pytest.approx(ratio, rel=0.05)
         assert level["verdict"] == ("better" if low > 1.0 else "worse" if high < 1.0 else "tie")
     assert figures["given_best_noise_is"] in ("found", "below", "above", "not bracketed")
-    assert json.loads(Path("runs/tune-linear-0/tuned.json").read_text()) == figures
+    assert json.loads((folder / "runs/tune-linear-0/tuned.json").read_text()) == figures
 
 
-def test_several_noises_make_a_scenario_each(quick: str) -> None:
-    outcome = cmg_mj(
-        "tune", quick, "--observer", "linear", "--worlds", 2, "--noise-levels", "200,400", "--out", "t", "--json"
-    )
+def test_several_noises_make_a_scenario_each(two_levels: tuple[CommandOutcome, Path]) -> None:
+    outcome, folder = two_levels
     assert outcome.err == ""
     for noise in (200.0, 400.0):
-        scenario = load_scenario(f"t/scenario-{noise:g}.toml")
+        scenario = load_scenario(str(folder / f"runs/tune-linear-0/scenario-{noise:g}.toml"))
         assert scenario.sensors.accelerometer.noise_density_ug_rthz == noise
 
 
@@ -122,6 +135,7 @@ def test_wrong_input_is_one_line(quick: str, arguments: list[str], line: str) ->
     assert cmg_mj("tune", quick, *arguments).complaint.startswith(line)
 
 
+@pytest.mark.slow
 def test_figures_are_plain_json(quick: str) -> None:
     """Nothing that JSON does not know, such as NaN."""
     outcome = cmg_mj("tune", quick, "--observer", "homogeneous", "--parameters", "k1", "--worlds", 2, "--json")

@@ -110,6 +110,7 @@ def test_the_verdict_is_that_of_the_ratio_in_the_table() -> None:
         assert (changed.ratio.high < 1.0) == (verdict == "worse")
 
 
+@pytest.mark.daily_cases("zeros1-0.1000 to 0.2000 rad/s")
 @pytest.mark.parametrize(
     ("zeros", "message"), [((0.104, 0.10402), "0.1040 rad/s"), ((0.1, 0.2), "0.1000 to 0.2000 rad/s")]
 )

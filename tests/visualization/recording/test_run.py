@@ -225,6 +225,7 @@ def pose(path: Path, entity: str, k: int) -> tuple[float, np.ndarray, np.ndarray
     return times[k], np.array(translation, float), np.array(quaternion, float)
 
 
+@pytest.mark.daily_cases("0", "25")
 @pytest.mark.parametrize("k", [0, 7, 25, -1])
 def test_bodies_stand_where_kinematics_puts_them(path: Path, run: Run, experiment: Experiment, k: int) -> None:
     model = experiment.plant.drawn_model
@@ -456,6 +457,7 @@ def test_two_observers_have_a_branch_each(tmp_path: Path) -> None:
     assert re.search(r"\| +homogeneous \| +ltv \|", summary)
 
 
+@pytest.mark.daily_cases("0", "2")
 @pytest.mark.parametrize("ticks", [0, 1, 2])
 def test_a_run_of_no_length(run: Run, experiment: Experiment, tmp_path: Path, ticks: int) -> None:
     short = replace(run.trajectory, columns={name: values[:ticks] for name, values in run.trajectory.columns.items()})
@@ -501,6 +503,7 @@ def test_a_users_observer_may_have_any_name(run: Run, experiment: Experiment, tm
     assert color != static(path, f"/{part}/rate_estimate/1_homogeneous", "SeriesLines:colors")
 
 
+@pytest.mark.daily_cases("name2")
 @pytest.mark.parametrize("name", ["my_lab.observers:Kalman", "a/b (c) é", "x" * 300])
 def test_rerun_does_not_complain_of_a_name(
     run: Run, experiment: Experiment, tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str
@@ -516,6 +519,7 @@ def test_runs_need_names_of_their_own(run: Run, experiment: Experiment, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.daily_cases("old1-pipe", "old0-memory")
 @pytest.mark.parametrize("through", ["pipe", "memory"])
 @pytest.mark.parametrize("old", [[], ["recording.rrd"]])
 def test_a_full_disk_leaves_no_half_file(

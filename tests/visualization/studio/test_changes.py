@@ -230,6 +230,7 @@ def test_history_goes_back_to_before_an_observer_failed() -> None:
         same(studio.rows[:20], rows[first : first + 20])
 
 
+@pytest.mark.slow
 def test_a_stopped_controller_starts_again_with_another_observer() -> None:
     with session("push=[]") as studio:
         run_until_failure(studio)

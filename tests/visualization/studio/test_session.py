@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from mujoco.studio import messages
@@ -12,6 +14,7 @@ from cmg_mj.visualization.studio.settings import FEEDBACK, NOISE, OBSERVER
 from tests.visualization.studio.session import as_rows, session
 
 
+@cache
 def runner_rows(*settings: str, scenario: str = "push_recovery") -> np.ndarray:
     trajectory = prepare(load_scenario(scenario, list(settings))).run().trajectory
     assert trajectory is not None
@@ -24,6 +27,7 @@ def same(rows: np.ndarray, expected: np.ndarray) -> None:
     np.testing.assert_array_equal(rows[:, 1:], expected[: len(rows), 1:])
 
 
+@pytest.mark.daily_cases("settings1", "settings3", "settings4")
 @pytest.mark.parametrize(
     "settings",
     [
@@ -88,6 +92,7 @@ def test_pause_and_single_steps_change_nothing() -> None:
         same(studio.rows, runner_rows("duration_s=4.0"))
 
 
+@pytest.mark.daily_cases("-1")
 @pytest.mark.parametrize("key", [-1, None])
 def test_reset_is_the_scenarios_start_with_the_wheels_at_speed(key: int | None) -> None:
     with session() as studio:
@@ -128,6 +133,7 @@ def test_reload_begins_as_the_file_is_now() -> None:
         assert studio.data.time == pytest.approx(before + 0.5)
 
 
+@pytest.mark.daily_cases("-40", "-161")
 @pytest.mark.parametrize("back", [-1, -40, -161, -10_000])
 def test_history_brings_the_controller_back(back: int) -> None:
     """A push has come and gone since; what happens again is what happened, bit for bit."""

@@ -27,6 +27,7 @@ def runner(*settings: str) -> np.ndarray:
     return runner_rows(*settings, scenario="two_axes")
 
 
+@pytest.mark.daily_cases("swings", "free base", "locked")
 @pytest.mark.parametrize(
     "settings",
     [
@@ -80,6 +81,7 @@ def test_the_axis_shown_stays_through_a_reload_as_long_as_there_is_one() -> None
         assert (studio.session_state().axes, studio.session_state().axis) == (("roll",), "roll")
 
 
+@pytest.mark.daily_cases("-81")
 @pytest.mark.parametrize("back", [-1, -30, -81])
 def test_history_brings_all_axes_back(back: int) -> None:
     """The gyro about the vertical and each axis' sensors, observer and integrator; pushes on both come and go."""
@@ -160,6 +162,7 @@ def test_a_law_is_the_runners_on_both_axes_from_the_start() -> None:
         same(studio.rows[:200], as_rows(trajectory))
 
 
+@pytest.mark.slow
 def test_what_is_refused_changes_no_axis() -> None:
     with session(scenario="two_axes") as studio:
         studio.run(0.5)

@@ -37,7 +37,7 @@ int controller_decide(
 {
     const double *y = result->y;
     double *estimate = result->estimate, *law = memory + places->law;
-    const double held = memory[places->decisions] == 0.0 ? 0.0 : memory[places->u];
+    double held = memory[places->u];
     double x[MOST_ESTIMATES];
 
     controller->measure(inputs->forces, inputs->encoders, result->y);
@@ -45,7 +45,8 @@ int controller_decide(
     if (memory[places->decisions] == 0.0) {
         controller->observer_init(memory + places->observer, y);
         controller->law_init(law, y);
-        for (int i = 0; i < controller->estimates; ++i) estimate[i] = 0.0;
+        held = 0.0 * y[0]; /* a zero with its sign, as the runner has it */
+        for (int i = 0; i < controller->estimates; ++i) estimate[i] = held;
         estimate[0] = y[0];
         estimate[2] = y[1];
     } else {
@@ -60,10 +61,11 @@ int controller_decide(
     for (int i = 3; i < controller->estimates; ++i) x[i] = estimate[i];
     result->x_e = controller->integrator < 0 ? (double)NAN : law[controller->integrator];
     controller->law_step(law, y, x, held, &result->u);
+    const int is_command = isfinite(result->u); /* an infinite one is none, and not the limit */
     result->u = clip(result->u, -controller->rate_limit, controller->rate_limit);
     memory[places->u] = result->u;
     memory[places->decisions] += 1.0;
-    return are_finite(estimate, controller->estimates) && are_finite(law, controller->law) && isfinite(result->u) &&
+    return are_finite(estimate, controller->estimates) && are_finite(law, controller->law) && is_command &&
            are_finite(memory + places->observer, controller->observer);
 }
 

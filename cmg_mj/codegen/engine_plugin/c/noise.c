@@ -92,7 +92,7 @@ static uint32_t mixed(uint32_t x, uint32_t y)
 /* The words of an integer, at least one; returns how many. */
 static int words_of(double value, uint32_t words[2])
 {
-    const uint64_t integer = (uint64_t)value;
+    const uint64_t integer = value >= 0.0 && value <= NOISE_LARGEST ? (uint64_t)value : 0;
     words[0] = (uint32_t)integer;
     words[1] = (uint32_t)(integer >> 32);
     return words[1] ? 2 : 1;

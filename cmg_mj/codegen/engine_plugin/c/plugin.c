@@ -36,7 +36,9 @@ static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
 {
     char message[MESSAGE] = "";
     (void)data;
-    if (!setup(&rig, m, instance, state, message)) state[STATUS] = UNREADY;
+    if (setup(&rig, m, instance, state, message)) return;
+    mju_warning("%s: %s; nothing is controlled", rig.plugin, message);
+    state[STATUS] = UNREADY;
 }
 
 /* u = 0 from now on, until a reset. */
@@ -51,6 +53,13 @@ static void fail(double *state, const char *why)
         at = axis_place(rig.axis[i], at, &places);
         state[places.held] = state[places.rate] = state[places.shown + SHOWN_U] = 0;
     }
+}
+
+/* A program has written into the state what cannot be there: begin anew, at rest. */
+static void restore(const mjModel *m, double *state, int instance)
+{
+    reset(m, state, NULL, instance);
+    if (state[STATUS] == READY) fail(state, "a program has overwritten its state");
 }
 
 /* The number of an element in the state, whatever a program has written there; -1 if there is none. */
@@ -190,6 +199,10 @@ static void take_instant(const mjModel *m, mjData *d, double *state)
         return;
     }
     if (fmod(state[STEPS], state[PER_INSTANT]) != 0.0) return;
+    if (!state_is_finite(&rig, state)) {
+        fail(state, "a number in its state is none");
+        return;
+    }
     sense(m, d);
     if (!read_inputs(m, d, state)) fail(state, "what the sensors show is no number");
     else if (!try_decision(d, state)) fail(state, "the observer or the law gave no finite number");
@@ -216,6 +229,7 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability)
         drive_flywheels(m, d, state);
         return;
     }
+    if (!state_is_intact(&rig, state)) restore(m, state, instance);
     if (state[STARTS_SPINNING] != 0.0 && state[STEPS] == 0.0 && state[IS_SPINNING_UP] == 0.0) {
         start_spinning(m, d, instance, state);
         return;
@@ -245,21 +259,35 @@ static void advance(const mjModel *m, mjData *d, int instance)
     state[STEPS] += 1.0;
 }
 
+/* Whether another library that has registered this plugin's name is a copy of this one. */
+static int is_copy(const mjpPlugin *other)
+{
+    for (int i = 0; i < other->nattribute; ++i)
+        if (!strcmp(other->attributes[i], rig.build)) return 1;
+    return 0;
+}
+
 mjPLUGIN_LIB_INIT(cmg_mj)
 {
     mjpPlugin plugin;
+    const mjpPlugin *other;
+    const char *attributes[SETUP_KEYS + 1]; /* the last one tells copies */
     if (mj_version() != mjVERSION_HEADER) {
         mju_warning("%s: made for MuJoCo %d, and this is %d: not loaded", rig.plugin, mjVERSION_HEADER, mj_version());
         return;
     }
-    if (mjp_getPlugin(rig.plugin, NULL)) {
-        mju_warning("%s: has been loaded already, from another library, which stays in force", rig.plugin);
+    other = mjp_getPlugin(rig.plugin, NULL);
+    if (other) {
+        if (!is_copy(other))
+            mju_warning("%s: has been loaded already, from another library, which stays in force", rig.plugin);
         return;
     }
+    for (int i = 0; i < SETUP_KEYS; ++i) attributes[i] = setup_keys[i];
+    attributes[SETUP_KEYS] = rig.build;
     mjp_defaultPlugin(&plugin);
     plugin.name = rig.plugin;
-    plugin.nattribute = SETUP_KEYS;
-    plugin.attributes = setup_keys;
+    plugin.nattribute = SETUP_KEYS + 1;
+    plugin.attributes = attributes;
     plugin.capabilityflags = mjPLUGIN_SENSOR | mjPLUGIN_ACTUATOR;
     plugin.needstage = mjSTAGE_VEL;
     plugin.nstate = nstate;

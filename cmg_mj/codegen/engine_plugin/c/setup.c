@@ -54,6 +54,15 @@ static int find(const search *in, int type, const char *kind, const char *first,
     return id;
 }
 
+/* Number of a joint of a kind, or -1 and a message. */
+static int find_joint(const search *in, const char *first, const char *last, mjtJoint kind)
+{
+    const int id = find(in, mjOBJ_JOINT, "joint", first, last);
+    if (id < 0 || in->m->jnt_type[id] == (int)kind) return id;
+    (void)refuse(in, "joint '%s%s' must be %s", first, last, kind == mjJNT_FREE ? "free" : "a hinge");
+    return -1;
+}
+
 static int find_sensor(const search *in, const char *first, const char *last, int kind, double *place)
 {
     const int id = find(in, mjOBJ_SENSOR, "sensor", first, last);
@@ -65,7 +74,16 @@ static int find_sensor(const search *in, const char *first, const char *last, in
     return 1;
 }
 
-static int find_actuator(const search *in, const char *first, const char *last, int dynamics, double *number)
+static int find_encoder(const search *in, const char *name, int gimbal, double *place)
+{
+    if (!find_sensor(in, name, "/gimbal_encoder", mjSENS_JOINTPOS, place)) return 0;
+    const int id = find(in, mjOBJ_SENSOR, "sensor", name, "/gimbal_encoder");
+    if (in->m->sensor_objid[id] == gimbal) return 1;
+    return refuse(in, "sensor '%s/gimbal_encoder' must be of joint '%s/gimbal'", name, name);
+}
+
+static int find_actuator(
+    const search *in, const char *first, const char *last, int dynamics, int joint, double *number)
 {
     const mjModel *m = in->m;
     const int id = find(in, mjOBJ_ACTUATOR, "actuator", first, last);
@@ -78,6 +96,11 @@ static int find_actuator(const search *in, const char *first, const char *last, 
             dynamics == mjDYN_INTEGRATOR ? "an <intvelocity>" : "a <velocity>");
     if (m->actuator_actearly[id] || m->actuator_delay[id] != 0.0 || m->actuator_historyadr[id] >= 0)
         return refuse(in, "actuator '%s%s' has actearly, a delay or a history", first, last);
+    if (m->actuator_trntype[id] != mjTRN_JOINT || m->actuator_trnid[2 * id] != joint)
+        return refuse(in, "actuator '%s%s' must drive joint '%s'", first, last, m->names + m->name_jntadr[joint]);
+    const int group = m->actuator_group[id];
+    if (group >= 0 && group < 31 && (m->opt.disableactuator & (1 << group)))
+        return refuse(in, "actuator '%s%s' is in a group that is switched off", first, last);
     *number = id;
     return 1;
 }
@@ -95,18 +118,20 @@ static int find_axis(const search *in, const axis_type *axis, const axis_places 
         *from += 1; /* its y axis */
     }
     if (axis->controller->feedback == FEEDBACK_TRUTH) {
-        const int joint = find(in, mjOBJ_JOINT, "joint", axis->joint, "");
+        const int is_free = axis->dofs > 1;
+        const int joint = find_joint(in, axis->joint, "", is_free ? mjJNT_FREE : mjJNT_HINGE);
         if (joint < 0) return 0;
-        const int first = in->m->jnt_dofadr[joint] + (in->m->jnt_type[joint] == mjJNT_FREE ? 3 : 0);
+        const int first = in->m->jnt_dofadr[joint] + (is_free ? 3 : 0);
         for (int i = 0; i < axis->dofs; ++i) state[places->rates_from + i] = first + i;
     }
     for (int i = 0; i < axis->gimbals; ++i) {
         const char *name = axis->modules[i].name;
-        if (!find_sensor(in, name, "/gimbal_encoder", mjSENS_JOINTPOS, &state[places->encoders + i])) return 0;
-        if (!find_actuator(in, name, "/gimbal_servo", mjDYN_INTEGRATOR, &state[places->servos + i])) return 0;
-        if (find(in, mjOBJ_JOINT, "joint", name, "/gimbal") < 0) return 0;
-        if (find(in, mjOBJ_JOINT, "joint", name, "/flywheel") < 0) return 0;
-        if (!find_actuator(in, name, "/flywheel_motor", mjDYN_NONE, &state[places->motors + i])) return 0;
+        const int gimbal = find_joint(in, name, "/gimbal", mjJNT_HINGE);
+        const int flywheel = gimbal < 0 ? -1 : find_joint(in, name, "/flywheel", mjJNT_HINGE);
+        if (flywheel < 0) return 0;
+        if (!find_encoder(in, name, gimbal, &state[places->encoders + i])) return 0;
+        if (!find_actuator(in, name, "/gimbal_servo", mjDYN_INTEGRATOR, gimbal, &state[places->servos + i])) return 0;
+        if (!find_actuator(in, name, "/flywheel_motor", mjDYN_NONE, flywheel, &state[places->motors + i])) return 0;
     }
     return 1;
 }
@@ -133,6 +158,7 @@ static int configure(const search *in, int instance, const rig_type *type, doubl
     double density, force_counts, angle_counts;
     const char *build = mj_getPluginConfig(in->m, instance, setup_keys[KEY_BUILD]);
     const char *start = mj_getPluginConfig(in->m, instance, setup_keys[KEY_START]);
+    const char *copies = mj_getPluginConfig(in->m, instance, type->build);
     axis_places places;
     int at = HEAD;
     state[STARTS_SPINNING] = start && !strcmp(start, "spinning");
@@ -140,6 +166,8 @@ static int configure(const search *in, int instance, const rig_type *type, doubl
         return refuse(in, "<config key=\"start\" value=\"%.40s\">: must be keyframe or spinning", start);
     if (build && *build && strcmp(build, type->build))
         return refuse(in, "the model was written with another library (build %.40s, and this is %s)", build, type->build);
+    if (copies && *copies)
+        return refuse(in, "<config key=\"%s\">: must have no value", type->build);
     if (!configured(in, instance, KEY_SEED, type->seed, NOISE_LARGEST, 1, &state[SEED])) return 0;
     if (!configured(in, instance, KEY_WORLD, type->world, NOISE_LARGEST, 1, &state[WORLD])) return 0;
     if (!configured(in, instance, KEY_NOISE, unset, most, 0, &density)) return 0;
@@ -206,6 +234,7 @@ int setup(const rig_type *type, const mjModel *m, int instance, double *state, c
     memset(state, 0, (size_t)state_size(type) * sizeof *state);
     if (in.prefix_length < 0) return refuse(&in, "the instance must be named '%s', or PREFIX%s", INSTANCE, INSTANCE);
     if (m->opt.disableflags & mjDSBL_SENSOR) return refuse(&in, "<flag sensor=\"disable\"/> leaves the controller blind");
+    if (m->opt.disableflags & mjDSBL_ACTUATION) return refuse(&in, "<flag actuation=\"disable\"/> holds its drives");
     if (!(steps >= 1.0 && fabs(steps * step - type->instant) <= 1e-9 * type->instant))
         return refuse(&in, "a physics step of %g s: must divide %g s", step, type->instant);
     for (int i = 0; i < type->axes; ++i) {
@@ -222,6 +251,7 @@ int setup(const rig_type *type, const mjModel *m, int instance, double *state, c
     state[STATUS] = READY;
     state[PER_INSTANT] = steps;
     state[TIMESTEP] = step;
+    state[CHECK] = state_constants(type, state);
     return 1;
 }
 

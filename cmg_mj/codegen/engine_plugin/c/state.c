@@ -1,5 +1,7 @@
 #include "state.h"
 
+#include "noise.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -48,6 +50,77 @@ int state_size(const rig_type *type)
     int at = HEAD;
     for (int i = 0; i < type->axes; ++i) at = axis_place(type->axis[i], at, &places);
     return turning_place(type->turning, at, &turning);
+}
+
+static double sum_of(const double *numbers, int n)
+{
+    double sum = 0.0;
+    for (int i = 0; i < n; ++i) sum += numbers[i];
+    return sum;
+}
+
+double state_constants(const rig_type *type, const double *state)
+{
+    axis_places places;
+    turning_places turning;
+    int at = HEAD;
+    double sum = state[PER_INSTANT] + state[TIMESTEP] + state[STARTS_SPINNING];
+    for (int i = 0; i < type->axes; ++i) {
+        const axis_type *axis = type->axis[i];
+        at = axis_place(axis, at, &places);
+        sum += sum_of(state + places.forces, places.held - places.forces);
+        if (axis->controller->feedback == FEEDBACK_FOG) sum += state[places.gyro_from];
+        if (axis->controller->feedback == FEEDBACK_TRUTH) sum += sum_of(state + places.rates_from, axis->dofs);
+    }
+    if (type->turning) {
+        (void)turning_place(type->turning, at, &turning);
+        sum += state[turning.rate_from];
+    }
+    return sum;
+}
+
+static int is_whole(double number)
+{
+    return number >= 0.0 && number <= NOISE_LARGEST && number == floor(number);
+}
+
+/* A gimbal is never turned faster than the law's limit, but for what rounding adds. */
+static int is_rate(const axis_type *axis, double rate)
+{
+    return fabs(rate) <= 1.001 * axis->controller->rate_limit;
+}
+
+int state_is_intact(const rig_type *type, const double *state)
+{
+    axis_places places;
+    int at = HEAD, is_intact = state[STATUS] == READY || state[STATUS] == FAILED;
+    for (int i = 0; i < type->axes; ++i) {
+        at = axis_place(type->axis[i], at, &places);
+        is_intact = is_intact && is_rate(type->axis[i], state[places.held]);
+    }
+    return is_intact && is_whole(state[SEED]) && is_whole(state[WORLD]) && is_whole(state[STEPS]) &&
+           state[CHECK] == state_constants(type, state);
+}
+
+static int are_finite(const double *numbers, int n)
+{
+    int result = 1;
+    for (int i = 0; i < n; ++i) result &= isfinite(numbers[i]) != 0;
+    return result;
+}
+
+int state_is_finite(const rig_type *type, const double *state)
+{
+    axis_places places;
+    int at = 0, result = 1, next = HEAD;
+    for (int i = 0; i < type->axes; ++i) {
+        next = axis_place(type->axis[i], next, &places);
+        result &= are_finite(state + at, places.shown - at);
+        at = places.shown + SHOWN_ESTIMATE + type->axis[i]->controller->estimates; /* a law may have no integrator */
+        result &= are_finite(state + at, next - at);
+        at = next;
+    }
+    return result & are_finite(state + at, state_size(type) - at);
 }
 
 /* The tilt rate that is not the observer's, if one is fed back. */
@@ -151,7 +224,7 @@ int state_advance(const rig_type *type, double *state)
         const axis_type *axis = type->axis[i];
         axis_show(axis, &places[i], state, &results[i]);
         state[places[i].rate] = controller_gimbal_rate(axis->controller, &places[i].controller, state, totals[i]);
-        is_good = is_good && isfinite(totals[i]);
+        is_good = is_good && is_rate(axis, state[places[i].rate]);
     }
     return is_good;
 }

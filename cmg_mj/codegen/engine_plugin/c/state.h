@@ -15,9 +15,10 @@ enum {
     IS_PENDING,  /* whether the inputs of this instant have been read and not yet been counted */
     STARTS_SPINNING, /* whether the flywheels are set going at the start */
     IS_SPINNING_UP,  /* while this is being done */
+    CHECK,       /* sum of the numbers that `setup` has written and nothing changes: see `state_constants` */
     HEAD
 };
-enum { UNREADY, READY, FAILED };
+enum { BLANK, READY, FAILED, UNREADY };
 
 /* Places of one axis. */
 typedef struct {
@@ -51,6 +52,15 @@ int turning_place(const turning_type *turning, int at, turning_places *places);
 
 /* Numbers in the state. */
 int state_size(const rig_type *type);
+
+/* Sum of the numbers that stay as they are from one reset to the next. */
+double state_constants(const rig_type *type, const double *state);
+
+/* Whether a program has left alone what tells the plugin where it is and what it drives. */
+int state_is_intact(const rig_type *type, const double *state);
+
+/* Whether all memory is finite. */
+int state_is_finite(const rig_type *type, const double *state);
 
 /* Take the samples, and the decision if it is time for one, from the inputs in the state; 0 if that failed. */
 int state_advance(const rig_type *type, double *state);

@@ -1,0 +1,65 @@
+"""Controllers of which no plugin is made: one line, and no folder."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mujoco
+import pytest
+
+from cmg_mj import InputError, load_scenario, plugin
+from cmg_mj.plant.mujoco_state import quiet
+from tests.codegen.engine_plugin.made import make, needs_compiler
+from tests.command import cmg_mj
+
+pytestmark = needs_compiler
+
+UNSTABLE = "controller.rate_hz = 5: the closed loop is unstable on this rig's reduced model, sampled every 0.2 s"
+
+
+@pytest.mark.usefixtures("elsewhere")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["linear", "--set", "controller.rate_hz=5"], f"cmg-mj: {UNSTABLE}"),
+        pytest.param(
+            ["linear", "--set", "controller.rate_hz=5", "--scenario", "two_axes"],
+            f"cmg-mj: axis roll: {UNSTABLE}",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            ["high_gain", "--set", "controller.rate_hz=20"],
+            "HighGain cannot be exported: it cannot be compared on random signals: observer HighGain returned inf",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            ["linear", "--set", "controller.kind=tests.codegen.export.own_laws:Branches"],
+            "law Branches: cannot be exported: a branch on a value (",
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_one_line_and_nothing_written(arguments: list[str], words: str) -> None:
+    complaint = cmg_mj("plugin", *arguments, "--out", "balance").err.splitlines()[-1]
+    assert words in complaint
+    assert not Path("balance").exists()
+
+
+@pytest.mark.slow
+def test_an_infinite_command_stops_the_gimbals() -> None:
+    """Of a law that commands it when the rig hangs; the runner ends such a run."""
+    made = make("linear", "controller.kind=tests.codegen.export.own_laws:Overflows", "push=[]")
+    data, (axis,) = made.start(), made.experiment.plant.axes
+    mujoco.mj_step(made.model, data, 5)
+    assert abs(data.sensor("balance/command").data) == made.experiment.law.rate_limit
+    data.qpos[made.model.jnt_qposadr[axis.line.joint]] += math.pi
+    with quiet():
+        mujoco.mj_step(made.model, data, 5)
+    assert data.sensor("balance/command").data == 0.0
+
+
+def test_in_python_too(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"^controller\.rate_hz = 5: the closed loop is unstable"):
+        plugin(load_scenario("push_recovery", ["controller.rate_hz=5"], "linear"), tmp_path / "balance")
+    assert not (tmp_path / "balance").exists()
