@@ -38,7 +38,7 @@ PATIENCE_S, AGAIN_S = 300.0, 0.05
 
 @pytest.fixture(autouse=True)
 def few_signals_and_patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An export compares C with Python on few signals (see its tests); a handshake may take as long as a busy machine."""
+    """An export compares C with Python on few signals (see its tests); a handshake may take long on a busy machine."""
     monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
     monkeypatch.setattr("cmg_mj.codegen.board.wired_board.PATIENCE_S", PATIENCE_S)
 
@@ -101,7 +101,7 @@ def test_ticks_that_are_lost_hold_the_command_and_are_counted(tmp_path: Path) ->
     experiment = short("gyro_free", "duration_s=1.0")
     with (
         wire_to(experiment, tmp_path) as wire,
-        on_a_wire(experiment.axis_controller(), wire.name, deadline_s=2.0, most_lost=4) as board,
+        on_a_wire(experiment.axis_controller(), wire.name, deadline_s=4.0, most_lost=4) as board,
     ):
 
         def deafen(time_s: float) -> None:
@@ -110,7 +110,7 @@ def test_ticks_that_are_lost_hold_the_command_and_are_counted(tmp_path: Path) ->
 
         result = experiment.run_on(board, on_progress=deafen)
     assert result.outcomes[0].kind == "stopped"
-    assert "has not answered for 4 ticks in a row, within 2000 ms each, at t = 0.615 s" in result.outcomes[0].reason
+    assert "has not answered for 4 ticks in a row, within 4000 ms each, at t = 0.615 s" in result.outcomes[0].reason
     assert result.wire is not None
     assert (result.wire.figures["lost"], result.wire.figures["lost_in_a_row"]) == (7, 4)
     assert result.trajectory is not None
