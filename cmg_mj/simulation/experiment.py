@@ -21,8 +21,8 @@ from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
+from cmg_mj.results.rerun_head import rerun_head
 from cmg_mj.results.result import Driver, Result
-from cmg_mj.results.wire import WireReport
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import base_of
@@ -132,14 +132,9 @@ class Experiment:
 
     def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
-        from cmg_mj.codegen.board import Board, WiredBoard
+        from cmg_mj.codegen.board import result_of
 
-        result = self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
-        if isinstance(processor, WiredBoard):
-            rates = () if result.trajectory is None else result.trajectory["x2_rad_s"].tolist()
-            wire = WireReport(processor.name, processor.figures(), processor.log(rates))
-            return dataclasses.replace(result, driver="board", wire=wire)
-        return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result
+        return result_of(processor, self.simulate(self.plant, self.axis_controller(int(world), processor), **options))
 
     def run_many(
         self,
@@ -309,25 +304,8 @@ class Experiment:
         return law_change | differences(bundled.resolved(), self.resolved())
 
     def as_toml(self, driver: Driver = "native", world: int = 0, port: str = "") -> str:
-        """The resolved scenario: running it again gives the same run; its head says if that needs options.
-
-        Args:
-            driver: Who calls the controller, or is it.
-            world: Number of the world.
-            port: Port of a real board, if one decides.
-        """
-        why, command = "", "cmg-mj run scenario.toml"
-        if port:
-            why += f"Run on a board at {port} (docs/board.md), where ticks may be lost. "
-            command += f" --driver board --port {port}"
-        elif driver == "board":
-            why += "Run on the emulated board (docs/board.md), whose numbers are not quite the host's. "
-            command += " --driver board"
-        if world:
-            why += f"World {world}: its noise is not that of world 0. "
-            command += f" --world {world}"
-        head = f"# {why}To the same numbers it runs with\n#     {command}\n\n" if why else ""
-        return head + tomli_w.dumps(self.resolved())
+        """The resolved scenario: running it again gives the same run; its head says if that needs options."""
+        return rerun_head(driver, world, port) + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path) -> None:
         """Write it as TOML."""

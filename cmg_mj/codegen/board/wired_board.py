@@ -9,7 +9,7 @@ import time
 from array import array
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -17,14 +17,16 @@ import numpy as np
 from cmg_mj.codegen.board.frames import AROUND, Frame, FrameReader
 from cmg_mj.codegen.board.identity import HELLO, Identity, identity_of, read_identity
 from cmg_mj.codegen.board.ports import BAUD, TCP, Port, open_port, require_fit
-from cmg_mj.codegen.board.qemu import NOT_FINITE, STATUSES
+from cmg_mj.codegen.board.qemu import NOT_FINITE, STATUSES, Board
 from cmg_mj.codegen.board.serial_line import Closed
 from cmg_mj.codegen.export import generate_code
 from cmg_mj.codegen.export.names import name_of
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.processor import Decision
+from cmg_mj.controllers.processor import Decision, Processor
 from cmg_mj.errors import InputError, RunStopped, shown
+from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import Summary
+from cmg_mj.results.wire import WireReport
 
 PATIENCE_S = 3.0
 """Longest wait for an answer of the handshake [s]."""
@@ -288,6 +290,15 @@ class WiredBoard:
             if i < len(rates):
                 parts.append(Frame("r", question[2], struct.pack("<f", rates[i])).encode())
         return b"".join(parts)
+
+
+def result_of(processor: Processor, result: Result) -> Result:
+    """Return the result of a run with what its processor adds: that it was a board, and what went over its wire."""
+    if isinstance(processor, WiredBoard):
+        rates = () if result.trajectory is None else result.trajectory["x2_rad_s"].tolist()
+        wire = WireReport(processor.name, processor.figures(), processor.log(rates))
+        return replace(result, driver="board", wire=wire)
+    return replace(result, driver="board") if isinstance(processor, Board) else result
 
 
 @contextmanager
