@@ -72,9 +72,14 @@ class FrameReader:
         del held[:at]
         return frames
 
-    def resync(self) -> list[Frame]:
-        """Give up the frame whose rest has not come, if any; return the frames that lie behind its first byte."""
-        if not self._held:
+    def resync(self, awaited: bytes = b"") -> list[Frame]:
+        """Give up the frame whose rest has not come, if any; return the frames that lie behind its first byte.
+
+        Args:
+            awaited: Beginning of a frame that may be slow: one that begins so is not given up.
+        """
+        held = self._held
+        if not held or (awaited and awaited[: len(held)] == held[: len(awaited)]):
             return []
         self.damaged += not self._lost_track
         self._lost_track = True

@@ -161,10 +161,11 @@ class WiredBoard:
         """Send a sample, again if need be, and return its answer; None if there is none by the deadline."""
         begun = now = time.perf_counter()
         deadline, first = begun + self.deadline_s, True
+        awaited = question[:3] + bytes((_COST.size + self._answer.size,))
         while now < deadline:
             if not first:
                 self.counts.sent_again += 1
-                self._waiting += self._reader.resync()
+                self._waiting += self._reader.resync(awaited)
             self._send(question)
             answer = self._await(frame, min(now + self._again_s, deadline), until_refused=first)
             now, first = time.perf_counter(), False

@@ -58,3 +58,12 @@ def test_a_frame_whose_rest_does_not_come_is_given_up() -> None:
     assert reader.feed(b"\xa5u\x01\xff" + whole) == []  # it waits for 255 bytes
     assert reader.resync() == [FRAMES[0]]
     assert reader.damaged == 1
+
+
+def test_a_frame_that_is_slow_is_not_given_up_where_it_is_awaited() -> None:
+    reader, whole = FrameReader(), FRAMES[3].encode()
+    for count in (2, 7):
+        assert reader.feed(whole[:count]) == reader.resync(whole[:4]) == []
+        assert reader.feed(whole[count:]) == [FRAMES[3]]
+    assert reader.feed(FRAMES[4].encode()[:7]) == reader.resync(whole[:4]) == []
+    assert reader.damaged == 1
