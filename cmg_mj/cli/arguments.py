@@ -57,7 +57,13 @@ class RunArguments:
         return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
 
     def folder(
-        self, label: str, names: Sequence[str], experiment: Experiment, driver: Driver = "native", world: int = 0
+        self,
+        label: str,
+        names: Sequence[str],
+        experiment: Experiment,
+        driver: Driver = "native",
+        world: int = 0,
+        port: str = "",
     ) -> RunFolder:
         """Claim the folder for files: --out, or one in runs/ named for the scenario, the label and the settings."""
         from cmg_mj.scenario.differences import folder_suffix, safe_name
@@ -70,7 +76,7 @@ class RunArguments:
             *([f"world{world}"] if world else []),
         )
         name = "-".join(parts) + folder_suffix(experiment.differences)
-        return claim_output(self.out, name, names, request_toml=experiment.as_toml(driver, world))
+        return claim_output(self.out, name, names, request_toml=experiment.as_toml(driver, world, port))
 
 
 def _as_utf8(argument: str) -> str:

@@ -14,6 +14,7 @@ from cmg_mj.errors import InputError, nearest
 from cmg_mj.results.per_world_table import as_table
 from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, open_loop_figures
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.results.wire import WireReport
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -57,6 +58,7 @@ class Result:
         seed: Seed of the sensors' noise.
         worlds: The worlds' numbers, (n_worlds,).
         driver: Who called the controller, or was it.
+        wire: Exchange with a real board, if one decided.
     """
 
     outcomes: list[Outcome]
@@ -67,6 +69,7 @@ class Result:
     seed: int = 0
     worlds: Sequence[int] = ()
     driver: Driver = "native"
+    wire: WireReport | None = None
 
     @property
     def stood(self) -> np.ndarray:

@@ -28,6 +28,7 @@ from cmg_mj.results.summary_keys import (
     open_loop_figures,
     section,
 )
+from cmg_mj.results.wire import wire_line
 from cmg_mj.scenario.description import assignments
 from cmg_mj.scenario.differences import describe_differences
 from cmg_mj.scenario.loading import load_scenario
@@ -146,6 +147,7 @@ def comparison_note(summaries: Comparison) -> str:
 def run_title(summary: Mapping[str, SummaryValue]) -> str:
     """Name a run in a line: scenario, observer, seed, world, what differs from the bundled scenario."""
     place = " on the board" if summary.get("driver") == "board" else ""
+    place += f" at {summary['port']}" if "port" in summary else ""
     world = f", world {summary['world']}" if "world" in summary else ""
     changes = summary["differs"]
     differs = describe_differences(changes) if isinstance(changes, Mapping) else ""
@@ -171,7 +173,8 @@ def summary_table(summary: Mapping[str, SummaryValue]) -> Group:
     open_loop = [_open_loop_table(name, axis_summary) for name, axis_summary in axes.items()]
     floors = {name for axis_summary in axes.values() for name in FLOORS if name in open_loop_figures(axis_summary)}
     about = [_about_floors(FLOOR_ACCELERATION in floors)] if floors else []
-    return Group(table, *(rows for rows in open_loop if rows.row_count), *about)
+    wire = [line] if (line := wire_line(summary)) else []
+    return Group(table, *(rows for rows in open_loop if rows.row_count), *about, *wire)
 
 
 def _about_floors(has_acceleration: bool) -> str:

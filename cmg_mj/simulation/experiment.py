@@ -21,6 +21,7 @@ from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
+from cmg_mj.results.rerun_head import rerun_head
 from cmg_mj.results.result import Driver, Result
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.disturbances import Push
@@ -133,10 +134,9 @@ class Experiment:
 
     def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
-        from cmg_mj.codegen.board import Board
+        from cmg_mj.codegen.board import result_of
 
-        result = self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
-        return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result
+        return result_of(processor, self.simulate(self.plant, self.axis_controller(int(world), processor), **options))
 
     def run_many(
         self,
@@ -308,17 +308,9 @@ class Experiment:
             bundled = prepare(base)
         return law_change | differences(bundled.resolved(), self.resolved())
 
-    def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
+    def as_toml(self, driver: Driver = "native", world: int = 0, port: str = "") -> str:
         """The resolved scenario: running it again gives the same run; its head says if that needs options."""
-        why, command = "", "cmg-mj run scenario.toml"
-        if driver == "board":
-            why += "Run on the emulated board (docs/board.md), whose numbers are not quite the host's. "
-            command += " --driver board"
-        if world:
-            why += f"World {world}: its noise is not that of world 0. "
-            command += f" --world {world}"
-        head = f"# {why}To the same numbers it runs with\n#     {command}\n\n" if why else ""
-        return head + tomli_w.dumps(self.resolved())
+        return rerun_head(driver, world, port) + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path) -> None:
         """Write it as TOML."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from cmg_mj.codegen.board.identity import identity_of
 from cmg_mj.codegen.board.image import build
 from cmg_mj.codegen.board.qemu import Board
 from cmg_mj.codegen.board.tools import require
@@ -23,10 +24,12 @@ class ExportedFiles(NamedTuple):
     Attributes:
         observer: The observer's name in C.
         folder: Folder of the files.
+        identity: The text with which a board that runs it introduces itself.
     """
 
     observer: str
     folder: Path
+    identity: str
 
 
 @contextmanager
@@ -48,8 +51,9 @@ def exported(controller: Controller) -> Iterator[ExportedFiles]:
             "on its own estimate, 'observer'"
         )
     with TemporaryDirectory(prefix="cmg_mj-board-") as folder:
-        header = export(controller, Path(folder), precision="single", name=_name_of(controller))[0]
-        yield ExportedFiles(header.stem, Path(folder))
+        header, source, *_ = export(controller, Path(folder), precision="single", name=_name_of(controller))
+        identity = identity_of(controller, header.stem, source.read_text(encoding="utf-8")).text()
+        yield ExportedFiles(header.stem, Path(folder), identity)
 
 
 def _name_of(controller: Controller) -> str:

@@ -30,7 +30,7 @@ STATUSES = {
     101: "its processor met a fault",
     102: "its stack is full",
 }
-"""Exit status -> the reason, as firmware/machine.h numbers them."""
+"""Exit status -> the reason, as firmware/port.h numbers them."""
 
 NOT_FINITE = {1: "a reading was not finite", 2: "its state, estimate or command was not finite"}
 """Status of an update -> the reason why the controller has stopped, as the exported header numbers them."""
@@ -78,17 +78,7 @@ class Board:
 
     def __init__(self, image: Path, *, counting: bool = False, patience_s: float = PATIENCE_S) -> None:
         host, board = socket.socketpair()
-        command = [
-            *_parent_death_prefix(),
-            EMULATOR,
-            "-M",
-            "mps2-an500",
-            "-nodefaults",
-            "-nographic",
-            "-monitor",
-            "none",
-        ]
-        command += ["-semihosting-config", "enable=on,target=native", "-serial", "stdio", "-kernel", str(image)]
+        command = [*_parent_death_prefix(), *emulator_command(image)]
         if counting:
             command += ["-icount", f"shift={NANOSECONDS_AN_INSTRUCTION.bit_length() - 1}"]
         with board:
@@ -201,6 +191,12 @@ class Board:
                 return f"{EMULATOR} was ended by signal {-status}"
             return STATUSES.get(status, f"{EMULATOR} has ended with status {status}")
         return "it has closed the line"
+
+
+def emulator_command(image: Path) -> list[str]:
+    """Return the command that runs an image with its serial line on standard input and output."""
+    options = "-M mps2-an500 -nodefaults -nographic -monitor none -semihosting-config enable=on,target=native"
+    return [EMULATOR, *options.split(), "-serial", "stdio", "-kernel", str(image)]
 
 
 def _parent_death_prefix() -> list[str]:

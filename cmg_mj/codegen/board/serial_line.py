@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import binascii
 import socket
 import struct
 
+from cmg_mj.codegen.board.frames import START_BYTE, Frame, checksum
 from cmg_mj.errors import RunStopped
-
-START_BYTE = b"\xa5"
 
 
 class Silent(RunStopped):
@@ -17,12 +15,6 @@ class Silent(RunStopped):
 
 class Closed(RunStopped):
     """The board has closed the line."""
-
-
-def frame(kind: str, number: int, payload: bytes) -> bytes:
-    """Encode a message for the line."""
-    body = bytes((ord(kind), number, len(payload))) + payload
-    return START_BYTE + body + struct.pack("<H", _crc(body))
 
 
 class SerialLine:
@@ -55,7 +47,7 @@ class SerialLine:
         """
         self._number = (self._number + 1) % 256
         try:
-            self._line.sendall(frame(kind, self._number, payload))
+            self._line.sendall(Frame(kind, self._number, payload).encode())
         except OSError as error:
             raise Closed("the board is gone") from error
         answer_kind, number, answer = self._message()
@@ -74,8 +66,8 @@ class SerialLine:
         if self._message() != ("!", 0, b""):
             raise RunStopped("the board says something else than that it is ready")
 
-    def _message(self) -> tuple[str, int, bytes]:
-        """Receive the next message: kind, number and payload."""
+    def _message(self) -> Frame:
+        """Receive the next message."""
         try:
             head = self._receive(4)
             if head[:1] != START_BYTE:
@@ -85,9 +77,9 @@ class SerialLine:
             raise Silent(f"the board has not answered for {self.patience_s:g} s") from error
         except OSError as error:
             raise Closed("the board is gone") from error
-        if struct.pack("<H", _crc(head[1:] + rest[:-2])) != rest[-2:]:
+        if checksum(head[1:] + rest[:-2]) != rest[-2:]:
             raise RunStopped("the board sent a message that was damaged on the line")
-        return chr(head[1]), head[2], rest[:-2]
+        return Frame(chr(head[1]), head[2], rest[:-2])
 
     def _receive(self, count: int) -> bytes:
         received = b""
@@ -97,8 +89,3 @@ class SerialLine:
                 raise Closed("the board is gone")
             received += more
         return received
-
-
-def _crc(body: bytes) -> int:
-    """Compute the CRC-16/CCITT."""
-    return binascii.crc_hqx(body, 0xFFFF)

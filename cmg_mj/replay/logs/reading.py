@@ -22,6 +22,7 @@ from cmg_mj.replay.logs.checks import (
     windows_inside,
 )
 from cmg_mj.replay.logs.columns import ACCELEROMETERS, ONE_ACCELEROMETER, Column, columns_of
+from cmg_mj.replay.logs.from_board import board_log_options
 from cmg_mj.replay.logs.from_run import log_of_trajectory
 from cmg_mj.replay.logs.log import REFERENCE, Log, ReadOptions
 from cmg_mj.replay.logs.one_accelerometer import remarks_on_one, tilt_of_one
@@ -52,7 +53,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     """Read a log.
 
     Args:
-        path: A CSV with a heading, a Parquet file, or a run's folder or `trajectory.parquet`, whose columns are known.
+        path: A CSV with a heading, a Parquet file, or what has known columns: a run's folder, its
+            `trajectory.parquet`, or a board's log.
         options: The columns of the file, and how to convert and sample them; none for a run's own recording.
 
     Returns:
@@ -65,7 +67,10 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if path.is_dir() and (path / "trajectory.parquet").is_file():
         path = path / "trajectory.parquet"
     if not options.columns:
-        return _read_run(path, options)
+        board_options = board_log_options(path, options)
+        if board_options is None:
+            return _read_run(path, options)
+        options = board_options
     rows = _convert(path, options)
     if options.time_range_s is not None:
         rows = _cut(path, rows, options.time_range_s, options.rate_hz)

@@ -1,0 +1,146 @@
+"""A board's log: the frames of its line, recorded, as columns."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from cmg_mj.codegen.board.frames import START_BYTE, Frame, FrameReader
+from cmg_mj.codegen.board.identity import FIRMWARE_NAME, HELLO, Identity, read_identity
+from cmg_mj.errors import InputError
+
+READ = 1 << 20
+"""Size of a piece in which a log is read [bytes]."""
+COLUMNS = {
+    "time": "time_s",
+    "inner_x": "inner_x_m_s2",
+    "inner_z": "inner_z_m_s2",
+    "outer_x": "outer_x_m_s2",
+    "outer_z": "outer_z_m_s2",
+    "gimbal": "gimbal_rad",
+    "command": "command_rad_s",
+    "rate": "reference_rad_s",
+}
+"""Role in a user's log -> heading of a board's."""
+
+
+class BoardLog(NamedTuple):
+    """A board's log.
+
+    Attributes:
+        identity: The board's account of itself.
+        columns: Heading -> numbers, (n_samples,); without a reference in the log there is no column for one.
+        damaged: Number of places where the file was no frame.
+        missing: Number of samples whose frames are missing, by the frames' numbers.
+    """
+
+    identity: Identity
+    columns: dict[str, np.ndarray]
+    damaged: int
+    missing: int
+
+    def remarks(self) -> list[str]:
+        """Say in a line each what is wrong with the log."""
+        places = f"{self.damaged:,} place{'' if self.damaged == 1 else 's'}"
+        samples = f"{self.missing:,} sample{' is' if self.missing == 1 else 's are'}"
+        return [
+            *([f"the board's log is damaged in {places}"] if self.damaged else []),
+            *([f"{samples} missing in the board's log, by its frames' numbers"] if self.missing else []),
+        ]
+
+
+def is_board_log(head: bytes) -> bool:
+    """Return whether a file that begins so is a board's log."""
+    return head.startswith(START_BYTE + HELLO.encode())
+
+
+def read_board_log(path: Path, most_samples: int) -> BoardLog:
+    """Read a board's log: who it is ('h'), then of every period the sample, its answer ('u') and perhaps a rate ('r').
+
+    A sample whose answer is missing has the command that was held. Numbers of samples run on modulo 256: where frames
+    are missing, the times of those after them are later.
+
+    Args:
+        path: The file.
+        most_samples: Largest number of samples.
+
+    Returns:
+        The log.
+
+    Raises:
+        InputError: The file cannot be read, is no such log, or is too long.
+    """
+    reader, rows = FrameReader(), None
+    try:
+        with path.open("rb") as file:
+            while piece := file.read(READ):
+                for frame in reader.feed(piece):
+                    if rows is None:
+                        rows = _Rows(read_identity(frame, str(path)), path, most_samples)
+                    else:
+                        rows.take(frame)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    if rows is None or not rows.samples:
+        raise InputError(f"{path}: a board's log without a sample")
+    columns = rows.columns()
+    return BoardLog(rows.identity, columns, reader.damaged, rows.missing)
+
+
+class _Rows:
+    """The samples of a log in the making."""
+
+    def __init__(self, identity: Identity, path: Path, most_samples: int) -> None:
+        if identity.firmware != FIRMWARE_NAME:
+            raise InputError(f"{path}: a log of the firmware {identity.firmware!r}, not of {FIRMWARE_NAME}")
+        self.identity, self._path, self._most = identity, path, most_samples
+        real = "f" if identity.precision == "single" else "d"
+        self._sample = struct.Struct(f"<{4 + len(identity.gimbals.zeros)}{real}")
+        self._command, self._rate = struct.Struct(f"<3I{real}"), struct.Struct(f"<{real}")
+        self._last: int | None = None
+        self._answered = True
+        self._held = 0.0
+        self._tick = 0
+        self.missing = 0
+        self.samples: list[tuple[float, ...]] = []
+        self._ticks: list[int] = []
+        self._commands: list[float] = []
+        self._rates: list[float] = []
+
+    def take(self, frame: Frame) -> None:
+        """Take a frame; kinds that are neither a sample, an answer nor a rate are passed over."""
+        if frame.kind == "u" and frame.number != self._last:
+            self._take_sample(frame)
+        elif frame.kind == "u" and not self._answered and len(frame.payload) > self._command.size:
+            self._answered = True
+            self._held = self._commands[-1] = self._command.unpack_from(frame.payload)[3]
+        elif frame.kind == "r" and self.samples and len(frame.payload) == self._rate.size:
+            self._rates += [np.nan] * (len(self.samples) - len(self._rates))
+            self._rates[-1] = self._rate.unpack(frame.payload)[0]
+
+    def _take_sample(self, frame: Frame) -> None:
+        if len(frame.payload) != self._sample.size:
+            # An answer whose sample is missing: the sample is, and so is this one.
+            return
+        if len(self.samples) >= self._most:
+            raise InputError(f"{self._path}: more than {self._most:,} samples: cut out a part of it")
+        if self._last is not None:
+            step = (frame.number - self._last) % 256
+            self._tick += step
+            self.missing += step - 1
+        self._last, self._answered = frame.number, False
+        self.samples.append(self._sample.unpack(frame.payload))
+        self._ticks.append(self._tick)
+        self._commands.append(self._held)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return the columns, in the order of `COLUMNS`."""
+        samples = np.array(self.samples)
+        gimbal = self.identity.gimbals(list(samples[:, 4:].T))
+        series = [np.array(self._ticks) / self.identity.rate_hz, *samples[:, :4].T, gimbal, np.array(self._commands)]
+        if self._rates:
+            series.append(np.array(self._rates + [np.nan] * (len(samples) - len(self._rates))))
+        return dict(zip(COLUMNS.values(), series, strict=False))

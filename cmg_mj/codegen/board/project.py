@@ -1,0 +1,84 @@
+"""Writes the firmware with a controller as a project that one can build and flash."""
+
+from __future__ import annotations
+
+from cmg_mj.codegen.board.identity import identity_of
+from cmg_mj.codegen.board.image import FIRMWARE, FLAGS, MACHINES, macros_of
+from cmg_mj.codegen.board.ports import BAUD
+from cmg_mj.codegen.board.tools import COMPILER, EMULATOR
+from cmg_mj.controllers.controller import Controller
+
+EMULATED_PORT = 5555
+"""TCP port of the emulated board that `make emulate` starts."""
+STRICT = ("-Werror", "-Wl,--fatal-warnings")
+"""Flags that a user's own compiler need not bear with."""
+NEVER_RUN = ("stm32f746",)
+"""Machines whose firmware compiles and has never run on the chip."""
+HOW_TO_RUN = {
+    "mps2": f"""emulate: $(NAME).elf
+\t{EMULATOR} -M mps2-an500 -nodefaults -nographic -monitor none -semihosting-config enable=on,target=native \\
+\t  -serial tcp:localhost:$(PORT),server=on,nodelay=on -kernel $<
+""",
+    "stm32f746": """flash: $(NAME).elf
+\topenocd -f board/stm32f746g-disco.cfg -c "program $< verify reset exit"
+""",
+}
+"""Machine -> the Makefile's rule that brings the firmware to run."""
+COMMANDS = {"mps2": ("make emulate", f"tcp:localhost:{EMULATED_PORT}"), "stm32f746": ("make flash", "/dev/ttyACM0")}
+"""Machine -> the command that brings the firmware to run, and the port on which it answers then."""
+
+
+def project_files(machine: str) -> list[str]:
+    """Name the files of a project beside those of the export."""
+    board = MACHINES[machine]
+    return ["board.c", "its.h", "port.h", "startup.c", board.sources, board.script, "Makefile"]
+
+
+def project(controller: Controller, name: str, code: str, machine: str) -> dict[str, str]:
+    """Write the files of a project beside those of the export.
+
+    Args:
+        controller: The exported controller.
+        name: The observer's name in C.
+        code: Text of its .c file, in single precision.
+        machine: The board, one of `MACHINES`.
+
+    Returns:
+        Name -> text.
+    """
+    *sources, _ = project_files(machine)
+    files = {file: (FIRMWARE / file).read_text(encoding="utf-8") for file in sources}
+    return {**files, "Makefile": _makefile(name, machine, identity_of(controller, name, code).text())}
+
+
+def _makefile(name: str, machine: str, identity: str) -> str:
+    board = MACHINES[machine]
+    flags = " ".join(flag for flag in FLAGS if flag not in STRICT)
+    macros = " ".join(f"'-D{macro}'" for macro in macros_of(name, machine, identity))
+    sources = f"startup.c {board.sources} board.c {name}.c"
+    command, port = COMMANDS[machine]
+    warning = "# The firmware compiles. It has never run on this chip.\n" if machine in NEVER_RUN else ""
+    return f"""# {name} on {board.title}; written by cmg_mj, whose docs/board.md says more.
+# {command}, then: cmg-mj run push_recovery --driver board --observer {name} --port {port}
+{warning}
+NAME := {name}
+BAUD ?= {BAUD}
+PORT ?= {EMULATED_PORT}
+CC := {COMPILER}
+FLAGS := {flags}
+MACROS := {macros} -DBAUD=$(BAUD)u
+
+all: $(NAME).elf $(NAME).bin
+
+$(NAME).elf: {sources} {name}.h its.h port.h {board.script} Makefile
+\t$(CC) $(FLAGS) $(MACROS) -I. -T {board.script} {sources} -lm -o $@
+
+$(NAME).bin: $(NAME).elf
+\t{COMPILER.replace("gcc", "objcopy")} -O binary $< $@
+
+{HOW_TO_RUN[machine]}
+clean:
+\trm -f $(NAME).elf $(NAME).bin
+
+.PHONY: all clean emulate flash
+"""

@@ -1,0 +1,128 @@
+"""A board's log, the frames of its line, as a log of the user's."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj.codegen.board.frames import Frame
+from cmg_mj.codegen.board.identity import Identity
+from cmg_mj.errors import InputError
+from cmg_mj.replay.logs import ReadOptions
+from cmg_mj.replay.logs.reading import read_log
+from cmg_mj.sensors.gimbal_angle import GimbalAngle
+from tests.command import cmg_mj
+
+PAIR = GimbalAngle((1.0, -1.0), (1.5, 1.5))
+WHO = Identity("cmg_mj", "2", "linear", "single", 100.0, "", (0.1, 0.2), PAIR)
+N = 400
+TILT = 0.1 * np.sin(0.05 * np.arange(N))
+RATE = 0.5 * np.cos(0.05 * np.arange(N))
+
+
+def hello(identity: Identity = WHO) -> bytes:
+    return Frame("h", 1, struct.pack("<2I", 1, 2) + identity.text().encode()).encode()
+
+
+def sample(k: int) -> bytes:
+    """Both accelerometers show gravity alone; the gimbals are 0.01 k from their zeros, the command is k."""
+    forces = (-9.81 * math.sin(TILT[k]), 9.81 * math.cos(TILT[k])) * 2
+    return Frame("u", k % 256, struct.pack("<6f", *forces, 1.5 + 0.01 * k, 1.5 - 0.01 * k)).encode()
+
+
+def answer(k: int) -> bytes:
+    return Frame("u", k % 256, struct.pack("<3I5f", 0, 0, 0, k, 0.0, 0.0, 0.0, 0.0)).encode()
+
+
+def reference(k: int) -> bytes:
+    return Frame("r", k % 256, struct.pack("<f", RATE[k])).encode()
+
+
+def write(path: Path, parts: Sequence[bytes]) -> Path:
+    path.write_bytes(b"".join(parts))
+    return path
+
+
+def whole(lacking: Sequence[int] = ()) -> list[bytes]:
+    return [hello(), *(sample(k) + answer(k) + reference(k) for k in range(N) if k not in lacking)]
+
+
+def test_it_is_a_log_with_everything(tmp_path: Path) -> None:
+    log = read_log(write(tmp_path / "board.frames", whole()))
+    assert log.has == {"gimbals", "acceleration", "reference"}
+    assert (log.dt, len(log), log.notes) == (0.01, N, ())
+    np.testing.assert_allclose(log["y1_rad"], TILT, atol=1e-6)
+    np.testing.assert_allclose(log["y2_rad"], 0.01 * np.arange(N), atol=1e-5)
+    np.testing.assert_array_equal(log["u_rad_s"], np.arange(N))
+    np.testing.assert_allclose(log["reference_rad_s"], RATE, atol=1e-6)
+    assert log.tilt is not None
+    assert (log.tilt.r_inner, log.tilt.r_outer) == (0.1, 0.2)
+
+
+def test_without_a_reference_it_has_none(tmp_path: Path) -> None:
+    parts = [hello(), *(sample(k) + answer(k) for k in range(N))]
+    assert read_log(write(tmp_path / "board.frames", parts)).has == {"gimbals", "acceleration"}
+
+
+def test_an_answer_that_was_lost_holds_the_command(tmp_path: Path) -> None:
+    parts = [hello(), *(sample(k) + (b"" if k in (7, 8) else answer(k)) for k in range(N))]
+    log = read_log(write(tmp_path / "board.frames", parts))
+    assert log["u_rad_s"][5:10].tolist() == [5.0, 6.0, 6.0, 6.0, 9.0]
+
+
+def test_what_is_missing_and_damaged_is_said(tmp_path: Path) -> None:
+    """Two samples in a row, and a byte of a third: three are bridged, and the times after them are right."""
+    parts = whole(lacking=(100, 101))
+    spoiled = bytearray(parts[51])
+    spoiled[9] ^= 4
+    parts[51] = bytes(spoiled)
+    log = read_log(write(tmp_path / "board.frames", parts))
+    assert len(log) == N
+    assert log["time_s"][-1] == pytest.approx(0.01 * (N - 1))
+    assert "the board's log is damaged in 1 place" in log.notes
+    assert "3 samples are missing in the board's log, by its frames' numbers" in log.notes
+    np.testing.assert_allclose(log["y1_rad"], TILT, atol=1e-3)
+
+
+def test_a_long_gap_parts_the_log(tmp_path: Path) -> None:
+    log = read_log(write(tmp_path / "board.frames", whole(lacking=range(150, 300))))
+    assert [len(range(*part.indices(N))) for part in log.parts] == [150, 100]
+    assert log["time_s"][150] == pytest.approx(3.0)
+
+
+def test_its_options_are_a_users(tmp_path: Path) -> None:
+    path = write(tmp_path / "board.frames", whole())
+    log = read_log(path, ReadOptions(time_range_s=(1.0, 2.0), scale={"rate": -1.0}))
+    assert len(log) == 101
+    np.testing.assert_allclose(log["reference_rad_s"], -RATE[100:201], atol=1e-6)
+    assert read_log(path, ReadOptions(columns={"time": "time_s", "rate": "reference_rad_s", "tilt": "gimbal_rad"})).has
+    with pytest.raises(InputError, match=r"has no column 'gyro_rad'; it has: 'command_rad_s'"):
+        read_log(path, ReadOptions(columns={"tilt": "gyro_rad"}))
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ([hello()], "a board's log without a sample$"),
+        ([Frame("h", 1, b"12345678who knows").encode(), sample(0)], "no firmware of cmg_mj: 'who knows'$"),
+        ([hello()[:20]], "a board's log without a sample$"),
+    ],
+)
+def test_logs_that_are_none(tmp_path: Path, parts: list[bytes], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        read_log(write(tmp_path / "board.frames", parts))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("elsewhere")
+def test_the_command_takes_it() -> None:
+    path = write(Path("board.frames"), whole())
+    outcome = cmg_mj("replay", path, "--observers", "linear,finite_difference", "--out", "here", "--markdown")
+    assert outcome.status == 0, outcome.err
+    assert "| `finite_difference` |" in outcome.out
+    assert Path("here/summary.json").is_file()
