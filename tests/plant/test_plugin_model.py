@@ -44,7 +44,7 @@ def test_what_stands_in_frames_is_where_it_was(tmp_path: Path) -> None:
     (tmp_path / "plugin.xml").write_text(plugin_mjcf(plant, "cmg_mj.mine", {}), encoding="utf-8")
     stripped = strip_plugins(tmp_path / "plugin.xml")
     assert stripped is not None
-    written, drawn = mujoco.MjModel.from_xml_string(stripped.text), compile_model(plant.drawn_spec(), plant.path)
+    written, drawn = stripped.parse().compile(), compile_model(plant.drawn_spec(), plant.path)
     for name in ("body_pos", "body_quat", "body_inertia", "site_pos", "jnt_axis", "cam_pos", "cam_quat"):
         np.testing.assert_array_equal(getattr(written, name), getattr(drawn, name), err_msg=name)
     solid = drawn.geom_type != int(mujoco.mjtGeom.mjGEOM_MESH)
