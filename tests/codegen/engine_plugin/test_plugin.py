@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import pickle
 import re
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ from cmg_mj import InputError, load_scenario, prepare
 from cmg_mj.codegen.engine_plugin.build import FLAGS, common_files
 from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE, generate_plugin
 from cmg_mj.plant.mujoco_state import quiet
-from cmg_mj.plant.plugin_state import FAILED, initial_states, set_world
+from cmg_mj.plant.plugin_state import FAILED, initial_states, instance_states, set_world
 from cmg_mj.simulation.plugin import describe_rig
 from tests.codegen.engine_plugin.made import Made, check_against_runner, make, needs_compiler, run
 
@@ -113,10 +114,32 @@ def test_worlds_by_rollout_are_those_of_run_many() -> None:
     assert len(set(command[:, -1])) == 3
 
 
-@pytest.mark.parametrize(("seed", "world"), [(2**53 + 1, 0), (0, -1)])
+@pytest.mark.parametrize(("seed", "world"), [(2**53 + 1, 0), (0, -1), (1.5, 0), (0, 0.5), (math.nan, 0)])
 def test_numbers_that_no_state_holds(seed: int, world: int) -> None:
     with pytest.raises(InputError, match=r"takes \w+ from 0 to 2\^53"):
         set_world(quick().model, quick().start(), seed, world)
+
+
+def test_initial_states_leave_the_data_alone() -> None:
+    data = quick().start()
+    before = data.plugin_state.copy()
+    initial_states(quick().model, data, 3, 5)
+    np.testing.assert_array_equal(data.plugin_state, before)
+
+
+def test_a_plugin_of_others_is_left_alone() -> None:
+    """Also one whose instance is named as if it were this package's."""
+    pid = '<plugin plugin="mujoco.pid"><instance name="unbalance"><config key="ki" value="1"/></instance></plugin>'
+    drive = '<plugin name="pid" joint="{}" plugin="mujoco.pid" instance="unbalance" actdim="1"/></actuator>'
+    text = quick().plugin.model.read_text(encoding="utf-8").replace("</extension>", f"{pid}</extension>")
+    text = re.sub("<key .*?/>", "", text.replace("</actuator>", drive.format("tilt")))
+    model = mujoco.MjModel.from_xml_string(text)
+    assert model.nplugin == 2
+    assert len(instance_states(model, mujoco.MjData(model))) == 1
+    alone = '<mujoco><extension>{}</extension><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>'
+    model = mujoco.MjModel.from_xml_string(f"{alone.format(pid)}<actuator>{drive.format('j')}</mujoco>")
+    with pytest.raises(InputError, match="has no plugin of cmg_mj's"):
+        set_world(model, mujoco.MjData(model), 1, 0)
 
 
 def test_noise_that_has_begun() -> None:
