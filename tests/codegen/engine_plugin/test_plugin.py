@@ -127,6 +127,23 @@ def test_initial_states_leave_the_data_alone() -> None:
     np.testing.assert_array_equal(data.plugin_state, before)
 
 
+def test_a_world_that_a_program_writes_itself() -> None:
+    """As docs/plugin.md says, also after the forward pass of an environment's reset."""
+    made, ends = quick(), []
+    for way in ("set_world", "numbers", "neither"):
+        data = made.start()
+        mujoco.mj_forward(made.model, data)
+        if way == "numbers":
+            (address,) = made.model.plugin_stateadr
+            data.plugin_state[address : address + 2] = 0, 7
+        elif way == "set_world":
+            set_world(made.model, data, 0, 7)
+        mujoco.mj_step(made.model, data, 20)
+        ends.append(data.qpos.copy())
+    np.testing.assert_array_equal(ends[0], ends[1])
+    assert not np.array_equal(ends[0], ends[2])
+
+
 def test_a_plugin_of_others_is_left_alone() -> None:
     """Also one whose instance is named as if it were this package's."""
     pid = '<plugin plugin="mujoco.pid"><instance name="unbalance"><config key="ki" value="1"/></instance></plugin>'
