@@ -31,6 +31,8 @@ for seed in range(10):
     env.reset(seed=seed)
     env.action_space.seed(seed)
     data.act[:] = start.act
+    for address in model.plugin_stateadr:  # the robots have no other plugin; each episode has its own sensor noise
+        data.plugin_state[address + 1] = seed  # the world, as long as nothing has been stepped
     for step in range(1, 501):
         is_over = env.step(start.ctrl + share * own * env.action_space.sample())[2]
         if is_over or data.site("fog").xmat[8] < np.cos(0.2):

@@ -12,7 +12,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from importlib.metadata import version
+from importlib.metadata import entry_points, version
 from pathlib import Path
 from typing import NamedTuple
 
@@ -163,6 +163,12 @@ def list_plugins() -> tuple[str, list[PluginStatus]]:
     with _refusals():
         folder = plugin_folder()
         return folder, [_status(folder, name) for name in (list_names(folder) if folder else ())]
+
+
+def is_called() -> bool:
+    """Return whether `import mujoco` calls `load` here: the metadata of an older installation do not say so."""
+    called = f"{load.__name__}:{load.load.__name__}"
+    return any(point.value == called for point in entry_points(group="mujoco.plugins"))
 
 
 def has_another(library: Path) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import pickle
 import re
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ from cmg_mj import InputError, load_scenario, prepare
 from cmg_mj.codegen.engine_plugin.build import FLAGS, common_files
 from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE, generate_plugin
 from cmg_mj.plant.mujoco_state import quiet
-from cmg_mj.plant.plugin_state import FAILED, initial_states, set_world
+from cmg_mj.plant.plugin_state import FAILED, initial_states, instance_states, set_world
 from cmg_mj.simulation.plugin import describe_rig
 from tests.codegen.engine_plugin.made import Made, check_against_runner, make, needs_compiler, run
 
@@ -105,7 +106,9 @@ def test_worlds_by_rollout_are_those_of_run_many() -> None:
     quiet_run = prepare(load_scenario("push_recovery", ("duration_s=0.5", "push=[]"), "gyro_free"))
     trajectory = quiet_run.run_many([0, 3, 7]).trajectory
     assert trajectory is not None
-    states = initial_states(made.model, made.start(), made.experiment.scenario.seed, [0, 3, 7])
+    data, untouched = made.start(), made.start().plugin_state
+    states = initial_states(made.model, data, made.experiment.scenario.seed, [0, 3, 7])
+    np.testing.assert_array_equal(data.plugin_state, untouched)
     ways = [mujoco.MjData(made.model) for _ in range(2)]
     _, sensors = rollout.rollout(made.model, ways, states, nstep=100)
     command = sensors[:, :, made.model.sensor("balance/command").adr[0]]
@@ -113,10 +116,42 @@ def test_worlds_by_rollout_are_those_of_run_many() -> None:
     assert len(set(command[:, -1])) == 3
 
 
-@pytest.mark.parametrize(("seed", "world"), [(2**53 + 1, 0), (0, -1)])
+@pytest.mark.parametrize(("seed", "world"), [(2**53 + 1, 0), (0, -1), (1.5, 0), (0, 0.5), (math.nan, 0)])
 def test_numbers_that_no_state_holds(seed: int, world: int) -> None:
     with pytest.raises(InputError, match=r"takes \w+ from 0 to 2\^53"):
         set_world(quick().model, quick().start(), seed, world)
+
+
+def test_a_world_that_a_program_writes_itself() -> None:
+    """As docs/plugin.md says, also after the forward pass of an environment's reset."""
+    made, ends = quick(), []
+    for way in ("set_world", "numbers", "neither"):
+        data = made.start()
+        mujoco.mj_forward(made.model, data)
+        if way == "numbers":
+            (address,) = made.model.plugin_stateadr
+            data.plugin_state[address : address + 2] = 0, 7
+        elif way == "set_world":
+            set_world(made.model, data, 0, 7)
+        mujoco.mj_step(made.model, data, 20)
+        ends.append(data.qpos.copy())
+    np.testing.assert_array_equal(ends[0], ends[1])
+    assert not np.array_equal(ends[0], ends[2])
+
+
+def test_a_plugin_of_others_is_left_alone() -> None:
+    """Also one whose instance is named as if it were this package's."""
+    pid = '<plugin plugin="mujoco.pid"><instance name="unbalance"><config key="ki" value="1"/></instance></plugin>'
+    drive = '<plugin name="pid" joint="{}" plugin="mujoco.pid" instance="unbalance" actdim="1"/></actuator>'
+    text = quick().plugin.model.read_text(encoding="utf-8").replace("</extension>", f"{pid}</extension>")
+    text = re.sub("<key .*?/>", "", text.replace("</actuator>", drive.format("tilt")))
+    model = mujoco.MjModel.from_xml_string(text)
+    assert model.nplugin == 2
+    assert len(instance_states(model, mujoco.MjData(model))) == 1
+    alone = '<mujoco><extension>{}</extension><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>'
+    model = mujoco.MjModel.from_xml_string(f"{alone.format(pid)}<actuator>{drive.format('j')}</mujoco>")
+    with pytest.raises(InputError, match="has no plugin of cmg_mj's"):
+        set_world(model, mujoco.MjData(model), 1, 0)
 
 
 def test_noise_that_has_begun() -> None:
