@@ -164,7 +164,7 @@ AT_ONCE = "__attribute__((constructor)) static void at_once(void) {{ {} }}"
 STRANGE = {
     "no plugin": ("int x;", "its library is no plugin of MuJoCo"),
     "a crash": ("void abort(void);" + AT_ONCE.format("abort();"), "crashed the process that loaded it (signal 6)"),
-    "no end": (AT_ONCE.format("for (;;) {}"), "does not come to an end when it is loaded"),
+    "no end": (AT_ONCE.format("for (;;) {}"), "has not loaded within 5 s, where milliseconds are usual"),
     "an unknown function": ("int missing(void); int x(void) { return missing(); }", "undefined symbol: missing"),
     "an exit": ("void exit(int); " + AT_ONCE.format("exit(0);"), "ended the process that loaded it"),
 }
