@@ -241,7 +241,7 @@ def _try(library: Path, copy: Path, name: str) -> str:
             )
         except subprocess.TimeoutExpired as error:
             raise InputError(
-                f"--install {library}: has not loaded within {LONGEST_TRIAL:g} s, which milliseconds do"
+                f"--install {library}: has not loaded within {LONGEST_TRIAL:g} s, where milliseconds are usual"
             ) from error
     if process.returncode < 0:
         raise InputError(f"--install {library}: crashed the process that loaded it (signal {-process.returncode})")

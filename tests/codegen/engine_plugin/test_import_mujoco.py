@@ -120,6 +120,12 @@ def test_another_library_of_an_installed_name(folder: Path, site: Path, tmp_path
     process = python(program + LOAD.format(model=str(model)), site)
     assert "from another library, which stays in force" in process.stdout
     assert "the model was written with another library" in process.stderr
+    example = (tmp_path / "new" / f"{name}_example.py").read_text("utf-8")
+    quiet = "import mujoco; mujoco.set_mju_user_warning(print)\n"  # no log
+    process = python(quiet + example.replace("__file__", repr(str(library))), site)
+    assert process.returncode == 1
+    assert f"Was a copy installed? cmg-mj plugin --install {tmp_path}/new, or --uninstall {name}" in process.stderr
+    assert "Traceback" not in process.stderr
     assert cmg_mj("plugin", "--install", library).status == 0
     assert python(LOAD.format(model=str(model)), site).stdout == "1\n"
 
