@@ -19,7 +19,7 @@ class Robot(MujocoEnv):
         """Take an action, whose part for the pair the plugin ignores."""
         self.do_simulation(action, self.frame_skip)
         fell = self.data.body(sys.argv[2]).xmat[8] < np.cos(0.2)
-        return np.append(self.data.qpos, self.data.qvel), 1.0, bool(fell), False, {}
+        return np.append(self.data.qpos, self.data.qvel), np.float64(1.0), bool(fell), False, {}
 
     def reset_model(self):
         """Stand where the robot balances; noise in a free joint's height would lift it off the floor."""
