@@ -7,7 +7,7 @@ from typing import Literal
 import click
 
 from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
-from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
+from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, show, users_code
 
 
 @click.command(short_help="Write an observer and the control law around it as C code.")
@@ -78,4 +78,5 @@ def export(
         off = (figures["c_off_by"] or {})[part]
         note(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer makes so much of a last digit")
     at = files[0].parent
-    say_written(folder, at, f"Try it: cc -std=c99 {at / name}.c {at / name}_example.c -lm && ./a.out", as_json)
+    compile_it = shell_command("cc", "-std=c99", at / f"{name}.c", at / f"{name}_example.c", "-lm")
+    say_written(folder, at, f"Try it: {compile_it} && ./a.out", as_json)

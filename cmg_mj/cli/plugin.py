@@ -8,7 +8,7 @@ import click
 from click.core import ParameterSource
 
 from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
-from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
+from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -113,9 +113,10 @@ def plugin(
     }
     _show(figures, as_json)
     place = result.library.parent
-    say_written(folder, place, f"Try it: python {place / made.name}_example.py", as_json)
+    say_written(folder, place, f"Try it: {shell_command('python', place / f'{made.name}_example.py')}", as_json)
     if has_another(result.library):
-        note(f"hint: {result.name} is installed from another library: cmg-mj plugin --install {result.library}")
+        remedy = shell_command("cmg-mj", "plugin", "--install", result.library)
+        note(f"hint: {result.name} is installed from another library: {remedy}")
 
 
 def _check_alone() -> None:

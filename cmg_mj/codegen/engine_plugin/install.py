@@ -38,7 +38,7 @@ from cmg_mj.results.files import whole_file, write_bytes
 from cmg_mj.results.run_folder.lock import Busy, Lock
 
 LONGEST_WAIT = 60.0  # for another install [s]
-LONGEST_TRIAL = 120.0  # for a library to load [s]
+LONGEST_TRIAL = 20.0  # for a library to load, which takes milliseconds [s]
 TRIAL = r"""
 import runpy, sys
 import mujoco
@@ -246,7 +246,9 @@ def _try(library: Path, copy: Path, name: str) -> str:
                 check=False,
             )
         except subprocess.TimeoutExpired as error:
-            raise InputError(f"--install {library}: does not come to an end when it is loaded") from error
+            raise InputError(
+                f"--install {library}: has not loaded within {LONGEST_TRIAL:g} s, where milliseconds are usual"
+            ) from error
     if process.returncode < 0:
         raise InputError(f"--install {library}: crashed the process that loaded it (signal {-process.returncode})")
     if process.returncode:
