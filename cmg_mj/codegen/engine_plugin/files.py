@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from importlib.resources import files
 
@@ -24,11 +25,12 @@ def extra_files(name: str, sources: Sequence[str], axis: str) -> dict[str, str]:
     Returns:
         Name -> text.
     """
-    mujoco = find_mujoco()
+    mujoco, tilt = find_mujoco(), "/".join(filter(None, ("balance", axis, "tilt")))
     words = {
         "NAME": name,
         "LIBRARY": library_name(name),
-        "TILT": "/".join(filter(None, ("balance", axis, "tilt"))),
+        "TILT_IN_C": c_text(tilt),
+        "TILT_IN_PYTHON": json.dumps(tilt, ensure_ascii=False),
         "MUJOCO": str(mujoco.library.parent),
         "LIBMUJOCO": mujoco.library.name,
         "SOURCES": " ".join(sources),
@@ -36,6 +38,12 @@ def extra_files(name: str, sources: Sequence[str], axis: str) -> dict[str, str]:
     }
     templates = {f"{name}_example.c": "example.c", f"{name}_example.py": "example.py.txt", "Makefile": "Makefile"}
     return {file: _filled(template, words) for file, template in templates.items()}
+
+
+def c_text(text: str) -> str:
+    """Print a text as C reads it; in octal whatever is no plain letter, and ?, which begins trigraphs."""
+    letters = (chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode())
+    return f'"{"".join(letters)}"'
 
 
 def _filled(template: str, words: dict[str, str]) -> str:
