@@ -119,9 +119,9 @@ def test_noise_that_has_begun() -> None:
 
 WRONG_CONFIGS = {
     "seed": ("-1", "1.5", "1 2", "one", "nan", "inf", "1e400", "9007199254740994", "0,5", "1;", "--1"),
-    "world": ("-1", "0.5", "x", "1e17", "nan", "1 0"),
+    "world": ("-1", "0.5", "x", "1e17", "nan", "1 0", "0x10", "1e3", "+1", " 1", "9007199254740993"),
     "noise_density_ug_rthz": ("-400", "much", "nan", "inf", "4e2x", "1e10"),
-    "counts_per_g": ("-1", "none", "nan", "-inf", "1e300"),
+    "counts_per_g": ("-1", "0x10", "none", "nan", "-inf", "1e300"),
     "counts_per_revolution": ("-4096", "12 bit", "nan", "1e300", "4096%"),
     "start": ("rest", "Spinning", "keyframe ", "0"),
     "build": ("0123456789abcdef", "?"),

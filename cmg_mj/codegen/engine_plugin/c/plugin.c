@@ -250,6 +250,25 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability)
     show(&rig, m, instance, state, d->sensordata);
 }
 
+/* Whether MuJoCo leaves an actuator out that the state names. */
+static int is_off(const mjModel *m, double number)
+{
+    const int actuator = element(number, (int)m->nactuator), group = actuator < 0 ? -1 : m->actuator_group[actuator];
+    return group >= 0 && group < 31 && (m->opt.disableactuator & (1 << group));
+}
+
+static int drives_are_off(const mjModel *m, const double *state)
+{
+    axis_places places;
+    int at = HEAD, result = (m->opt.disableflags & mjDSBL_ACTUATION) != 0;
+    for (int i = 0; i < rig.axes; ++i) {
+        at = axis_place(rig.axis[i], at, &places);
+        for (int j = 0; j < rig.axis[i]->gimbals; ++j)
+            result = result || is_off(m, state[places.servos + j]) || is_off(m, state[places.motors + j]);
+    }
+    return result;
+}
+
 /* A step has been taken: the decision counts. */
 static void advance(const mjModel *m, mjData *d, int instance)
 {
@@ -257,6 +276,10 @@ static void advance(const mjModel *m, mjData *d, int instance)
     axis_places places;
     int at = HEAD;
     if (state[STATUS] != READY) return;
+    if (drives_are_off(m, state)) {
+        fail(state, "its drives were switched off during a step");
+        return;
+    }
     if (state[IS_PENDING] != 0.0) {
         (void)state_advance(&rig, state);
         for (int i = 0; i < rig.axes; ++i) {
