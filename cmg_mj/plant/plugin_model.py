@@ -172,9 +172,7 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, drawn: mujoco.MjModel
 def _with_instance(text: str, plugin: str, config: Mapping[str, str], axes: Sequence[str]) -> str:
     """Add an instance of the plugin to an MJCF that MuJoCo has written, and the sensors that it shows for some axes."""
     names = [escape("/".join(filter(None, (INSTANCE, axis, part)))) for axis in axes for part in QUANTITIES]
-    sensors = "".join(
-        f'  <plugin name="{name}" plugin="{plugin}" instance="{INSTANCE}"/>\n  ' for name in names
-    )
+    sensors = "".join(f'  <plugin name="{name}" plugin="{plugin}" instance="{INSTANCE}"/>\n  ' for name in names)
     lines = "".join(f'        <config key="{key}" value="{value}"/>\n' for key, value in config.items())
     head = text.index("<mujoco")
     head = text.index(">", head) + 1

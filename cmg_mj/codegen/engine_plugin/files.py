@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from importlib.resources import files
 
 from cmg_mj.codegen.engine_plugin.build import FLAGS, find_mujoco
@@ -14,12 +14,13 @@ def library_name(name: str) -> str:
     return f"libcmg_mj_{name}.so"
 
 
-def extra_files(name: str, sources: Sequence[str], axis: str) -> dict[str, str]:
+def extra_files(name: str, code: Collection[str], sources: Sequence[str], axis: str) -> dict[str, str]:
     """Print the Makefile and the examples.
 
     Args:
         name: The plugin's name behind `cmg_mj.`.
-        sources: The files that are compiled.
+        code: The files of the C.
+        sources: Those of them that are compiled.
         axis: The first axis' name, or nothing.
 
     Returns:
@@ -34,6 +35,7 @@ def extra_files(name: str, sources: Sequence[str], axis: str) -> dict[str, str]:
         "MUJOCO": str(mujoco.library.parent),
         "LIBMUJOCO": mujoco.library.name,
         "SOURCES": " ".join(sources),
+        "INCLUDED": " ".join(file for file in code if file not in sources),
         "FLAGS": " ".join(FLAGS),
     }
     templates = {f"{name}_example.c": "example.c", f"{name}_example.py": "example.py.txt", "Makefile": "Makefile"}
