@@ -1,5 +1,5 @@
 /* A program without Python: program LIBRARY MODEL STEPS CYCLES. It prints qpos after each step; then, on standard
- * error, by how many bytes what is allocated grows from the second tenth of the cycles of creation and destruction on. */
+ * error, by how many bytes what is allocated grows from the second tenth of the cycles of making and deleting on. */
 #include <malloc.h>
 #include <mujoco/mujoco.h>
 #include <stdio.h>
