@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path
 
 import mujoco
@@ -181,7 +182,7 @@ def _balanced(plant: Plant) -> np.ndarray:
 
 def _with_instance(text: str, plugin: str, config: Mapping[str, str], axes: Sequence[str]) -> str:
     """Add an instance of the plugin to an MJCF that MuJoCo has written, and the sensors that it shows for some axes."""
-    names = ["/".join(filter(None, (INSTANCE, axis, quantity))) for axis in axes for quantity in QUANTITIES]
+    names = [escape("/".join(filter(None, (INSTANCE, axis, part)))) for axis in axes for part in QUANTITIES]
     sensors = "".join(f'  <plugin name="{name}" plugin="{plugin}" instance="{INSTANCE}"/>\n  ' for name in names)
     lines = "".join(f'        <config key="{key}" value="{value}"/>\n' for key, value in config.items())
     head = text.index("<mujoco")

@@ -140,7 +140,7 @@ def make_plugin(
     name = name_of(experiment.parts[0].design.observer(), name)
     rig = describe_rig(experiment, name, world)
     code = generate_plugin(rig, name)
-    texts = code.files | extra_files(name, code.sources, experiment.plant.axis_names[0])
+    texts = code.files | extra_files(name, code.files, code.sources, experiment.plant.axis_names[0])
     texts[f"{name}.xml"] = plugin_mjcf(experiment.plant, rig.plugin, {"start": start, "build": code.build}, sensors)
     return PluginTexts(name, code, texts)
 

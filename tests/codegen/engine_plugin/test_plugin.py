@@ -7,7 +7,6 @@ import math
 import pickle
 import re
 from collections.abc import Callable, Iterator
-from functools import cache
 
 import mujoco
 import numpy as np
@@ -15,16 +14,15 @@ import pytest
 from mujoco import rollout
 
 from cmg_mj import InputError, load_scenario, prepare
-from cmg_mj.codegen.engine_plugin.build import FLAGS, common_files
+from cmg_mj.codegen.engine_plugin.build import common_files
 from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE, generate_plugin
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.plugin_state import FAILED, initial_states, instance_states, set_world
 from cmg_mj.simulation.plugin import describe_rig
-from tests.codegen.engine_plugin.made import Made, check_against_runner, make, needs_compiler, run
+from tests.codegen.engine_plugin.made import check_against_runner, needs_compiler, quick, run
 
 pytestmark = needs_compiler
 
-SHORT = ("duration_s=0.5", "push.0.start_s=0.2")
 SEED, WORLD, STATUS, STEPS, PER_INSTANT, TIMESTEP, IS_PENDING, STARTS_SPINNING, IS_SPINNING_UP, CHECK = range(10)
 CONSTANTS = range(CHECK, CHECK + 14)
 """Places in the state, as state.h numbers them; the constants are where sensors and drives are, and the settings."""
@@ -35,15 +33,6 @@ STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 def _no_log() -> Iterator[None]:
     with quiet():
         yield
-
-
-@cache
-def quick() -> Made:
-    """Made as fast as can be: the export compares on few signals, the compiler does not optimise."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
-        patch.setattr("cmg_mj.codegen.engine_plugin.build.FLAGS", (*FLAGS, "-O0"))
-        return make("gyro_free", *SHORT)
 
 
 def test_half_a_second_is_bit_for_bit() -> None:
@@ -165,9 +154,9 @@ def test_noise_that_has_begun() -> None:
 
 WRONG_CONFIGS = {
     "seed": ("-1", "1.5", "1 2", "one", "nan", "inf", "1e400", "9007199254740994", "0,5", "1;", "--1"),
-    "world": ("-1", "0.5", "x", "1e17", "nan", "1 0"),
+    "world": ("-1", "0.5", "x", "1e17", "nan", "1 0", "0x10", "1e3", "+1", " 1", "9007199254740993"),
     "noise_density_ug_rthz": ("-400", "much", "nan", "inf", "4e2x", "1e10"),
-    "counts_per_g": ("-1", "none", "nan", "-inf", "1e300"),
+    "counts_per_g": ("-1", "0x10", "none", "nan", "-inf", "1e300"),
     "counts_per_revolution": ("-4096", "12 bit", "nan", "1e300", "4096%"),
     "start": ("rest", "Spinning", "keyframe ", "0"),
     "build": ("0123456789abcdef", "?"),
@@ -255,7 +244,7 @@ def test_a_wrong_model_does_not_compile(case: str) -> None:
 
 
 def test_flywheels_that_a_program_has_left_at_rest() -> None:
-    """With start="spinning" the first pass sets them going: all is as if they had turned before."""
+    """With start="spinning" every pass before the first step sets them going: all is as if they had turned before."""
     made = quick()
     text = made.plugin.model.read_text(encoding="utf-8")
     model = mujoco.MjModel.from_xml_string(text.replace('value="keyframe"', 'value="spinning"'))
@@ -281,15 +270,6 @@ def test_a_step_that_is_changed_stops_the_gimbals() -> None:
     mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
     mujoco.mj_step(model, data)
     assert data.sensor("balance/command").data != 0.0
-
-
-@pytest.fixture
-def messages() -> Iterator[list[str]]:
-    """What MuJoCo warns of."""
-    result: list[str] = []
-    mujoco.set_mju_user_warning(result.append)
-    yield result
-    mujoco.set_mju_user_warning(None)
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, -1.0, 1e300, 2.0**54 + 4.0])
