@@ -7,7 +7,7 @@ from typing import Literal
 import click
 
 from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
-from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
+from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, show, users_code
 from cmg_mj.errors import InputError
 
 
@@ -98,6 +98,7 @@ def export(
         after = f"cmg-mj run push_recovery --driver board --observer {name} --port {port}"
         if firmware in NEVER_RUN:
             note("the firmware compiles for this board, and has never run on one (docs/board.md)")
-        say_written(folder, at, f"Then: (cd {at} && {command}); {after}", as_json)
+        say_written(folder, at, f"Then: ({shell_command("cd", at)} && {command}); {after}", as_json)
         return
-    say_written(folder, at, f"Try it: cc -std=c99 {at / name}.c {at / name}_example.c -lm && ./a.out", as_json)
+    compile_it = shell_command("cc", "-std=c99", at / f"{name}.c", at / f"{name}_example.c", "-lm")
+    say_written(folder, at, f"Try it: {compile_it} && ./a.out", as_json)

@@ -19,7 +19,16 @@ from cmg_mj.cli.arguments import (
     out_option,
     settings_option,
 )
-from cmg_mj.cli.terminal import CtrlC, end_interrupted, final_path, progress, say_written, show, users_code
+from cmg_mj.cli.terminal import (
+    CtrlC,
+    end_interrupted,
+    final_path,
+    progress,
+    say_written,
+    shell_command,
+    show,
+    users_code,
+)
 from cmg_mj.errors import InputError
 from cmg_mj.results.summary_keys import finite
 
@@ -208,6 +217,6 @@ def replay(
             results = replays.results
             table = report.replay_markdown(results) if markdown else report.replay_tables(results)
             show(finite(report.replay_figures(results)), table, as_json)
-    say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", as_json)
+    say_written(folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", as_json)
     if ctrl_c.noted or not replays.complete:
         end_interrupted(f"interrupted; {len(replays.results)} of {total} logs are in {final_path(folder, place)}")

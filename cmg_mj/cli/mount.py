@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 import click
 
 from cmg_mj.cli.arguments import json_option, observer_option
-from cmg_mj.cli.terminal import CtrlC, note, note_hints, progress, show, users_code
+from cmg_mj.cli.terminal import CtrlC, note, note_hints, progress, shell_command, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -146,7 +146,8 @@ def mount(
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:
         note_hints(result.hints)
-        note(f"wrote {result.path} and {result.scenario_path}; try: cmg-mj run {result.scenario_path}")
+        run_it = shell_command("cmg-mj", "run", result.scenario_path)
+        note(f"wrote {result.path} and {result.scenario_path}; try: {run_it}")
         if result.plugin:
             example = result.plugin.model.with_name(f"{result.plugin.model.stem}_example.py")
-            note(f"wrote {result.plugin.model.parent}; try: python {example}")
+            note(f"wrote {result.plugin.model.parent}; try: {shell_command('python', example)}")

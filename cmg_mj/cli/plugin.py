@@ -8,11 +8,17 @@ import click
 from click.core import ParameterSource
 
 from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
-from cmg_mj.cli.terminal import note, note_hints, say_written, show, users_code
+from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.simulation.plugin import Start
+
+
+_NOT_CALLED = (
+    "`import mujoco` loads no plugin in this Python environment: its cmg_mj has no entry point in the group "
+    "mujoco.plugins; install cmg_mj again"
+)
 
 
 @click.command(short_help="Compile the controller into MuJoCo: a library, and a model.")
@@ -84,15 +90,21 @@ def plugin(
         raise InputError("plugin: name an OBSERVER to make a plugin, or give --install, --uninstall or --list")
     from cmg_mj.codegen.engine_plugin.install import has_another
     from cmg_mj.simulation.experiment import prepare
-    from cmg_mj.simulation.plugin import find_tools, make_plugin, plugin_files, require_stable_periods, write_plugin
+    from cmg_mj.simulation.plugin import (
+        check_tools,
+        make_plugin,
+        plugin_files,
+        require_stable_periods,
+        write_plugin_or_sources,
+    )
 
-    find_tools()
+    check_tools()
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
     require_stable_periods(experiment)
     note_hints(experiment.hints)
     made = make_plugin(experiment, name, sensors=not no_sensors, start=start)
     with claim_output(out, f"plugin-{made.name}", plugin_files(made)) as folder:
-        result = write_plugin(made, folder)
+        result = write_plugin_or_sources(made, folder)
     figures = {
         "plugin": result.name,
         "library": result.library.name,
@@ -101,9 +113,10 @@ def plugin(
     }
     _show(figures, as_json)
     place = result.library.parent
-    say_written(folder, place, f"Try it: python {place / made.name}_example.py", as_json)
+    say_written(folder, place, f"Try it: {shell_command('python', place / f'{made.name}_example.py')}", as_json)
     if has_another(result.library):
-        note(f"hint: {result.name} is installed from another library: cmg-mj plugin --install {result.library}")
+        remedy = shell_command("cmg-mj", "plugin", "--install", result.library)
+        note(f"hint: {result.name} is installed from another library: {remedy}")
 
 
 def _check_alone() -> None:
@@ -121,7 +134,7 @@ def _check_alone() -> None:
 
 
 def _install(target: str, as_json: bool) -> None:
-    from cmg_mj.codegen.engine_plugin.install import find_library, install, list_plugins
+    from cmg_mj.codegen.engine_plugin.install import find_library, install, is_called, list_plugins
 
     library = find_library(target)
     manifests = [status.manifest for status in list_plugins()[1]]
@@ -132,7 +145,8 @@ def _install(target: str, as_json: bool) -> None:
         for other in manifests:
             if other is not None and other.plugin == result.plugin and other.sha256 != result.sha256:
                 note(f"it takes the place of the library from {other.source}, whose models no longer load")
-        note(f"installed: `import mujoco` loads it from now on. Take it back: cmg-mj plugin --uninstall {name}")
+        loads = "`import mujoco` loads it from now on" if is_called() else _NOT_CALLED
+        note(f"installed: {loads}. Take it back: cmg-mj plugin --uninstall {name}")
 
 
 def _uninstall(name: str, as_json: bool) -> None:
@@ -142,7 +156,7 @@ def _uninstall(name: str, as_json: bool) -> None:
 
 
 def _list(as_json: bool) -> None:
-    from cmg_mj.codegen.engine_plugin.install import list_plugins
+    from cmg_mj.codegen.engine_plugin.install import is_called, list_plugins
 
     folder, plugins = list_plugins()
     figures = [
@@ -162,6 +176,8 @@ def _list(as_json: bool) -> None:
     ]
     place = folder or "CMG_MJ_PLUGINS is empty: no plugin is loaded"
     show({"folder": folder, "plugins": figures}, "\n".join([*(lines or ["no plugin is installed"]), place]), as_json)
+    if plugins and not is_called():
+        note(f"hint: {_NOT_CALLED}")
 
 
 def _show(figures: dict[str, str], as_json: bool) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
-from contextlib import nullcontext
+import tomllib
+from contextlib import nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,6 +32,7 @@ from cmg_mj.cli.terminal import (
     own_stdout,
     progress,
     say_written,
+    shell_command,
     show,
     users_code,
 )
@@ -118,7 +121,9 @@ def run(
             show(report.summary, tables.summary_table(report.summary), arguments.as_json)
     if live_view is not None and live_view.failure:
         note(f"the viewer missed a part: {live_view.failure}; the run and its files are complete")
-    say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", arguments.as_json)
+    say_written(
+        folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", arguments.as_json
+    )
     outcome = result.outcomes[0]
     if outcome.kind == "stopped":
         raise RunStopped(f"{outcome.reason}; what was recorded until then is in {final_path(folder, place)}")
@@ -192,7 +197,9 @@ def compare(
             title = f"{scenario.title or arguments.name}: {worlds} worlds an observer, seed {scenario.seed}{differs}"
             table = report.comparison_markdown(summaries) if markdown else report.comparison_table(summaries, title)
             show(summaries, table, arguments.as_json)
-    say_written(folder, place, f"Open the recording: rerun {place / 'recording.rrd'}", arguments.as_json)
+    say_written(
+        folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", arguments.as_json
+    )
     for entry in compared:
         if entry.stopped:
             note(f"{entry.kind}: {len(entry.stopped)} of {worlds} worlds stopped: {entry.stopped[0].reason}")
@@ -233,7 +240,20 @@ def check(file: str) -> None:
 
     is_model = Path(file).suffix.lower() in (".xml", ".mjb")
     scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file)
-    describe = rig_description if is_model else description
+    describe = partial(rig_description, own=_scenario_beside(Path(file))) if is_model else description
     parts = prepare(scenario).parts
     texts = [describe(file, part.scenario, part.design, part.plant.parameters, part.plant.axis.name) for part in parts]
     click.echo("\n".join(texts), file=own_stdout())
+
+
+def _scenario_beside(model: Path) -> str:
+    """Find the scenario of a model file, as `mount` writes it: beside the model, or beside its plugin's folder."""
+    place = model.absolute().parent if model.parent == Path() else model.parent
+    stem = place.name.removesuffix("_plugin")
+    mounted = place.with_name(f"{stem}.xml") if stem != place.name else model
+    for path in dict.fromkeys((model, mounted)):
+        with suppress(OSError, ValueError, AttributeError):  # a scenario that cannot be read is none
+            scenario = tomllib.loads(path.with_suffix(".toml").read_text(encoding="utf-8"))
+            if scenario.get("plant", {}).get("model") == path.name:
+                return str(path.with_suffix(".toml"))
+    return ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import signal
 import sys
 import threading
@@ -128,6 +129,11 @@ def end_interrupted(message: str) -> NoReturn:
 def final_path(folder: RunFolder, place: Path) -> str:
     """Return the path of a result, with the reason if it is not the requested folder."""
     return str(place) if place == folder.path else f"{place}; the earlier files in {folder.path} stay as they were"
+
+
+def shell_command(*words: str | Path) -> str:
+    """Return a command as a shell takes it, with quotes where a word needs them."""
+    return shlex.join(map(str, words))
 
 
 def say_written(folder: RunFolder, place: Path, open_it: str, as_json: bool) -> None:

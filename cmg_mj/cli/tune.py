@@ -21,7 +21,16 @@ from cmg_mj.cli.arguments import (
     worlds_option,
 )
 from cmg_mj.cli.logs import log_options, noise_option, pendulum_option
-from cmg_mj.cli.terminal import CtrlC, end_interrupted, final_path, progress, say_written, show, users_code
+from cmg_mj.cli.terminal import (
+    CtrlC,
+    end_interrupted,
+    final_path,
+    progress,
+    say_written,
+    shell_command,
+    show,
+    users_code,
+)
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -98,7 +107,9 @@ def tune(
         total = len(densities) or 1
         files = save_study(folder, study, complete=len(study.levels) == total)
     place = files[0].parent
-    say_written(folder, place, f"Run with the tuned observer: cmg-mj run {files[1]}", arguments.as_json)
+    say_written(
+        folder, place, f"Run with the tuned observer: {shell_command('cmg-mj', 'run', files[1])}", arguments.as_json
+    )
     if ctrl_c.noted:
         end_interrupted(f"interrupted; {len(study.levels)} of {total} noise levels are in {final_path(folder, place)}")
 

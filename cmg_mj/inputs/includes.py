@@ -35,10 +35,20 @@ def check_files(path: Path) -> list[Path]:
     Raises:
         InputError: The model names a pipe or device, contains itself, or asks for too many copies.
     """
-    return list(dict.fromkeys(_checked(path, path, ())))
+    return list(dict.fromkeys(file for file, _ in _checked(path, path, ())))
 
 
-def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[Path]:
+def model_files(path: Path) -> list[Path]:
+    """List a model's file and those that it includes or attaches, as far as they are there.
+
+    Raises:
+        InputError: See `check_files`.
+    """
+    return list(dict.fromkeys(file for file, is_model in _checked(path, path, ()) if is_model))
+
+
+def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[tuple[Path, bool]]:
+    """Check a file and those that it names; yield each, and whether it is a model or a part of one."""
     here = path.resolve()
     if here in within:
         raise InputError(
@@ -51,7 +61,7 @@ def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[Path]
         )
     name = str(root) if path == root else f"{root}: {path.name}"
     text = _COMMENT.sub("", read_text(path, name, MODEL_FILE))
-    yield path
+    yield path, True
     for element, name, count in _COUNT.findall(text):
         if math.prod(int(number) for number in re.findall(r"\d{1,20}", count)) > LARGEST_COUNT:
             raise InputError(f"{root}: <{element} {name}={count!r}>: at most {LARGEST_COUNT} are allowed")
@@ -71,7 +81,7 @@ def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[Path]
                 yield from _checked(file, root, (*within, here))
                 break
             if file.is_file():
-                yield file
+                yield file, False
 
 
 def _places(value: str, path: Path, root: Path, folders: list[str]) -> Iterator[Path]:

@@ -16,13 +16,13 @@ from cmg_mj.plant.bend import bend_frame
 from cmg_mj.plant.checks import RigChecker, invalid_numbers
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
 from cmg_mj.plant.parts import REQUIRED_PARTS, axes_of, missing_parts
-from cmg_mj.plant.without_plugins import plugins_in, strip_plugins
+from cmg_mj.plant.without_plugins import NAMES_OF_COPIES, OWN, strip_plugins
 from cmg_mj.scenario.plant_settings import PlantSettings
 
 
 def _one_line(error: Exception) -> str:
     """MuJoCo's message without what tells a user nothing."""
-    text = " ".join(str(error).split()).removeprefix("Error: ")
+    text = NAMES_OF_COPIES.sub("", " ".join(str(error).split()).removeprefix("Error: "))
     syntax = re.match(r"XML parse error .*Line number=(\d+)", text)
     return (
         f"XML syntax error at line {syntax[1]}" if syntax else re.sub(r" The (static|visual) .* remain so\.", "", text)
@@ -35,14 +35,17 @@ def parse(path: Path) -> mujoco.MjSpec:
     Raises:
         InputError: It is no MJCF.
     """
+    return _parse(path)[0]
+
+
+def _parse(path: Path) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
+    """Read a model file; the names are those of the plugins that were left out."""
     check_files(path)
     stripped = strip_plugins(path)
     try:
         if stripped is None:
-            return mujoco.MjSpec.from_file(str(path))
-        spec = mujoco.MjSpec.from_string(stripped.text)
-        spec.modelfiledir = str(path.resolve().parent)
-        return spec
+            return mujoco.MjSpec.from_file(str(path)), ()
+        return stripped.parse(), stripped.plugins
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise InputError(f"{path}: not a model MuJoCo can read: {_one_line(error)}") from error
 
@@ -51,8 +54,11 @@ def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     """Compile a parsed model.
 
     Raises:
-        InputError: MuJoCo's compiler refuses it.
+        InputError: MuJoCo's compiler refuses it, or it has a plugin of this package's.
     """
+    for plugin in spec.plugins:
+        if plugin.plugin_name.startswith(OWN):
+            raise InputError(f"{path}: the plugin {plugin.plugin_name} cannot be left out; take it out of the file")
     try:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
@@ -109,7 +115,7 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = (), bend: P
     Raises:
         InputError: The file holds no rig. All that is missing or wrong is named.
     """
-    spec = parse(path)
+    spec, plugins = _parse(path)
     missing = missing_parts(spec)
     if lock and not missing:
         lock_thrust_bearing(spec, path)
@@ -129,7 +135,7 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = (), bend: P
         placement = None if numbers else RigChecker(model, axes)
         wrong += numbers if placement is None else placement.wrong
         hints = () if placement is None else tuple(placement.hints)
-        rig = Rig(model, axes, (*hints, *(_HAS_PLUGIN.format(name) for name in plugins_in(path))))
+        rig = Rig(model, axes, (*hints, *(_HAS_PLUGIN.format(name) for name in plugins)))
     if wrong or rig is None:
         raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([REQUIRED_PARTS] if missing else [])]))
     if locked_axes:

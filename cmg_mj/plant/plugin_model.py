@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path
 
 import mujoco
@@ -165,12 +166,23 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, drawn: mujoco.MjModel
     for key in spec.keys:
         if key.name == EQUILIBRIUM_KEY:
             key.qvel, key.ctrl = model.key_qvel[plant.key], model.key_ctrl[plant.key]
+            key.qpos = _balanced(plant)
     spec.add_key(name=START_KEY, qpos=start.qpos, qvel=start.qvel, act=start.act, ctrl=start.ctrl)
+
+
+def _balanced(plant: Plant) -> np.ndarray:
+    """Return qpos at the keyframe where the plant balances: by e off the file's keyframe, about each axis."""
+    data = mujoco.MjData(plant.model)
+    mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
+    for axis in plant.axes:
+        if axis.bias:
+            axis.line.tilt(data, -axis.bias)
+    return data.qpos.copy()
 
 
 def _with_instance(text: str, plugin: str, config: Mapping[str, str], axes: Sequence[str]) -> str:
     """Add an instance of the plugin to an MJCF that MuJoCo has written, and the sensors that it shows for some axes."""
-    names = ["/".join(filter(None, (INSTANCE, axis, quantity))) for axis in axes for quantity in QUANTITIES]
+    names = [escape("/".join(filter(None, (INSTANCE, axis, part)))) for axis in axes for part in QUANTITIES]
     sensors = "".join(f'  <plugin name="{name}" plugin="{plugin}" instance="{INSTANCE}"/>\n  ' for name in names)
     lines = "".join(f'        <config key="{key}" value="{value}"/>\n' for key, value in config.items())
     head = text.index("<mujoco")

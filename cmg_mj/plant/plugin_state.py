@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import mujoco
@@ -9,7 +10,8 @@ import numpy as np
 
 from cmg_mj.codegen.engine_plugin.rig import LARGEST_SEED
 from cmg_mj.errors import InputError
-from cmg_mj.plant.plugin_model import INSTANCE
+from cmg_mj.plant.plugin_names import plugin_names
+from cmg_mj.plant.without_plugins import OWN
 
 SEED, WORLD, STATUS, STEPS = range(4)
 """Places in an instance's state, as state.h numbers them."""
@@ -30,8 +32,8 @@ def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int)
         InputError: The model has no such plugin, a number is none that a plugin takes, or the noise has begun.
     """
     for name, number in (("seed", seed), ("world", world)):
-        if not 0 <= number <= LARGEST_SEED:
-            raise InputError(f"{name} = {number}: a plugin takes {name}s from 0 to 2^53")
+        if not 0 <= number <= LARGEST_SEED or number != int(number):
+            raise InputError(f"{name} = {number}: a plugin takes {name}s from 0 to 2^53, as whole numbers")
     for state in instance_states(model, data):
         if state[STEPS]:
             raise InputError("the plugin's noise has begun: choose seed and world right after a reset")
@@ -44,10 +46,9 @@ def instance_states(model: mujoco.MjModel, data: mujoco.MjData) -> list[np.ndarr
     Raises:
         InputError: The model has no such plugin.
     """
-    names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i) or "" for i in range(model.nplugin)]
-    starts = [int(model.plugin_stateadr[i]) for i, name in enumerate(names) if name.endswith(INSTANCE)]
+    starts = [int(model.plugin_stateadr[i]) for i, name in enumerate(plugin_names(model)) if name.startswith(OWN)]
     if not starts:
-        raise InputError(f"the model has no plugin instance named {INSTANCE!r}")
+        raise InputError("the model has no plugin of cmg_mj's")
     return [data.plugin_state[start:] for start in starts]
 
 
@@ -56,7 +57,7 @@ def initial_states(model: mujoco.MjModel, data: mujoco.MjData, seed: int, worlds
 
     Args:
         model: A model with plugins of this package.
-        data: Its data in the state that all worlds start from, not yet stepped since its reset.
+        data: Its data in the state that all worlds start from, not yet stepped since its reset. It stays as it is.
         seed: Seed of the noise.
         worlds: How many, or their numbers.
 
@@ -69,6 +70,7 @@ def initial_states(model: mujoco.MjModel, data: mujoco.MjData, seed: int, worlds
     kind = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
     numbers = range(worlds) if isinstance(worlds, int) else worlds
     states = np.empty((len(numbers), mujoco.mj_stateSize(model, kind)))
+    data = copy.copy(data)
     for state, world in zip(states, numbers, strict=True):
         set_world(model, data, seed, world)
         mujoco.mj_getState(model, data, state, kind)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator, Mapping
 
 from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
@@ -139,7 +140,9 @@ def _law_rows(
         yield "", "your own code, which was imported and tried on two samples"
 
 
-def rig_description(name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "") -> str:
+def rig_description(
+    name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "", own: str = ""
+) -> str:
     """Describe a model file in the lines that `cmg-mj check` prints.
 
     Args:
@@ -148,8 +151,16 @@ def rig_description(name: str, scenario: Scenario, design: Design, rig: PlantPar
         design: The law and the observers by default.
         rig: The parameters of the plant.
         axis: The name of the axis, if it has one.
+        own: The model's own scenario file, if it has one, whose gains are then not judged here.
     """
     about = f" --set push.0.axis={axis}" if axis else ""
+    push_it = f"cmg-mj run push_recovery --set {shlex.quote(f'plant.model={name}')}{about}"
+    law = f"gains are a scenario's; here Table 2's, K_e = {number(TABLE_2_GAINS)}"
+    clauses: Iterable[str] = hints(scenario, design, rig)
+    if own:
+        clauses = (f"{rig.path}: {hint}" for hint in rig.hints)
+        push_it = f"cmg-mj run {shlex.quote(own)}"
+        law = f"the gains are its scenario's: cmg-mj check {shlex.quote(own)}"
     reduced = rig.reduced
     share = f", for one of {reduced.gimbals} gimbals" if reduced.gimbals > 1 else ""
     rows = [
@@ -157,9 +168,9 @@ def rig_description(name: str, scenario: Scenario, design: Design, rig: PlantPar
         ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
         ("", f"omega_d = {reduced.omega_d:.6g} rad/s, m g l/sqrt(2) = {reduced.gravity_torque:.6g} N m"),
         ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),
-        ("law", f"Table 2's gains, K_e = {number(TABLE_2_GAINS)}"),
-        *(("hint", hint) for hint in hints(scenario, design, rig)),
-        ("run it", f"cmg-mj run push_recovery --set plant.model={name}{about}"),
+        ("law", law),
+        *(("hint", hint) for hint in clauses),
+        ("run it", push_it),
     ]
     return lines(f"{name}: a rig{f', axis {axis}' if axis else ''}", rows)
 

@@ -85,6 +85,16 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
     return PluginRig(tuple(axes), f"cmg_mj.{name}", turning)
 
 
+def check_tools() -> None:
+    """Check what a plugin's C is generated with, before anything is computed.
+
+    Raises:
+        InputError: CasADi is missing, or the platform is not supported.
+    """
+    check_platform()
+    check_installed()
+
+
 def find_tools() -> list[str]:
     """Find what a plugin is made with, before anything is computed.
 
@@ -94,14 +104,17 @@ def find_tools() -> list[str]:
     Raises:
         InputError: CasADi or a compiler is missing, or the platform is not supported.
     """
-    check_platform()
-    check_installed()
-    from cmg_mj.codegen.export.check import find_compiler  # imports CasADi
-
-    compiler = find_compiler()
+    check_tools()
+    compiler = _find_compiler()
     if compiler is None:
         raise InputError("plugin: there is no C compiler: install gcc or clang, or name one in CC")
     return compiler
+
+
+def _find_compiler() -> list[str] | None:
+    from cmg_mj.codegen.export.check import find_compiler  # imports CasADi
+
+    return find_compiler()
 
 
 def require_stable_periods(experiment: Experiment) -> None:
@@ -132,7 +145,7 @@ def make_plugin(
     name = name_of(experiment.parts[0].design.observer(), name)
     rig = describe_rig(experiment, name, world)
     code = generate_plugin(rig, name)
-    texts = code.files | extra_files(name, code.sources, experiment.plant.axis_names[0])
+    texts = code.files | extra_files(name, code.files, code.sources, experiment.plant.axis_names[0])
     texts[f"{name}.xml"] = plugin_mjcf(experiment.plant, rig.plugin, {"start": start, "build": code.build}, sensors)
     return PluginTexts(name, code, texts)
 
@@ -146,9 +159,7 @@ def write_plugin(made: PluginTexts, out: Path | RunFolder) -> Plugin:
     """Compile a plugin and write it to a folder: see `plugin`."""
     name, library = made.name, library_name(made.name)
     compiler = find_tools()
-    writers: dict[str, Callable[[Path], None]] = {
-        file: partial(write_text, text=text) for file, text in made.texts.items()
-    }
+    writers = _writers(made)
     with tempfile.TemporaryDirectory() as temporary, claimed(out, plugin_files(made)) as folder:
         compiled = Path(temporary) / library
         for file in made.code.files:
@@ -158,6 +169,26 @@ def write_plugin(made: PluginTexts, out: Path | RunFolder) -> Plugin:
         place = folder.write(writers, all_or_none=True)
     files = [place / file for file in plugin_files(made)]
     return Plugin(f"cmg_mj.{name}", place / library, place / f"{name}.xml", files)
+
+
+def write_plugin_or_sources(made: PluginTexts, out: Path | RunFolder) -> Plugin:
+    """Compile a plugin and write it: see `plugin`.
+
+    Raises:
+        InputError: There is no compiler. All but the library is written.
+    """
+    if _find_compiler() is not None:
+        return write_plugin(made, out)
+    with claimed(out, list(made.texts)) as folder:
+        place = folder.write(_writers(made), all_or_none=True)
+    raise InputError(
+        f"plugin: {library_name(made.name)} is missing, for no C compiler was found (CC, cc, gcc, clang); the other "
+        f"files are in {place}: where there is one, `make` there compiles it"
+    )
+
+
+def _writers(made: PluginTexts) -> dict[str, Callable[[Path], None]]:
+    return {file: partial(write_text, text=text) for file, text in made.texts.items()}
 
 
 def _copy(source: Path, target: Path) -> None:
@@ -187,13 +218,14 @@ def plugin(
         What was written.
 
     Raises:
-        InputError: Something in use cannot be exported, the control period is too long, there is no compiler, CasADi is
-            missing, or the folder holds files of the user's that would be overwritten.
+        InputError: Something in use cannot be exported, the control period is too long, CasADi is missing, or the
+            folder holds files of the user's that would be overwritten. Without a compiler, all but the library is
+            written.
     """
-    find_tools()
+    check_tools()
     experiment = scenario if isinstance(scenario, Experiment) else prepare(scenario)
     require_stable_periods(experiment)
-    return write_plugin(make_plugin(experiment, name, sensors=sensors, start=start), out)
+    return write_plugin_or_sources(make_plugin(experiment, name, sensors=sensors, start=start), out)
 
 
 _numbers = itertools.count()

@@ -59,7 +59,7 @@ def measure(experiment: Experiment, worlds: int, threads: int, on_progress: Call
         mujoco.mj_loadPluginLibrary(str(written.library))
         stripped = strip_plugins(written.model)
         assert stripped is not None
-        models = [mujoco.MjModel.from_xml_path(str(written.model)), mujoco.MjModel.from_xml_string(stripped.text)]
+        models = [mujoco.MjModel.from_xml_path(str(written.model)), stripped.parse().compile()]
     ratios: dict[str, float] = {}
     costs: dict[str, float] = {}
     with quiet():

@@ -3,7 +3,7 @@
     python docs/studies/gymnasium_plugin.py [ROBOT ...] (about eight minutes; ROBOT is a part of a name)
 
 Each robot is mounted as `cmg-mj mount ... --plugin --quick` does it. Then examples/gymnasium_plugin.py, which imports
-nothing of cmg_mj, runs ten seeds in a process of its own.
+nothing of cmg_mj, runs ten seeds in a process of its own. The seed is also the world of the sensors' noise.
 """
 
 from __future__ import annotations

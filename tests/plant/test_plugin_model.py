@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import mujoco
 import numpy as np
+import pytest
 
-from cmg_mj.plant.mjcf import compile_model
+from cmg_mj.plant.mjcf import compile_model, load_rig
 from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.plant.plugin_model import plugin_mjcf
@@ -44,10 +46,20 @@ def test_what_stands_in_frames_is_where_it_was(tmp_path: Path) -> None:
     (tmp_path / "plugin.xml").write_text(plugin_mjcf(plant, "cmg_mj.mine", {}), encoding="utf-8")
     stripped = strip_plugins(tmp_path / "plugin.xml")
     assert stripped is not None
-    written, drawn = mujoco.MjModel.from_xml_string(stripped.text), compile_model(plant.drawn_spec(), plant.path)
+    written, drawn = stripped.parse().compile(), compile_model(plant.drawn_spec(), plant.path)
     for name in ("body_pos", "body_quat", "body_inertia", "site_pos", "jnt_axis", "cam_pos", "cam_quat"):
         np.testing.assert_array_equal(getattr(written, name), getattr(drawn, name), err_msg=name)
     solid = drawn.geom_type != int(mujoco.mjtGeom.mjGEOM_MESH)
     for name in ("geom_pos", "geom_quat"):
         np.testing.assert_array_equal(getattr(written, name)[solid], getattr(drawn, name)[solid], err_msg=name)
     np.testing.assert_array_equal(written.key("start").qpos, plant.new_data().qpos)
+
+
+def test_the_equilibrium_is_where_the_plant_balances(tmp_path: Path) -> None:
+    """With the bias e in its masses, it does not where the file's keyframe has it."""
+    plant = load_plant(equilibrium_bias_deg=0.5)
+    (tmp_path / "plugin.xml").write_text(plugin_mjcf(plant, "cmg_mj.mine", {}), encoding="utf-8")
+    rig = load_rig(tmp_path / "plugin.xml", lock=False)  # as `cmg-mj check` does
+    (tilt,) = (axis.line for axis in plant.axes)
+    assert tilt.lean(rig.model.key("equilibrium").qpos) == pytest.approx(-math.radians(0.5), rel=1e-12)
+    assert [hint for hint in rig.hints if "cmg_mj.mine" in hint]

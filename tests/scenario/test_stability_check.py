@@ -102,6 +102,20 @@ def test_half_the_flywheel_is_hinted_at(half: str) -> None:
     assert "hint" in cmg_mj("check", "half.xml").out
 
 
+def test_a_model_with_its_scenario_beside_it_is_not_judged_by_other_gains(half: str) -> None:
+    Path("half.toml").write_text('[plant]\nmodel = "half.xml"\n', encoding="utf-8")
+    plugin = Path("half_plugin")
+    plugin.mkdir()
+    for name in ("half.xml", "cube.xml"):
+        Path(plugin, name).write_text(Path(name).read_text())
+    for model, scenario in (("half.xml", "half.toml"), ("half_plugin/half.xml", "half.toml")):
+        out = cmg_mj("check", model).out
+        assert "hint" not in out
+        assert f"run it      cmg-mj run {scenario}" in out
+    Path("half.toml").write_text('[plant]\nmodel = "other.xml"\n', encoding="utf-8")
+    assert "run it      cmg-mj run push_recovery --set plant.model=half.xml" in cmg_mj("check", "half.xml").out
+
+
 def test_half_the_flywheel_is_solved_for(half: str) -> None:
     """With gains made for it, it stands."""
     solved = ["--set", "controller.lqr.state_cost=[1, 1, 1, 1]", "--set", "duration_s=4"]

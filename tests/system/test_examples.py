@@ -37,8 +37,8 @@ OUTPUT = {
     "tuning": "better",
 }
 """Example -> a part of what it prints."""
-WITH_A_ROBOT = ["gymnasium_plugin"]
-"""Takes a robot that has a plugin: it runs in tests/codegen/engine_plugin/test_mount.py."""
+WITH_A_ROBOT = ["gymnasium_own_robot", "gymnasium_plugin"]
+"""Take a robot that has a plugin: they run in tests/codegen/engine_plugin/test_mount.py."""
 OPTIONS = {"mujoco_viewer": ["--headless"]}
 """The same loop where there is no screen."""
 

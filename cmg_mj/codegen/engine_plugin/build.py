@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import shlex
 import subprocess
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -79,8 +80,10 @@ def compile_plugin(folder: Path, compiler: Sequence[str], sources: Sequence[str]
             command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=300, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise InputError(f"plugin: {compiler[0]} cannot be run: {error}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"plugin: the C compiler {shlex.join(compiler)} cannot be run: {reason}") from error
     if process.returncode:
         lines = process.stderr.splitlines()
-        first = next((line for line in lines if "error" in line), lines[0] if lines else "no message")
+        status = f"it ended with status {process.returncode} and without a message"
+        first = next((line for line in lines if "error" in line), lines[0] if lines else status)
         raise InputError(f"plugin: the C does not compile with {compiler[0]}: {first}")

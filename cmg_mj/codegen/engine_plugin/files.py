@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Collection, Sequence
 from importlib.resources import files
 
 from cmg_mj.codegen.engine_plugin.build import FLAGS, find_mujoco
@@ -13,29 +14,38 @@ def library_name(name: str) -> str:
     return f"libcmg_mj_{name}.so"
 
 
-def extra_files(name: str, sources: Sequence[str], axis: str) -> dict[str, str]:
+def extra_files(name: str, code: Collection[str], sources: Sequence[str], axis: str) -> dict[str, str]:
     """Print the Makefile and the examples.
 
     Args:
         name: The plugin's name behind `cmg_mj.`.
-        sources: The files that are compiled.
+        code: The files of the C.
+        sources: Those of them that are compiled.
         axis: The first axis' name, or nothing.
 
     Returns:
         Name -> text.
     """
-    mujoco = find_mujoco()
+    mujoco, tilt = find_mujoco(), "/".join(filter(None, ("balance", axis, "tilt")))
     words = {
         "NAME": name,
         "LIBRARY": library_name(name),
-        "TILT": "/".join(filter(None, ("balance", axis, "tilt"))),
+        "TILT_IN_C": c_text(tilt),
+        "TILT_IN_PYTHON": json.dumps(tilt, ensure_ascii=False),
         "MUJOCO": str(mujoco.library.parent),
         "LIBMUJOCO": mujoco.library.name,
         "SOURCES": " ".join(sources),
+        "INCLUDED": " ".join(file for file in code if file not in sources),
         "FLAGS": " ".join(FLAGS),
     }
     templates = {f"{name}_example.c": "example.c", f"{name}_example.py": "example.py.txt", "Makefile": "Makefile"}
     return {file: _filled(template, words) for file, template in templates.items()}
+
+
+def c_text(text: str) -> str:
+    """Print a text as C reads it; in octal whatever is no plain letter, and ?, which begins trigraphs."""
+    letters = (chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode())
+    return f'"{"".join(letters)}"'
 
 
 def _filled(template: str, words: dict[str, str]) -> str:

@@ -63,7 +63,7 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
 
     Args:
         rig: The rig with its controllers.
-        name: Prefix of the exported controllers in C; of several axes AXIS follows.
+        name: Prefix of the exported controllers in C; of several axes the axis' number follows.
 
     Returns:
         The code.
@@ -76,13 +76,12 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
         raise InputError(f"--name {name}: is a name in every plugin's C; take another, such as {name}_of_mine")
     files, names = common_files(), []
     sources: list[str] = [*COMMON_SOURCES]
-    for axis in rig.axes:
-        axis_name = axis.prefix.rstrip("/").replace("/", "_")
-        own = f"{name}_{axis_name}" if axis_name else name
-        controller = axis.controller
-        code = generate_code(_exportable(controller), "double", own)
+    for number, axis in enumerate(rig.axes):
+        suffix = f"_{number}" if len(rig.axes) > 1 else ""
+        own, controller = name + suffix, axis.controller
+        code = generate_code(_exportable(controller), "double", name, suffix)
         files |= {file: text for file, text in code.files.items() if file in (f"{own}.h", f"{own}.c")}
-        files[f"{own}_controller.c"] = format_controller(own, controller, code.figures["numbers_in_state"], code.law)
+        files[f"{own}_controller.c"] = format_controller(own, axis, code.figures["numbers_in_state"], code.law)
         sources.append(f"{own}_controller.c")
         names.append(own)
     files["rig.c"] = format_rig(rig, names, "")

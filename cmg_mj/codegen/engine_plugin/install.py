@@ -12,7 +12,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from importlib.metadata import version
+from importlib.metadata import entry_points, version
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,7 +38,7 @@ from cmg_mj.results.files import whole_file, write_bytes
 from cmg_mj.results.run_folder.lock import Busy, Lock
 
 LONGEST_WAIT = 60.0  # for another install [s]
-LONGEST_TRIAL = 120.0  # for a library to load [s]
+LONGEST_TRIAL = 20.0  # for a library to load, which takes milliseconds [s]
 TRIAL = r"""
 import runpy, sys
 import mujoco
@@ -165,6 +165,12 @@ def list_plugins() -> tuple[str, list[PluginStatus]]:
         return folder, [_status(folder, name) for name in (list_names(folder) if folder else ())]
 
 
+def is_called() -> bool:
+    """Return whether `import mujoco` calls `load` here: the metadata of an older installation do not say so."""
+    called = f"{load.__name__}:{load.load.__name__}"
+    return any(point.value == called for point in entry_points(group="mujoco.plugins"))
+
+
 def has_another(library: Path) -> bool:
     """Return whether another library is installed under this one's name, which this one's model will refuse."""
     with suppress(InputError, OSError):
@@ -240,7 +246,9 @@ def _try(library: Path, copy: Path, name: str) -> str:
                 check=False,
             )
         except subprocess.TimeoutExpired as error:
-            raise InputError(f"--install {library}: does not come to an end when it is loaded") from error
+            raise InputError(
+                f"--install {library}: has not loaded within {LONGEST_TRIAL:g} s, where milliseconds are usual"
+            ) from error
     if process.returncode < 0:
         raise InputError(f"--install {library}: crashed the process that loaded it (signal {-process.returncode})")
     if process.returncode:

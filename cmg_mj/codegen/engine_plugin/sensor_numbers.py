@@ -42,7 +42,6 @@ class Pair:
     period: int
     raw: int
     skew: int
-    uneven: int
     settling: int
     outer_capacity: int
     limit: float
@@ -140,7 +139,6 @@ def describe_pair(sensor: Accelerometer, axis: int, clock: Clock) -> Pair:
         period=period,
         raw=raw,
         skew=skew,
-        uneven=int(uneven),
         settling=math.ceil(2.0 * INSIDE_HZ / sensor.bandwidth_hz) if sensor.bandwidth_hz else 0,
         outer_capacity=-(-skew // raw) + 2 if skew else 0,
         limit=sensor.range_g * STANDARD_GRAVITY,

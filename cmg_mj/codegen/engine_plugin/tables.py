@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from cmg_mj.codegen.engine_plugin.rig import PluginRig
+from cmg_mj.codegen.engine_plugin.files import c_text
+from cmg_mj.codegen.engine_plugin.rig import PluginAxis, PluginRig
 from cmg_mj.codegen.engine_plugin.sensor_numbers import (
     Delivery,
     Encoders,
@@ -20,7 +20,6 @@ from cmg_mj.codegen.engine_plugin.sensor_numbers import (
     describe_settings,
     describe_turn_gyro,
 )
-from cmg_mj.controllers.controller import Controller
 
 if TYPE_CHECKING:
     from cmg_mj.codegen.export.law_code import LawPrinter
@@ -32,19 +31,21 @@ Value = Number | str | Sequence[Number]
 FEEDBACK = {"observer": "FEEDBACK_OBSERVER", "fog": "FEEDBACK_FOG", "truth": "FEEDBACK_TRUTH"}
 
 
-def format_controller(name: str, controller: Controller, observer_numbers: int, law: LawPrinter) -> str:
+def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: LawPrinter) -> str:
     """Print NAME_controller.c, which joins an exported controller to the plugin.
 
     Args:
         name: Name of the export.
-        controller: The controller.
+        axis: The axis with the controller.
         observer_numbers: Numbers in the exported observer's state.
         law: The printer of its law.
 
     Returns:
         The text.
     """
+    controller = axis.controller
     n, gap, formulas = name, float(controller.backlash), law.law
+    whose = f", axis '{_comment(axis.prefix.removesuffix('/'))}'," if axis.prefix else ""
     trimmed = -(-controller.trimmed_until // controller.period)
     fields = {
         "estimates": 3 + len(controller.extra_signals[0]),
@@ -62,7 +63,7 @@ def format_controller(name: str, controller: Controller, observer_numbers: int, 
     }
     numbers = "".join(f"    .{field} = {_value(value)},\n" for field, value in fields.items())
     numbers += f"    .feedback = {FEEDBACK[controller.feedback]},\n"
-    return f"""/* {n} as the plugin calls it. The exported code is included: its measurement and law are static. */
+    return f"""/* {n}{whose} as the plugin calls it. The exported code is included: its functions are static. */
 #include "{n}.c"
 
 #include "controller.h"
@@ -216,9 +217,14 @@ def _struct(value: Struct, indent: int) -> str:
 def _value(value: Value) -> str:
     """Print a number, a text or a row of numbers; every number as C reads it exactly."""
     if isinstance(value, str):
-        return json.dumps(value)
+        return c_text(value)
     if isinstance(value, int):
         return str(int(value))
     if isinstance(value, float):
         return repr(float(value))
     return f"{{{', '.join(_value(part) for part in value)}}}"
+
+
+def _comment(text: str) -> str:
+    """Print a text within a comment in C, which neither ends nor begins one."""
+    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")

@@ -220,10 +220,10 @@ def check_c(folder: Path, name: str, compiler: Sequence[str]) -> dict[str, float
     """
     program = folder / f"{name}_example"
     sources = [str(folder / f"{name}.c"), str(folder / f"{name}_example.c")]
-    process = _run([*compiler, *FLAGS, *sources, "-o", str(program), "-lm"], "the C compiler")
+    process = _run([*compiler, *FLAGS, *sources, "-o", str(program), "-lm"], f"the C compiler {shlex.join(compiler)}")
     if process.returncode:
         hint = " (CC must name a compiler for this machine)" if os.environ.get("CC") else ""
-        raise InputError(f"the C does not compile with {shlex.join(compiler)}{hint}: {_first_line(process.stderr)}")
+        raise InputError(f"the C does not compile with {shlex.join(compiler)}{hint}: {_first_line(process)}")
     process = _run([str(program)], "the compiled example")
     program.unlink()
     if process.returncode:
@@ -239,5 +239,7 @@ def _run(command: Sequence[str], what: str) -> subprocess.CompletedProcess[str]:
         raise InputError(f"{what} cannot be run: {getattr(error, 'strerror', None) or error}") from error
 
 
-def _first_line(text: str) -> str:
-    return next((line for line in text.splitlines() if "error" in line), text.strip().split("\n")[0])
+def _first_line(process: subprocess.CompletedProcess[str]) -> str:
+    lines = process.stderr.strip().splitlines()
+    status = f"it ended with status {process.returncode} and without a message"
+    return next((line for line in lines if "error" in line), lines[0] if lines else status)

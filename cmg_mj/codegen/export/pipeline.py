@@ -69,12 +69,12 @@ class Code(NamedTuple):
     law: LawPrinter
 
 
-def generate_code(controller: Controller, precision: Precision, name: str | None = None) -> Code:
-    """Generate a controller's C and compare it with Python; see `export`."""
+def generate_code(controller: Controller, precision: Precision, name: str | None = None, suffix: str = "") -> Code:
+    """Generate a controller's C, whose name has a suffix, and compare it with Python; see `export`."""
     _refuse_unexported(controller)
     cls = type(controller.observer)
     try:
-        return _generate(controller, precision, name_of(controller.observer, name))
+        return _generate(controller, precision, name_of(controller.observer, name) + suffix)
     except LawNotExportable as error:
         raise InputError(f"law {type(controller.law).__name__}: cannot be exported: {error}") from error
     except InputError as error:

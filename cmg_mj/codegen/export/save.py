@@ -40,12 +40,17 @@ def export(
     return write_code(out, generate_code(controller, precision, name))
 
 
-def generate_code(controller: Controller, precision: Literal["double", "single"], name: str | None = None) -> Code:
-    """Generate a controller's C and compare it with Python, as `export` does, without writing it."""
+def generate_code(
+    controller: Controller, precision: Literal["double", "single"], name: str | None = None, suffix: str = ""
+) -> Code:
+    """Generate a controller's C and compare it with Python, as `export` does, without writing it.
+
+    Its name has a suffix, which tells a plugin's axes apart.
+    """
     check_installed()
     from cmg_mj.codegen.export import pipeline
 
-    return pipeline.generate_code(controller, precision, name)
+    return pipeline.generate_code(controller, precision, name, suffix)
 
 
 def write_code(out: Path | RunFolder, code: Code) -> list[Path]:

@@ -34,7 +34,7 @@ FIRMWARE = ("board.c", "its.h", "port.h", "startup.c", "Makefile")
 PORT_LAYERS = (("mps2.c", "mps2.ld"), ("stm32f746.c", "stm32f746.ld"))
 """The files of a firmware around an export; all of them, and a port layer's, are always written together."""
 PLUGIN = ("libcmg_mj_{}.so", "{}.xml", "{}_example.c", "{}_example.py", "Makefile", "plugin.c", "rig.c")
-"""Files of an engine plugin, which the user names; all are always written together."""
+"""Files of an engine plugin, which the user names; all but the library, the first, are always written together."""
 PLUGIN_CODE = r"(noise|sensors|gyros|controller|state|setup)\.[ch]|(ziggurat|rig)\.h|{}(_\w+)?(\.h|\.c|_controller\.c)"
 """Pattern of the other files that stand with them: what all plugins have in common, and an axis' controller."""
 
@@ -65,13 +65,13 @@ def foreign_names(names: Iterable[str]) -> list[str]:
     return [name for name in names if name not in code and not _is_listed(name)]
 
 
-def _plugin_files(library: str, names: list[str]) -> list[str]:
-    """List those of the names that are of the plugin with this library."""
-    match = re.fullmatch(r"libcmg_mj_([A-Za-z][A-Za-z0-9_]*)\.so", library)
+def _plugin_files(example: str, names: list[str]) -> list[str]:
+    """List those of the names that are of the plugin with this example. Without a compiler it has no library."""
+    match = re.fullmatch(r"([A-Za-z][A-Za-z0-9_]*)_example\.py", example)
     if match is None:
         return []
     files = [form.format(match[1]) for form in PLUGIN]
-    if not set(files) <= set(names):
+    if not set(files[1:]) <= set(names):
         return []
     return files + [name for name in names if re.fullmatch(PLUGIN_CODE.format(match[1]), name, re.ASCII)]
 

@@ -11,6 +11,9 @@ from cmg_mj.studies.push_limits.mount_files import MountResult
 from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG
 from cmg_mj.studies.push_limits.simulated_push import LEAST, LONGEST_S, OTHER_WORLDS, UNPUSHED_S, SimulatedPush
 
+BUSY = ": run it again while the machine does nothing else, or take E alone by --quick"
+"""Advice where the time did not suffice, in clauses."""
+
 
 def mount_report_lines(result: MountResult) -> Iterator[str]:
     """Describe a mounted robot and the limits of its pair, line by line.
@@ -31,6 +34,8 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
         yield f"  held where they stand: {', '.join(mounted.held)}"
     for note in mounted.notes:
         yield f"  {note}"
+    if result.plugin:
+        yield from _plugin_step(mounted.spec.option.timestep, plant.timestep)
     yield (
         f"  inertia {figures['inertia_kg_m2']:.4g} kg m^2, gravity {figures['gravity_torque_n_m']:.4g} N m, momentum "
         f"{figures['momentum_n_m_s']:.4g} N m s, falls with {figures['pole_1_s']:.3g} 1/s"
@@ -49,19 +54,28 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
     yield from _demands(result)
 
 
+def _plugin_step(file: float, runner: float) -> Iterator[str]:
+    """Say that the plugin's model takes the runner's physics steps, where these are not the mounted model's [s]."""
+    if not math.isclose(file, runner):
+        yield (
+            f"  its physics steps of {1e3 * file:.4g} ms are {1e3 * runner:.4g} ms in the plugin's model, as in runs: "
+            "whole steps fit between two samples"
+        )
+
+
 def _simulated(simulated: SimulatedPush | None) -> str:
     """Describe what the robot stands in MuJoCo, up to the words on the reduced model."""
     if simulated is None:
         return "not tried in MuJoCo; "
     if simulated.standing is None:
-        return f"in MuJoCo nothing found within {LONGEST_S:g} s; "
+        return f"in MuJoCo nothing found within {LONGEST_S:g} s{BUSY}; "
     if simulated.falls:
         fallen = simulated.worlds - simulated.standing
         return (
             f"does not stand: in MuJoCo {fallen} of {simulated.worlds} worlds fall within {UNPUSHED_S:g} s, unpushed; "
         )
     if not simulated.impulse:
-        reason = f"none found within {LONGEST_S:g} s"
+        reason = f"none found within {LONGEST_S:g} s{BUSY}"
         if simulated.complete:
             reason = f"not even {LEAST:.0%} of any controller's push"
         return f"stands in MuJoCo only unpushed ({reason}); "

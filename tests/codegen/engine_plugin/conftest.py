@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
+import mujoco
 import pytest
 
 from cmg_mj.codegen.engine_plugin import install as installing
@@ -32,3 +34,12 @@ def open_names(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setitem(sys.modules, "mujoco", SimpleNamespace(__version__=MUJOCO))
     monkeypatch.setattr(loading, "open_library", lambda library, name: names.append(name))
     return names
+
+
+@pytest.fixture
+def messages() -> Iterator[list[str]]:
+    """What MuJoCo warns of."""
+    result: list[str] = []
+    mujoco.set_mju_user_warning(result.append)
+    yield result
+    mujoco.set_mju_user_warning(None)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
+from cmg_mj.codegen.engine_plugin.build import FLAGS
 from cmg_mj.plant.plugin_model import plugin_mjcf
 from cmg_mj.plant.plugin_state import set_world
 from cmg_mj.plant.tilt_line import apply_torques
@@ -61,6 +62,9 @@ QUANTITIES = {
 SENSORS = {"exact": EXACT, "default": (), "all": ALL_IMPERFECTIONS}
 
 
+SHORT = ("duration_s=0.5", "push.0.start_s=0.2")
+
+
 class Made(NamedTuple):
     """A plugin with its experiment, loaded."""
 
@@ -81,6 +85,15 @@ def make(kind: str, *settings: str, scenario: str = "push_recovery") -> Made:
     made = plugin(experiment, Path(_folder.name) / str(number), name=f"test_{number}")
     mujoco.mj_loadPluginLibrary(str(made.library))
     return Made(experiment, made, mujoco.MjModel.from_xml_path(str(made.model)))
+
+
+@cache
+def quick() -> Made:
+    """Made as fast as can be: the export compares on few signals, the compiler does not optimise."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
+        patch.setattr("cmg_mj.codegen.engine_plugin.build.FLAGS", (*FLAGS, "-O0"))
+        return make("gyro_free", *SHORT)
 
 
 def variant(made: Made, settings: Mapping[str, str | float]) -> Made:

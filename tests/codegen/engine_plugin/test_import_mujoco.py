@@ -120,6 +120,12 @@ def test_another_library_of_an_installed_name(folder: Path, site: Path, tmp_path
     process = python(program + LOAD.format(model=str(model)), site)
     assert "from another library, which stays in force" in process.stdout
     assert "the model was written with another library" in process.stderr
+    example = (tmp_path / "new" / f"{name}_example.py").read_text("utf-8")
+    quiet = "import mujoco; mujoco.set_mju_user_warning(print)\n"  # no log
+    process = python(quiet + example.replace("__file__", repr(str(library))), site)
+    assert process.returncode == 1
+    assert f"Was a copy installed? cmg-mj plugin --install {tmp_path}/new, or --uninstall {name}" in process.stderr
+    assert "Traceback" not in process.stderr
     assert cmg_mj("plugin", "--install", library).status == 0
     assert python(LOAD.format(model=str(model)), site).stdout == "1\n"
 
@@ -164,7 +170,7 @@ AT_ONCE = "__attribute__((constructor)) static void at_once(void) {{ {} }}"
 STRANGE = {
     "no plugin": ("int x;", "its library is no plugin of MuJoCo"),
     "a crash": ("void abort(void);" + AT_ONCE.format("abort();"), "crashed the process that loaded it (signal 6)"),
-    "no end": (AT_ONCE.format("for (;;) {}"), "does not come to an end when it is loaded"),
+    "no end": (AT_ONCE.format("for (;;) {}"), "has not loaded within 5 s, where milliseconds are usual"),
     "an unknown function": ("int missing(void); int x(void) { return missing(); }", "undefined symbol: missing"),
     "an exit": ("void exit(int); " + AT_ONCE.format("exit(0);"), "ended the process that loaded it"),
 }

@@ -6,7 +6,7 @@ import json
 import os
 import threading
 import time
-from importlib.metadata import version
+from importlib.metadata import EntryPoint, version
 from pathlib import Path
 
 import pytest
@@ -133,6 +133,23 @@ def test_command(folder: Path, tmp_path: Path) -> None:
     )
     assert cmg_mj("plugin", "--uninstall", "balance").out == "uninstalled cmg_mj.balance\n"
     assert cmg_mj("plugin", "--list").out == f"no plugin is installed\n{folder}\n"
+
+
+@pytest.mark.parametrize(
+    ("value", "is_called"), [("cmg_mj.codegen.engine_plugin.load:load", True), ("other:load", False)]
+)
+def test_a_package_that_mujoco_does_not_call(
+    value: str, is_called: bool, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its metadata have no entry point: it was installed before it had plugins."""
+    points = {"mujoco.plugins": [EntryPoint("cmg_mj", value, "mujoco.plugins")]}
+    monkeypatch.setattr(installing, "entry_points", lambda group: points[group])
+    said = cmg_mj("plugin", "--install", make_library(tmp_path)).err
+    assert ("`import mujoco` loads it from now on" in said) == is_called
+    for options in ((), ("--json",)):
+        said = cmg_mj("plugin", "--list", *options).err
+        assert said.startswith("" if is_called else "cmg-mj: hint: `import mujoco` loads no plugin in this Python")
+        assert len(said.splitlines()) == (0 if is_called else 1)
 
 
 @pytest.mark.parametrize(

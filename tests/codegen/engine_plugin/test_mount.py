@@ -29,7 +29,7 @@ from tests.studies.push_limits.robots import PENDULUM
 
 pytestmark = [needs_compiler, pytest.mark.usefixtures("elsewhere")]
 
-EXAMPLE = ROOT / "examples" / "gymnasium_plugin.py"
+EXAMPLE, OWN_ROBOT = (ROOT / "examples" / f"gymnasium_{name}.py" for name in ("plugin", "own_robot"))
 MOUNT = ("mount", "robot.xml", "--body", "pole", "--quick", "--plugin")
 DRIVEN = PENDULUM.replace(
     "</body>\n  </worldbody>",
@@ -191,11 +191,12 @@ def test_a_second_axis() -> None:
     assert data.sensor("balance/roll/command").data != data.sensor("balance/pitch/command").data != 0.0
 
 
-def test_the_example_names_nothing_of_this_package() -> None:
-    tree = ast.parse(EXAMPLE.read_text(encoding="utf-8"))
+@pytest.mark.parametrize("example", [EXAMPLE, OWN_ROBOT], ids=lambda example: example.stem)
+def test_the_example_names_nothing_of_this_package(example: Path) -> None:
+    tree = ast.parse(example.read_text(encoding="utf-8"))
     names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     names |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert names == {"gymnasium", "mujoco", "numpy", "pathlib", "sys"}
+    assert {name.partition(".")[0] for name in names} == {"gymnasium", "mujoco", "numpy", "pathlib", "sys"}
 
 
 PLAIN = """
@@ -255,3 +256,17 @@ def test_the_pendulum_stands_in_stock_gymnasium(options: list[str]) -> None:
     assert stood("InvertedPendulum-v5", "balanced_plugin/balanced.xml") == 10
     assert stood("InvertedPendulum-v5", "balanced.xml") == 0
     output(PLAIN)
+
+
+@pytest.mark.slow
+def test_a_robot_of_ones_own_stands_in_gymnasium() -> None:
+    """And its file's step is not the plugin's, which is said."""
+    pytest.importorskip("gymnasium")
+    pytest.importorskip("imageio", reason='imageio is not installed: python -m pip install "gymnasium[mujoco]"')
+    robot = PENDULUM.replace("<worldbody>", '<option timestep="0.004"/>\n  <worldbody>', 1)
+    Path("robot.xml").write_text(robot, encoding="utf-8")
+    assert "its physics steps of 4 ms are 2.5 ms in the plugin's model" in cmg_mj(*MOUNT).out
+    for model, standing in (("balanced_plugin/balanced.xml", 10), ("balanced.xml", 0)):
+        code = f"import runpy, sys; sys.argv = {['own', model, 'pole']!r}\n"
+        text = output(code + f"runpy.run_path({str(OWN_ROBOT)!r}, run_name='__main__')")
+        assert text == f"{standing} of 10 stand 500 steps of 0.02 s\n"

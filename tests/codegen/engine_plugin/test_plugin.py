@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import copy
+import math
 import pickle
 import re
 from collections.abc import Callable, Iterator
-from functools import cache
 
 import mujoco
 import numpy as np
@@ -14,16 +14,15 @@ import pytest
 from mujoco import rollout
 
 from cmg_mj import InputError, load_scenario, prepare
-from cmg_mj.codegen.engine_plugin.build import FLAGS, common_files
+from cmg_mj.codegen.engine_plugin.build import common_files
 from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE, generate_plugin
 from cmg_mj.plant.mujoco_state import quiet
-from cmg_mj.plant.plugin_state import FAILED, initial_states, set_world
+from cmg_mj.plant.plugin_state import FAILED, initial_states, instance_states, set_world
 from cmg_mj.simulation.plugin import describe_rig
-from tests.codegen.engine_plugin.made import Made, check_against_runner, make, needs_compiler, run
+from tests.codegen.engine_plugin.made import check_against_runner, needs_compiler, quick, run
 
 pytestmark = needs_compiler
 
-SHORT = ("duration_s=0.5", "push.0.start_s=0.2")
 SEED, WORLD, STATUS, STEPS, PER_INSTANT, TIMESTEP, IS_PENDING, STARTS_SPINNING, IS_SPINNING_UP, CHECK = range(10)
 CONSTANTS = range(CHECK, CHECK + 14)
 """Places in the state, as state.h numbers them; the constants are where sensors and drives are, and the settings."""
@@ -34,15 +33,6 @@ STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 def _no_log() -> Iterator[None]:
     with quiet():
         yield
-
-
-@cache
-def quick() -> Made:
-    """Made as fast as can be: the export compares on few signals, the compiler does not optimise."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("cmg_mj.codegen.export.check.TICKS", 40)
-        patch.setattr("cmg_mj.codegen.engine_plugin.build.FLAGS", (*FLAGS, "-O0"))
-        return make("gyro_free", *SHORT)
 
 
 def test_half_a_second_is_bit_for_bit() -> None:
@@ -105,7 +95,9 @@ def test_worlds_by_rollout_are_those_of_run_many() -> None:
     quiet_run = prepare(load_scenario("push_recovery", ("duration_s=0.5", "push=[]"), "gyro_free"))
     trajectory = quiet_run.run_many([0, 3, 7]).trajectory
     assert trajectory is not None
-    states = initial_states(made.model, made.start(), made.experiment.scenario.seed, [0, 3, 7])
+    data, untouched = made.start(), made.start().plugin_state
+    states = initial_states(made.model, data, made.experiment.scenario.seed, [0, 3, 7])
+    np.testing.assert_array_equal(data.plugin_state, untouched)
     ways = [mujoco.MjData(made.model) for _ in range(2)]
     _, sensors = rollout.rollout(made.model, ways, states, nstep=100)
     command = sensors[:, :, made.model.sensor("balance/command").adr[0]]
@@ -113,10 +105,42 @@ def test_worlds_by_rollout_are_those_of_run_many() -> None:
     assert len(set(command[:, -1])) == 3
 
 
-@pytest.mark.parametrize(("seed", "world"), [(2**53 + 1, 0), (0, -1)])
+@pytest.mark.parametrize(("seed", "world"), [(2**53 + 1, 0), (0, -1), (1.5, 0), (0, 0.5), (math.nan, 0)])
 def test_numbers_that_no_state_holds(seed: int, world: int) -> None:
     with pytest.raises(InputError, match=r"takes \w+ from 0 to 2\^53"):
         set_world(quick().model, quick().start(), seed, world)
+
+
+def test_a_world_that_a_program_writes_itself() -> None:
+    """As docs/plugin.md says, also after the forward pass of an environment's reset."""
+    made, ends = quick(), []
+    for way in ("set_world", "numbers", "neither"):
+        data = made.start()
+        mujoco.mj_forward(made.model, data)
+        if way == "numbers":
+            (address,) = made.model.plugin_stateadr
+            data.plugin_state[address : address + 2] = 0, 7
+        elif way == "set_world":
+            set_world(made.model, data, 0, 7)
+        mujoco.mj_step(made.model, data, 20)
+        ends.append(data.qpos.copy())
+    np.testing.assert_array_equal(ends[0], ends[1])
+    assert not np.array_equal(ends[0], ends[2])
+
+
+def test_a_plugin_of_others_is_left_alone() -> None:
+    """Also one whose instance is named as if it were this package's."""
+    pid = '<plugin plugin="mujoco.pid"><instance name="unbalance"><config key="ki" value="1"/></instance></plugin>'
+    drive = '<plugin name="pid" joint="{}" plugin="mujoco.pid" instance="unbalance" actdim="1"/></actuator>'
+    text = quick().plugin.model.read_text(encoding="utf-8").replace("</extension>", f"{pid}</extension>")
+    text = re.sub("<key .*?/>", "", text.replace("</actuator>", drive.format("tilt")))
+    model = mujoco.MjModel.from_xml_string(text)
+    assert model.nplugin == 2
+    assert len(instance_states(model, mujoco.MjData(model))) == 1
+    alone = '<mujoco><extension>{}</extension><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>'
+    model = mujoco.MjModel.from_xml_string(f"{alone.format(pid)}<actuator>{drive.format('j')}</mujoco>")
+    with pytest.raises(InputError, match="has no plugin of cmg_mj's"):
+        set_world(model, mujoco.MjData(model), 1, 0)
 
 
 def test_noise_that_has_begun() -> None:
@@ -130,9 +154,9 @@ def test_noise_that_has_begun() -> None:
 
 WRONG_CONFIGS = {
     "seed": ("-1", "1.5", "1 2", "one", "nan", "inf", "1e400", "9007199254740994", "0,5", "1;", "--1"),
-    "world": ("-1", "0.5", "x", "1e17", "nan", "1 0"),
+    "world": ("-1", "0.5", "x", "1e17", "nan", "1 0", "0x10", "1e3", "+1", " 1", "9007199254740993"),
     "noise_density_ug_rthz": ("-400", "much", "nan", "inf", "4e2x", "1e10"),
-    "counts_per_g": ("-1", "none", "nan", "-inf", "1e300"),
+    "counts_per_g": ("-1", "0x10", "none", "nan", "-inf", "1e300"),
     "counts_per_revolution": ("-4096", "12 bit", "nan", "1e300", "4096%"),
     "start": ("rest", "Spinning", "keyframe ", "0"),
     "build": ("0123456789abcdef", "?"),
@@ -220,7 +244,7 @@ def test_a_wrong_model_does_not_compile(case: str) -> None:
 
 
 def test_flywheels_that_a_program_has_left_at_rest() -> None:
-    """With start="spinning" the first pass sets them going: all is as if they had turned before."""
+    """With start="spinning" every pass before the first step sets them going: all is as if they had turned before."""
     made = quick()
     text = made.plugin.model.read_text(encoding="utf-8")
     model = mujoco.MjModel.from_xml_string(text.replace('value="keyframe"', 'value="spinning"'))
@@ -246,15 +270,6 @@ def test_a_step_that_is_changed_stops_the_gimbals() -> None:
     mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
     mujoco.mj_step(model, data)
     assert data.sensor("balance/command").data != 0.0
-
-
-@pytest.fixture
-def messages() -> Iterator[list[str]]:
-    """What MuJoCo warns of."""
-    result: list[str] = []
-    mujoco.set_mju_user_warning(result.append)
-    yield result
-    mujoco.set_mju_user_warning(None)
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, -1.0, 1e300, 2.0**54 + 4.0])

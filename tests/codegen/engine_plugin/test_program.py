@@ -62,7 +62,7 @@ def compile_strictly(made: Made, folder: Path, *flags: str) -> tuple[Path, Path]
 def run_program(
     model: Path, library: Path, program: Path, steps: int, cycles: int, *before: str
 ) -> tuple[np.ndarray, int]:
-    """Return qpos after each step, and the growth [kB]."""
+    """Return qpos after each step, and the growth [bytes]."""
     process = subprocess.run(
         [*before, str(program), str(library), str(model), str(steps), str(cycles)],
         capture_output=True,
@@ -91,7 +91,7 @@ def test_a_users_own_observer_without_python(tmp_path: Path) -> None:
     rows, growth = run_program(made.plugin.model, *compile_strictly(made, tmp_path, "-O2"), 3000, 1000)
     positions = np.stack([trajectory[name] for name in trajectory.layout.positions()], axis=1)
     np.testing.assert_array_equal(rows[:-1], positions[1:])
-    assert growth < 500
+    assert growth < 900  # of 900 cycles
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import subprocess
 from pathlib import Path
 
 import mujoco
@@ -63,3 +64,25 @@ def test_in_python_too(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"^controller\.rate_hz = 5: the closed loop is unstable"):
         plugin(load_scenario("push_recovery", ["controller.rate_hz=5"], "linear"), tmp_path / "balance")
     assert not (tmp_path / "balance").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("elsewhere")
+def test_without_a_compiler_all_else_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The line comes when `make` has something to compile, here with the compiler that is there after all."""
+    monkeypatch.delenv("CC", raising=False)
+    with monkeypatch.context() as patch:
+        patch.setattr("shutil.which", lambda name: None)
+        outcome = cmg_mj("plugin", "linear", "--out", "balance", "--set", "plant.equilibrium_bias_deg=0.5")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err.splitlines()[-1] == (
+        "cmg-mj: plugin: libcmg_mj_linear.so is missing, for no C compiler was found (CC, cc, gcc, clang); the other "
+        "files are in balance: where there is one, `make` there compiles it"
+    )
+    assert not Path("balance/libcmg_mj_linear.so").exists()
+    subprocess.run(["make", "-C", "balance"], check=True, timeout=300, capture_output=True)
+    outcome = cmg_mj("check", "balance/linear.xml")  # the command's own output
+    assert outcome.status == 0
+    assert "has the plugin cmg_mj.linear" in outcome.out + outcome.err
+    mujoco.mj_loadPluginLibrary("balance/libcmg_mj_linear.so")
+    assert mujoco.MjModel.from_xml_path("balance/linear.xml").nplugin == 1

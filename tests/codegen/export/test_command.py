@@ -185,8 +185,8 @@ def test_a_temporary_folder_that_is_full(monkeypatch: pytest.MonkeyPatch) -> Non
     ("cc", "words"),
     [
         ("'", "No closing quotation"),
-        ("no-such-compiler", "the C compiler cannot be run"),
-        (f"{sys.executable} -c 'raise SystemExit(1)'", "the C does not compile with"),
+        ("no-such-compiler", "the C compiler no-such-compiler cannot be run: No such file or directory"),
+        (f"{sys.executable} -c 'raise SystemExit(1)'", "it ended with status 1 and without a message"),
         (f"{sys.executable} -c 0", "the compiled example cannot be run"),
     ],
 )

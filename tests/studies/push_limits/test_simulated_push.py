@@ -217,7 +217,7 @@ def pendulum(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
         (SimulatedPush(10, 0.0), "gyro_free: stands in MuJoCo only unpushed (not even 2% of any controller's push)"),
         pytest.param(
             SimulatedPush(10, 0.0, complete=False),
-            "stands in MuJoCo only unpushed (none found within 60 s)",
+            "stands in MuJoCo only unpushed (none found within 60 s: run it again while the machine does ",
             marks=pytest.mark.slow,
         ),
         pytest.param(
@@ -229,7 +229,7 @@ def pendulum(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
             SimulatedPush(28, worlds=30),
             "gyro_free: does not stand: in MuJoCo 2 of 30 worlds fall within 20 s, unpushed",
         ),
-        (SimulatedPush(None, complete=False), "gyro_free: in MuJoCo nothing found within 60 s; by its reduced model E"),
+        (SimulatedPush(None, complete=False), "or take E alone by --quick; by its reduced model E"),
     ],
 )
 def test_it_says_what_the_robot_itself_stands(

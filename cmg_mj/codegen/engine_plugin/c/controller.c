@@ -1,12 +1,9 @@
 #include "controller.h"
 
+#include "sensors.h"
+
 #include <math.h>
 #include <string.h>
-
-static double clip(double x, double low, double high)
-{
-    return x < low ? low : x > high ? high : x;
-}
 
 static int are_finite(const double *numbers, int n)
 {

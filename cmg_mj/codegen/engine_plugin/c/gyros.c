@@ -4,11 +4,6 @@
 
 #include <math.h>
 
-static double clip(double x, double low, double high)
-{
-    return x < low ? low : x > high ? high : x;
-}
-
 int fog_place(const fog_type *fog, int at, fog_places *places)
 {
     places->noise = at;

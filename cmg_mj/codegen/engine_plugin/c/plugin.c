@@ -209,16 +209,31 @@ static void take_instant(const mjModel *m, mjData *d, double *state)
     else state[IS_PENDING] = 1;
 }
 
-/* Set the flywheels going, and come to this stage again: MuJoCo has computed it with what the program had set. */
-static void start_spinning(const mjModel *m, mjData *d, int instance, double *state)
+/* Whether an instance of this library is to set its flywheels going: at every pass before its first step. */
+static int is_to_spin(const mjModel *m, mjData *d, int instance)
 {
+    const double *state = state_of(m, d, instance);
+    return state[STATUS] == READY && state[STARTS_SPINNING] != 0.0 && state[STEPS] == 0.0;
+}
+
+/* Set the flywheels of all instances going, and come to this stage again: MuJoCo has computed it with what the program
+ * had set. The first instance does so for all, since each repetition calls them all; 0 if it is another one. */
+static int start_spinning(const mjModel *m, mjData *d, int instance)
+{
+    double *state = state_of(m, d, instance);
+    const int slot = m->plugin[instance];
+    if (state[IS_SPINNING_UP] != 0.0) return 0;
+    for (int i = 0; i < instance; ++i)
+        if (m->plugin[i] == slot && is_to_spin(m, d, i)) return 0;
+    for (int i = instance; i < m->nplugin; ++i)
+        if (m->plugin[i] == slot && is_to_spin(m, d, i)) spin(&rig, m, d, i);
     state[IS_SPINNING_UP] = 1;
-    spin(&rig, m, d, instance);
     mj_fwdPosition(m, d);
     mj_sensorPos(m, d);
     mj_fwdVelocity(m, d);
     mj_sensorVel(m, d); /* calls `compute` */
     state[IS_SPINNING_UP] = 0;
+    return 1;
 }
 
 static void compute(const mjModel *m, mjData *d, int instance, int capability)
@@ -230,12 +245,28 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability)
         return;
     }
     if (!state_is_intact(&rig, state)) restore(m, state, instance);
-    if (state[STARTS_SPINNING] != 0.0 && state[STEPS] == 0.0 && state[IS_SPINNING_UP] == 0.0) {
-        start_spinning(m, d, instance, state);
-        return;
-    }
+    if (is_to_spin(m, d, instance) && start_spinning(m, d, instance)) return;
     if (state[STATUS] == READY) take_instant(m, d, state);
     show(&rig, m, instance, state, d->sensordata);
+}
+
+/* Whether MuJoCo leaves an actuator out that the state names. */
+static int is_off(const mjModel *m, double number)
+{
+    const int actuator = element(number, (int)m->nactuator), group = actuator < 0 ? -1 : m->actuator_group[actuator];
+    return group >= 0 && group < 31 && (m->opt.disableactuator & (1 << group));
+}
+
+static int drives_are_off(const mjModel *m, const double *state)
+{
+    axis_places places;
+    int at = HEAD, result = (m->opt.disableflags & mjDSBL_ACTUATION) != 0;
+    for (int i = 0; i < rig.axes; ++i) {
+        at = axis_place(rig.axis[i], at, &places);
+        for (int j = 0; j < rig.axis[i]->gimbals; ++j)
+            result = result || is_off(m, state[places.servos + j]) || is_off(m, state[places.motors + j]);
+    }
+    return result;
 }
 
 /* A step has been taken: the decision counts. */
@@ -245,6 +276,10 @@ static void advance(const mjModel *m, mjData *d, int instance)
     axis_places places;
     int at = HEAD;
     if (state[STATUS] != READY) return;
+    if (drives_are_off(m, state)) {
+        fail(state, "its drives were switched off during a step");
+        return;
+    }
     if (state[IS_PENDING] != 0.0) {
         (void)state_advance(&rig, state);
         for (int i = 0; i < rig.axes; ++i) {

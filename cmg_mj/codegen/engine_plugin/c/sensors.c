@@ -7,7 +7,7 @@
 
 static const int CROSSWISE[FORCES] = {1, 0, 3, 2}; /* each channel's other axis of the same part */
 
-static double clip(double x, double low, double high)
+double clip(double x, double low, double high)
 {
     return x < low ? low : x > high ? high : x;
 }

@@ -26,7 +26,6 @@ typedef struct {
     int period;  /* from one delivered sample to the next */
     int raw;     /* from one sample inside the part to the next */
     int skew;    /* by which the outer's sample is older */
-    int uneven;  /* whether skew or low-pass is on */
     int settling; /* samples that the low-pass sees before the first */
     int outer_capacity;
     double limit;
@@ -71,6 +70,8 @@ void pair_sample(
 void encoder_sample(
     const encoder_type *encoder, const delivery_places *places, double *memory, const sensor_settings *settings,
     double instant, const double *angles);
+
+double clip(double x, double low, double high);
 
 /* What all sensors have in common: whether one is due, and delivery; the newest sample that has been delivered. */
 int is_due(double instant, int period);

@@ -144,8 +144,10 @@ static int configured(const search *in, int instance, int key, double otherwise,
     *value = otherwise;
     if (!text || !*text) return 1;
     const double number = strtod(text, &end);
+    const int is_too_long = is_integer && strtoull(text, NULL, 10) > (unsigned long long)most; /* rounded, it is not */
+    const int is_decimal = !text[strspn(text, is_integer ? "0123456789" : "0123456789.eE+- ")];
     while (*end == ' ') ++end;
-    if (*end || end == text || !(number >= 0.0 && number <= most) || (is_integer && number != floor(number)))
+    if (!is_decimal || is_too_long || *end || end == text || !(number >= 0.0 && number <= most) || (is_integer && number != floor(number)))
         return refuse(in, "<config key=\"%s\" value=\"%.40s\">: must be %s from 0 to %.16g", setup_keys[key], text,
             is_integer ? "a whole number" : "a number", most);
     *value = number;
@@ -282,29 +284,16 @@ int shown_size(const rig_type *type, const mjModel *m, int instance, int sensor)
     return quantity == NOTHING ? 0 : quantity == ESTIMATE ? type->axis[which]->controller->estimates : 1;
 }
 
-/* The same as `quantity_of`, of a sensor that `check_sensors` has looked at: no two quantities begin alike. */
-static int known_quantity(const rig_type *type, const char *name, int *which)
-{
-    *which = 0;
-    while (*which < type->axes - 1 && strncmp(name, type->axis[*which]->prefix, strlen(type->axis[*which]->prefix)))
-        ++*which;
-    name += strlen(type->axis[*which]->prefix);
-    for (int quantity = ESTIMATE; quantity < SAMPLE; ++quantity)
-        if (*name == QUANTITIES[quantity][0]) return quantity;
-    return SAMPLE;
-}
-
 void show(const rig_type *type, const mjModel *m, int instance, const double *state, double *sensordata)
 {
     static const int PLACE[] = {0, SHOWN_ESTIMATE, SHOWN_U, SHOWN_Y1, SHOWN_Y2, SHOWN_ACCELERATION, SHOWN_X_E, 0};
-    const size_t owner = strlen(instance_name(m, instance)) + 1;
     axis_places places[MOST_AXES];
     int at = HEAD;
     for (int i = 0; i < type->axes; ++i) at = axis_place(type->axis[i], at, &places[i]);
     for (int sensor = 0; sensor < m->nsensor; ++sensor) {
         if (m->sensor_type[sensor] != mjSENS_PLUGIN || m->sensor_plugin[sensor] != instance) continue;
-        int which;
-        const int quantity = known_quantity(type, m->names + m->name_sensoradr[sensor] + owner, &which);
+        int which = 0;
+        const int quantity = quantity_of(type, m, instance, sensor, &which);
         double *result = sensordata + m->sensor_adr[sensor];
         const double *shown = state + places[which].shown + PLACE[quantity];
         if (quantity == SAMPLE) *result = floor(state[STEPS] / state[PER_INSTANT] / type->period);

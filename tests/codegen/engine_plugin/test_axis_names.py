@@ -1,0 +1,81 @@
+"""Axes of whatever name: the runner's numbers, in files and symbols of their own."""
+
+from __future__ import annotations
+
+import json
+import re
+from html import escape
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cmg_mj
+from cmg_mj import load_scenario, prepare
+from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.simulation.plugin import make_plugin, plugin
+from tests.codegen.engine_plugin.made import needs_compiler
+
+pytestmark = [needs_compiler, pytest.mark.slow]
+
+MODELS = Path(cmg_mj.__file__).parents[1] / "models"
+SCENARIO = """\
+duration_s = 1.0
+push = [{{ axis = {0}, start_s = 0.5, torque_n_m = 1.0 }}, {{ axis = {1}, start_s = 0.5, torque_n_m = -1.0 }}]
+[plant]
+model = "two_axes.xml"
+turn_rate_rad_s = 1.0
+[axes.{1}.plant]
+equilibrium_bias_deg = -0.3
+[controller]
+gains = "scaled"
+"""
+
+
+def two_axes(roll: str, pitch: str, folder: Path) -> Experiment:
+    """The bundled plant, its axes named otherwise."""
+    for file in MODELS.glob("*.xml"):
+        text = file.read_text(encoding="utf-8")
+        for axis in ("roll", "pitch"):
+            text = re.sub(rf'\b{axis}/|(?<=prefix="){axis}', lambda match: f"@{match[0]}", text)
+        for axis, name in (("roll", roll), ("pitch", pitch)):
+            text = text.replace(f"@{axis}", escape(name))
+        (folder / file.name).write_text(text, encoding="utf-8")
+    names = [json.dumps(name, ensure_ascii=False) for name in (roll, pitch)]
+    (folder / "scenario.toml").write_text(SCENARIO.format(*names), encoding="utf-8")
+    return prepare(load_scenario(str(folder / "scenario.toml"), [], "gyro_free"))
+
+
+@pytest.mark.parametrize(
+    ("roll", "pitch"),
+    [
+        ("l", "l/x"),
+        ("l/x", "l"),
+        ("a/b", "a_b"),
+        ("x", "x_controller"),
+        ("a b", "c-d"),
+        ("größe", "controller"),
+        ('"*/?\\', "<&'??/\U0001f600"),
+    ],
+)
+def test_two_axes_of_some_names(roll: str, pitch: str, tmp_path: Path) -> None:
+    experiment = two_axes(roll, pitch, tmp_path)
+    native, other = experiment.run(), experiment.run("plugin")
+    assert native.trajectory is not None
+    assert other.trajectory is not None
+    for name, values in native.trajectory.columns.items():
+        np.testing.assert_array_equal(other.trajectory[name], values, err_msg=name)
+
+
+def test_the_longest_name(tmp_path: Path) -> None:
+    """Its axes' numbers make the names in C longer than anybody may give one."""
+    made = plugin(prepare(load_scenario("two_axes", [], "gyro_free")), tmp_path / "balance", name="a" * 40)
+    assert made.library.is_file()
+    names = {path.name for path in made.files}
+    assert {f"{'a' * 40}_{number}{end}" for number in range(2) for end in (".c", ".h", "_controller.c")} <= names
+
+
+def test_the_axes_own_names_stand_in_the_c(tmp_path: Path) -> None:
+    made = make_plugin(two_axes("a*/b", "größe", tmp_path), "mine")
+    assert "axis 'a* /b'" in made.texts["mine_0_controller.c"]
+    assert "axis 'größe'" in made.texts["mine_1_controller.c"]
