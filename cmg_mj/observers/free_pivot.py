@@ -1,7 +1,7 @@
 """`gyro_free` on a pivot that moves: it finds out how strongly, and trusts the tilt so much less.
 
-Accelerometers take the pivot's acceleration for gravity, which makes y1 wrong by its horizontal part over g. The angular
-acceleration is the difference between two accelerometers of one body, and that the pivot's motion leaves alone.
+Accelerometers take the pivot's acceleration for gravity, which makes y1 wrong by its horizontal part over g. The
+angular acceleration is the difference between two accelerometers on one body: the pivot's motion is not in it.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ class FreePivot:
 
     - The sensors' variance is r times that of the datasheet, at least once: vibration is white and no motion of the
       pivot. r is the mean of (y1 - 2 y1- + y1--)^2/(6 var v) over about `noise_s`.
-    - S+ = S + share (w^2 + ww - S + surprise S (e^2/ee - 1)), at least pivot_floor^2. w and ww are the estimate after the
-      sample and its variance: a step of expectation-maximisation. e and ee are the innovation and its variance, which
-      tell sooner that S is wrong by much. `share` is dt/learn_s at the start and falls, as that of a mean over all
-      samples, to dt/pivot_s.
+    - S+ = S + share (w^2 + ww - S + surprise S (e^2/ee - 1)), at least pivot_floor^2. w and ww are the estimate after
+      the sample and its variance: a step of expectation-maximisation. e and ee are the innovation and its variance,
+      which tell sooner that S is wrong by much. `share` is dt/learn_s at the start and falls, as that of a mean over
+      all samples, to dt/pivot_s.
 
     While S is zero and r is one it is `gyro_free`.
 
@@ -69,8 +69,7 @@ class FreePivot:
         model: The reduced model (not used).
         noise: Of tilt and angular acceleration, by the sensors' datasheet.
         rate_start: Standard deviation of the rate at the start, about zero [rad/s].
-        bias_start: The same of b [rad/s^2]. The default, that of `gyro_free`, is about 5 mg between the two accelerometers of the
-            bundled rig.
+        bias_start: The same of b [rad/s^2]. The default is that of `gyro_free`.
         bias_walk: How fast b may change: standard deviation after a second [rad/s^2].
         jerk: How far alpha is off the straight line between samples: standard deviation of its mean [rad/s^2].
         pivot_hz: How quickly w is renewed. Not the corner of the motion, which is not known [Hz].
@@ -128,13 +127,12 @@ class FreePivot:
         bend = step - step_before
         scale = scale + self._shares[2] * (per_bend * bend * bend - scale)
         r = where(scale > 1.0, scale, 1.0)
-        nn, rest = r * nn, r * rest
 
         # Correct p, z, b, w, n by e = y1 - p - w - d alpha.
         e = y.y1 - p - w - d * (y.acceleration - b)
         ep, ez, eb, ew = pp + pw - d * pb, pz + zw - d * zb, pb + bw - d * bb, pw + ww - d * bw
-        en = (c - d) * nn
-        ee = ep + ew - d * eb + (c - d) * en + rest
+        en = r * ((c - d) * nn)
+        ee = ep + ew - d * eb + r * ((c - d) * (c - d) * nn + rest)
         kp, kz, kb, kw, kn = ep / ee, ez / ee, eb / ee, ew / ee, en / ee
         p, z, b, w, n = p + kp * e, z + kz * e, b + kb * e, w + kw * e, kn * e
         alpha = y.acceleration - b - n
@@ -145,10 +143,10 @@ class FreePivot:
         pb, zb, bb = pb - kp * eb, zb - kz * eb, bb - kb * eb
         pw, zw, bw, ww = pw - kp * ew, zw - kz * ew, bw - kb * ew, ww - kw * ew
         pm, zm, bm, wm = pb - kp * en, zb - kz * en, bb - kb * en, bw - kw * en
-        mm = bm - kn * eb + nn - kn * en + self.jerk**2
+        mm = bm - kn * eb + r * nn - kn * en + self.jerk**2
 
         # Learn how strongly the pivot moves.
-        pivot = pivot + share * (w * w + ww - pivot + self.surprise * pivot * (e * e / ee - 1.0))
+        pivot = pivot + share * (w * w + ww + pivot * (self.surprise * (e * e / ee) - (1.0 + self.surprise)))
         floor = self.pivot_floor**2
         pivot = where(pivot > floor, pivot, floor)
         slower = share / (1.0 + share)

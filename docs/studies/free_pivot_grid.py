@@ -2,21 +2,22 @@
 
     python docs/studies/free_pivot_grid.py [--worlds 100] [--parts open,loop] [--jobs 2] [--only pivot] [--seed 130000]
 
-push_recovery (400 ug/rtHz, e = 0.5 deg, a push of 1 N m for 0.1 s). Every cell differs from it in one thing. Noise of the
-pivot has its RMS and its corner; a sine has the same RMS, so its amplitude is 1.41 times that. The parts:
+push_recovery (400 ug/rtHz, e = 0.5 deg, a push of 1 N m for 0.1 s). Every cell differs from it in one thing. Noise of
+the pivot has its RMS and its corner; a sine has the same RMS, so that its amplitude is 1.41 times that. The parts:
 
-- open: the law is fed the true rate, all observers run open loop on the same worlds. Means of the velocity RMS error over
-  the run; `free_pivot` by the best other observer (zero, gyros and floors do not count), and by `gyro_free`; start-up, the
-  RMS error from 1 to 1.5 s over that from 8 s on; the bound. A last column has the bars and whether they are met.
-- loop: each in a loop of its own: falls, and errors. If `free_pivot` falls in any world, every other observer runs too, and
-  Fisher's exact test (one-sided: more falls) compares it with the one that falls least.
+- open: the law is fed the true rate, all observers run open loop on the same worlds. Means of the velocity RMS error
+  over the run; `free_pivot` by the best other observer (zero, gyros and floors do not count), and by `gyro_free`;
+  start-up, the RMS error from 1 to 1.5 s over that from 8 s on; the bound; "told"; the bars, and whether they are met.
+- loop: each in a loop of its own: falls, and errors. If `free_pivot` falls in any world, every other observer runs
+  too, and Fisher's exact test (one-sided: more falls) compares it with the one that falls least.
 
-The bound is the error of the stationary Kalman filter that knows what no observer is told: that the accelerometers have no
-offset, how strong the pivot's motion is, and its corner (a second-order Butterworth low-pass) or the frequency of its sine
-(nothing is then left of it). Vibration counts as so much more white noise. Without a pivot's motion it is `floor_accel`.
+The bound is the error of the stationary Kalman filter that knows what no observer is told: that the accelerometers
+have no offset, how strong the pivot's motion is, and its corner (a second-order Butterworth low-pass) or the frequency
+of its sine (nothing is then left of it). Vibration counts as so much more white noise. Where the pivot rests and
+nothing shakes it is `floor_accel`.
 
-"told" is `free_pivot` that is told the pivot's RMS and does not learn it: its error and its start-up. How much of a slow
-start-up is due to learning, and how much to the accelerometers' unknown offset, is to be seen there.
+"told" is `free_pivot` that is told the pivot's RMS and does not learn it: its error and its start-up. How much of a
+slow start-up is due to learning, and how much to the accelerometers' unknown offset, is to be seen there.
 
 `free_pivot` was tuned on other seeds: `--seed 40000 --worlds 16` prints its figures there.
 """
@@ -251,7 +252,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen, counts = [cell for _, cell in cells], [options.worlds] * len(cells)
     with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
         if "open" in options.parts:
-            rows = [open_row(cell, run) for cell, run in zip(chosen, pool.map(open_loop, chosen, seeds, counts))]
+            rows = [
+                open_row(cell, run)
+                for cell, run in zip(chosen, pool.map(open_loop, chosen, seeds, counts), strict=True)
+            ]
             print(f"\nOpen loop, the law fed the true rate, {options.worlds} worlds [1e-3 rad/s]:\n")
             headings = ["cell", "zero", f"`{BASE}`", f"`{OURS}`", "best other", "by it", f"by `{BASE}`", "bound"]
             headings += ["start-up", f"of `{BASE}`", "told", "its start-up", "bars"]
