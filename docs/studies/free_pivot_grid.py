@@ -1,6 +1,7 @@
 """What `free_pivot` and every other observer are worth on rigs that are not at rest: one factor at a time.
 
     python docs/studies/free_pivot_grid.py [--worlds 100] [--parts open,loop] [--jobs 2] [--only pivot] [--seed 130000]
+        [--keep FOLDER]
 
 push_recovery (400 ug/rtHz, e = 0.5 deg, a push of 1 N m for 0.1 s). Every cell differs from it in one thing. Noise of
 the pivot has its RMS and its corner; a sine has the same RMS, so that its amplitude is 1.41 times that. The parts:
@@ -19,16 +20,22 @@ nothing shakes it is `floor_accel`.
 "told" is `free_pivot` that is told the pivot's RMS and does not learn it: its error and its start-up. How much of a
 slow start-up is due to learning, and how much to the accelerometers' unknown offset, is to be seen there.
 
+With `--keep` every cell is written down once it is done, and another call goes on where one was stopped.
+
 `free_pivot` was tuned on other seeds: `--seed 40000 --worlds 16` prints its figures there.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from multiprocessing import get_context
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +47,7 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.tilt import TiltNoise
 from cmg_mj.simulation.experiment import Experiment, prepare
 
+Row = list[list[str]]
 SEED = 130_000
 OURS, BASE = "free_pivot", "gyro_free"
 ERROR = "velocity_rms_error_rad_s"
@@ -184,8 +192,9 @@ def best_other(errors: dict[str, np.ndarray]) -> str:
     return min((float(errors[name].mean()), name) for name in OBSERVERS if name != OURS)[1]
 
 
-def open_row(cell: Cell, run: OpenLoop) -> tuple[list[str], list[str]]:
+def open_rows(cell: Cell, seed: int, worlds: int) -> list[list[str]]:
     """The row of the verdicts, and that of all observers' errors."""
+    run = open_loop(cell, seed, worlds)
     means = {name: 1e3 * float(values.mean()) for name, values in run.errors.items()}
     best = best_other(run.errors)
     by_best, by_base = means[OURS] / means[best], means[OURS] / means[BASE]
@@ -202,7 +211,20 @@ def open_row(cell: Cell, run: OpenLoop) -> tuple[list[str], list[str]]:
     row = [cell.name, f"{means['zero']:.1f}", f"{means[BASE]:.1f}", f"{means[OURS]:.1f}", f"`{best}`", f"{by_best:.2f}"]
     row += [f"{by_base:.2f}", f"{1e3 * run.bound:.1f}", *(f"{run.start[name]:.2f}" for name in (OURS, BASE))]
     row += [f"{1e3 * run.told[0]:.1f}", f"{run.told[1]:.2f}", verdict]
-    return row, [cell.name, *(f"{means[name]:.1f}" for name in [*OBSERVERS, "zero"])]
+    return [row, [cell.name, *(f"{means[name]:.1f}" for name in [*OBSERVERS, "zero"])]]
+
+
+def kept(work: Callable[[Cell, int, int], Row], folder: str, cell: Cell, seed: int, worlds: int) -> Row:
+    """A cell's rows, computed unless they are in the folder already."""
+    name = re.sub(r"[^a-z0-9.]+", "_", f"{work.__name__} {cell.name} {seed} {worlds}".lower())
+    file = Path(folder, f"{name}.json") if folder else None
+    if file is not None and file.exists():
+        return json.loads(file.read_text(encoding="utf-8"))
+    row = work(cell, seed, worlds)
+    if file is not None:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(row), encoding="utf-8")
+    return row
 
 
 def in_loop(cell: Cell, observer: str, seed: int, worlds: int) -> tuple[int, float | None]:
@@ -218,8 +240,8 @@ def more_falls(ours: int, others: int, worlds: int) -> float:
     return float(fisher_exact([[ours, worlds - ours], [others, worlds - others]], alternative="greater").pvalue)
 
 
-def loop_row(cell: Cell, seed: int, worlds: int) -> list[str]:
-    """A cell with observers in loops of their own."""
+def loop_rows(cell: Cell, seed: int, worlds: int) -> list[list[str]]:
+    """The row of a cell with observers in loops of their own."""
     runs = {name: in_loop(cell, name, seed, worlds) for name in (OURS, BASE)}
     fell = runs[OURS][0]
     if fell:
@@ -230,7 +252,7 @@ def loop_row(cell: Cell, seed: int, worlds: int) -> list[str]:
     least = f"`{rival}` {runs[rival][0]}" if fell else "none can be fewer"
     verdict = "met" if p > SIGNIFICANT else "more falls"
     row = [cell.name, str(fell), str(runs[BASE][0]), least, f"{p:.2g}", *errors]
-    return [*row, f"reported: {verdict}" if cell.reported else verdict]
+    return [[*row, f"reported: {verdict}" if cell.reported else verdict]]
 
 
 def numbered(only: str) -> list[tuple[int, Cell]]:
@@ -246,16 +268,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", default="", help="only cells whose name contains this")
     parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--keep", default="", metavar="FOLDER")
     options = parser.parse_args(arguments)
     cells = numbered(options.only)
     seeds = [options.seed + 1000 * i for i, _ in cells]
     chosen, counts = [cell for _, cell in cells], [options.worlds] * len(cells)
     with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
         if "open" in options.parts:
-            rows = [
-                open_row(cell, run)
-                for cell, run in zip(chosen, pool.map(open_loop, chosen, seeds, counts), strict=True)
-            ]
+            work = partial(kept, open_rows, options.keep)
+            rows = list(pool.map(work, chosen, seeds, counts))
             print(f"\nOpen loop, the law fed the true rate, {options.worlds} worlds [1e-3 rad/s]:\n")
             headings = ["cell", "zero", f"`{BASE}`", f"`{OURS}`", "best other", "by it", f"by `{BASE}`", "bound"]
             headings += ["start-up", f"of `{BASE}`", "told", "its start-up", "bars"]
@@ -263,10 +284,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print("\nAll observers, the same worlds [1e-3 rad/s]:\n")
             print(table(["cell", *(f"`{name}`" for name in OBSERVERS), "`zero`"], [row for _, row in rows]), flush=True)
         if "loop" in options.parts:
-            rows = list(pool.map(loop_row, chosen, seeds, counts))
+            work = partial(kept, loop_rows, options.keep)
+            rows = list(pool.map(work, chosen, seeds, counts))
             print(f"\nEach in its own loop, {options.worlds} worlds; errors of the worlds that stood [1e-3 rad/s]:\n")
             headings = ["cell", f"`{OURS}` fell", f"`{BASE}` fell", "fewest falls of another", "p", f"`{OURS}`"]
-            print(table([*headings, f"`{BASE}`", "bar"], rows))
+            print(table([*headings, f"`{BASE}`", "bar"], [row for (row,) in rows]))
 
 
 if __name__ == "__main__":
