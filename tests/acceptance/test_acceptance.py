@@ -64,7 +64,7 @@ def test_order_in_the_push_window() -> None:
 
 
 def test_what_an_estimate_of_zero_does_as_well() -> None:
-    """Over the whole run it beats linear and ltv in their own loops, and on the gyro's all but gyro_free and free_pivot.
+    """Over the whole run it beats linear and ltv in their own loops, on the gyro's all but gyro_free and free_pivot.
 
     In the push window linear_high_gain and linear beat it there, and homogeneous does not.
     """
