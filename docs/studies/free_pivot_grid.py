@@ -237,7 +237,7 @@ def more_falls(ours: int, others: int, worlds: int) -> float:
     """Fisher's exact test, one-sided: how likely so many more falls are by chance."""
     from scipy.stats import fisher_exact
 
-    return float(fisher_exact([[ours, worlds - ours], [others, worlds - others]], alternative="greater").pvalue)
+    return float(fisher_exact([[ours, worlds - ours], [others, worlds - others]], alternative="greater")[1])
 
 
 def loop_rows(cell: Cell, seed: int, worlds: int) -> list[list[str]]:
