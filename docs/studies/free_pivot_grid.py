@@ -235,9 +235,9 @@ def in_loop(cell: Cell, observer: str, seed: int, worlds: int) -> tuple[int, flo
 
 def more_falls(ours: int, others: int, worlds: int) -> float:
     """Fisher's exact test, one-sided: how likely so many more falls are by chance."""
-    from scipy.stats import fisher_exact
+    from scipy.stats import hypergeom
 
-    return float(fisher_exact([[ours, worlds - ours], [others, worlds - others]], alternative="greater")[1])
+    return float(hypergeom.sf(ours - 1, 2 * worlds, ours + others, worlds))
 
 
 def loop_rows(cell: Cell, seed: int, worlds: int) -> list[list[str]]:
