@@ -106,6 +106,15 @@ MUTATIONS = [
         )
         for name in ("rate_start", "bias_start", "bias_walk", "jerk")
     ),
+    *(
+        Mutation(
+            f"free_pivot: {name}", OBSERVERS + "free_pivot.py", rf"\n    {name}: (?:Positive|NonNegative) = " + NUMBER
+        )
+        for name in (
+            *("rate_start", "bias_start", "bias_walk", "jerk", "pivot_hz", "pivot_start", "pivot_floor"),
+            *("pivot_s", "learn_s", "surprise", "noise_s"),
+        )
+    ),
     Mutation("super_twisting: L", OBSERVERS + "super_twisting.py", r"    L: Positive = " + NUMBER),
     Mutation("super_twisting: l0", OBSERVERS + "super_twisting.py", r"l0: Positive = " + NUMBER),
     Mutation("super_twisting: l1", OBSERVERS + "super_twisting.py", r"l1: Positive = " + NUMBER),

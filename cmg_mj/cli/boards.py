@@ -98,7 +98,8 @@ def export(
         after = f"cmg-mj run push_recovery --driver board --observer {name} --port {port}"
         if firmware in NEVER_RUN:
             note("the firmware compiles for this board, and has never run on one (docs/board.md)")
-        say_written(folder, at, f"Then: ({shell_command("cd", at)} && {command}); {after}", as_json)
+        enter = shell_command("cd", at)
+        say_written(folder, at, f"Then: ({enter} && {command}); {after}", as_json)
         return
     compile_it = shell_command("cc", "-std=c99", at / f"{name}.c", at / f"{name}_example.c", "-lm")
     say_written(folder, at, f"Try it: {compile_it} && ./a.out", as_json)

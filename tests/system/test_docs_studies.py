@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from cmg_mj.results.error_bounds import acceleration_floor
+from cmg_mj.sensors.tilt import TiltNoise
 from tests.command import cmg_mj
 
 STUDIES = Path(__file__).resolve().parents[2] / "docs/studies"
@@ -106,3 +108,23 @@ def test_a_cell_of_the_bending_frames_table() -> None:
     heads = [head for head, _ in study.rows(1)]
     page = (STUDIES.parent / "real_rigs.md").read_text(encoding="utf-8")
     assert all(f"| {head} |" in page for head in heads if "off by" not in head)
+
+
+def test_the_grid_of_free_pivot(tmp_path: Path) -> None:
+    """Two worlds of two cells; the second call computes nothing."""
+    arguments = ["--worlds", "2", "--jobs", "1", "--only", "0.5 m/s2 to 5 Hz", "--keep", tmp_path]
+    command = [sys.executable, STUDIES / "free_pivot_grid.py", *map(str, arguments)]
+    tables = [subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2)]
+    assert tables[0] == tables[1]
+    assert len(list(tmp_path.iterdir())) == 2
+    assert tables[0].count("| pivot 0.5 m/s2 to 5 Hz") == 3
+
+
+@pytest.mark.slow
+def test_the_bound_of_a_pivot_at_rest_is_that_of_the_acceleration(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(STUDIES)
+    bound = importlib.import_module("free_pivot_grid").matched_bound
+    noise = TiltNoise(0.0063, 0.41, 0.89)
+    at_rest = bound(noise, 0.005, None, 9.81)
+    assert at_rest == pytest.approx(acceleration_floor(noise, 0.005), rel=1e-9)
+    assert at_rest < bound(noise, 0.005, ("noise", 0.05, 5.0), 9.81) < bound(noise, 0.005, ("noise", 0.5, 5.0), 9.81)

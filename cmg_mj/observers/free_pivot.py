@@ -1,0 +1,206 @@
+"""`gyro_free` on a pivot that moves: it finds out how strongly, and trusts the tilt so much less.
+
+Accelerometers take the pivot's acceleration for gravity, which makes y1 wrong by its horizontal part over g. The
+angular acceleration is the difference between two accelerometers on one body: the pivot's motion is not in it.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.elementwise import Scalar, where
+from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
+from cmg_mj.observers.protocol import Estimate, Measurement
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.sensors.tilt import TiltNoise
+
+
+class State(NamedTuple):
+    """Prediction of sample k, p, z, b, w, its covariance, and what has been learnt of the noise and of the pivot."""
+
+    p: Scalar
+    z: Scalar
+    b: Scalar
+    w: Scalar
+    pp: Scalar
+    pz: Scalar
+    pb: Scalar
+    pw: Scalar
+    zz: Scalar
+    zb: Scalar
+    zw: Scalar
+    bb: Scalar
+    bw: Scalar
+    ww: Scalar
+    scale: Scalar
+    """The sensors' variance over that of the datasheet."""
+    pivot: Scalar
+    """Variance of w [rad^2]."""
+    share: Scalar
+    """How much of it the next sample has."""
+    y1: Scalar
+    """That of the sample before, and by how much it differed from the one before that."""
+    step: Scalar
+
+
+@dataclass(frozen=True, config=STRICT)
+class FreePivot:
+    """x1' = x2, x2' = alpha; the sensors show y1 = x1 + w + v and a = alpha + b + n, at the samples.
+
+    As in `gyro_free`, whose p, z, b, n, v and equations these are, but for w, minus the pivot's horizontal acceleration
+    over g. It fades and is renewed: w+ = f w + white, f = exp(-2 pi pivot_hz dt), so that its variance S is stationary.
+    Two things are learnt on the way, r and S:
+
+    - The sensors' variance is r times that of the datasheet, at least once: vibration is white and no motion of the
+      pivot. r is the mean of (y1 - 2 y1- + y1--)^2/(6 var v) over about `noise_s`.
+    - S+ = S + share (w^2 + ww - S + surprise S (e^2/ee - 1)), at least pivot_floor^2. w and ww are the estimate after
+      the sample and its variance: a step of expectation-maximisation. e and ee are the innovation and its variance,
+      which tell sooner that S is wrong by much. `share` is dt/learn_s at the start and falls, as that of a mean over
+      all samples, to dt/pivot_s.
+
+    While S is zero and r is one it is `gyro_free`.
+
+    Attributes:
+        dt: Sample period [s].
+        model: The reduced model (not used).
+        noise: Of tilt and angular acceleration, by the sensors' datasheet.
+        rate_start: Standard deviation of the rate at the start, about zero [rad/s].
+        bias_start: The same of b [rad/s^2]. The default is that of `gyro_free`.
+        bias_walk: How fast b may change: standard deviation after a second [rad/s^2].
+        jerk: How far alpha is off the straight line between samples: standard deviation of its mean [rad/s^2].
+        pivot_hz: How quickly w is renewed. Not the corner of the motion, which is not known [Hz].
+        pivot_start: Standard deviation of w that is expected at the start [rad].
+        pivot_floor: The least one [rad].
+        pivot_s: Time over which S is learnt [s].
+        learn_s: The same at the start [s].
+        surprise: Weight of the innovation in it.
+        noise_s: Time over which r is learnt [s].
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("acceleration",)
+
+    dt: Positive
+    model: ReducedModel
+    noise: TiltNoise
+    rate_start: Positive = 0.02
+    bias_start: Positive = 0.35
+    bias_walk: NonNegative = 0.01
+    jerk: NonNegative = 0.1
+    pivot_hz: Positive = 5.0
+    pivot_start: NonNegative = 5e-3
+    pivot_floor: NonNegative = 1e-3
+    pivot_s: Positive = 0.5
+    learn_s: Positive = 0.02
+    surprise: NonNegative = 2.0
+    noise_s: Positive = 0.3
+
+    def __post_init__(self) -> None:
+        if not (self.noise.tilt or self.noise.acceleration or self.bias_walk or self.jerk):
+            raise ValueError("bias_walk = 0 and jerk = 0: with sensors without noise one of them must be positive")
+
+    def init(self, y: Measurement) -> State:
+        """Start at rest at the measured tilt, with no bias; of the tilt nothing else is known."""
+        zero = 0.0 * y.y1
+        p = y.y1 - self.dt * self.dt / 6.0 * y.acceleration  # so that the first sample shows what is expected
+        zz, bb, ww = self.rate_start**2 + zero, self.bias_start**2 + zero, self.pivot_start**2 + zero
+        known = (1.0 + zero, zero, zero, zero, zz, zero, zero, bb, zero, ww)
+        learnt = (1.0 + zero, ww, self._shares[1] + zero, y.y1, zero)
+        return self._sample(State(p, zero, zero, zero, *known, *learnt), y)[0]
+
+    def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
+        """Advance by one sample period."""
+        state, x1, x2 = self._sample(state, y)
+        return state, Estimate(x1, x2, y.y2)
+
+    def _sample(self, state: State, y: Measurement) -> tuple[State, Scalar, Scalar]:
+        """Correct what was expected of a sample by what it shows, and advance to the next; x1 and x2 between both."""
+        h, d, f = self.dt, self.dt * self.dt / 6.0, self._fade
+        p, z, b, w, pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, scale, pivot, share, before, step_before = state
+
+        # Learn the noise that there is.
+        c, nn, rest, per_bend = self._noise
+        step = y.y1 - before
+        bend = step - step_before
+        scale = scale + self._shares[2] * (per_bend * bend * bend - scale)
+        r = where(scale > 1.0, scale, 1.0)
+
+        # Correct p, z, b, w, n by e = y1 - p - w - d alpha.
+        e = y.y1 - p - w - d * (y.acceleration - b)
+        ep, ez, eb, ew = pp + pw - d * pb, pz + zw - d * zb, pb + bw - d * bb, pw + ww - d * bw
+        en = r * ((c - d) * nn)
+        ee = ep + ew - d * eb + r * ((c - d) * (c - d) * nn + rest)
+        kp, kz, kb, kw, kn = ep / ee, ez / ee, eb / ee, ew / ee, en / ee
+        p, z, b, w, n = p + kp * e, z + kz * e, b + kb * e, w + kw * e, kn * e
+        alpha = y.acceleration - b - n
+        x1, x2 = p + d * alpha, z + 0.5 * h * alpha
+
+        # What remains uncertain: of p, z, b, w, and of m = b + n, which is alpha's error.
+        pp, pz, zz = pp - kp * ep, pz - kp * ez, zz - kz * ez
+        pb, zb, bb = pb - kp * eb, zb - kz * eb, bb - kb * eb
+        pw, zw, bw, ww = pw - kp * ew, zw - kz * ew, bw - kb * ew, ww - kw * ew
+        pm, zm, bm, wm = pb - kp * en, zb - kz * en, bb - kb * en, bw - kw * en
+        mm = bm - kn * eb + r * nn - kn * en + self.jerk**2
+
+        # Learn how strongly the pivot moves.
+        pivot = pivot + share * (w * w + ww + pivot * (self.surprise * (e * e / ee) - (1.0 + self.surprise)))
+        floor = self.pivot_floor**2
+        pivot = where(pivot > floor, pivot, floor)
+        slower = share / (1.0 + share)
+
+        # Advance: p+ = r + h^2 alpha with r = p + h z, z+ = z + h alpha, w+ = f w + white.
+        r, rr, rz, rb, rw, rm = (
+            p + h * z,
+            pp + h * (2.0 * pz + h * zz),
+            pz + h * zz,
+            pb + h * zb,
+            pw + h * zw,
+            pm + h * zm,
+        )
+        ahead = State(
+            p=r + h * h * alpha,
+            z=z + h * alpha,
+            b=b,
+            w=f * w,
+            pp=rr + h * h * (h * h * mm - 2.0 * rm),
+            pz=rz + h * (h * (h * mm - zm) - rm),
+            pb=rb - h * h * bm,
+            pw=f * (rw - h * h * wm),
+            zz=zz + h * (h * mm - 2.0 * zm),
+            zb=zb - h * bm,
+            zw=f * (zw - h * wm),
+            bb=bb + h * self.bias_walk**2,
+            bw=f * bw,
+            ww=f * f * (ww - pivot) + pivot,
+            scale=scale,
+            pivot=pivot,
+            share=where(slower > self._shares[0], slower, self._shares[0]),
+            y1=y.y1,
+            step=step,
+        )
+        return ahead, x1, x2
+
+    @cached_property
+    def _fade(self) -> float:
+        """What remains of w after a sample period."""
+        return math.exp(-2.0 * math.pi * self.pivot_hz * self.dt)
+
+    @cached_property
+    def _shares(self) -> tuple[float, float, float]:
+        """A sample's in S once it has settled and at the start, and in r."""
+        dt = self.dt
+        return min(dt / self.pivot_s, 1.0), min(dt / self.learn_s, 1.0), min(dt / self.noise_s, 1.0)
+
+    @cached_property
+    def _noise(self) -> tuple[float, float, float, float]:
+        """C and the variances of n and of v', where v = c n + v', v' independent of n; one over 6 times that of v."""
+        noise = self.noise
+        return (
+            noise.correlation * noise.tilt / noise.acceleration if noise.acceleration else 0.0,
+            noise.acceleration**2,
+            noise.tilt**2 * (1.0 - noise.correlation**2),
+            1.0 / (6.0 * noise.tilt**2) if noise.tilt else 0.0,
+        )

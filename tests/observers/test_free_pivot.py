@@ -1,0 +1,157 @@
+"""free_pivot against gyro_free, against least squares over all samples, and what it learns of noise and pivot."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cmg_mj
+from cmg_mj.observers import Measurement, make_observer
+from cmg_mj.observers.free_pivot import FreePivot, State
+from cmg_mj.sensors.tilt import TiltNoise
+from tests.observers.reference import DT, NOISE, PAPER
+from tests.observers.test_gyro_free import gyro_free, motion
+from tests.observers.test_gyro_free import walk as walk_gyro_free
+
+C = NOISE.correlation * NOISE.tilt / NOISE.acceleration
+NEVER: dict[str, Any] = {"pivot_s": 1e12, "learn_s": 1e12, "noise_s": 1e12}
+"""Nothing is learnt: a Kalman filter with the variances that it is told."""
+
+
+def free_pivot(**parameters: Any) -> FreePivot:
+    return FreePivot(DT, PAPER, NOISE, **parameters)
+
+
+def walk(estimator: FreePivot, y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, list[State]]:
+    """Estimates (x1, x2, x3) of the samples after the first, and all states."""
+    states, rows = [estimator.init(Measurement(y1[0], 0.0, a[0]))], []
+    for k in range(1, len(y1)):
+        state, estimate = estimator.step(states[-1], Measurement(y1[k], 0.0, a[k]), 0.0)
+        states.append(state)
+        rows.append(estimate)
+    return np.array(rows), states
+
+
+def shares_of_y1(n: int, sigma: float, hz: float, rng: np.random.Generator) -> np.ndarray:
+    """What a pivot that moves adds to y1: first-order noise."""
+    f, w = math.exp(-2.0 * math.pi * hz * DT), [rng.normal(0.0, sigma)]
+    for _ in range(n - 1):
+        w.append(f * w[-1] + rng.normal(0.0, sigma * math.sqrt(1.0 - f * f)))
+    return np.array(w)
+
+
+def test_while_the_pivot_rests_it_is_gyro_free() -> None:
+    """With no variance of the pivot's, and noise that the datasheet covers."""
+    x1, _, alpha, y1, a = motion(400, np.random.default_rng(1), bias=0.3)
+    y1, a = x1 + 0.5 * (y1 - x1), alpha + 0.3 + 0.5 * (a - alpha - 0.3)
+    estimates, states = walk(free_pivot(pivot_start=0.0, pivot_floor=0.0), y1, a)
+    expected, _ = walk_gyro_free(gyro_free(), y1, a)
+    assert max(state.scale for state in states) <= 1.0
+    np.testing.assert_allclose(estimates, expected, rtol=0.0, atol=1e-12)
+
+
+def least_squares(estimator: FreePivot, y1: np.ndarray, a: np.ndarray) -> tuple[float, float, float]:
+    """x1, x2 and w at the last sample that fit all samples and the start best, weighed by their standard deviations.
+
+    Unknown are x1 and x2 at the first sample, b, and every sample's n and w; bias_walk and jerk are zero.
+    """
+    n = len(y1)
+    unknown = 3 + 2 * n
+    alpha = np.zeros((n, unknown + 1))  # the last column is what is known
+    alpha[:, 2], alpha[:, -1] = -1.0, a
+    alpha[np.arange(n), 3 + np.arange(n)] = -1.0
+    x1, x2 = np.zeros((n, unknown + 1)), np.zeros((n, unknown + 1))
+    x1[0, 0] = x2[0, 1] = 1.0
+    for k in range(1, n):
+        x2[k] = x2[k - 1] + 0.5 * DT * (alpha[k - 1] + alpha[k])
+        x1[k] = x1[k - 1] + DT * x2[k - 1] + DT**2 * (alpha[k - 1] / 3.0 + alpha[k] / 6.0)
+    noise, w = np.eye(n, unknown + 1, 3), np.eye(n, unknown + 1, 3 + n)
+    f, sigma = math.exp(-2.0 * math.pi * estimator.pivot_hz * DT), estimator.pivot_start
+    reading = x1 + w + C * noise
+    reading[:, -1] -= y1
+    reading /= NOISE.tilt * math.sqrt(1.0 - NOISE.correlation**2)
+    start_p = x1[:1] - DT**2 / 6.0 * alpha[:1]
+    start_p[:, -1] -= y1[0] - DT**2 / 6.0 * a[0]
+    start_z = (x2[:1] - 0.5 * DT * alpha[:1]) / estimator.rate_start
+    start_b = np.eye(1, unknown + 1, 2) / estimator.bias_start
+    renewed = (w[1:] - f * w[:-1]) / (sigma * math.sqrt(1.0 - f * f))
+    rows = np.vstack([reading, noise / NOISE.acceleration, start_p, start_z, start_b, w[:1] / sigma, renewed])
+    solution = np.append(np.linalg.lstsq(rows[:, :-1], -rows[:, -1], rcond=None)[0], 1.0)
+    return float(x1[-1] @ solution), float(x2[-1] @ solution), float(w[-1] @ solution)
+
+
+@pytest.mark.parametrize("n", [2, 3, 10, 60])
+def test_with_nothing_to_learn_it_is_least_squares_over_all_samples(n: int) -> None:
+    """Any wrong term in means or covariances shows."""
+    estimator = free_pivot(bias_walk=0.0, jerk=0.0, pivot_start=0.03, surprise=0.0, **NEVER)
+    rng = np.random.default_rng(n)
+    *_, y1, a = motion(n, rng, bias=0.4)
+    y1 = y1 + shares_of_y1(n, 0.03, 5.0, rng)
+    estimates, states = walk(estimator, y1, a)
+    x1, x2, w = least_squares(estimator, y1, a)
+    np.testing.assert_allclose(estimates[-1, :2], (x1, x2), rtol=1e-7, atol=1e-10)
+    f = math.exp(-2.0 * math.pi * estimator.pivot_hz * DT)
+    assert states[-1].w / f == pytest.approx(w, rel=1e-7, abs=1e-10)
+
+
+@pytest.mark.parametrize("hz", [1.0, 5.0, 15.0])
+def test_it_learns_how_strongly_the_pivot_moves(hz: float) -> None:
+    """The standard deviation of w, mean over the last five of eight seconds, to a third; nothing at rest."""
+    rng = np.random.default_rng(3)
+    *_, y1, a = motion(1600, rng, bias=0.2)
+    at_rest, moving = (
+        math.sqrt(np.mean([state.pivot for state in walk(free_pivot(), y1 + w, a)[1][600:]]))
+        for w in (np.zeros(1600), shares_of_y1(1600, 0.05, hz, rng))
+    )
+    assert at_rest < 0.005
+    assert moving == pytest.approx(0.05, rel=0.35)
+
+
+def test_it_does_not_take_vibration_for_the_pivots_motion() -> None:
+    """Noise of thrice the datasheet's has nine times its variance."""
+    x1, _, alpha, y1, a = motion(1600, np.random.default_rng(4), bias=0.0)
+    _, states = walk(free_pivot(), x1 + 3.0 * (y1 - x1), alpha + 3.0 * (a - alpha))
+    assert np.mean([state.scale for state in states[400:]]) == pytest.approx(9.0, rel=0.2)
+    assert math.sqrt(np.mean([state.pivot for state in states[400:]])) < 0.01
+
+
+def test_without_a_measured_acceleration_it_is_refused() -> None:
+    with pytest.raises(cmg_mj.InputError, match="needs the noise of its sensors"):
+        make_observer("free_pivot", DT, PAPER)
+
+
+def test_with_nothing_uncertain_it_is_refused() -> None:
+    perfect = TiltNoise(0.0, 0.0, 0.9)
+    FreePivot(DT, PAPER, perfect, jerk=0.1, bias_walk=0.0)
+    with pytest.raises(ValueError, match="one of them must be positive"):
+        FreePivot(DT, PAPER, perfect, jerk=0.0, bias_walk=0.0)
+
+
+def loop(kind: str, *settings: str) -> float:
+    """Mean velocity RMS error over worlds of push_recovery, the observer in its loop [rad/s]."""
+    scenario = cmg_mj.load_scenario("push_recovery", ["seed=150000", *settings], kind)
+    result = cmg_mj.prepare(scenario).run_many(8, keep_trajectory=False)
+    assert result.stood.all()
+    mean = result.mean("velocity_rms_error_rad_s")
+    assert mean is not None
+    return mean
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("setting", "most"),
+    [
+        ("seed=150000", 1.05),
+        ('pivot=[{kind="noise", acceleration_m_s2=0.5, corner_hz=5.0}]', 0.4),
+        ('pivot=[{kind="noise", acceleration_m_s2=0.5, corner_hz=1.0}]', 0.7),
+        ('pivot=[{kind="sine", acceleration_m_s2=0.7, frequency_hz=3.0}]', 0.3),
+        ("sensors.accelerometer.misalignment_deg=[0.0,1.0]", 1.2),
+        ("sensors.accelerometer.vibration_mg=20", 1.1),
+    ],
+)
+def test_in_the_loop_it_keeps_to_its_share_of_gyro_free(setting: str, most: float) -> None:
+    """docs/studies/free_pivot_grid.py has all cells on 100 worlds."""
+    assert loop("free_pivot", setting) < most * loop("gyro_free", setting)
