@@ -62,12 +62,6 @@ static void restore(const mjModel *m, double *state, int instance)
     if (state[STATUS] == READY) fail(state, "a program has overwritten its state");
 }
 
-/* The number of an element in the state, whatever a program has written there; -1 if there is none. */
-static int element(double number, int n)
-{
-    return number >= 0.0 && number < n ? (int)number : -1;
-}
-
 static double limited(const mjModel *m, int actuator, double control)
 {
     const int i = m->actuator_ctrladr[actuator];
@@ -247,7 +241,7 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability)
     if (!state_is_intact(&rig, state)) restore(m, state, instance);
     if (is_to_spin(m, d, instance) && start_spinning(m, d, instance)) return;
     if (state[STATUS] == READY) take_instant(m, d, state);
-    show(&rig, m, instance, state, d->sensordata);
+    show(&rig, m, state, d->sensordata);
 }
 
 /* Whether MuJoCo leaves an actuator out that the state names. */

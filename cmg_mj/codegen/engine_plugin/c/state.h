@@ -25,6 +25,7 @@ typedef struct {
     int forces;              /* places in sensordata of inner x, inner z, outer x, outer z */
     int encoders;            /* places in sensordata, one a gimbal */
     int servos, motors;      /* numbers of the actuators, one a gimbal */
+    int shows;               /* places in sensordata of what plugin sensors show, -1 where there is none */
     int settings;            /* force sigma, force step, angle step */
     int held, rate;          /* rate of the gimbals until this instant, and from it on [rad/s] */
     int inputs;              /* of this instant: ideal forces, then ideal gimbal angles */
@@ -40,6 +41,9 @@ typedef struct {
 
 enum { SHOWN_Y1, SHOWN_Y2, SHOWN_ACCELERATION, SHOWN_U, SHOWN_X_E, SHOWN_ESTIMATE };
 
+/* Quantities of plugin sensors. */
+enum { ESTIMATE, COMMAND, TILT, GIMBAL, ACCELERATION, INTEGRATOR, SAMPLE, QUANTITIES };
+
 /* Places of the rig as a whole, behind those of the axes, if its turns are compensated. */
 typedef struct {
     int rate_from, rate; /* place in sensordata, and input, of the rate about the vertical [rad/s] */
@@ -49,6 +53,9 @@ typedef struct {
 /* Each returns the first place behind the block. */
 int axis_place(const axis_type *axis, int at, axis_places *places);
 int turning_place(const turning_type *turning, int at, turning_places *places);
+
+/* The number of an element in the state, whatever a program has written there; -1 if there is none. */
+int element(double number, int n);
 
 /* Numbers in the state. */
 int state_size(const rig_type *type);
