@@ -298,8 +298,28 @@ def test_whatever_a_program_writes_into_the_state(number: float, messages: list[
             assert np.isfinite(data.sensordata).all()
             assert abs(data.sensor("balance/command").data) <= made.experiment.law.rate_limit
     assert {SEED, WORLD, STATUS, STEPS, PER_INSTANT, TIMESTEP, STARTS_SPINNING, *CONSTANTS} <= set(stopped)
-    if not np.isfinite(number):  # but for what every step writes
-        assert model.npluginstate - len(stopped) < 20
+    if not np.isfinite(number):  # but for what every step writes, such as the whole second half
+        assert model.npluginstate // 2 - len(stopped) < 20
+
+
+def test_whatever_a_program_writes_between_the_halves_of_a_step(messages: list[str]) -> None:
+    """What a decision has left for the step to count is looked at before it drives anything."""
+    made = quick()
+    model, data = copy.copy(made.model), mujoco.MjData(made.model)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    n_stopped = 0
+    for place in range(model.npluginstate):
+        messages.clear()
+        mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+        mujoco.mj_step(model, data, 3)
+        mujoco.mj_step1(model, data)
+        data.plugin_state[place] = np.nan
+        mujoco.mj_step2(model, data)
+        mujoco.mj_step(model, data, 3)
+        n_stopped += data.plugin_state[STATUS] == FAILED
+        assert len(messages) == (data.plugin_state[STATUS] == FAILED), place
+        assert np.isfinite(data.sensordata).all(), place
+    assert model.npluginstate // 2 - n_stopped < 20
 
 
 def test_a_state_of_zeros_and_one_of_another_step(messages: list[str]) -> None:

@@ -238,7 +238,7 @@ int setup(const rig_type *type, const mjModel *m, int instance, double *state, c
     const double step = m->opt.timestep, steps = floor(type->instant / step + 0.5);
     axis_places places[MOST_AXES];
     int at = HEAD;
-    memset(state, 0, (size_t)state_size(type) * sizeof *state);
+    memset(state, 0, 2 * (size_t)state_size(type) * sizeof *state);
     if (in.prefix_length < 0) return refuse(&in, "the instance must be named '%s', or PREFIX%s", INSTANCE, INSTANCE);
     if (m->opt.disableflags & mjDSBL_SENSOR) return refuse(&in, "<flag sensor=\"disable\"/> leaves the controller blind");
     if (m->opt.disableflags & mjDSBL_ACTUATION) return refuse(&in, "<flag actuation=\"disable\"/> holds its drives");

@@ -90,8 +90,7 @@ static int is_whole(double number)
     return number >= 0.0 && number <= NOISE_LARGEST && number == floor(number);
 }
 
-/* A gimbal is never turned faster than the law's limit, but for what rounding adds. */
-static int is_rate(const axis_type *axis, double rate)
+int is_rate(const axis_type *axis, double rate)
 {
     return fabs(rate) <= 1.001 * axis->controller->rate_limit;
 }

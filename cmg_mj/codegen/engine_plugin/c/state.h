@@ -1,4 +1,5 @@
-/* The layout of an instance's plugin_state: the head, then a block an axis. Every memory lies there. */
+/* The layout of an instance's plugin_state: the head, then a block an axis; and the same once more, as it will be when
+ * the step is taken. Every memory lies there. */
 #ifndef CMG_MJ_STATE_H
 #define CMG_MJ_STATE_H
 
@@ -57,7 +58,7 @@ int turning_place(const turning_type *turning, int at, turning_places *places);
 /* The number of an element in the state, whatever a program has written there; -1 if there is none. */
 int element(double number, int n);
 
-/* Numbers in the state. */
+/* Numbers in one half of the state. */
 int state_size(const rig_type *type);
 
 /* Sum of the numbers that stay as they are from one reset to the next. */
@@ -65,6 +66,9 @@ double state_constants(const rig_type *type, const double *state);
 
 /* Whether a program has left alone what tells the plugin where it is and what it drives. */
 int state_is_intact(const rig_type *type, const double *state);
+
+/* Whether gimbals may turn at a rate: never faster than the law's limit, but for what rounding adds. */
+int is_rate(const axis_type *axis, double rate);
 
 /* Whether all memory is finite. */
 int state_is_finite(const rig_type *type, const double *state);
