@@ -24,7 +24,7 @@ from tests.codegen.engine_plugin.made import check_against_runner, needs_compile
 pytestmark = needs_compiler
 
 SEED, WORLD, STATUS, STEPS, PER_INSTANT, TIMESTEP, IS_PENDING, STARTS_SPINNING, IS_SPINNING_UP, CHECK = range(10)
-CONSTANTS = range(CHECK, CHECK + 14)
+CONSTANTS = range(CHECK, CHECK + 21)
 """Places in the state, as state.h numbers them; the constants are where sensors and drives are, and the settings."""
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
