@@ -18,7 +18,7 @@ from cmg_mj.codegen.engine_plugin.build import common_files
 from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE, generate_plugin
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.plugin_state import FAILED, initial_states, instance_states, set_world
-from cmg_mj.simulation.plugin import describe_rig
+from cmg_mj.simulation.plugin_files import describe_rig
 from tests.codegen.engine_plugin.made import check_against_runner, needs_compiler, quick, run
 
 pytestmark = needs_compiler
