@@ -51,7 +51,7 @@ class StudyOptions(TypedDict):
     "log:first:last:count. With --sample or --sobol also low:high. Fields joined by + take the same values. May be "
     "given again; every combination is run.",
 )
-@observers_option("the scenario's", distinct=False)
+@observers_option("the scenario's", distinct=False, baselines=True)
 @worlds_option("Worlds of each cell.  [default: 20]")
 @click.option(
     "--sample", type=click.IntRange(1), metavar="N", help="Run N points of a quasi-random design instead of a grid."
