@@ -12,9 +12,13 @@ import pytest
 
 from cmg_mj.results.error_bounds import acceleration_floor
 from cmg_mj.sensors.tilt import TiltNoise
+from cmg_mj.studies.sweeps.study import SweepStudy
+from cmg_mj.studies.sweeps.study_file import axes_of, design_of, scenario_of, study_file
 from tests.command import cmg_mj
 
 STUDIES = Path(__file__).resolve().parents[2] / "docs/studies"
+REAL_RIGS = ("real_bend", "real_pivot", "real_rigs", "real_vibration")
+"""Study files of many observers, which `--dry-run` would try for minutes."""
 STEPS = STUDIES / "steps.py"
 
 
@@ -82,11 +86,37 @@ def test_the_tables_of_two_axes() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("study", sorted(path.name for path in STUDIES.glob("*.toml")))
+@pytest.mark.parametrize(
+    "study", sorted({path.name for path in STUDIES.glob("*.toml")} - {f"{name}.toml" for name in REAL_RIGS})
+)
 def test_a_study_file_can_be_run(study: str) -> None:
     outcome = cmg_mj("sweep", STUDIES / study, "--dry-run")
     assert outcome.status == 0, outcome.err
     assert " trials in " in outcome.out
+
+
+@pytest.mark.parametrize("study", REAL_RIGS)
+def test_a_study_of_real_rigs_has_the_baselines(study: str) -> None:
+    name = str(STUDIES / f"{study}.toml")
+    fields = study_file(name)
+    assert fields is not None
+    settings = fields["sweep"]
+    design = design_of(name, settings)
+    scenario, axes = scenario_of(name, fields), tuple(axes_of(name, fields))
+    parsed = SweepStudy(scenario, axes, tuple(settings["observers"]), settings["worlds"], *design)
+    assert {"zero", "mems_as_bought", "mems_fused"} <= set(parsed.references)
+    assert {"gyro_free", "free_pivot"} <= set(parsed.observers)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("study", REAL_RIGS)
+def test_a_study_of_real_rigs_runs(study: str, tmp_path: Path) -> None:
+    size = "--sample 2 --worlds 1 --observers free_pivot,gyro_free,zero --set duration_s=0.1 --set push=[]"
+    outcome = cmg_mj("sweep", STUDIES / f"{study}.toml", *size.split(), "--out", tmp_path)
+    assert outcome.status == 0, outcome.err
+    report = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "| zero (baseline)" in report
+    assert "stopped" not in report
 
 
 @pytest.mark.slow

@@ -92,8 +92,8 @@ def cells_of(trials: Trials) -> Iterator[Summary]:
     """Make a row a cell, point by point: counts of falls, every figure's mean, and its difference to the best.
 
     The best observer of a point has the smallest (or largest, where more is better) mean among those that stood in
-    every world, baselines apart; differences are taken world by world. The share of falls is among the trials that fell or stood; a
-    cell of which all trials were refused or stopped has none.
+    every world, baselines apart; differences are taken world by world. The share of falls is among the trials that
+    fell or stood; a cell of which all trials were refused or stopped has none.
     """
     fallen = trials.fell
     figures = {key: trials.figure(key) for key in COMPARED}

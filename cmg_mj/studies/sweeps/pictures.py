@@ -178,9 +178,7 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
     return pictures
 
 
-def _least_falls(
-    fell: np.ndarray, known: np.ndarray, places: list[int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _least_falls(fell: np.ndarray, known: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find who of some falls the least, unless several do, (n_y, n_x, n_observers) -> (n_y, n_x) each.
 
     The best is sure if its Wilson interval is below those of all others.

@@ -45,8 +45,8 @@ ABOUT_AHEAD = (
 ABOUT_LEADS = (
     f"At how many points each observer has the least mean {heading(ERROR)} of those that stood in every world; "
     "surely: by its difference to every other, world by world, beyond 95 % intervals; close: stood in every world, "
-    f"with at most {CLOSE:g} times the least error. Of a baseline: at how many its error is less than the best observer's, "
-    "or every observer fell somewhere."
+    f"with at most {CLOSE:g} times the least error. Of a baseline: at how many its error is less than the best "
+    "observer's, or no observer stood in every world."
 )
 ABOUT_CURVES = (
     "Bands are 95 % intervals. A cross: some worlds did not stand to the end, and the mean is that of the others, "

@@ -266,8 +266,9 @@ def check_values(study: SweepStudy) -> None:
             changed_plant = load_scenario_plant(scenario, plant) if alone else plant
             for observer in study.observers if parameters else study.observers[: int(alone)]:
                 settings = scenario.observer
-                if observer != base.observer.kind:
-                    settings = ObserverSettings.model_validate({"kind": observer, **dict.fromkeys(parameters, value)})
+                kind = BASELINE_LOOP if observer in RATES else observer
+                if kind != base.observer.kind:
+                    settings = ObserverSettings.model_validate({"kind": kind, **dict.fromkeys(parameters, value)})
                 prepare(scenario.model_copy(update={"observer": settings}), changed_plant)
 
 
