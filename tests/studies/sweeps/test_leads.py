@@ -16,7 +16,6 @@ from cmg_mj.studies.sweeps.cells import cells_of
 from cmg_mj.studies.sweeps.leads import lead_rows
 from cmg_mj.studies.sweeps.pictures import pictures_of
 from cmg_mj.studies.sweeps.report_sections import leads
-from cmg_mj.studies.sweeps.study import SweepStudy
 from tests.command import cmg_mj
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, VELOCITY, make_trials
 
