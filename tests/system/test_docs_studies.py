@@ -111,12 +111,12 @@ def test_a_study_of_real_rigs_has_the_baselines(study: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("study", REAL_RIGS)
 def test_a_study_of_real_rigs_runs(study: str, tmp_path: Path) -> None:
-    size = "--sample 2 --worlds 1 --observers free_pivot,gyro_free,zero --set duration_s=0.1 --set push=[]"
+    size = "--sample 2 --worlds 1 --observers free_pivot,gyro_free,zero --set duration_s=0.1 --set push.0.start_s=0"
     outcome = cmg_mj("sweep", STUDIES / f"{study}.toml", *size.split(), "--out", tmp_path)
     assert outcome.status == 0, outcome.err
     report = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "| zero (baseline)" in report
-    assert "stopped" not in report
+    assert "## Refused and stopped" not in report
 
 
 @pytest.mark.slow
