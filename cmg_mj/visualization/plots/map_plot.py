@@ -92,7 +92,8 @@ def _boundaries(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Se
 def _dotted(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Sequence[str]) -> None:
     """Draw where each of what is no candidate is as good as the best; nothing where it is so in all cells or none."""
     for share, color in zip(spec.ahead.values(), palette, strict=True):
-        if np.nanmin(share, initial=1.0) < 0.5 < np.nanmax(share, initial=0.0):
+        known = share[np.isfinite(share)]
+        if known.min(initial=1.0) < 0.5 < known.max(initial=0.0):
             line = _to_edges(spec, x, y, share)
             axes.contour(*line, [0.5], colors=CASING, linewidths=AHEAD + 2.0)
             axes.contour(*line, [0.5], colors=color, linewidths=AHEAD, linestyles=["dotted"])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
+import matplotlib.image
 import numpy as np
 import pytest
 
@@ -16,6 +18,8 @@ from cmg_mj.studies.sweeps.cells import cells_of
 from cmg_mj.studies.sweeps.leads import lead_rows
 from cmg_mj.studies.sweeps.pictures import pictures_of
 from cmg_mj.studies.sweeps.report_sections import leads
+from cmg_mj.visualization.plots.colours import BASELINE_COLOURS
+from cmg_mj.visualization.plots.run_plot import draw
 from tests.command import cmg_mj
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, VELOCITY, make_trials
 
@@ -80,6 +84,22 @@ def test_a_map_shows_where_baselines_are_ahead() -> None:
     plain = pictures_of(make_trials(GRID, ("linear", "ltv"), 4, error))[0].panels[0].map
     assert plain is not None
     assert not plain.ahead
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fused", [0.15, None])
+def test_the_map_is_drawn_with_a_baselines_line(tmp_path: Path, fused: float | None) -> None:
+    """A line of the fused gyro's colour, unless the true rate falls throughout."""
+    observers = ("linear", "ltv", "mems_fused")
+
+    def drawn(point: dict[str, Any], name: str, world: int) -> float | None:
+        return fused if name == "mems_fused" else error(point, name, world)
+
+    path = tmp_path / "map.png"
+    draw(path, pictures_of(make_trials(GRID, observers, 4, drawn))[0])
+    pixels = (255 * matplotlib.image.imread(path)[:, :400, :3]).round()  # left of the legend
+    of_line = (np.abs(pixels - BASELINE_COLOURS["mems_fused"]).max(axis=2) <= 2.0).sum()
+    assert (of_line > 100) == (fused is not None)
 
 
 def test_a_falls_map_has_the_true_rate_for_the_baselines() -> None:
