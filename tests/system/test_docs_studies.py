@@ -100,10 +100,10 @@ def test_a_study_of_real_rigs_has_the_baselines(study: str) -> None:
     name = str(STUDIES / f"{study}.toml")
     fields = study_file(name)
     assert fields is not None
-    settings = fields["sweep"]
+    settings = fields.get("sweep", {})
     design = design_of(name, settings)
     scenario, axes = scenario_of(name, fields), tuple(axes_of(name, fields))
-    parsed = SweepStudy(scenario, axes, tuple(settings["observers"]), settings["worlds"], *design)
+    parsed = SweepStudy(scenario, axes, tuple(settings.get("observers", [])), settings.get("worlds", 0), *design)
     assert {"zero", "mems_as_bought", "mems_fused"} <= set(parsed.references)
     assert {"gyro_free", "free_pivot"} <= set(parsed.observers)
 
