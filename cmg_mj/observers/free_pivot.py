@@ -63,10 +63,11 @@ class FreePivot:
     - S+ = S + share (w^2 + ww - S + surprise S (e^2/ee - 1)), at least pivot_floor^2. w and ww are the estimate after
       the sample and its variance: a step of expectation-maximisation. e and ee are the innovation and its variance,
       which tell sooner that S is wrong by much. `share` is dt/learn_s at the start and falls, as that of a mean over
-      all samples, to dt/pivot_s.
+      all samples, to dt/pivot_s. Where S rises, hurry share times the rise is added: at the start it is worse to learn of
+      a moving pivot late than to suspect one that rests.
 
     Early samples were trusted too much if S then turns out larger: the p that began at y1 took the w of that time for
-    tilt. So a rise of S adds doubt share (rise of S) to p's variance and to w's, and takes it from their covariance.
+    tilt. So doubt share times the rise is added to p's variance and to w's, and taken from their covariance.
 
     While S is zero and r is one it is `gyro_free`. All is computed in angles of a sample period, x2 dt and alpha dt^2:
     so many multiplications by dt less.
@@ -86,7 +87,8 @@ class FreePivot:
         learn_s: The same at the start [s].
         surprise: Weight of the innovation in it.
         noise_s: Time over which r is learnt [s].
-        doubt: How much of the rise of S is added to the doubt about p, over `share`.
+        hurry: How much faster S rises than it falls, over `share`.
+        doubt: How much of a rise is added to p's variance, over `share`.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("acceleration",)
@@ -99,13 +101,14 @@ class FreePivot:
     bias_walk: NonNegative = 0.01
     jerk: NonNegative = 0.1
     pivot_hz: Positive = 5.0
-    pivot_start: NonNegative = 5e-3
+    pivot_start: NonNegative = 2e-3
     pivot_floor: NonNegative = 1e-3
     pivot_s: Positive = 0.5
     learn_s: Positive = 0.02
     surprise: NonNegative = 2.0
     noise_s: Positive = 0.3
-    doubt: NonNegative = 2.0
+    hurry: NonNegative = 20.0
+    doubt: NonNegative = 3.0
 
     def __post_init__(self) -> None:
         if not (self.noise.tilt or self.noise.acceleration or self.bias_walk or self.jerk):
@@ -161,10 +164,11 @@ class FreePivot:
 
         # Learn how strongly the pivot moves.
         rise = share * (w * w + ww + pivot * (self.surprise * (e * e / ee) - (1.0 + self.surprise)))
-        pivot = pivot + rise
+        early = share * where(rise > 0.0, rise, 0.0)
+        pivot = pivot + rise + self.hurry * early
         floor = self.pivot_floor**2
         pivot = where(pivot > floor, pivot, floor)
-        doubt = self.doubt * share * where(rise > 0.0, rise, 0.0)
+        doubt = self.doubt * early
         pp, pw, ww = pp + doubt, pw - doubt, ww + doubt
         slower = share / (1.0 + share)
 
