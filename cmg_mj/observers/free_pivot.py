@@ -63,8 +63,8 @@ class FreePivot:
     - S+ = S + share (w^2 + ww - S + surprise S (e^2/ee - 1)), at least pivot_floor^2. w and ww are the estimate after
       the sample and its variance: a step of expectation-maximisation. e and ee are the innovation and its variance,
       which tell sooner that S is wrong by much. `share` is dt/learn_s at the start and falls, as that of a mean over
-      all samples, to dt/pivot_s. Where S rises, hurry share times the rise is added: at the start it is worse to learn of
-      a moving pivot late than to suspect one that rests.
+      all samples, to dt/pivot_s. Where S rises, hurry share times the rise is added: at the start it is worse to
+      learn late of a pivot that moves than to suspect one that rests.
 
     Early samples were trusted too much if S then turns out larger: the p that began at y1 took the w of that time for
     tilt. So doubt share times the rise is added to p's variance and to w's, and taken from their covariance.
