@@ -9,9 +9,9 @@ the pivot has its RMS and its corner; a sine has the same RMS, so that its ampli
 - open: the law is fed the true rate, all observers run open loop on the same worlds. Means of the velocity RMS error
   over the run; `free_pivot` by the best other observer (zero, gyros and floors do not count), and by `gyro_free`;
   start-up, the RMS error from 1 to 1.5 s over that from 8 s on; the bound; "told"; the bars, and whether they are met.
-- loop: each in a loop of its own: falls, and errors. If both `free_pivot` and `gyro_free` fall in some world, every other
-  observer runs too. Fisher's exact test (one-sided: more falls) compares it with the one that falls least. A frame that bends is
-  a mast with a fifth of the inertia, and its loop has a notch at the mode (`controller.notch_hz`).
+- loop: each in a loop of its own: falls, and errors. If both `free_pivot` and `gyro_free` fall in some world, every
+  other observer runs too. Fisher's exact test (one-sided: more falls) compares it with the one that falls least. A
+  frame that bends is a mast with a fifth of the inertia; its loop has a notch at the mode (`controller.notch_hz`).
 
 The bound is the error of the stationary Kalman filter that knows what no observer is told: that the accelerometers
 have no offset, how strong the pivot's motion is, and its corner (a second-order Butterworth low-pass) or the frequency
