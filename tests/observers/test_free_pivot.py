@@ -168,6 +168,13 @@ def test_it_learns_how_strongly_the_pivot_moves(hz: float) -> None:
     assert moving == pytest.approx(0.05, rel=0.35)
 
 
+def test_without_noise_the_expected_motion_falls_to_its_floor() -> None:
+    """0.01 m/s^2, a fifth of the weakest motion of the grid."""
+    zeros = np.zeros(300)
+    _, states = walk(free_pivot(), zeros, zeros)
+    assert 9.81 * math.sqrt(states[-1].pivot) == pytest.approx(0.01, rel=0.05)
+
+
 def test_it_does_not_take_vibration_for_the_pivots_motion() -> None:
     """Noise of thrice the datasheet's has nine times its variance."""
     x1, _, alpha, y1, a = motion(1600, np.random.default_rng(4), bias=0.0)
