@@ -20,7 +20,10 @@ from cmg_mj.sensors.tilt import TiltNoise
 
 
 class State(NamedTuple):
-    """Prediction of sample k, p, z, b, w, its covariance, and what has been learnt of the noise and of the pivot."""
+    """Prediction of sample k, p, z, b, w, its covariance, and what has been learnt of the noise and of the pivot.
+
+    All angles: z is that of a sample period, z dt, and b that of its square, b dt^2.
+    """
 
     p: Scalar
     z: Scalar
@@ -60,9 +63,14 @@ class FreePivot:
     - S+ = S + share (w^2 + ww - S + surprise S (e^2/ee - 1)), at least pivot_floor^2. w and ww are the estimate after
       the sample and its variance: a step of expectation-maximisation. e and ee are the innovation and its variance,
       which tell sooner that S is wrong by much. `share` is dt/learn_s at the start and falls, as that of a mean over
-      all samples, to dt/pivot_s.
+      all samples, to dt/pivot_s. Where S rises, hurry share times the rise is added: at the start it is worse to
+      learn late of a pivot that moves than to suspect one that rests.
 
-    While S is zero and r is one it is `gyro_free`.
+    Early samples were trusted too much if S then turns out larger: the p that began at y1 took the w of that time for
+    tilt. So doubt share times the rise is added to p's variance and to w's, and taken from their covariance.
+
+    While S is zero and r is one it is `gyro_free`. All is computed in angles of a sample period, x2 dt and alpha dt^2:
+    so many multiplications by dt less.
 
     Attributes:
         dt: Sample period [s].
@@ -79,6 +87,8 @@ class FreePivot:
         learn_s: The same at the start [s].
         surprise: Weight of the innovation in it.
         noise_s: Time over which r is learnt [s].
+        hurry: How much faster S rises than it falls, over `share`.
+        doubt: How much of a rise is added to p's variance, over `share`.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("acceleration",)
@@ -91,12 +101,14 @@ class FreePivot:
     bias_walk: NonNegative = 0.01
     jerk: NonNegative = 0.1
     pivot_hz: Positive = 5.0
-    pivot_start: NonNegative = 5e-3
+    pivot_start: NonNegative = 2e-3
     pivot_floor: NonNegative = 1e-3
     pivot_s: Positive = 0.5
     learn_s: Positive = 0.02
     surprise: NonNegative = 2.0
     noise_s: Positive = 0.3
+    hurry: NonNegative = 20.0
+    doubt: NonNegative = 3.0
 
     def __post_init__(self) -> None:
         if not (self.noise.tilt or self.noise.acceleration or self.bias_walk or self.jerk):
@@ -104,9 +116,13 @@ class FreePivot:
 
     def init(self, y: Measurement) -> State:
         """Start at rest at the measured tilt, with no bias; of the tilt nothing else is known."""
-        zero = 0.0 * y.y1
-        p = y.y1 - self.dt * self.dt / 6.0 * y.acceleration  # so that the first sample shows what is expected
-        zz, bb, ww = self.rate_start**2 + zero, self.bias_start**2 + zero, self.pivot_start**2 + zero
+        zero, h = 0.0 * y.y1, self.dt
+        p = y.y1 - h * h * y.acceleration / 6.0  # so that the first sample shows what is expected
+        zz, bb, ww = (
+            (h * self.rate_start) ** 2 + zero,
+            (h * h * self.bias_start) ** 2 + zero,
+            self.pivot_start**2 + zero,
+        )
         known = (1.0 + zero, zero, zero, zero, zz, zero, zero, bb, zero, ww)
         learnt = (1.0 + zero, ww, self._shares[1] + zero, y.y1, zero)
         return self._sample(State(p, zero, zero, zero, *known, *learnt), y)[0]
@@ -118,7 +134,7 @@ class FreePivot:
 
     def _sample(self, state: State, y: Measurement) -> tuple[State, Scalar, Scalar]:
         """Correct what was expected of a sample by what it shows, and advance to the next; x1 and x2 between both."""
-        h, d, f = self.dt, self.dt * self.dt / 6.0, self._fade
+        h, d, f = self.dt, 1.0 / 6.0, self._fade
         p, z, b, w, pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, scale, pivot, share, before, step_before = state
 
         # Learn the noise that there is.
@@ -129,50 +145,48 @@ class FreePivot:
         r = where(scale > 1.0, scale, 1.0)
 
         # Correct p, z, b, w, n by e = y1 - p - w - d alpha.
-        e = y.y1 - p - w - d * (y.acceleration - b)
+        a = h * h * y.acceleration
+        e = y.y1 - p - w - d * (a - b)
         ep, ez, eb, ew = pp + pw - d * pb, pz + zw - d * zb, pb + bw - d * bb, pw + ww - d * bw
         en = r * ((c - d) * nn)
         ee = ep + ew - d * eb + r * ((c - d) * (c - d) * nn + rest)
         kp, kz, kb, kw, kn = ep / ee, ez / ee, eb / ee, ew / ee, en / ee
         p, z, b, w, n = p + kp * e, z + kz * e, b + kb * e, w + kw * e, kn * e
-        alpha = y.acceleration - b - n
-        x1, x2 = p + d * alpha, z + 0.5 * h * alpha
+        alpha = a - b - n
+        x1, x2 = p + d * alpha, (z + 0.5 * alpha) * (1.0 / h)
 
         # What remains uncertain: of p, z, b, w, and of m = b + n, which is alpha's error.
         pp, pz, zz = pp - kp * ep, pz - kp * ez, zz - kz * ez
         pb, zb, bb = pb - kp * eb, zb - kz * eb, bb - kb * eb
         pw, zw, bw, ww = pw - kp * ew, zw - kz * ew, bw - kb * ew, ww - kw * ew
         pm, zm, bm, wm = pb - kp * en, zb - kz * en, bb - kb * en, bw - kw * en
-        mm = bm - kn * eb + r * nn - kn * en + self.jerk**2
+        mm = bm - kn * eb + r * nn - kn * en + (h * h * self.jerk) ** 2
 
         # Learn how strongly the pivot moves.
-        pivot = pivot + share * (w * w + ww + pivot * (self.surprise * (e * e / ee) - (1.0 + self.surprise)))
+        rise = share * (w * w + ww + pivot * (self.surprise * (e * e / ee) - (1.0 + self.surprise)))
+        early = share * where(rise > 0.0, rise, 0.0)
+        pivot = pivot + rise + self.hurry * early
         floor = self.pivot_floor**2
         pivot = where(pivot > floor, pivot, floor)
+        doubt = self.doubt * early
+        pp, pw, ww = pp + doubt, pw - doubt, ww + doubt
         slower = share / (1.0 + share)
 
-        # Advance: p+ = r + h^2 alpha with r = p + h z, z+ = z + h alpha, w+ = f w + white.
-        r, rr, rz, rb, rw, rm = (
-            p + h * z,
-            pp + h * (2.0 * pz + h * zz),
-            pz + h * zz,
-            pb + h * zb,
-            pw + h * zw,
-            pm + h * zm,
-        )
+        # Advance: p+ = r + alpha with r = p + z, z+ = z + alpha, w+ = f w + white.
+        r, rz, rb, rw, rm = p + z, pz + zz, pb + zb, pw + zw, pm + zm
         ahead = State(
-            p=r + h * h * alpha,
-            z=z + h * alpha,
+            p=r + alpha,
+            z=z + alpha,
             b=b,
             w=f * w,
-            pp=rr + h * h * (h * h * mm - 2.0 * rm),
-            pz=rz + h * (h * (h * mm - zm) - rm),
-            pb=rb - h * h * bm,
-            pw=f * (rw - h * h * wm),
-            zz=zz + h * (h * mm - 2.0 * zm),
-            zb=zb - h * bm,
-            zw=f * (zw - h * wm),
-            bb=bb + h * self.bias_walk**2,
+            pp=pp + pz + rz + mm - 2.0 * rm,
+            pz=rz + mm - zm - rm,
+            pb=rb - bm,
+            pw=f * (rw - wm),
+            zz=zz + mm - 2.0 * zm,
+            zb=zb - bm,
+            zw=f * (zw - wm),
+            bb=bb + h**5 * self.bias_walk**2,
             bw=f * bw,
             ww=f * f * (ww - pivot) + pivot,
             scale=scale,
@@ -196,11 +210,12 @@ class FreePivot:
 
     @cached_property
     def _noise(self) -> tuple[float, float, float, float]:
-        """C and the variances of n and of v', where v = c n + v', v' independent of n; one over 6 times that of v."""
+        """C and the variances of n dt^2 and of v', v = c n dt^2 + v', v' independent of n; one over 6 times v's."""
         noise = self.noise
+        n = noise.acceleration * self.dt * self.dt
         return (
-            noise.correlation * noise.tilt / noise.acceleration if noise.acceleration else 0.0,
-            noise.acceleration**2,
+            noise.correlation * noise.tilt / n if n else 0.0,
+            n**2,
             noise.tilt**2 * (1.0 - noise.correlation**2),
             1.0 / (6.0 * noise.tilt**2) if noise.tilt else 0.0,
         )

@@ -169,7 +169,8 @@ def positive_gains() -> list[tuple[str, str]]:
             (kind, name) for name in names if isinstance(value := getattr(estimator, name), float) and value > 0.0
         ]
     may_be_zero = {("high_gain", "d_inf"), ("gyro_free", "bias_walk"), ("gyro_free", "jerk")}
-    may_be_zero |= {("free_pivot", name) for name in ("bias_walk", "jerk", "pivot_start", "pivot_floor", "surprise")}
+    may_be_zero |= {("free_pivot", name) for name in ("bias_walk", "jerk", "pivot_start", "pivot_floor")}
+    may_be_zero |= {("free_pivot", name) for name in ("surprise", "hurry", "doubt")}
     return [gain for gain in result if gain not in may_be_zero]
 
 

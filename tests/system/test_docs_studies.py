@@ -155,7 +155,11 @@ def test_the_grid_of_free_pivot(tmp_path: Path) -> None:
 def test_the_bound_of_a_pivot_at_rest_is_that_of_the_acceleration(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(STUDIES)
     bound = importlib.import_module("free_pivot_grid").matched_bound
-    noise = TiltNoise(0.0063, 0.41, 0.89)
-    at_rest = bound(noise, 0.005, None, 9.81)
-    assert at_rest == pytest.approx(acceleration_floor(noise, 0.005), rel=1e-9)
-    assert at_rest < bound(noise, 0.005, ("noise", 0.05, 5.0), 9.81) < bound(noise, 0.005, ("noise", 0.5, 5.0), 9.81)
+    noise, start = TiltNoise(0.0063, 0.41, 0.89), {"offset": 0.35, "rate": 0.02}
+    at_rest, weak, strong, sine = (
+        bound(noise, 0.005, motion, 9.81, **start)
+        for motion in (None, ("noise", 0.05, 5.0), ("noise", 0.5, 5.0), ("sine", 0.5, 5.0))
+    )
+    assert at_rest.error == pytest.approx(acceleration_floor(noise, 0.005), rel=1e-9)
+    assert at_rest.error == sine.error < weak.error < strong.error
+    assert at_rest.start < weak.start < strong.start
