@@ -14,6 +14,7 @@ from cmg_mj.scenario.bend_cures import is_near, loop_of
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
+from cmg_mj.scenario.sliding_pivot import sliding_hint
 
 POOR_DAMPING = 0.4
 """A mode with a smaller damping ratio overshoots by more than a quarter."""
@@ -107,7 +108,7 @@ def _closed_loop(scenario: Scenario, law: StateFeedback, model: ReducedModel) ->
     K = np.array([law.gains])
     late = min(math.floor(delay / period + 1e-9), MOST_PERIODS_LATE)  # whole periods, and the rest of one
     rest = max(delay - late * period, 0.0) if late < MOST_PERIODS_LATE else 0.0
-    before, after = _held(model, rest), _held(model, period - rest)
+    before, after = model.held(rest), model.held(period - rest)
     A = after[0] @ before[0]
     newer, older = after[1], after[0] @ before[1]  # what u of `late` periods ago does, and the one before it
     n, waiting = len(A), late + 1
@@ -153,8 +154,8 @@ def hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]
     """
     law = design.law
     loop = closed_loop(scenario, law, rig.reduced).hint if isinstance(law, StateFeedback) else None
-    bend = _bend_hint(scenario, rig)
-    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *(hint for hint in (loop, bend) if hint)]
+    bend, slide = _bend_hint(scenario, rig), sliding_hint(scenario, law, rig)
+    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *(hint for hint in (loop, bend, slide) if hint)]
 
 
 def _bend_hint(scenario: Scenario, rig: PlantParameters) -> str | None:
@@ -197,19 +198,8 @@ def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:
 
 def _sampled_pole(law: StateFeedback, model: ReducedModel, period: float) -> float:
     """Return the slowest pole of the loop sampled so often, as a continuous one's [1/s]."""
-    A, B = _held(model, period)
+    A, B = model.held(period)
     closed = A - B @ np.array([law.gains])
     if not np.all(np.isfinite(closed)):
         return math.inf
     return math.log(max(float(np.abs(np.linalg.eigvals(closed)).max()), np.finfo(float).tiny)) / period
-
-
-def _held(model: ReducedModel, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """The linearisation (6) with the integrator after a time with the command held: x+ = A x + B u."""
-    from scipy.linalg import expm
-
-    n = len(model.A_e)
-    whole = np.zeros((n + 1, n + 1))
-    whole[:n, :n], whole[:n, n:] = model.A_e, model.B_e
-    whole = expm(whole * time)
-    return whole[:n, :n], whole[:n, n:]

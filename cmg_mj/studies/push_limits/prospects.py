@@ -6,11 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from cmg_mj.controllers.laws.state_feedback import StateFeedback
 from cmg_mj.errors import InputError
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.mounting.fall_check import overlap, simulated_pole
 from cmg_mj.plant.mounting.request import SCALES
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
+from cmg_mj.scenario.sliding_pivot import measured_tilt_pole
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, PushMargin, push_margin
 from cmg_mj.studies.push_limits.recoverable_states import RecoverableLimit, ceiling
@@ -39,6 +41,8 @@ class Prospects:
         push_margin: Pushes that the scenario's law, observer and sensors recover from.
         pole: Unstable pole of the simulated robot, uncontrolled and with its flywheels at rest [1/s].
         overlap: Clause on geoms that overlap where it stands; "" if there are none.
+        pole_about_pivot: Slowest pole of the loop if the tilt were taken about a pivot that slides freely, fed with the
+            true rate [1/s]; NaN for a pivot at rest.
     """
 
     reduced: ReducedModel
@@ -46,6 +50,7 @@ class Prospects:
     push_margin: PushMargin
     pole: float
     overlap: str = ""
+    pole_about_pivot: float = math.nan
 
     @property
     def limit_push_impulse(self) -> float:
@@ -107,6 +112,11 @@ class Prospects:
             "push_margin_impulse_n_m_s": self.push_margin.median_impulse,
             "push_margin_worst_impulse_n_m_s": self.push_margin.worst_impulse,
             "push_margin_torque_n_m": self.push_margin.median_impulse / PUSH_S,
+            **(
+                {"pivot_arm_m": model.pivot_arm, "pole_tilt_about_pivot_1_s": self.pole_about_pivot}
+                if model.pivot_arm
+                else {}
+            ),
         }
 
 
@@ -129,7 +139,10 @@ def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = Tru
         pole = simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias)
         touching = overlap(plant.model, plant.key, plant.axis.line, pole)
     margin = push_margin(experiment.scenario, experiment.design) if with_margin else PushMargin(0.0, 0.0)
-    return Prospects(plant.reduced, limit, margin, pole, touching)
+    about = math.nan
+    if plant.reduced.pivot_arm and isinstance(experiment.law, StateFeedback):
+        about = measured_tilt_pole(experiment.law, plant.reduced, plant.gravity)
+    return Prospects(plant.reduced, limit, margin, pole, touching, about)
 
 
 def smallest_sufficient_scale(suffices: Callable[[float], bool], scale: float) -> float | None:
