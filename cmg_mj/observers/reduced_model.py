@@ -164,16 +164,6 @@ class ReducedModel:
         """B with the integrator appended, (4, 1)."""
         return np.vstack([self.B, [[0.0]]])
 
-    def held(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """The linearisation (6) with the integrator after a time [s] with the command held: x+ = A x + B u."""
-        from scipy.linalg import expm
-
-        n = len(self.A_e)
-        whole = np.zeros((n + 1, n + 1))
-        whole[:n, :n], whole[:n, n:] = self.A_e, self.B_e
-        whole = expm(whole * time)
-        return whole[:n, :n], whole[:n, n:]
-
     def linear_system(self) -> control.StateSpace:
         """The linearisation (6) with the measured outputs, for python-control."""
         import control

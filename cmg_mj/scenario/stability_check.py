@@ -108,7 +108,7 @@ def _closed_loop(scenario: Scenario, law: StateFeedback, model: ReducedModel) ->
     K = np.array([law.gains])
     late = min(math.floor(delay / period + 1e-9), MOST_PERIODS_LATE)  # whole periods, and the rest of one
     rest = max(delay - late * period, 0.0) if late < MOST_PERIODS_LATE else 0.0
-    before, after = model.held(rest), model.held(period - rest)
+    before, after = _held(model, rest), _held(model, period - rest)
     A = after[0] @ before[0]
     newer, older = after[1], after[0] @ before[1]  # what u of `late` periods ago does, and the one before it
     n, waiting = len(A), late + 1
@@ -198,8 +198,19 @@ def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:
 
 def _sampled_pole(law: StateFeedback, model: ReducedModel, period: float) -> float:
     """Return the slowest pole of the loop sampled so often, as a continuous one's [1/s]."""
-    A, B = model.held(period)
+    A, B = _held(model, period)
     closed = A - B @ np.array([law.gains])
     if not np.all(np.isfinite(closed)):
         return math.inf
     return math.log(max(float(np.abs(np.linalg.eigvals(closed)).max()), np.finfo(float).tiny)) / period
+
+
+def _held(model: ReducedModel, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """The linearisation (6) with the integrator after a time with the command held: x+ = A x + B u."""
+    from scipy.linalg import expm
+
+    n = len(model.A_e)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n], whole[:n, n:] = model.A_e, model.B_e
+    whole = expm(whole * time)
+    return whole[:n, :n], whole[:n, n:]

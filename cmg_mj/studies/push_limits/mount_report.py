@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from cmg_mj.plant.tilt_line import HingeLine
-from cmg_mj.scenario.sliding_pivot import IN_THE_MODEL, NOT_IN_THE_MODEL, measured_words, sliding_words, verdict
+from cmg_mj.scenario.sliding_pivot import IN_THE_MODEL, NOT_IN_THE_MODEL, loop_words, measured_words, sliding_words
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
 from cmg_mj.studies.push_limits.mount_files import MountResult
 from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG
@@ -61,7 +61,7 @@ def _pivot(result: MountResult) -> Iterator[str]:
     rig = result.plant.parameters
     if rig.reduced.pivot_arm:
         yield f"  its pivot {sliding_words(rig)}"
-        loop = verdict(result.prospects.pole_about_pivot)
+        loop = loop_words(result.prospects.pole_about_pivot)
         yield f"    about the pivot {measured_words(rig)}, and the loop would be {loop} with the true rate"
         yield f"    in the reduced model: {IN_THE_MODEL}; not: {NOT_IN_THE_MODEL}"
 

@@ -6,13 +6,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cmg_mj.controllers.laws.state_feedback import StateFeedback
 from cmg_mj.errors import InputError
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.mounting.fall_check import overlap, simulated_pole
 from cmg_mj.plant.mounting.request import SCALES
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.scenario.sliding_pivot import measured_tilt_pole
+from cmg_mj.scenario.sliding_pivot import pole_about_pivot
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, PushMargin, push_margin
 from cmg_mj.studies.push_limits.recoverable_states import RecoverableLimit, ceiling
@@ -139,9 +138,7 @@ def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = Tru
         pole = simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias)
         touching = overlap(plant.model, plant.key, plant.axis.line, pole)
     margin = push_margin(experiment.scenario, experiment.design) if with_margin else PushMargin(0.0, 0.0)
-    about = math.nan
-    if plant.reduced.pivot_arm and isinstance(experiment.law, StateFeedback):
-        about = measured_tilt_pole(experiment.law, plant.reduced, plant.gravity)
+    about = pole_about_pivot(experiment.law, plant.parameters)
     return Prospects(plant.reduced, limit, margin, pole, touching, about)
 
 
