@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +15,22 @@ from cmg_mj.scenario.schema import Scenario
 
 IN_THE_MODEL = "the inertia that is left, and the pivot's acceleration in what the sensors show"
 NOT_IN_THE_MODEL = "friction, damping, springs and ends of what it slides on, and that the inertia grows with the tilt"
+_FED = "with that angle and the true rate"
+_UNKNOWN = "and what it slides on is damped or sprung so much that the mass centre does not stay where it is"
 STANDS_STILL = 1e-6
 """A mode of the sampled loop that is so near 1 is the place of what slides, which nothing holds or moves."""
+
+
+class SlidingPoles(NamedTuple):
+    """Slowest pole of the loop fed with the true rate and the tilt taken about a point of the radial line [1/s].
+
+    Attributes:
+        about_centre: About the common mass centre.
+        about_pivot: About the pivot.
+    """
+
+    about_centre: float
+    about_pivot: float
 
 
 def measured_tilt_pole(law: StateFeedback, rig: LinearRig, height: float, gravity: float) -> float:
@@ -44,15 +59,17 @@ def measured_tilt_pole(law: StateFeedback, rig: LinearRig, height: float, gravit
     return math.log(float(np.abs(z[np.abs(z - 1.0) > STANDS_STILL]).max())) / law.dt
 
 
-def pole_about_pivot(law: object, rig: PlantParameters) -> float:
-    """Find the slowest pole with the tilt taken about a pivot that slides [1/s]; NaN for a law of another kind."""
+def sliding_poles(law: object, rig: PlantParameters) -> SlidingPoles | None:
+    """Find the slowest poles of the loop of a rig whose pivot slides; None for a pivot at rest, or another law."""
     if rig.slide is None or not isinstance(law, StateFeedback):
-        return math.nan
-    return measured_tilt_pole(law, rig.slide(), 0.0, rig.gravity)
+        return None
+    linear = rig.slide()
+    heights = rig.reduced.pivot_arm, 0.0
+    return SlidingPoles(*(measured_tilt_pole(law, linear, height, rig.gravity) for height in heights))
 
 
 def sliding_words(rig: PlantParameters) -> str:
-    """Say where the tilt is taken about, for one line; empty for a pivot at rest."""
+    """Say what the tilt is taken about, for one line; empty for a pivot at rest."""
     arm = rig.reduced.pivot_arm
     if not arm:
         return ""
@@ -69,15 +86,20 @@ def measured_words(rig: PlantParameters) -> str:
 
 def loop_words(pole: float) -> str:
     """Say whether a loop with this slowest pole [1/s] is stable."""
-    return f"{'stable' if pole < -MARGIN else 'unstable'} (pole at {pole:.3g} 1/s)"
+    return f"{'stable' if pole < -MARGIN else 'UNSTABLE'} (pole at {pole:.3g} 1/s)"
 
 
 def sliding_hint(scenario: Scenario, law: object, rig: PlantParameters) -> str | None:
-    """Clause for a rig whose pivot slides while the tilt is taken about the pivot."""
-    if not rig.reduced.pivot_arm or rig.tilt.height:
+    """Clause for a rig whose pivot slides, where the tilt is taken about the pivot or the loop is unstable anyway."""
+    if not rig.reduced.pivot_arm:
         return None
-    pole = pole_about_pivot(law, rig) if scenario.controller.angle_source == "measured" else math.nan
-    loop = "" if math.isnan(pole) else f"; fed with it and the true rate, the loop is {loop_words(pole)}"
+    measured = scenario.controller.angle_source == "measured"
+    poles = sliding_poles(law, rig) if measured else None
+    if rig.tilt.height:
+        if poles is None or poles.about_centre < -MARGIN:
+            return None
+        return f"the pivot slides, {_UNKNOWN}: the loop is {loop_words(poles.about_centre)} {_FED}"
+    loop = "" if poles is None else f"; the loop is {loop_words(poles.about_pivot)} {_FED}"
     return (
         f"plant.pivot_slides = false: the pivot slides, and {measured_words(rig)}{loop}; with "
         "plant.pivot_slides=true the tilt is taken about the common mass centre"

@@ -61,8 +61,14 @@ def _pivot(result: MountResult) -> Iterator[str]:
     rig = result.plant.parameters
     if rig.reduced.pivot_arm:
         yield f"  its pivot {sliding_words(rig)}"
-        loop = loop_words(result.prospects.pole_about_pivot)
-        yield f"    about the pivot {measured_words(rig)}, and the loop would be {loop} with the true rate"
+        poles = result.prospects.sliding_poles
+        if poles:
+            yield (
+                f"    so the loop with the true rate is {loop_words(poles.about_centre)}; about the pivot, where "
+                f"{measured_words(rig)}, it is {loop_words(poles.about_pivot)}"
+            )
+        if result.observer != "free_pivot":
+            yield "    if what it slides on rubs, --observer free_pivot stands more of that"
         yield f"    in the reduced model: {IN_THE_MODEL}; not: {NOT_IN_THE_MODEL}"
 
 
