@@ -1,6 +1,6 @@
 """Which observer stands on a cart that slides freely, and how light that may be: the tables of docs/mount.md.
 
-python docs/studies/light_cart.py (about eight minutes on a quiet core)
+python docs/studies/light_cart.py (about four minutes on a quiet core)
 python docs/studies/light_cart.py --rubbing (what the cart slides on is not free of friction; about three minutes)
 
 The cart-pole has the sizes of dm_control's: a pole of 1 m and 0.1 kg; the cart there has 1 kg. A pair of the papers'
@@ -25,7 +25,7 @@ from tests.studies.push_limits.robots import cart_pole
 
 WORLDS = 10
 SECONDS = 20.0
-CARTS_KG = (0.1, 0.3, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0)
+CARTS_KG = (0.1, 0.3, 1.0, 3.0, 10.0)
 RUBBING = ((0.0, 1.0), (0.0, 10.0), (0.0, 30.0), (0.5, 0.0), (1.0, 0.0), (2.0, 0.0))
 """Dry friction [N] and damping [N s/m] of the slider."""
 RATES = {
@@ -39,7 +39,7 @@ RATES = {
 PIVOT, CENTRE = "about the pivot", "about the mass centre"
 LOOPS = [(about, name, "measured") for about in (PIVOT, CENTRE) for name in RATES]
 LOOPS += [(PIVOT, name, "estimated") for name in ("gyro_free", "free_pivot", "kalman")]
-RUBBED = [loop for loop in LOOPS if loop[1] in ("true rate", "gyro_free", "free_pivot", "homogeneous")]
+RUBBED = [loop for loop in LOOPS if loop[0] == CENTRE]
 
 
 def mounted(mass: float, friction: float = 0.0, damping: float = 5e-4) -> tuple[Experiment, Prospects]:
@@ -96,14 +96,17 @@ def main() -> None:
         for friction, damping in RUBBING:
             cart = mounted(1.0, friction, damping)
             rows.append([f"{friction:g}", f"{damping:g}", *(standing(*cart, loop) for loop in RUBBED)])
+            print(*rows[-1], sep=" | ", file=sys.stderr, flush=True)
         print(table(["dry friction [N]", "damping [N s/m]", *names_of(RUBBED)], rows, text_columns=1))
         return
     carts = {mass: mounted(mass) for mass in CARTS_KG}
     names = ["cart [kg]", "inertia left [kg m^2]", "pole: reduced, simulated [1/s]", "ceiling [N m s]", "c [m]"]
     names += ["y1 about the pivot", "loop's pole about the pivot [1/s]", "about the mass centre"]
     print(table(names, [[f"{mass:g}", *figures(*cart)] for mass, cart in carts.items()], text_columns=1), flush=True)
-    cells = {loop: [standing(*cart, loop) for cart in carts.values()] for loop in LOOPS}
-    rows = [[name, *row] for name, row in zip(names_of(LOOPS), cells.values(), strict=True)]
+    rows = []
+    for name, loop in zip(names_of(LOOPS), LOOPS, strict=True):
+        rows.append([name, *(standing(*cart, loop) for cart in carts.values())])
+        print(*rows[-1], sep=" | ", file=sys.stderr, flush=True)
     print(
         table([f"worlds of {WORLDS} that stand; cart [kg]", *(f"{mass:g}" for mass in CARTS_KG)], rows, text_columns=1)
     )

@@ -156,3 +156,35 @@ def test_a_held_cart_is_a_pivot_at_rest(tmp_path: Path) -> None:
     spec = mujoco.MjSpec.from_string(cart_pole())
     model = mount(spec, "pole", axis="hinge").save(tmp_path / "held.xml")
     assert load_plant(model=str(model)).reduced.pivot_arm == 0.0
+
+
+TWO_JOINTS = """
+<mujoco><option timestep="0.005" integrator="RK4"/><worldbody>
+  <body pos="0 0 1"><joint name="lower" type="{kind}" axis="{axis}"/><geom type="box" size="0.2 0.15 0.1" mass="1"/>
+    <body name="pole" pos="0 0 0.2"><joint name="hinge" axis="0 1 0"/>
+      <geom type="capsule" fromto="0 0 0 0 0 1" size="0.045" mass="0.1"/></body></body>
+</worldbody></mujoco>
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "axis", "slides"),
+    [("slide", "1 0 1", True), ("slide", "-1 0 0", True), ("slide", "0 1 0", False), ("hinge", "0 1 0", False)],
+)
+def test_only_what_slides_across_counts(tmp_path: Path, kind: str, axis: str, slides: bool) -> None:
+    """On a slope of 45 deg half of the way is across; along the axis none is; what turns with the rig is no slide."""
+    spec = mujoco.MjSpec.from_string(TWO_JOINTS.format(kind=kind, axis=axis))
+    model = mount(spec, "pole", axis="hinge", release=["lower"]).save(tmp_path / "rig.xml")
+    plant = load_plant(model=str(model), equilibrium_bias_deg=0.0)
+    expected = mass_centre(plant, "lower") * (0.5 if axis == "1 0 1" else 1.0) if slides else 0.0
+    assert plant.reduced.pivot_arm == pytest.approx(expected, rel=1e-9)
+
+
+def mass_centre(plant: Plant, joint: str) -> float:
+    """Height of the common mass centre of all that a joint carries above the hinge: m h/M."""
+    data = plant.new_data()
+    body = int(plant.model.jnt_bodyid[plant.model.joint(joint).id])
+    pole = plant.model.body("pole").id
+    share = plant.model.body_subtreemass[pole] / plant.model.body_subtreemass[body]
+    return float(share * (data.subtree_com[pole, 2] - data.joint("hinge").xanchor[2]))

@@ -10,6 +10,7 @@ import mujoco
 import pytest
 
 from cmg_mj.plant.mounting import mount
+from cmg_mj.results.summary_keys import section
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits import simulated_push
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
@@ -106,3 +107,10 @@ def test_a_cart_that_is_damped_heavily_is_told_that_its_loop_is_unstable() -> No
     Path("cart.xml").write_text(cart_pole(damping=30.0), encoding="utf-8")
     cmg_mj("mount", "cart.xml", "--body", "pole", "--axis", "hinge", "--release", "slider", "--quick", "-o", "rig.xml")
     assert "the mass centre does not stay where it is: the loop is UNSTABLE" in cmg_mj("check", "rig.toml").out
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_where_y1_has_the_pivot_in_it_there_is_no_floor_of_the_noise_alone(light_cart: Experiment, known: bool) -> None:
+    settings = {"duration_s": 1.0, "plant.initial_tilt_deg": 0.0, "plant.pivot_slides": known}
+    (summary,) = light_cart.with_settings({**settings, "controller.angle_source": "estimated"}).run().summaries
+    assert ("floor_accel" in section(summary, "references")) == known
