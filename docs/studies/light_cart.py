@@ -2,6 +2,7 @@
 
 python docs/studies/light_cart.py (about four minutes on a quiet core)
 python docs/studies/light_cart.py --rubbing (what the cart slides on is not free of friction; about three minutes)
+python docs/studies/light_cart.py --height (the tilt is taken about another point than the mass centre; a minute)
 
 The cart-pole has the sizes of dm_control's: a pole of 1 m and 0.1 kg; the cart there has 1 kg. A pair of the papers'
 size is mounted on the pole with `--release slider`. Ten worlds a cell, for 20 s from the tilt that `mount` starts with,
@@ -17,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import mujoco
 
 from cmg_mj import mount
+from cmg_mj.plant import variations
 from cmg_mj.results.markdown import table
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits.mount_files import write_scenario
@@ -36,6 +38,8 @@ RATES = {
     "kalman": ("kalman", "observer"),
     "homogeneous": ("homogeneous", "observer"),
 }
+HEIGHTS_M = (-0.2, -0.1, 0.02, 0.03, 0.05)
+"""So much above the mass centre lies the point that the tilt is taken about."""
 PIVOT, CENTRE = "about the pivot", "about the mass centre"
 LOOPS = [(about, name, "measured") for about in (PIVOT, CENTRE) for name in RATES]
 LOOPS += [(PIVOT, name, "estimated") for name in ("gyro_free", "free_pivot", "kalman")]
@@ -98,6 +102,13 @@ def main() -> None:
             rows.append([f"{friction:g}", f"{damping:g}", *(standing(*cart, loop) for loop in RUBBED)])
             print(*rows[-1], sep=" | ", file=sys.stderr, flush=True)
         print(table(["dry friction [N]", "damping [N s/m]", *names_of(RUBBED)], rows, text_columns=1))
+        return
+    if "--height" in sys.argv:
+        loops, rows, right = RUBBED[:4], [], variations._still_height
+        for off in HEIGHTS_M:
+            variations._still_height = lambda *one, off=off: right(*one) + (off if one[0].pivot_slides else 0.0)
+            rows.append([f"{off:g}", *(standing(*mounted(1.0), loop) for loop in loops)])
+        print(table(["above the mass centre [m]", *names_of(loops)], rows, text_columns=1))
         return
     carts = {mass: mounted(mass) for mass in CARTS_KG}
     names = ["cart [kg]", "inertia left [kg m^2]", "pole: reduced, simulated [1/s]", "ceiling [N m s]", "c [m]"]

@@ -31,10 +31,12 @@ def known(plant: Plant) -> Plant:
     return plant.changed(dataclasses.replace(plant.settings, pivot_slides=True))
 
 
-def cart(folder: Path, mass: float = 1.0, damping: float = 0.0, **settings: float) -> Plant:
-    spec = mujoco.MjSpec.from_string(cart_pole(mass, damping=damping))
+def cart(folder: Path, damping: float = 0.0, wheel_speed: float = 314.0) -> Plant:
+    spec = mujoco.MjSpec.from_string(cart_pole(damping=damping))
     model = mount(spec, "pole", axis="hinge", release=["slider"]).save(folder / "cart.xml")
-    return load_plant(model=str(model), equilibrium_bias_deg=0.0, initial_tilt_deg=0.0, **settings)
+    return load_plant(
+        model=str(model), equilibrium_bias_deg=0.0, initial_tilt_deg=0.0, flywheel_speed_rad_s=wheel_speed
+    )
 
 
 def inertias(plant: Plant) -> tuple[float, float, float, float]:
@@ -88,7 +90,7 @@ def test_the_linearisation_is_mujocos(plant: Plant) -> None:
 @pytest.mark.parametrize("damping", [0.0, 1.0, 30.0])
 def test_damping_is_in_the_linearisation(tmp_path: Path, damping: float) -> None:
     """The pole of [[J, m h], [m h, M]] (x2', v') = (m g h x1, -D v), wheels at rest; the reduced model has no D."""
-    damped = cart(tmp_path, damping=damping, flywheel_speed_rad_s=1e-3)
+    damped = cart(tmp_path, damping=damping, wheel_speed=1e-3)
     J, mh, M, weight = inertias(damped)
     inverse = np.linalg.inv([[J, mh], [mh, M]])
     right = np.array([[weight, 0.0, 0.0], [0.0, 0.0, -damping]])
