@@ -132,7 +132,7 @@ def test_the_bound_of_a_pivot_at_rest_is_that_of_the_acceleration(monkeypatch: p
 
 @pytest.mark.slow
 def test_the_tables_of_the_light_cart() -> None:
-    """The cart of 1 kg: unstable about the pivot, where only the estimated angle helps; stable about the mass centre."""
+    """The cart of 1 kg: unstable about the pivot, stable about the mass centre."""
     command = [sys.executable, STUDIES / "light_cart.py", "--carts", "1", "--worlds", "1"]
     process = subprocess.run(command, capture_output=True, text=True, check=True)
     assert re.search(r"5.51 x1 \+ 0.12 u \| +274 \| +-0.279 \|", process.stdout)
