@@ -78,7 +78,7 @@ def plugin(observers: list[str], worlds: int, as_json: bool) -> None:
     """Time MuJoCo with the controller as a plugin against the same model without: processor time, in pairs."""
     from cmg_mj.scenario.loading import load_scenario
     from cmg_mj.simulation.experiment import prepare
-    from cmg_mj.simulation.plugin import find_tools
+    from cmg_mj.simulation.plugin_files import find_tools
     from cmg_mj.studies.plugin_benchmark import measure, plugin_table
 
     find_tools()

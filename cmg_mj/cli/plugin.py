@@ -12,7 +12,7 @@ from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, sh
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.simulation.plugin import Start
+    from cmg_mj.simulation.plugin_files import Start
 
 
 _NOT_CALLED = (
@@ -90,7 +90,7 @@ def plugin(
         raise InputError("plugin: name an OBSERVER to make a plugin, or give --install, --uninstall or --list")
     from cmg_mj.codegen.engine_plugin.install import has_another
     from cmg_mj.simulation.experiment import prepare
-    from cmg_mj.simulation.plugin import (
+    from cmg_mj.simulation.plugin_files import (
         check_tools,
         make_plugin,
         plugin_files,

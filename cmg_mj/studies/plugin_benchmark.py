@@ -19,7 +19,7 @@ from cmg_mj.plant.plugin_model import START_KEY
 from cmg_mj.plant.plugin_state import initial_states
 from cmg_mj.plant.without_plugins import strip_plugins
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.simulation.plugin import make_plugin, unused_name, write_plugin
+from cmg_mj.simulation.plugin_files import make_plugin, unused_name, write_plugin
 
 REPEATS = 15
 STEPS = 400

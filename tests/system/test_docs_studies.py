@@ -110,6 +110,7 @@ def test_a_cell_of_the_bending_frames_table() -> None:
     assert all(f"| {head} |" in page for head in heads if "off by" not in head)
 
 
+@pytest.mark.slow
 def test_the_grid_of_free_pivot(tmp_path: Path) -> None:
     """Two worlds of two cells; the second call computes nothing."""
     arguments = ["--worlds", "2", "--jobs", "1", "--only", "0.5 m/s2 to 5 Hz", "--keep", tmp_path]

@@ -32,6 +32,7 @@ def peak_mb(*arguments: str, folder: Path) -> int:
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     status, peak = done.stderr.split()[-2:]
     assert status == "0", done.stderr
+    print(f"peak {peak} MB")
     return int(peak)
 
 

@@ -10,6 +10,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 from cmg_mj.errors import InputError, raised
+from cmg_mj.results.memory import release_memory
 from cmg_mj.results.run_folder.lock import Busy, Lock
 from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, require_own, users_files
 from cmg_mj.results.run_folder.swap import ASIDE, recover, stage, swap_in
@@ -98,6 +99,7 @@ class RunFolder:
         except OSError as error:
             raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
         for name, write in files.items():
+            release_memory()  # freed by the file before: together, a long result's would take a lot
             try:
                 write(new / name)
             except BaseException as error:  # such as a title that no file can hold

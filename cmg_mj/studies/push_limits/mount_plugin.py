@@ -16,7 +16,7 @@ from cmg_mj.inputs.includes import check_files
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, users_files
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.simulation.plugin import Plugin, make_plugin, plugin_files, write_plugin
+from cmg_mj.simulation.plugin_files import Plugin, make_plugin, plugin_files, write_plugin
 
 LIBRARY = re.compile(r"libcmg_mj_\w+\.so", re.ASCII)
 

@@ -21,7 +21,8 @@ from cmg_mj.plant.plugin_state import set_world
 from cmg_mj.plant.tilt_line import apply_torques
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.simulation.plugin import Plugin, plugin
+from cmg_mj.simulation.plugin import plugin
+from cmg_mj.simulation.plugin_files import Plugin
 from tests.codegen.export.compiled import COMPILER
 
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")

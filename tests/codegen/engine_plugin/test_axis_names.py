@@ -13,7 +13,8 @@ import pytest
 import cmg_mj
 from cmg_mj import load_scenario, prepare
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.simulation.plugin import make_plugin, plugin
+from cmg_mj.simulation.plugin import plugin
+from cmg_mj.simulation.plugin_files import make_plugin
 from tests.codegen.engine_plugin.made import needs_compiler
 
 pytestmark = [needs_compiler, pytest.mark.slow]

@@ -13,7 +13,7 @@ import pytest
 
 from cmg_mj.codegen.engine_plugin import install as installing
 from cmg_mj.codegen.engine_plugin.load import VARIABLE
-from cmg_mj.simulation.plugin import Plugin
+from cmg_mj.simulation.plugin_files import Plugin
 from tests.codegen.engine_plugin.made import make, needs_compiler
 from tests.codegen.export.compiled import COMPILER
 from tests.command import ROOT, cmg_mj, environment

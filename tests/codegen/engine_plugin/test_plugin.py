@@ -18,13 +18,13 @@ from cmg_mj.codegen.engine_plugin.build import common_files
 from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE, generate_plugin
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.plugin_state import FAILED, initial_states, instance_states, set_world
-from cmg_mj.simulation.plugin import describe_rig
+from cmg_mj.simulation.plugin_files import describe_rig
 from tests.codegen.engine_plugin.made import check_against_runner, needs_compiler, quick, run
 
 pytestmark = needs_compiler
 
 SEED, WORLD, STATUS, STEPS, PER_INSTANT, TIMESTEP, IS_PENDING, STARTS_SPINNING, IS_SPINNING_UP, CHECK = range(10)
-CONSTANTS = range(CHECK, CHECK + 14)
+CONSTANTS = range(CHECK, CHECK + 21)
 """Places in the state, as state.h numbers them; the constants are where sensors and drives are, and the settings."""
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
@@ -298,8 +298,28 @@ def test_whatever_a_program_writes_into_the_state(number: float, messages: list[
             assert np.isfinite(data.sensordata).all()
             assert abs(data.sensor("balance/command").data) <= made.experiment.law.rate_limit
     assert {SEED, WORLD, STATUS, STEPS, PER_INSTANT, TIMESTEP, STARTS_SPINNING, *CONSTANTS} <= set(stopped)
-    if not np.isfinite(number):  # but for what every step writes
-        assert model.npluginstate - len(stopped) < 20
+    if not np.isfinite(number):  # but for what every step writes, such as the whole second half
+        assert model.npluginstate // 2 - len(stopped) < 20
+
+
+def test_whatever_a_program_writes_between_the_halves_of_a_step(messages: list[str]) -> None:
+    """What a decision has left for the step to count is looked at before it drives anything."""
+    made = quick()
+    model, data = copy.copy(made.model), mujoco.MjData(made.model)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    n_stopped = 0
+    for place in range(model.npluginstate):
+        messages.clear()
+        mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+        mujoco.mj_step(model, data, 3)
+        mujoco.mj_step1(model, data)
+        data.plugin_state[place] = np.nan
+        mujoco.mj_step2(model, data)
+        mujoco.mj_step(model, data, 3)
+        n_stopped += data.plugin_state[STATUS] == FAILED
+        assert len(messages) == (data.plugin_state[STATUS] == FAILED), place
+        assert np.isfinite(data.sensordata).all(), place
+    assert model.npluginstate // 2 - n_stopped < 20
 
 
 def test_a_state_of_zeros_and_one_of_another_step(messages: list[str]) -> None:

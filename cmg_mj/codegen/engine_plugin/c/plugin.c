@@ -15,7 +15,7 @@ static double *state_of(const mjModel *m, mjData *d, int instance)
 static int nstate(const mjModel *m, int instance)
 {
     (void)m, (void)instance;
-    return state_size(&rig);
+    return 2 * state_size(&rig);
 }
 
 static int nsensordata(const mjModel *m, int instance, int sensor)
@@ -62,12 +62,6 @@ static void restore(const mjModel *m, double *state, int instance)
     if (state[STATUS] == READY) fail(state, "a program has overwritten its state");
 }
 
-/* The number of an element in the state, whatever a program has written there; -1 if there is none. */
-static int element(double number, int n)
-{
-    return number >= 0.0 && number < n ? (int)number : -1;
-}
-
 static double limited(const mjModel *m, int actuator, double control)
 {
     const int i = m->actuator_ctrladr[actuator];
@@ -86,10 +80,11 @@ static void actuator_act_dot(const mjModel *m, mjData *d, int instance)
     for (int i = 0; i < rig.axes; ++i) {
         const axis_type *axis = rig.axis[i];
         at = axis_place(axis, at, &places);
+        const double rate = is_rate(axis, state[places.rate]) ? state[places.rate] : 0.0;
         for (int j = 0; j < axis->gimbals; ++j) {
             const int servo = element(state[places.servos + j], (int)m->nactuator);
             const int act = servo < 0 ? -1 : m->actuator_actadr[servo];
-            if (act >= 0) d->act_dot[act] = limited(m, servo, axis->modules[j].direction * state[places.rate]);
+            if (act >= 0) d->act_dot[act] = limited(m, servo, axis->modules[j].direction * rate);
         }
     }
 }
@@ -165,23 +160,21 @@ static int read_inputs(const mjModel *m, const mjData *d, double *state)
     return is_finite;
 }
 
-/* Decide on the inputs without counting the decision: everything but what is shown and commanded is put back. */
-static int try_decision(mjData *d, double *state)
+/* Decide on the inputs, in the state's second half: all but what is commanded and shown counts once a step is taken. */
+static int decide(double *state)
 {
-    const size_t size = (size_t)state_size(&rig);
+    const int size = state_size(&rig);
+    double *decided = state + size;
     axis_places places;
     int at = HEAD;
-    mj_markStack(d);
-    double *copy = mj_stackAllocNum(d, size);
-    memcpy(copy, state, size * sizeof *copy);
-    const int is_good = state_advance(&rig, copy);
+    memcpy(decided, state, (size_t)size * sizeof *state);
+    const int is_good = state_advance(&rig, decided);
     for (int i = 0; i < rig.axes; ++i) {
         at = axis_place(rig.axis[i], at, &places);
-        state[places.rate] = copy[places.rate];
-        memcpy(state + places.shown, copy + places.shown,
-            (size_t)(SHOWN_ESTIMATE + rig.axis[i]->controller->estimates) * sizeof *copy);
+        state[places.rate] = decided[places.rate];
+        memcpy(state + places.shown, decided + places.shown,
+            (size_t)(SHOWN_ESTIMATE + rig.axis[i]->controller->estimates) * sizeof *state);
     }
-    mj_freeStack(d);
     return is_good;
 }
 
@@ -205,7 +198,7 @@ static void take_instant(const mjModel *m, mjData *d, double *state)
     }
     sense(m, d);
     if (!read_inputs(m, d, state)) fail(state, "what the sensors show is no number");
-    else if (!try_decision(d, state)) fail(state, "the observer or the law gave no finite number");
+    else if (!decide(state)) fail(state, "the observer or the law gave no finite number");
     else state[IS_PENDING] = 1;
 }
 
@@ -247,7 +240,7 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability)
     if (!state_is_intact(&rig, state)) restore(m, state, instance);
     if (is_to_spin(m, d, instance) && start_spinning(m, d, instance)) return;
     if (state[STATUS] == READY) take_instant(m, d, state);
-    show(&rig, m, instance, state, d->sensordata);
+    show(&rig, m, state, d->sensordata);
 }
 
 /* Whether MuJoCo leaves an actuator out that the state names. */
@@ -281,7 +274,8 @@ static void advance(const mjModel *m, mjData *d, int instance)
         return;
     }
     if (state[IS_PENDING] != 0.0) {
-        (void)state_advance(&rig, state);
+        const int size = state_size(&rig);
+        memcpy(state + HEAD, state + size + HEAD, (size_t)(size - HEAD) * sizeof *state);
         for (int i = 0; i < rig.axes; ++i) {
             at = axis_place(rig.axis[i], at, &places);
             state[places.held] = state[places.rate];

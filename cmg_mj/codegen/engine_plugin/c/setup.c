@@ -191,38 +191,43 @@ static int configure(const search *in, int instance, const rig_type *type, doubl
 
 /* What a plugin sensor shows, by its name: INSTANCE/AXIS/estimate, ... */
 
-enum { NOTHING, ESTIMATE, COMMAND, TILT, GIMBAL, ACCELERATION, INTEGRATOR, SAMPLE };
-static const char *const QUANTITIES[] = {
-    "", "estimate", "command", "tilt", "gimbal_angle", "acceleration", "integrator", "sample"};
+static const char *const quantities[QUANTITIES] = {
+    "estimate", "command", "tilt", "gimbal_angle", "acceleration", "integrator", "sample"};
 
+/* -1 if it is no sensor of the instance's. */
 static int quantity_of(const rig_type *type, const mjModel *m, int instance, int sensor, int *which)
 {
     const char *owner = instance_name(m, instance), *name = m->names + m->name_sensoradr[sensor];
     const size_t length = strlen(owner);
-    if (strncmp(name, owner, length) || name[length] != '/') return NOTHING;
+    if (strncmp(name, owner, length) || name[length] != '/') return -1;
     name += length + 1;
     for (int i = 0; i < type->axes; ++i) {
         const char *prefix = type->axis[i]->prefix;
         if (strncmp(name, prefix, strlen(prefix))) continue;
-        for (int quantity = ESTIMATE; quantity <= SAMPLE; ++quantity)
-            if (!strcmp(name + strlen(prefix), QUANTITIES[quantity])) {
+        for (int quantity = 0; quantity < QUANTITIES; ++quantity)
+            if (!strcmp(name + strlen(prefix), quantities[quantity])) {
                 *which = i;
                 return quantity;
             }
     }
-    return NOTHING;
+    return -1;
 }
 
-static int check_sensors(const search *in, const rig_type *type, int instance)
+static int find_shown(const search *in, const rig_type *type, int instance, const axis_places *places, double *state)
 {
     const mjModel *m = in->m;
     int which = 0;
-    for (int i = 0; i < m->nsensor; ++i)
-        if (m->sensor_type[i] == mjSENS_PLUGIN && m->sensor_plugin[i] == instance &&
-            quantity_of(type, m, instance, i, &which) == NOTHING)
+    for (int i = 0; i < type->axes; ++i)
+        for (int quantity = 0; quantity < QUANTITIES; ++quantity) state[places[i].shows + quantity] = -1.0;
+    for (int i = 0; i < m->nsensor; ++i) {
+        if (m->sensor_type[i] != mjSENS_PLUGIN || m->sensor_plugin[i] != instance) continue;
+        const int quantity = quantity_of(type, m, instance, i, &which);
+        if (quantity < 0)
             return refuse(in, "sensor '%s': must be named '%s/' and, of several axes, 'AXIS/', and then estimate, "
                 "command, tilt, gimbal_angle, acceleration, integrator or sample", m->names + m->name_sensoradr[i],
                 instance_name(m, instance));
+        state[places[which].shows + quantity] = m->sensor_adr[i];
+    }
     return 1;
 }
 
@@ -231,17 +236,17 @@ int setup(const rig_type *type, const mjModel *m, int instance, double *state, c
     const char *name = instance_name(m, instance);
     const search in = {m, name, prefix_length(name), message};
     const double step = m->opt.timestep, steps = floor(type->instant / step + 0.5);
-    axis_places places;
+    axis_places places[MOST_AXES];
     int at = HEAD;
-    memset(state, 0, (size_t)state_size(type) * sizeof *state);
+    memset(state, 0, 2 * (size_t)state_size(type) * sizeof *state);
     if (in.prefix_length < 0) return refuse(&in, "the instance must be named '%s', or PREFIX%s", INSTANCE, INSTANCE);
     if (m->opt.disableflags & mjDSBL_SENSOR) return refuse(&in, "<flag sensor=\"disable\"/> leaves the controller blind");
     if (m->opt.disableflags & mjDSBL_ACTUATION) return refuse(&in, "<flag actuation=\"disable\"/> holds its drives");
     if (!(steps >= 1.0 && fabs(steps * step - type->instant) <= 1e-9 * type->instant))
         return refuse(&in, "a physics step of %g s: must divide %g s", step, type->instant);
     for (int i = 0; i < type->axes; ++i) {
-        at = axis_place(type->axis[i], at, &places);
-        if (!find_axis(&in, type->axis[i], &places, state)) return 0;
+        at = axis_place(type->axis[i], at, &places[i]);
+        if (!find_axis(&in, type->axis[i], &places[i], state)) return 0;
     }
     if (type->turning) {
         turning_places turning;
@@ -249,7 +254,7 @@ int setup(const rig_type *type, const mjModel *m, int instance, double *state, c
         if (!find_sensor(&in, type->axis[0]->prefix, "fog", mjSENS_GYRO, &state[turning.rate_from])) return 0;
         state[turning.rate_from] += 2; /* its z axis, upward */
     }
-    if (!check_sensors(&in, type, instance) || !configure(&in, instance, type, state)) return 0;
+    if (!find_shown(&in, type, instance, places, state) || !configure(&in, instance, type, state)) return 0;
     state[STATUS] = READY;
     state[PER_INSTANT] = steps;
     state[TIMESTEP] = step;
@@ -281,23 +286,23 @@ int shown_size(const rig_type *type, const mjModel *m, int instance, int sensor)
 {
     int which = 0;
     const int quantity = quantity_of(type, m, instance, sensor, &which);
-    return quantity == NOTHING ? 0 : quantity == ESTIMATE ? type->axis[which]->controller->estimates : 1;
+    return quantity < 0 ? 0 : quantity == ESTIMATE ? type->axis[which]->controller->estimates : 1;
 }
 
-void show(const rig_type *type, const mjModel *m, int instance, const double *state, double *sensordata)
+void show(const rig_type *type, const mjModel *m, const double *state, double *sensordata)
 {
-    static const int PLACE[] = {0, SHOWN_ESTIMATE, SHOWN_U, SHOWN_Y1, SHOWN_Y2, SHOWN_ACCELERATION, SHOWN_X_E, 0};
-    axis_places places[MOST_AXES];
+    static const int PLACE[QUANTITIES] = {
+        SHOWN_ESTIMATE, SHOWN_U, SHOWN_Y1, SHOWN_Y2, SHOWN_ACCELERATION, SHOWN_X_E, 0};
+    axis_places places;
     int at = HEAD;
-    for (int i = 0; i < type->axes; ++i) at = axis_place(type->axis[i], at, &places[i]);
-    for (int sensor = 0; sensor < m->nsensor; ++sensor) {
-        if (m->sensor_type[sensor] != mjSENS_PLUGIN || m->sensor_plugin[sensor] != instance) continue;
-        int which = 0;
-        const int quantity = quantity_of(type, m, instance, sensor, &which);
-        double *result = sensordata + m->sensor_adr[sensor];
-        const double *shown = state + places[which].shown + PLACE[quantity];
-        if (quantity == SAMPLE) *result = floor(state[STEPS] / state[PER_INSTANT] / type->period);
-        else if (quantity != ESTIMATE) *result = *shown;
-        else memcpy(result, shown, (size_t)m->sensor_dim[sensor] * sizeof *result);
+    for (int i = 0; i < type->axes; ++i) {
+        at = axis_place(type->axis[i], at, &places);
+        for (int quantity = 0; quantity < QUANTITIES; ++quantity) {
+            const int n = quantity == ESTIMATE ? type->axis[i]->controller->estimates : 1;
+            const int place = element(state[places.shows + quantity], (int)m->nsensordata - n + 1);
+            if (place < 0) continue;
+            if (quantity == SAMPLE) sensordata[place] = floor(state[STEPS] / state[PER_INSTANT] / type->period);
+            else memcpy(sensordata + place, state + places.shown + PLACE[quantity], (size_t)n * sizeof *state);
+        }
     }
 }

@@ -20,6 +20,6 @@ void spin(const rig_type *type, const mjModel *m, mjData *d, int instance);
 
 /* Places in sensordata, and what is shown there of a state. */
 int shown_size(const rig_type *type, const mjModel *m, int instance, int sensor);
-void show(const rig_type *type, const mjModel *m, int instance, const double *state, double *sensordata);
+void show(const rig_type *type, const mjModel *m, const double *state, double *sensordata);
 
 #endif

@@ -12,7 +12,8 @@ int axis_place(const axis_type *axis, int at, axis_places *places)
     places->encoders = places->forces + FORCES;
     places->servos = places->encoders + gimbals;
     places->motors = places->servos + gimbals;
-    places->settings = places->motors + gimbals;
+    places->shows = places->motors + gimbals;
+    places->settings = places->shows + QUANTITIES;
     places->held = places->settings + 3;
     places->rate = places->held + 1;
     places->inputs = places->rate + 1;
@@ -41,6 +42,11 @@ int turning_place(const turning_type *turning, int at, turning_places *places)
     places->rate_from = at++;
     places->rate = at++;
     return turn_gyro_place(at, &places->gyro);
+}
+
+int element(double number, int n)
+{
+    return number >= 0.0 && number < n ? (int)number : -1;
 }
 
 int state_size(const rig_type *type)
@@ -84,8 +90,7 @@ static int is_whole(double number)
     return number >= 0.0 && number <= NOISE_LARGEST && number == floor(number);
 }
 
-/* A gimbal is never turned faster than the law's limit, but for what rounding adds. */
-static int is_rate(const axis_type *axis, double rate)
+int is_rate(const axis_type *axis, double rate)
 {
     return fabs(rate) <= 1.001 * axis->controller->rate_limit;
 }

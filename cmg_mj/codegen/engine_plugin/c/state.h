@@ -1,4 +1,5 @@
-/* The layout of an instance's plugin_state: the head, then a block an axis. Every memory lies there. */
+/* The layout of an instance's plugin_state: the head, then a block an axis; and the same once more, as it will be when
+ * the step is taken. Every memory lies there. */
 #ifndef CMG_MJ_STATE_H
 #define CMG_MJ_STATE_H
 
@@ -25,6 +26,7 @@ typedef struct {
     int forces;              /* places in sensordata of inner x, inner z, outer x, outer z */
     int encoders;            /* places in sensordata, one a gimbal */
     int servos, motors;      /* numbers of the actuators, one a gimbal */
+    int shows;               /* places in sensordata of what plugin sensors show, -1 where there is none */
     int settings;            /* force sigma, force step, angle step */
     int held, rate;          /* rate of the gimbals until this instant, and from it on [rad/s] */
     int inputs;              /* of this instant: ideal forces, then ideal gimbal angles */
@@ -40,6 +42,9 @@ typedef struct {
 
 enum { SHOWN_Y1, SHOWN_Y2, SHOWN_ACCELERATION, SHOWN_U, SHOWN_X_E, SHOWN_ESTIMATE };
 
+/* Quantities of plugin sensors. */
+enum { ESTIMATE, COMMAND, TILT, GIMBAL, ACCELERATION, INTEGRATOR, SAMPLE, QUANTITIES };
+
 /* Places of the rig as a whole, behind those of the axes, if its turns are compensated. */
 typedef struct {
     int rate_from, rate; /* place in sensordata, and input, of the rate about the vertical [rad/s] */
@@ -50,7 +55,10 @@ typedef struct {
 int axis_place(const axis_type *axis, int at, axis_places *places);
 int turning_place(const turning_type *turning, int at, turning_places *places);
 
-/* Numbers in the state. */
+/* The number of an element in the state, whatever a program has written there; -1 if there is none. */
+int element(double number, int n);
+
+/* Numbers in one half of the state. */
 int state_size(const rig_type *type);
 
 /* Sum of the numbers that stay as they are from one reset to the next. */
@@ -58,6 +66,9 @@ double state_constants(const rig_type *type, const double *state);
 
 /* Whether a program has left alone what tells the plugin where it is and what it drives. */
 int state_is_intact(const rig_type *type, const double *state);
+
+/* Whether gimbals may turn at a rate: never faster than the law's limit, but for what rounding adds. */
+int is_rate(const axis_type *axis, double rate);
 
 /* Whether all memory is finite. */
 int state_is_finite(const rig_type *type, const double *state);
