@@ -24,6 +24,11 @@ from cmg_mj.sensors.tilt import RadialTilt
 _new = tuple.__new__  # a named tuple's own takes twice as long
 
 QUARTER_TURN = math.pi / 2.0
+LEAST_ARM_M = 1e-4
+"""A pivot that moves by less for a tilt of 1 rad is at rest [m]."""
+UP = np.array([0.0, 0.0, 1.0])
+TURNS_ALIKE = 1e-6
+"""A frame whose rate differs from the hinge's by less turns with the hinge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,4 +232,21 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     line.tilt(data, QUARTER_TURN)
     mujoco.mj_forward(model, data)
     gravity_torque = -(line.motion(model, data) @ data.qfrc_bias) / n
-    return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n)
+    arm = _pivot_arm(model, key, axis, upright.rates)
+    return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n, arm)
+
+
+def _pivot_arm(model: mujoco.MjModel, key: int, axis: Axis, rates: np.ndarray) -> float:
+    """Find how far the pivot slides back, across the axis, for a tilt of 1 rad while the joints have these rates [m].
+
+    It is 0 where the pivot is at rest, and where what the hinge hangs on turns with it: that is no sliding pivot.
+    """
+    data = at_keyframe(model, key)
+    turn = data.xmat[axis.frame].reshape(3, 3)
+    slides, turns = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    mujoco.mj_jac(model, data, slides, turns, data.xpos[axis.frame] + turn @ axis.point, axis.frame)
+    line = turn @ axis.direction
+    if abs(float(line @ turns @ rates) - 1.0) > TURNS_ALIKE:
+        return 0.0
+    arm = -float(np.cross(line, UP) @ slides @ rates)
+    return arm if arm > LEAST_ARM_M else 0.0

@@ -17,10 +17,17 @@ SMALL = 1e-9
 
 @dataclass(frozen=True)
 class Inertia:
-    """About a line: `coupling_row` couples a tilt with every joint, (nv,); `tilt_inertia` is the tilt's [kg m^2]."""
+    """About a line.
+
+    Attributes:
+        coupling_row: Couples a tilt with every joint, (nv,).
+        tilt_inertia: The tilt's [kg m^2].
+        rates: The joints' rates while it tilts by 1 rad/s and all that nothing holds gives way, (nv,).
+    """
 
     coupling_row: np.ndarray
     tilt_inertia: float
+    rates: np.ndarray
 
 
 def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int, float]) -> Inertia:
@@ -46,17 +53,21 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
     mujoco.mj_fullM(model, data, dense)
     motion = line.motion(model, data)
     row = motion @ dense
-    line_inertia = row @ motion
+    line_inertia, rates = row @ motion, motion
     loose = _free_dofs(model, data) if isinstance(line, HingeLine) else []
     loose = [dof for dof in loose if not motion[dof]]
     if loose:
         gives, inertia = row[loose], dense[np.ix_(loose, loose)]
         held = np.concatenate([_contacts(model, data), _weld_jacobian(model, data)])[:, loose]
+        ways = None
         if held.size:
             ways = _null_space(held)
             gives, inertia = gives @ ways, ways.T @ inertia @ ways
-        line_inertia = line_inertia - gives @ np.linalg.solve(inertia, gives)
-    return Inertia(row, float(line_inertia))
+        way = np.linalg.solve(inertia, gives)
+        line_inertia = line_inertia - gives @ way
+        rates = motion.copy()
+        rates[loose] -= way if ways is None else ways @ way
+    return Inertia(row, float(line_inertia), rates)
 
 
 def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, joint: int, speed: float) -> np.ndarray:

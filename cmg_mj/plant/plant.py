@@ -6,7 +6,7 @@ import copy
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Unpack
@@ -33,6 +33,7 @@ from cmg_mj.plant.coupling import turning
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse_drawn
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
 from cmg_mj.plant.parts import EQUILIBRIUM_KEY, element_id
+from cmg_mj.plant.sliding_model import sliding_model
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
@@ -296,8 +297,7 @@ class Plant:
         """
         if len(self.axes) > 1:
             raise InputError(f"{self.path}: tilts about several axes; use multi_axis_controller")
-        law = law or StateFeedback(dt=0.005)
-        sensors = sensors or Sensors()
+        law, sensors = law or StateFeedback(dt=0.005), sensors or Sensors()
         if isinstance(observer, (str, Mapping)):
             settings = ObserverSettings(**({"kind": observer} if isinstance(observer, str) else observer))
             observer = settings.make(law.dt, self.reduced, self.parameters.noise(sensors))
@@ -338,7 +338,8 @@ class Plant:
         names = tuple(module.name for module in self.axis.modules)
         numbers = self.reduced, self.radial_tilt, self.gravity, self.timestep, self.largest_step
         bend = bend_model(self.model, self.key, self.axis, self.settings)
-        return PlantParameters(self.path, names, *numbers, self.hints, bend)
+        slide = partial(sliding_model, self.model, self.key, self.axis) if self.reduced.pivot_arm else None
+        return PlantParameters(self.path, names, *numbers, self.hints, bend, slide)
 
     def initialise(self, data: mujoco.MjData) -> None:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""

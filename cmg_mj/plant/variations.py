@@ -149,12 +149,13 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
         InputError: The outer one is no farther out than the inner one.
     """
     as_filed = axis.radial_tilt
+    height = _still_height(settings, axis, path)
     distances = {
         "accelerometer_inner": (settings.accelerometer_inner_m, as_filed.r_inner),
         "accelerometer_outer": (settings.accelerometer_outer_m, as_filed.r_outer),
     }
     if all(to is None for to, _ in distances.values()) and not settings.has_misplaced:
-        return as_filed
+        return as_filed.about(height)
     known = [was if to is None else to for to, was in distances.values()]
     off = {
         "accelerometer_inner": settings.accelerometer_inner_misplaced_mm,
@@ -175,7 +176,17 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
             arm = model.site_pos[site] - axis.point
             model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (to / was - 1.0)
             model.site_sameframe[site] = 0  # should it have stood where the body's frame does
-    return RadialTilt(*known)
+    return RadialTilt(*known).about(height)
+
+
+def _still_height(settings: PlantSettings, axis: Axis, path: Path) -> float:
+    """Height above the pivot of the point that the tilt estimate takes to be at rest [m]."""
+    if not settings.pivot_slides:
+        return 0.0
+    if not axis.reduced.pivot_arm:
+        about = f" of axis {axis.name!r}" if axis.name else ""
+        raise InputError(f"plant.pivot_slides = true: {path}: the pivot{about} does not slide freely; leave it out")
+    return axis.reduced.pivot_arm
 
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:

@@ -17,6 +17,7 @@ from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.plant_settings import BendBeyond
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
+from cmg_mj.scenario.sliding_pivot import IN_THE_MODEL, NOT_IN_THE_MODEL, sliding_words
 from cmg_mj.scenario.stability_check import closed_loop, hints
 
 BEYOND: dict[BendBeyond, str] = {
@@ -68,6 +69,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
     ]
     rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
     rows += [("pivot", pivot.words) for pivot in scenario.pivot]
+    rows += _pivot_rows(rig)
     missing = list(left_out(scenario).values())
     if missing:
         rows.append(("left out", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
@@ -80,6 +82,14 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
 
 def _about(torque: Push | Swing) -> str:
     return "" if torque.axis is None else f" about {torque.axis}"
+
+
+def _pivot_rows(rig: PlantParameters) -> Iterator[tuple[str, str]]:
+    """Where a pivot slides: what the tilt is taken about, and what of the sliding is in the reduced model."""
+    if rig.reduced.pivot_arm:
+        yield "pivot", sliding_words(rig)
+        yield "", f"in the reduced model: {IN_THE_MODEL}"
+        yield "", f"not in it: {NOT_IN_THE_MODEL}"
 
 
 def _bend_rows(scenario: Scenario, rig: PlantParameters) -> Iterator[tuple[str, str]]:
@@ -167,6 +177,7 @@ def rig_description(
         ("modules", ", ".join(rig.modules)),
         ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
         ("", f"omega_d = {reduced.omega_d:.6g} rad/s, m g l/sqrt(2) = {reduced.gravity_torque:.6g} N m"),
+        *_pivot_rows(rig),
         ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),
         ("law", law),
         *(("hint", hint) for hint in clauses),

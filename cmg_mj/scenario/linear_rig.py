@@ -46,16 +46,21 @@ class LinearRig(NamedTuple):
             frequencies_hz: Frequencies below half the sample rate, (n_frequencies,) [Hz].
             dt: Sample period [s].
         """
+        n = len(self.A)
+        F, G = self.held(dt)
+        z = np.exp(2j * np.pi * frequencies_hz * dt)
+        states = np.linalg.solve(z[:, None, None] * np.eye(n) - F, np.broadcast_to(G, (len(z), n, 1)))
+        return Response(*(self.C @ states)[:, :, 0].T)
+
+    def held(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """The rig after a time [s] with the command held: x+ = F x + G u."""
         from scipy.linalg import expm
 
         n = len(self.A)
         whole = np.zeros((n + 1, n + 1))
         whole[:n, :n], whole[:n, n:] = self.A, self.B
         whole = expm(whole * dt)
-        F, G = whole[:n, :n], whole[:n, n:]
-        z = np.exp(2j * np.pi * frequencies_hz * dt)
-        states = np.linalg.solve(z[:, None, None] * np.eye(n) - F, np.broadcast_to(G, (len(z), n, 1)))
-        return Response(*(self.C @ states)[:, :, 0].T)
+        return whole[:n, :n], whole[:n, n:]
 
     def lightly_damped(self, ratio: float = 0.3) -> np.ndarray:
         """Poles of poorly damped modes, one of each pair, (n_modes,) complex [1/s]."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.scenario.linear_rig import BendModel
+from cmg_mj.scenario.linear_rig import BendModel, LinearRig
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 
@@ -26,6 +27,8 @@ class PlantParameters(NamedTuple):
         largest_step: The largest physics step that is accurate enough [s].
         hints: Clauses on what the reduced model does not know of the plant.
         bend: The plant with its bend, linearised; None if its frame is rigid.
+        slide: Linearises a plant whose pivot slides freely, with its servos and the tilt taken about the pivot; None
+            for a pivot at rest.
     """
 
     path: Path
@@ -37,6 +40,7 @@ class PlantParameters(NamedTuple):
     largest_step: float
     hints: tuple[str, ...]
     bend: BendModel | None = None
+    slide: Callable[[], LinearRig] | None = None
 
     def noise(self, sensors: Sensors) -> TiltNoise:
         """The noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""

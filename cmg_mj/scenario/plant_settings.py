@@ -47,6 +47,9 @@ class PlantSettings:
         accelerometer_inner_misplaced_mm: So much farther out the inner accelerometer sits than the tilt estimate
             knows [mm].
         accelerometer_outer_misplaced_mm: The outer accelerometer likewise [mm].
+        pivot_slides: What the tilt joint hangs on slides freely, as a light cart does, and the tilt estimate knows it:
+            it counts the accelerometers' distances from the common mass centre, which stays where it is. Otherwise
+            from the pivot.
         tilt_friction_n_m: Dry friction of the tilt joint [N m].
         tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
         flywheel_speed_rad_s: At which all flywheels turn, each in its own direction [rad/s]. The controller knows it.
@@ -77,6 +80,7 @@ class PlantSettings:
     accelerometer_outer_m: Annotated[Positive | None, Batched(), PerAxis()] = None
     accelerometer_inner_misplaced_mm: Annotated[float, Batched(), PerAxis()] = 0.0
     accelerometer_outer_misplaced_mm: Annotated[float, Batched(), PerAxis()] = 0.0
+    pivot_slides: Annotated[bool, PerAxis()] = False
     tilt_friction_n_m: Annotated[NonNegative | None, Batched()] = None
     tilt_damping_n_m_s: Annotated[NonNegative | None, Batched()] = None
     flywheel_speed_rad_s: Positive | None = None

@@ -14,6 +14,7 @@ from cmg_mj.scenario.bend_cures import is_near, loop_of
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
+from cmg_mj.scenario.sliding_pivot import sliding_hint
 
 POOR_DAMPING = 0.4
 """A mode with a smaller damping ratio overshoots by more than a quarter."""
@@ -153,8 +154,8 @@ def hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]
     """
     law = design.law
     loop = closed_loop(scenario, law, rig.reduced).hint if isinstance(law, StateFeedback) else None
-    bend = _bend_hint(scenario, rig)
-    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *(hint for hint in (loop, bend) if hint)]
+    bend, slide = _bend_hint(scenario, rig), sliding_hint(scenario, law, rig)
+    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *(hint for hint in (loop, bend, slide) if hint)]
 
 
 def _bend_hint(scenario: Scenario, rig: PlantParameters) -> str | None:

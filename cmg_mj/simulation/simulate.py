@@ -148,6 +148,7 @@ class _Simulation:
         y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
         has_acceleration = [
             not (self.pivots or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.settings.bends)
+            and plant.radial_tilt.height == plant.reduced.pivot_arm
             for plant, sensor in pairs
         ]
         floors = Floors(noises, y1_period, has_acceleration)

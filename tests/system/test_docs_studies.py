@@ -163,3 +163,13 @@ def test_the_bound_of_a_pivot_at_rest_is_that_of_the_acceleration(monkeypatch: p
     assert at_rest.error == pytest.approx(acceleration_floor(noise, 0.005), rel=1e-9)
     assert at_rest.error == sine.error < weak.error < strong.error
     assert at_rest.start < weak.start < strong.start
+
+
+@pytest.mark.slow
+def test_the_tables_of_the_light_cart() -> None:
+    """The cart of 1 kg: unstable about the pivot, stable about the mass centre."""
+    command = [sys.executable, STUDIES / "light_cart.py", "--carts", "1", "--worlds", "1"]
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert re.search(r"5.51 x1 \+ 0.12 u \| +274 \| +-0.279 \|", process.stdout)
+    for about, stands in (("about the pivot", 0), ("about the mass centre", 1)):
+        assert re.search(rf"\n\| gyro_free, {about} +\| +{stands} \|", process.stdout)

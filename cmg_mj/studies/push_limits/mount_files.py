@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Collection
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -177,7 +178,8 @@ def _mount_and_write(
                 trial = model.with_suffix(".trial.xml")
                 sufficient = _sufficient_scale(robot, request, trial, observer, time_limit)
         pushed = write_scenario(model, mounted.path, observer, limits, request.name, simulated) if folder else None
-        text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated)
+        sliding = sliding_axes(experiment.plant)
+        text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated, sliding)
         model.with_suffix(".toml").write_bytes(signed(text, ".toml"))
         check_replaceable(file, overwrite=overwrite)  # also what has come meanwhile
         if folder and pushed:
@@ -242,9 +244,21 @@ def write_scenario(
         The prepared experiment.
     """
     path = model.with_suffix(".toml")
-    with whole_file(path) as temporary:
-        temporary.write_bytes(signed(scenario_text(model.name, robot, observer, limits, axis, simulated), ".toml"))
-    return prepare(load_scenario(str(path)))
+
+    def written(sliding: Collection[str]) -> Experiment:
+        with whole_file(path) as temporary:
+            text = scenario_text(model.name, robot, observer, limits, axis, simulated, sliding)
+            temporary.write_bytes(signed(text, ".toml"))
+        return prepare(load_scenario(str(path)))
+
+    experiment = written(())
+    sliding = sliding_axes(experiment.plant)
+    return written(sliding) if sliding else experiment
+
+
+def sliding_axes(plant: Plant) -> list[str]:
+    """Return the names of the axes whose pivot slides freely."""
+    return [axis.name for axis in plant.axes if axis.reduced.pivot_arm]
 
 
 def scenario_text(
@@ -254,10 +268,16 @@ def scenario_text(
     limits: Prospects | None,
     axis: str,
     simulated: SimulatedPush | None = None,
+    sliding: Collection[str] = (),
 ) -> str:
-    """Return the scenario that `write_scenario` writes, as TOML."""
+    """Return the scenario that `write_scenario` writes, as TOML; `sliding` are the axes whose pivot slides."""
     start = {"initial_tilt_deg": limits.start_tilt_deg if limits else 0.0}
     plant = {"model": model, "equilibrium_bias_deg": 0.0, **({"initial_tilt_deg": 0.0} if axis else start)}
+    slides = {"pivot_slides": True}
+    plant |= slides if "" in sliding else {}
+    axes = {axis: {"plant": start}} if axis else {}
+    for name in filter(None, sliding):
+        axes[name] = {"plant": axes.get(name, {}).get("plant", {}) | slides}
     pushes: list[dict[str, str | float]] = []
     largest = simulated.impulse if simulated else limits.push_margin.median_impulse if limits else 0.0
     if largest:
@@ -271,7 +291,7 @@ def scenario_text(
             "plant": plant,
             "controller": {"gains": "scaled"},
             "observer": {"kind": observer},
-            **({"axes": {axis: {"plant": start}}} if axis else {}),
+            **({"axes": axes} if axes else {}),
             **({"push": pushes} if pushes else {}),
         }
     )
