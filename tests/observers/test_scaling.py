@@ -1,4 +1,4 @@
-"""Observers carried to another rig: with time, tilt, inertia and noise scaled they do the same in their own units."""
+"""Observers carried to another rig: with time, inertia and noise scaled they do the same in their own units."""
 
 from __future__ import annotations
 
@@ -13,14 +13,12 @@ from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.observers.scaling import TORQUE, Owner, Scales, Unit, carried, scaled_parameters, scales_of, units_of
+from cmg_mj.observers.scaling import PURE, TORQUE, UNITS, Owner, Scales, Unit, carried, scaled_parameters, scales_of
 from tests.observers.reference import DT, HEAVY, NOISE, PAPER, rough_signals
 
-EXTRA = {"bias_rad": Unit(0, 1)}
+EXTRA = {"bias_rad": PURE}
 """Units of estimates beyond x; the others are torques."""
-PAPERS, SLOW = Scales(1.0), Scales(time=2.7)
-TINY, SLOW_TINY_AND_HEAVY = Scales(1.0, tilt=1e-8), Scales(time=2.7, tilt=0.13e-8, inertia=900.0)
-"""Another unit of tilt leaves (4) the same only while sin(x1) is x1 to the last digit."""
+SLOW_AND_HEAVY = Scales(time=2.7, inertia=900.0)
 OTHER: dict[str, dict[str, Any]] = {
     "homogeneous": {"friction_n_m": 0.02, "damping_n_m_s": 0.01},
     "luenberger": {"L": ((20.0, 0.3), (150.0, -2.0), (0.7, 20.0))},
@@ -38,14 +36,14 @@ def other_rig(model: ReducedModel, s: Scales) -> ReducedModel:
         J1=model.J1 * s.inertia,
         J2=model.J2 * s.inertia,
         J_d=model.J_d * s.inertia,
-        omega_d=model.omega_d * s.tilt / s.time,
+        omega_d=model.omega_d / s.time,
         gravity_torque=model.gravity_torque * s.inertia / s.time**2,
     )
 
 
 def of_all(kind: str, values: dict[str, Any], scales: Scales) -> dict[str, Any]:
     """Every parameter in the other rig's units, whatever it describes."""
-    units = units_of(kind)
+    units = UNITS[kind]
     return {name: carried(value, units[name], scales) if name in units else value for name, value in values.items()}
 
 
@@ -54,31 +52,28 @@ def estimates(kind: str, scales: Scales, model: ReducedModel) -> np.ndarray:
     signature = OBSERVER_CLASSES.takes(kind)
     names = [name for name in signature if name not in OBSERVER_CLASSES.bench_parameters]
     values = {name: signature[name].default for name in names} | OTHER.get(kind, {})
-    if kind == "high_gain" and scales.tilt != 1.0:  # its powers have no parameter with the unit of tilt
-        values["d_inf"] = 0.0
-    tilt, rate, acceleration = (Unit(time, 1).factor(scales) for time in (0, -1, -2))
+    rate, acceleration = 1.0 / scales.time, 1.0 / scales.time**2
     noise = replace(
         NOISE,
-        tilt=0.05 * NOISE.tilt * tilt,  # less than y1 has: free_pivot learns that
+        tilt=0.05 * NOISE.tilt,  # less than y1 has: free_pivot learns that
         acceleration=NOISE.acceleration * acceleration,
     )
     of_rig = (DT * scales.time, other_rig(model, scales), noise)
     observer = make_observer(kind, *of_rig, **of_all(kind, values, scales))
     y1, y2, u = rough_signals(150)
     a = np.random.default_rng(0).normal(0.0, 5.0, 150) * acceleration
-    y1, u = y1 * tilt, u / scales.time
+    u = u / scales.time
     state, rows = observer.init(Measurement(y1[0], y2[0], a[0])), []
     for k in range(1, 150):
         state, estimate = observer.step(state, Measurement(y1[k], y2[k], a[k]), u[k - 1])
         rows.append(estimate)
     extra = [EXTRA.get(name, TORQUE).factor(scales) for name in extra_signals(observer)]
-    return np.array(rows) / [tilt, rate, 1.0, *extra]
+    return np.array(rows) / [1.0, rate, 1.0, *extra]
 
 
 @pytest.mark.parametrize("kind", sorted(OBSERVERS))
-@pytest.mark.parametrize(("first", "other"), [(PAPERS, SLOW), (TINY, SLOW_TINY_AND_HEAVY)])
-def test_the_same_in_the_rigs_own_units(kind: str, first: Scales, other: Scales) -> None:
-    expected, scaled = (estimates(kind, scales, HEAVY) for scales in (first, other))
+def test_the_same_in_the_rigs_own_units(kind: str) -> None:
+    expected, scaled = (estimates(kind, scales, HEAVY) for scales in (Scales(1.0), SLOW_AND_HEAVY))
     size = np.abs(expected).max(axis=0)
     np.testing.assert_allclose(scaled / size, expected / size, rtol=0.0, atol=1e-9)
 
@@ -87,16 +82,12 @@ def test_the_same_in_the_rigs_own_units(kind: str, first: Scales, other: Scales)
 def test_every_number_has_a_unit(kind: str) -> None:
     parameters = OBSERVER_CLASSES.takes(kind).values()
     numbers = {p.name for p in parameters if p.name not in OBSERVER_CLASSES.bench_parameters}
-    assert set(units_of(kind)) == numbers - {"bias", "torque"}
+    assert set(UNITS[kind]) == numbers - {"bias", "torque"}
 
 
-def test_the_scales_are_those_of_the_law() -> None:
-    """k2 acts on a rate of tilt: [rad/s of the gimbal] per unit of tilt over time."""
+def test_the_scale_of_time_is_that_of_the_law() -> None:
     model = ReducedModel(J1=40.0, J2=0.01, J_d=0.04, omega_d=300.0, gravity_torque=350.0, gimbals=2)
-    time, tilt, _ = scales_of(model)
-    units = (Unit(-1, -1), Unit(0, -1), Unit(-1), Unit(-2))
-    expected = [gain * unit.factor(Scales(time, tilt)) for gain, unit in zip(TABLE_2_GAINS, units, strict=True)]
-    np.testing.assert_allclose(scaled_gains(model), expected, rtol=1e-12)
+    np.testing.assert_allclose(scaled_gains(model)[2], TABLE_2_GAINS[2] / scales_of(model).time, rtol=1e-12)
 
 
 def test_nothing_changes_on_the_papers_rig() -> None:
@@ -108,16 +99,14 @@ def test_nothing_changes_on_the_papers_rig() -> None:
 
 def test_a_slow_robot_gets_slow_gains() -> None:
     humanoid = ReducedModel(J1=68.79, J2=-0.0098, J_d=0.0567, omega_d=314.0, gravity_torque=536.6, gimbals=2)
-    time, tilt, inertia = scales_of(humanoid)
-    assert (time, tilt, inertia) == pytest.approx((2.675, 0.124, 1112.0), rel=2e-3)
-    assert scaled_parameters("homogeneous", humanoid) == pytest.approx(
-        {"k1": 20.0 / time * tilt**0.15, "k2": 150.0 / time**2 * tilt**0.3}
-    )
+    time, inertia = scales_of(humanoid)
+    assert (time, inertia) == pytest.approx((2.675, 1112.0), rel=2e-3)
+    assert scaled_parameters("homogeneous", humanoid) == pytest.approx({"k1": 20.0 / time, "k2": 150.0 / time**2})
     assert scaled_parameters("linear", humanoid) == {"tau": pytest.approx(0.02 * time)}
-    assert scaled_parameters("kalman", humanoid)["torque_start"] == pytest.approx(0.2 * inertia * tilt / time**2)
+    assert scaled_parameters("kalman", humanoid)["torque_start"] == pytest.approx(0.2 * inertia / time**2)
 
 
 def test_the_sensors_observers_and_a_users_own_stay_as_they_are() -> None:
     for kind in ("gyro_free", "free_pivot", "finite_difference", "tests.studies.tuning.user_observer:UserObserver"):
         assert scaled_parameters(kind, HEAVY) == {}
-    assert {unit.owner for unit in units_of("gyro_free").values() if isinstance(unit, Unit)} == {Owner.SENSORS}
+    assert {unit.owner for unit in UNITS["gyro_free"].values() if isinstance(unit, Unit)} == {Owner.SENSORS}

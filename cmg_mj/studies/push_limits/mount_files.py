@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ import tomli_w
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.paths import expanded
 from cmg_mj.observers import OBSERVER_CLASSES
+from cmg_mj.observers.scaling import Number, scaled_names, scaled_parameters
 from cmg_mj.plant.mounting import MountedRobot
 from cmg_mj.plant.mounting.mount import mount_on_request
 from cmg_mj.plant.mounting.mounted import check_target, with_scenario
@@ -24,6 +26,7 @@ from cmg_mj.results.files import whole_file
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.signed_text import signed
 from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.plugin import Plugin, find_tools
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
@@ -49,6 +52,13 @@ PUSH_SHARE = 0.6
 PUSHED_AT_S, DURATION_S = 10.0, 20.0
 """The gimbals come back from the first tilt before the push: both limits are those of upright gimbals. On a slow robot,
 whose pole is 3 1/s, that takes so long."""
+DIGITS = 4
+"""Significant digits of the observer's parameters."""
+SCALED_COMMENT = (
+    "# The observer's parameters, carried over from the papers' rig by this robot's time scale (docs/mount.md)."
+)
+AxesParameters = Mapping[str, Mapping[str, Number]]
+"""Axis -> parameter of its observer -> value."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +187,8 @@ def _mount_and_write(
                 trial = model.with_suffix(".trial.xml")
                 sufficient = _sufficient_scale(robot, request, trial, observer, time_limit)
         pushed = write_scenario(model, mounted.path, observer, limits, request.name, simulated) if folder else None
-        text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated)
+        parameters = observer_parameters(observer, experiment)
+        text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated, parameters)
         model.with_suffix(".toml").write_bytes(signed(text, ".toml"))
         check_replaceable(file, overwrite=overwrite)  # also what has come meanwhile
         if folder and pushed:
@@ -242,9 +253,17 @@ def write_scenario(
         The prepared experiment.
     """
     path = model.with_suffix(".toml")
-    with whole_file(path) as temporary:
-        temporary.write_bytes(signed(scenario_text(model.name, robot, observer, limits, axis, simulated), ".toml"))
-    return prepare(load_scenario(str(path)))
+
+    def written(kind: str, parameters: AxesParameters) -> Scenario:
+        text = scenario_text(model.name, robot, kind, limits, axis, simulated, parameters)
+        with whole_file(path) as temporary:
+            temporary.write_bytes(signed(text, ".toml"))
+        return load_scenario(str(path))
+
+    if not scaled_names(observer):
+        return prepare(written(observer, {}))
+    rig = prepare(written("finite_difference", {}))  # which suits every rig
+    return prepare(written(observer, observer_parameters(observer, rig)), rig.plant)
 
 
 def scenario_text(
@@ -254,6 +273,7 @@ def scenario_text(
     limits: Prospects | None,
     axis: str,
     simulated: SimulatedPush | None = None,
+    parameters: AxesParameters | None = None,
 ) -> str:
     """Return the scenario that `write_scenario` writes, as TOML."""
     start = {"initial_tilt_deg": limits.start_tilt_deg if limits else 0.0}
@@ -264,14 +284,36 @@ def scenario_text(
         torque = float(f"{PUSH_SHARE * largest / PUSH_S:.3g}")
         pushed_axis = {"axis": axis} if axis else {}
         pushes = [{**pushed_axis, "start_s": PUSHED_AT_S, "duration_s": PUSH_S, "torque_n_m": torque}]
-    return tomli_w.dumps(
+    observers = {name: its for name, its in (parameters or {}).items() if its}
+    axes = {name: {"observer": its} for name, its in observers.items()} if len(observers) > 1 else {}
+    if axis:
+        axes = {**axes, axis: {"plant": start, **axes.get(axis, {})}}
+    text = tomli_w.dumps(
         {
             "title": f"{robot.stem}, balanced",
             "duration_s": DURATION_S,
             "plant": plant,
             "controller": {"gains": "scaled"},
-            "observer": {"kind": observer},
-            **({"axes": {axis: {"plant": start}}} if axis else {}),
+            "observer": {"kind": observer, **(next(iter(observers.values())) if len(observers) == 1 else {})},
+            **({"axes": axes} if axes else {}),
             **({"push": pushes} if pushes else {}),
         }
     )
+    if observers:
+        header = "[axes" if len(observers) > 1 else "[observer]"
+        text = text.replace(f"\n{header}", f"\n{SCALED_COMMENT}\n{header}", 1)
+    return text
+
+
+def observer_parameters(kind: str, experiment: Experiment) -> AxesParameters:
+    """Carry an observer's parameters to a robot, axis by axis, in the digits that its scenario shows."""
+    parts = experiment.parts
+    return {part.plant.axis.name: _shown(scaled_parameters(kind, part.plant.reduced)) for part in parts}
+
+
+def _shown(parameters: Mapping[str, Number]) -> dict[str, Number]:
+    return {name: _rounded(value) for name, value in parameters.items()}
+
+
+def _rounded(value: Number) -> Number:
+    return tuple(map(_rounded, value)) if isinstance(value, tuple) else float(f"{value:.{DIGITS}g}")
