@@ -299,10 +299,14 @@ def scenario_text(
             **({"push": pushes} if pushes else {}),
         }
     )
-    if observers:
-        header = "[axes" if len(observers) > 1 else "[observer]"
-        text = text.replace(f"\n{header}", f"\n{SCALED_COMMENT}\n{header}", 1)
-    return text
+    if not observers:
+        return text
+    return commented(text, SCALED_COMMENT, "[axes" if len(observers) > 1 else "[observer]")
+
+
+def commented(text: str, comment: str, header: str) -> str:
+    """Put a comment above the first header in a TOML text that begins so."""
+    return text.replace(f"\n{header}", f"\n{comment}\n{header}", 1)
 
 
 def observer_parameters(kind: str, experiment: Experiment) -> AxesParameters:
