@@ -78,7 +78,6 @@ def tune_mounted(
     *,
     stop: Callable[[], bool] = lambda: False,
     on_share: Callable[[float], None] | None = None,
-    longest_s: float = LONGEST_S,
 ) -> MountTuning:
     """Tune the observer of a mounted robot, and write its parameters if they are better in both ways.
 
@@ -89,7 +88,6 @@ def tune_mounted(
         path: The scenario that the mount has written.
         stop: Whether to end the search now.
         on_share: Called now and then with the completed share.
-        longest_s: The search ends after so long [s].
 
     Returns:
         The result.
@@ -99,7 +97,7 @@ def tune_mounted(
     """
     experiment = prepare(load_scenario(str(path)))
     experiment.require_single_axis("mount --tune")
-    end, stopped = time.monotonic() + longest_s, False
+    end, stopped = time.monotonic() + LONGEST_S, False
 
     def over() -> bool:
         nonlocal stopped
