@@ -10,6 +10,7 @@ import mujoco
 import pytest
 
 from cmg_mj import mount
+from cmg_mj.observers.linear import LinearDifferentiator
 from cmg_mj.observers.scaling import scaled_parameters
 from cmg_mj.studies.push_limits.mount_files import SCALED_COMMENT, AxesParameters, scenario_text, write_scenario
 from tests.plant.mounting.test_mount import UNIVERSAL
@@ -48,5 +49,6 @@ def test_each_axis_has_those_of_its_own_reduced_model(tmp_path: Path) -> None:
     model = mount(first.spec, "trunk", axis="pitch", name="pitch", position=(0.0, 0.0, 0.35)).save(tmp_path / "rig.xml")
     experiment = write_scenario(model, model, "linear", axis="pitch")
     for part in experiment.parts:
-        expected = scaled_parameters("linear", part.plant.reduced)["tau"]
-        assert part.design.observer().tau == pytest.approx(expected, rel=1e-3)
+        observer = part.design.observer()
+        assert isinstance(observer, LinearDifferentiator)
+        assert observer.tau == pytest.approx(scaled_parameters("linear", part.plant.reduced)["tau"], rel=1e-3)
