@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack
 
 import click
 
@@ -156,8 +156,10 @@ def mount(
             with_plugin=with_plugin,
         )
     lines = list(mount_report_lines(result))
-    tuning, ctrl_c = _tuning(result, lines) if with_tuning else (None, None)
-    show(result.figures() | (tuning.figures() if tuning else {}), "\n".join(lines), as_json)
+    tuned = _tuned(result) if with_tuning else Tuned()
+    if tuned.tuning:
+        lines.append(tuned.tuning.line())
+    show(result.figures() | (tuned.tuning.figures() if tuned.tuning else {}), "\n".join(lines), as_json)
     if not as_json:
         note_hints(result.hints)
         run_it = shell_command("cmg-mj", "run", result.scenario_path)
@@ -165,18 +167,29 @@ def mount(
         if result.plugin:
             example = result.plugin.model.with_name(f"{result.plugin.model.stem}_example.py")
             note(f"wrote {result.plugin.model.parent}; try: {shell_command('python', example)}")
-    if ctrl_c is not None and ctrl_c.noted:
-        end_interrupted(f"interrupted; {result.scenario_path} is whole")
+    if tuned.error:
+        raise tuned.error
+    if tuned.interrupted:
+        end_interrupted(f"interrupted; {result.path} and {result.scenario_path} are whole")
 
 
-def _tuning(result: MountResult, lines: list[str]) -> tuple[MountTuning | None, CtrlC]:
+class Tuned(NamedTuple):
+    """What has become of the tuning."""
+
+    tuning: MountTuning | None = None
+    error: InputError | None = None
+    interrupted: bool = False
+
+
+def _tuned(result: MountResult) -> Tuned:
     """Tune the observer of a robot that is mounted; a Ctrl-C ends the search, and a second one leaves all as it was."""
     from cmg_mj.studies.push_limits.mount_tuning import tune_mounted
 
     with CtrlC() as ctrl_c, progress(f"tuning {result.observer}", 1.0) as on_progress:
         try:
             tuning = tune_mounted(result.scenario_path, stop=lambda: ctrl_c.noted, on_share=on_progress)
+        except InputError as error:
+            return Tuned(error=InputError(f"mounted, but --tune: {error}"))
         except KeyboardInterrupt:
-            return None, ctrl_c
-    lines.append(tuning.line())
-    return tuning, ctrl_c
+            return Tuned(interrupted=True)
+    return Tuned(tuning, interrupted=ctrl_c.noted)

@@ -26,6 +26,9 @@ LEVEL = NoiseLevelResult(400.0, {"tau": 0.05}, {"tau": 0.05}, [], 0.1, 0.2, 0.5 
 FOUND = "linear tuned on 8 worlds: tau 0.05; on 8 others its fit is 0.67 (before 0.33), and by the reduced model E = "
 
 
+TORSO = ("mount", str(EXAMPLES / "torso.xml"), "--body", "torso", "--axis", "x", "--scale", "1.21", "--quick")
+
+
 class Stubs(NamedTuple):
     path: Path
     use: Callable[[NoiseLevelResult, float, float], None]
@@ -90,12 +93,32 @@ def test_not_beside_a_plugin(elsewhere: None) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("failure", "status", "message"),
+    [
+        (InputError("nothing to tune"), 2, "mounted, but --tune: nothing to tune"),
+        (KeyboardInterrupt(), 130, "interrupted; balanced.xml and balanced.toml are whole"),
+    ],
+)
+def test_what_is_mounted_stays(
+    elsewhere: None, monkeypatch: pytest.MonkeyPatch, failure: BaseException, status: int, message: str
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise failure
+
+    monkeypatch.setattr(mount_tuning, "tune_mounted", fail)
+    outcome = cmg_mj(*TORSO, "--tune")
+    assert (outcome.status, outcome.err.splitlines()[-1]) == (status, f"cmg-mj: {message}")
+    assert "inertia 8.135 kg m^2" in outcome.out
+    assert is_as_written(Path("balanced.toml"))
+
+
+@pytest.mark.slow
 def test_the_command(elsewhere: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever comes out, within its time, the scenario runs and its first line is right."""
     monkeypatch.setattr(mount_tuning, "WORLDS", 2)
     monkeypatch.setattr(mount_tuning, "LONGEST_S", 1.0)
-    torso = ("mount", str(EXAMPLES / "torso.xml"), "--body", "torso", "--axis", "x", "--scale", "1.21", "--quick")
-    outcome = cmg_mj(*torso, "--observer", "linear", "--tune")
+    outcome = cmg_mj(*TORSO, "--observer", "linear", "--tune")
     assert outcome.status == 0
     assert "linear tuned" in outcome.out
     assert is_as_written(Path("balanced.toml"))
