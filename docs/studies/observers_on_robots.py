@@ -15,7 +15,7 @@ import math
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -27,8 +27,9 @@ from cmg_mj import mount
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.observers.scaling import scaled_names, scaled_parameters, scales_of
 from cmg_mj.observers.zero_order_hold import hold_matrices
-from cmg_mj.results.error_bounds import TiltFloor, acceleration_floor
+from cmg_mj.results.error_bounds import FLOOR_Y1, TiltFloor, acceleration_floor
 from cmg_mj.results.markdown import table
+from cmg_mj.results.summary_keys import SummaryValue, section
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import push_margin
@@ -130,6 +131,11 @@ def margins(experiment: Experiment, kind: str, ceiling: float) -> dict:
     return row
 
 
+def mean(values: Sequence[SummaryValue]) -> float:
+    """The mean of those that are numbers."""
+    return float(np.mean([value for value in values if isinstance(value, float)]))
+
+
 def in_its_own_loop(experiment: Experiment, kind: str) -> dict:
     """Fits as `cmg-mj run` has them, over the whole run and from the push on: the mean of the worlds that stood."""
     models = {"papers": {}, "scaled": scaled_parameters(kind, experiment.plant.reduced)}
@@ -142,10 +148,9 @@ def in_its_own_loop(experiment: Experiment, kind: str) -> dict:
             row[f"{name} stood"] = len(stood)
             for key, figure in {"whole": "velocity_fit", "push": "velocity_fit_push"}.items():
                 if stood:
-                    row[f"{name} {key}"] = float(np.mean([summary[figure] for summary in stood]))
-                    row[f"{name} {key} floor"] = float(
-                        np.mean([summary["references"]["floor_y1"][figure] for summary in stood])
-                    )
+                    row[f"{name} {key}"] = mean([summary[figure] for summary in stood])
+                    in_floors = [section(summary, "references")[FLOOR_Y1][figure] for summary in stood]
+                    row[f"{name} {key} floor"] = mean(in_floors)
     return row
 
 
