@@ -8,7 +8,7 @@ The robots are those of tests/plant/mounting/robots.py; ROBOT is a part of a nam
 `gyro_free`. The push that a robot stands is what `cmg-mj mount` prints, without the limit of a minute. It, and 1.8
 times it, is tried on ten worlds of another seed, to both sides, at 2 s from upright; and 30 s from the tilt that the
 scenario starts with, alone, are tried on that seed too. With --homogeneous both observers are pushed with the E
-that the reduced model has with `homogeneous`, and with 1.2 times it.
+that the reduced model has with `homogeneous` and the papers' parameters, and with 1.2 times it.
 """
 
 import math
@@ -20,7 +20,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj import mount
 from cmg_mj.results.markdown import table
-from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.scenario.schema import ObserverSettings
+from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S
 from cmg_mj.studies.push_limits.mount_files import write_scenario
 from cmg_mj.studies.push_limits.prospects import prospects
@@ -67,7 +68,9 @@ def row(name: str, robot: Robot, folder: Path) -> list[str]:
 def beside_homogeneous(name: str, robot: Robot, folder: Path) -> list[str]:
     """E with either observer, and the worlds that stand that of `homogeneous`, and 1.2 times it, to both sides."""
     model = mount(robot.path, **robot.options).save(folder / "balanced.xml")
-    loops = [write_scenario(model, robot.path, observer) for observer in ("homogeneous", "gyro_free")]
+    mounted = write_scenario(model, robot.path, "gyro_free")
+    kinds = [ObserverSettings(kind=kind) for kind in ("homogeneous", "gyro_free")]  # with the papers' parameters
+    loops = [prepare(mounted.scenario.model_copy(update={"observer": kind}), mounted.plant) for kind in kinds]
     limits = [prospects(loop) for loop in loops]
     push = limits[0].push_margin.median_impulse / PUSH_S
     upright = {"seed": SEED, "duration_s": 14.0, "plant.initial_tilt_deg": 0.0}
