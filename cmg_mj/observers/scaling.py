@@ -119,6 +119,8 @@ UNITS: Mapping[str, Mapping[str, Units]] = {
         "learn_s": Unit(1, owner=Owner.SURROUNDINGS),
         "surprise": PURE,
         "noise_s": Unit(1, owner=Owner.SENSORS),
+        "hurry": PURE,
+        "doubt": PURE,
     },
     "finite_difference": {},
     "super_twisting": {"L": Unit(-2), "l0": PURE, "l1": PURE},  # L bounds x1''

@@ -31,7 +31,7 @@ VARIATIONS = {
     "flywheel_imbalance_kg_m": 1e-5,
     "turn_rate_rad_s": 0.1,
 }
-OUTSIDE_THE_MODEL = {"initial_tilt_deg", "gimbal_backlash_arcmin"}
+OUTSIDE_THE_MODEL = {"initial_tilt_deg", "gimbal_backlash_arcmin", "pivot_slides"}
 OPTIONS = {"timestep_s", "integrator"}
 BEND = {"bend_frequency_hz", "bend_damping_ratio", "bend_share", "bend_beyond"}
 COMPILE_OPTIONS = {"model", "lock_thrust_bearing", "locked_axes"} | BEND
