@@ -10,7 +10,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 from cmg_mj.errors import InputError, raised
-from cmg_mj.results.memory import release_memory
+from cmg_mj.results.memory import release_free_memory
 from cmg_mj.results.run_folder.lock import Busy, Lock
 from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, require_own, users_files
 from cmg_mj.results.run_folder.swap import ASIDE, recover, stage, swap_in
@@ -99,8 +99,8 @@ class RunFolder:
         except OSError as error:
             raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
         for name, write in files.items():
-            release_memory()  # freed by the file before: together, a long result's would take a lot
             try:
+                release_free_memory()  # of the file before: together, those of a long result would take a lot
                 write(new / name)
             except BaseException as error:  # such as a title that no file can hold
                 (new / name).unlink(missing_ok=True)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
-import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,6 +17,7 @@ import tomli_w
 
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.results.files import is_plain_file, write_bytes, write_parquet
+from cmg_mj.results.memory import release_free_memory
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.axes import FieldValue
 from cmg_mj.studies.sweeps.chunk import compute, part_of_progress
@@ -237,18 +236,6 @@ def _set_aside(path: Path) -> Path:
         return path.rename(aside)
     except OSError as error:
         raise InputError(f"{aside}: cannot be written: {error.strerror or error}") from error
-
-
-def release_free_memory() -> None:
-    """Return what is free to the system.
-
-    A chunk takes and frees some thousand pieces of MuJoCo's, between which glibc's allocator keeps what is free:
-    without this a process that holds 145 MB between chunks has 370 after twenty of them.
-    """
-    if sys.platform == "linux":
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # musl has none
-        if trim is not None:
-            trim(0)
 
 
 def _require_versions(versions_of: Mapping[Path, FieldValue | None], ours: Mapping[str, str]) -> None:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import folder
+from cmg_mj.results.memory import release_free_memory
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.chunk import compute
-from cmg_mj.studies.sweeps.chunk_store import release_free_memory
 from cmg_mj.studies.sweeps.points import Point
 from cmg_mj.studies.sweeps.study import Chunk, SweepStudy
 from cmg_mj.studies.sweeps.trials import as_bytes, table_of
