@@ -112,7 +112,7 @@ MUTATIONS = [
         )
         for name in (
             *("rate_start", "bias_start", "bias_walk", "jerk", "pivot_hz", "pivot_start", "pivot_floor"),
-            *("pivot_s", "learn_s", "surprise", "noise_s", "hurry", "doubt"),
+            *("pivot_s", "learn_s", "surprise", "noise_s", "hurry", "doubt", "inflation"),
         )
     ),
     Mutation("super_twisting: L", OBSERVERS + "super_twisting.py", r"    L: Positive = " + NUMBER),

@@ -66,8 +66,12 @@ class FreePivot:
       all samples, to dt/pivot_s. Where S rises, hurry share times the rise is added: at the start it is worse to
       learn late of a pivot that moves than to suspect one that rests.
 
-    Early samples were trusted too much if S then turns out larger: the p that began at y1 took the w of that time for
-    tilt. So doubt share times the rise is added to p's variance and to w's, and taken from their covariance.
+    Early samples were trusted too much if S then turns out larger:
+
+    - The p that began at y1 took the w of that time for tilt. So doubt share times the rise is added to p's variance
+      and to w's, and taken from their covariance.
+    - The z that y1's differences gave is as uncertain as S was, not as it is found to be. So the covariance of p and z
+      is multiplied by 1 + inflation share rise/S.
 
     While S is zero and r is one it is `gyro_free`. All is computed in angles of a sample period, x2 dt and alpha dt^2:
     so many multiplications by dt less.
@@ -77,7 +81,8 @@ class FreePivot:
         model: The reduced model (not used).
         noise: Of tilt and angular acceleration, by the sensors' datasheet.
         rate_start: Standard deviation of the rate at the start, about zero [rad/s].
-        bias_start: The same of b [rad/s^2]. The default is that of `gyro_free`.
+        bias_start: The same of b [rad/s^2]. On the bundled rig the default is 7 mg between the two accelerometers: more
+            than in `gyro_free`, because an offset beyond what is expected looks like a pivot that moves.
         bias_walk: How fast b may change: standard deviation after a second [rad/s^2].
         jerk: How far alpha is off the straight line between samples: standard deviation of its mean [rad/s^2].
         pivot_hz: How quickly w is renewed. Not the corner of the motion, which is not known [Hz].
@@ -89,6 +94,7 @@ class FreePivot:
         noise_s: Time over which r is learnt [s].
         hurry: How much faster S rises than it falls, over `share`.
         doubt: How much of a rise is added to p's variance, over `share`.
+        inflation: How much a rise of S by itself multiplies what is uncertain of p and z, over `share`.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("acceleration",)
@@ -97,18 +103,19 @@ class FreePivot:
     model: ReducedModel
     noise: TiltNoise
     rate_start: Positive = 0.02
-    bias_start: Positive = 0.35
+    bias_start: Positive = 0.5
     bias_walk: NonNegative = 0.01
     jerk: NonNegative = 0.1
     pivot_hz: Positive = 5.0
     pivot_start: NonNegative = 2e-3
     pivot_floor: NonNegative = 1e-3
-    pivot_s: Positive = 0.5
-    learn_s: Positive = 0.02
-    surprise: NonNegative = 2.0
+    pivot_s: Positive = 1.0
+    learn_s: Positive = 0.05
+    surprise: NonNegative = 4.0
     noise_s: Positive = 0.3
-    hurry: NonNegative = 20.0
-    doubt: NonNegative = 3.0
+    hurry: NonNegative = 60.0
+    doubt: NonNegative = 10.0
+    inflation: NonNegative = 6.0
 
     def __post_init__(self) -> None:
         if not (self.noise.tilt or self.noise.acceleration or self.bias_walk or self.jerk):
@@ -170,6 +177,8 @@ class FreePivot:
         pivot = where(pivot > floor, pivot, floor)
         doubt = self.doubt * early
         pp, pw, ww = pp + doubt, pw - doubt, ww + doubt
+        inflate = 1.0 + self.inflation * early / where(pivot > 0.0, pivot, 1.0)
+        pp, pz, zz = inflate * pp, inflate * pz, inflate * zz
         slower = share / (1.0 + share)
 
         # Advance: p+ = r + alpha with r = p + z, z+ = z + alpha, w+ = f w + white.

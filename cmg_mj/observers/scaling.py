@@ -121,6 +121,7 @@ UNITS: Mapping[str, Mapping[str, Units]] = {
         "noise_s": Unit(1, owner=Owner.SENSORS),
         "hurry": PURE,
         "doubt": PURE,
+        "inflation": PURE,
     },
     "finite_difference": {},
     "super_twisting": {"L": Unit(-2), "l0": PURE, "l1": PURE},  # L bounds x1''

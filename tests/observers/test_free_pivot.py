@@ -50,7 +50,7 @@ def test_while_the_pivot_rests_it_is_gyro_free() -> None:
     x1, _, alpha, y1, a = motion(400, np.random.default_rng(1), bias=0.3)
     y1, a = x1 + 0.5 * (y1 - x1), alpha + 0.3 + 0.5 * (a - alpha - 0.3)
     estimates, states = walk(free_pivot(pivot_start=0.0, pivot_floor=0.0), y1, a)
-    expected, _ = walk_gyro_free(gyro_free(), y1, a)
+    expected, _ = walk_gyro_free(gyro_free(bias_start=0.5), y1, a)
     assert max(state.scale for state in states) <= 1.0
     np.testing.assert_allclose(estimates, expected, rtol=0.0, atol=1e-12)
 
@@ -109,8 +109,8 @@ def by_matrices(y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     F = np.diag([1.0, 1.0, 1.0, f, 0.0])
     F[:2, 1:] = [[DT, -(DT**2), 0.0, -(DT**2)], [1.0, -DT, 0.0, -DT]]
     drive = np.array([DT**2, DT, 0.0, 0.0, 0.0])
-    x, P = np.array([y1[0] - d * a[0], 0.0, 0.0, 0.0, 0.0]), np.diag([1.0, 0.02**2, 0.35**2, 0.002**2, 0.0])
-    r, S, share, bends = 1.0, 0.002**2, DT / 0.02, np.diff(np.append([y1[0]] * 2, y1), 2)
+    x, P = np.array([y1[0] - d * a[0], 0.0, 0.0, 0.0, 0.0]), np.diag([1.0, 0.02**2, 0.5**2, 0.002**2, 0.0])
+    r, S, share, bends = 1.0, 0.002**2, DT / 0.05, np.diff(np.append([y1[0]] * 2, y1), 2)
     rows, variances = [], []
     for k in range(len(y1)):
         r += DT / 0.3 * (bends[k] ** 2 / (6.0 * NOISE.tilt**2) - r)
@@ -120,11 +120,12 @@ def by_matrices(y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         x, P = x + K * e, P - np.outer(K, H @ P)
         alpha = a[k] - x[2] - x[4]
         rows.append((x[0] + d * alpha, x[1] + 0.5 * DT * alpha))
-        rise = share * (x[3] ** 2 + P[3, 3] - S + 2.0 * S * (e**2 / ee - 1.0))
+        rise = share * (x[3] ** 2 + P[3, 3] - S + 4.0 * S * (e**2 / ee - 1.0))
         early = share * max(rise, 0.0)
-        S = max(S + rise + 20.0 * early, 0.001**2)
-        P += 3.0 * early * np.outer([1.0, 0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, -1.0, 0.0])
-        share = max(share / (1.0 + share), DT / 0.5)
+        S = max(S + rise + 60.0 * early, 0.001**2)
+        P += 10.0 * early * np.outer([1.0, 0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, -1.0, 0.0])
+        P[:2, :2] *= 1.0 + 6.0 * early / S
+        share = max(share / (1.0 + share), DT / 1.0)
         x, P = F @ x + drive * a[k], F @ P @ F.T + 0.1**2 * np.outer(drive, drive)
         P[2, 2] += 0.01**2 * DT
         P[3, 3] += (1.0 - f * f) * S

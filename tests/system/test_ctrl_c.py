@@ -82,8 +82,14 @@ def test_ends_a_measurement_of_speed() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_what_ends_a_process_from_outside_counts_as_ctrl_c(name: str) -> None:
+    """Started by nohup a process ignores SIGHUP, and so do those that it starts: not here."""
     write(OBSERVER, "pressing.py")
-    outcome = cmg_mj_process("run", write(LONG), "--out", "it", "--set", f"observer.signal={name}", cwd=Path())
+    number = signal.Signals[name]
+    inherited = signal.signal(number, signal.SIG_DFL)
+    try:
+        outcome = cmg_mj_process("run", write(LONG), "--out", "it", "--set", f"observer.signal={name}", cwd=Path())
+    finally:
+        signal.signal(number, inherited)
     assert outcome.status == 130, outcome
     assert outcome.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
     assert len(assert_whole("it")) == 600

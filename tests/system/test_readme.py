@@ -35,6 +35,7 @@ CHEAPER = {
     "replay": "--observers linear",
     "export": "",
     "mount": "--quick",
+    "plugin": "",
 }
 """Command -> what is appended here, so that it takes a second or two."""
 
@@ -91,7 +92,7 @@ def test_a_command_runs(line: str) -> None:
         assert cmg_mj(*shlex.split(mounting)[1:], "--quick").status == 0
     if command == "sweep":
         shutil.copytree(ROOT / "docs" / "studies", Path("docs", "studies"))
-    if command == "export" or "board" in arguments:
+    if command in ("export", "plugin") or "board" in arguments:
         pytest.importorskip("casadi")
     if "board" in arguments and (missing_packages := missing()):
         pytest.skip(f"not installed: {', '.join(missing_packages)}")
