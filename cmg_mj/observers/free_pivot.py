@@ -71,7 +71,7 @@ class FreePivot:
     - The p that began at y1 took the w of that time for tilt. So doubt share times the rise is added to p's variance
       and to w's, and taken from their covariance.
     - The z that y1's differences gave is as uncertain as S was, not as it is found to be. So the covariance of p and z
-      is multiplied by 1 + inflation share rise/S.
+      is multiplied by 1 + inflation share rise/(S + var y1), the variance of y1's noise by the datasheet.
 
     While S is zero and r is one it is `gyro_free`. All is computed in angles of a sample period, x2 dt and alpha dt^2:
     so many multiplications by dt less.
@@ -94,7 +94,7 @@ class FreePivot:
         noise_s: Time over which r is learnt [s].
         hurry: How much faster S rises than it falls, over `share`.
         doubt: How much of a rise is added to p's variance, over `share`.
-        inflation: How much a rise of S by itself multiplies what is uncertain of p and z, over `share`.
+        inflation: How much a rise of S, in shares of y1's variance, multiplies the covariance of p and z, over `share`.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("acceleration",)
@@ -115,7 +115,7 @@ class FreePivot:
     noise_s: Positive = 0.3
     hurry: NonNegative = 60.0
     doubt: NonNegative = 10.0
-    inflation: NonNegative = 6.0
+    inflation: NonNegative = 10.0
 
     def __post_init__(self) -> None:
         if not (self.noise.tilt or self.noise.acceleration or self.bias_walk or self.jerk):
@@ -177,7 +177,7 @@ class FreePivot:
         pivot = where(pivot > floor, pivot, floor)
         doubt = self.doubt * early
         pp, pw, ww = pp + doubt, pw - doubt, ww + doubt
-        inflate = 1.0 + self.inflation * early / where(pivot > 0.0, pivot, 1.0)
+        inflate = 1.0 + self.inflation * early / (pivot + self.noise.tilt**2)
         pp, pz, zz = inflate * pp, inflate * pz, inflate * zz
         slower = share / (1.0 + share)
 

@@ -124,7 +124,7 @@ def by_matrices(y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         early = share * max(rise, 0.0)
         S = max(S + rise + 60.0 * early, 0.001**2)
         P += 10.0 * early * np.outer([1.0, 0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, -1.0, 0.0])
-        P[:2, :2] *= 1.0 + 6.0 * early / S
+        P[:2, :2] *= 1.0 + 10.0 * early / (S + NOISE.tilt**2)
         share = max(share / (1.0 + share), DT / 1.0)
         x, P = F @ x + drive * a[k], F @ P @ F.T + 0.1**2 * np.outer(drive, drive)
         P[2, 2] += 0.01**2 * DT
