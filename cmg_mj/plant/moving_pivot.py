@@ -30,7 +30,7 @@ def pivot_directions(plant: Plant, pivots: Sequence[Pivot]) -> list[list[float]]
     """
     if not pivots:
         return []
-    _refuse_other_forces(plant)
+    refuse_other_forces(plant)
     data = at_keyframe(plant.model, plant.key)
     along = {}
     for axis in plant.axes:
@@ -45,8 +45,12 @@ def pivot_directions(plant: Plant, pivots: Sequence[Pivot]) -> list[list[float]]
     return directions
 
 
-def _refuse_other_forces(plant: Plant) -> None:
-    """Refuse a model on which an acceleration of the pivot is not a shift of gravity alone."""
+def refuse_other_forces(plant: Plant) -> None:
+    """Refuse a model on which an acceleration of the pivot is not a shift of gravity alone.
+
+    Raises:
+        InputError: It has gravcomp, or drag in the air.
+    """
     model = plant.model
     compensated = np.flatnonzero(model.body_gravcomp)
     if len(compensated):

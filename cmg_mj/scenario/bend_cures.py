@@ -45,10 +45,10 @@ class Margins(NamedTuple):
     @property
     def words(self) -> str:
         """The margins, for one line."""
-        fall = f" or fall to {self.fall:.2f}" if self.fall > 0.0 else ""
-        rise = f"rise to {self.rise:.2f}" if np.isfinite(self.rise) else "rise at will"
+        fall = f" or fall to {self.fall:.2f} times" if self.fall > 0.0 else ""
+        rise = f"rise to {self.rise:.2f} times" if np.isfinite(self.rise) else "rise without limit"
         phase = f", phase margin {self.phase_deg:.0f} deg at {self.at_hz:.3g} Hz" if np.isfinite(self.phase_deg) else ""
-        return f"its gain may {rise}{fall} times{phase}"
+        return f"its gain may {rise}{fall}{phase}"
 
 
 class Trial(NamedTuple):

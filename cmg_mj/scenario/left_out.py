@@ -22,7 +22,7 @@ def left_out(scenario: Scenario) -> dict[str, str]:
         Field -> what it is, in words.
     """
     clauses = {}
-    if scenario.pivot:
+    if any(pivot.size for pivot in scenario.pivot):
         clauses["pivot"] = "the pivot's acceleration"
     accelerometer = scenario.sensors.accelerometer
     if accelerometer.vibration_mg:

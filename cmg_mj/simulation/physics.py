@@ -150,8 +150,8 @@ class ManyWorlds:
         self.batch = Batch(first.model, len(plants), threads)
         if any(plant is not first for plant in plants):
             self.batch.set_models([plant.model for plant in plants])
-        self._plants, self._still = plants, first.model.opt.gravity.tolist()
-        self._gravity: np.ndarray | None = None
+        self._plants = plants
+        self._gravity = self._still = np.zeros((0, 3))
         self._own_models: list[mujoco.MjModel] = []
         b = self.batch
         self._qpos, self._qvel, self._ctrl = b.bind("qpos"), b.bind("qvel"), b.bind("ctrl")
@@ -199,10 +199,11 @@ class ManyWorlds:
 
     def accelerate(self, acceleration: Acceleration) -> None:
         """Set the pivot's acceleration, x, y, z, one for all or (n_worlds,) each [m/s^2]."""
-        if self._gravity is None:
+        if not len(self._still):
             self._gravity = self._own_gravity()
+            self._still = self._gravity.copy()
         for i, part in enumerate(acceleration):
-            self._gravity[:, i] = self._still[i] - part
+            self._gravity[:, i] = self._still[:, i] - part
         if self._own_models:
             for model, gravity in zip(self._own_models, self._gravity, strict=True):
                 model.opt.gravity[:] = gravity

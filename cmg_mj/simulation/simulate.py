@@ -14,7 +14,7 @@ from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.make_controller import AnyController
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers.protocol import BIAS
-from cmg_mj.plant.moving_pivot import pivot_directions, with_own_model
+from cmg_mj.plant.moving_pivot import pivot_directions, refuse_other_forces, with_own_model
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import RATES, References
@@ -146,8 +146,9 @@ class _Simulation:
         dt, limit, sensors = controller.law.dt, controller.law.rate_limit, controller.sensors
         noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
         y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
+        moves = any(np.any(pivot.size) for pivot in self.pivots)
         has_acceleration = [
-            not (self.pivots or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.settings.bends)
+            not (moves or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.settings.bends)
             and plant.radial_tilt.height == plant.reduced.pivot_arm
             for plant, sensor in pairs
         ]
@@ -165,6 +166,8 @@ class _Simulation:
     def advance(self, physics: OneWorld | ManyWorlds, driver: Driver) -> None:
         """Run to the end, whatever that is."""
         if self.pivots:
+            for plant in dict.fromkeys(self.plants):
+                refuse_other_forces(plant)
             directions = pivot_directions(self.plants[0], self.pivots)
             pivot = PivotSignals(self.pivots, directions, self.controller.seed, self.controller.worlds)
             self.instants = with_moving_pivot(self.instants, pivot, physics.accelerate, self.timestep)

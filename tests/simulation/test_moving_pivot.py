@@ -24,6 +24,7 @@ from tests.command import cmg_mj
 from tests.simulation.driven_base import DrivenBase
 
 NOISE = 'pivot=[{kind="noise", acceleration_m_s2=0.3, corner_hz=5.0}]'
+STEP_OF_NONE = '{kind="step", acceleration_m_s2=0.0}'
 ALL_WAYS = [
     Pivot("sine", "across", 0.5, frequency_hz=3.0, phase_deg=40.0),
     Pivot("step", "along", 0.4, start_s=0.1, duration_s=0.2),
@@ -150,6 +151,29 @@ def test_one_world_of_many_is_the_world_alone() -> None:
             np.testing.assert_array_equal(many[name][:, 1], column, name)
             np.testing.assert_array_equal(varied[name][:, 1], column, name)
     assert np.abs(varied["x1_rad"][:, 0] - alone["x1_rad"]).max() > 1e-3
+
+
+def test_each_world_keeps_the_gravity_of_its_own_plant() -> None:
+    """As on the moon, beside a world on the earth: the same as each with nothing that moves."""
+    rig = experiment("duration_s=0.5", "controller.feedback=truth")
+    moon = with_own_model(rig.plant)
+    moon.model.opt.gravity[2] = -1.62
+    resting = experiment("duration_s=0.5", "controller.feedback=truth", f"pivot=[{STEP_OF_NONE}]")
+    still, moved = (one.run_many(2, plants=[one.plant, moon]).values("tilt_rms_deg") for one in (rig, resting))
+    assert moved.tolist() == still.tolist()
+    assert still[0] != still[1]
+
+
+def test_a_pivot_of_size_zero_is_at_rest() -> None:
+    assert "floor_accel" in section(experiment(f"pivot=[{STEP_OF_NONE}]").run().summaries[0], "references")
+
+
+def test_every_plant_of_a_batch_is_looked_at() -> None:
+    rig = experiment(NOISE)
+    held = with_own_model(rig.plant)
+    held.model.body_gravcomp[2] = 1.0
+    with pytest.raises(InputError, match="the body 'frame' has gravcomp"):
+        rig.run_many(2, plants=[rig.plant, held])
 
 
 def test_the_callback_sees_the_same() -> None:

@@ -118,13 +118,13 @@ def hash_of_models(study: SweepStudy) -> str:
                 ) from error
             digest.update(f"{path.name} {len(content)}\n".encode() + content)
     for i, pivot in enumerate(study.scenario.pivot):
-        if pivot.file is not None:
+        field = f"pivot.{i}.file"
+        varied = [str(value) for axis in study.axes if field in axis.fields for value in axis.values]
+        for file in varied or ([] if pivot.file is None else [pivot.file]):
             try:
-                content = Path(pivot.file).read_bytes()
+                content = Path(file).read_bytes()
             except OSError as error:
-                raise InputError(
-                    f"pivot.{i}.file = {pivot.file!r}: cannot be read: {error.strerror or error}"
-                ) from error
+                raise InputError(f"{field} = {file!r}: cannot be read: {error.strerror or error}") from error
             digest.update(f"track {i} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 

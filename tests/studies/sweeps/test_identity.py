@@ -84,10 +84,14 @@ def test_an_edited_model_is_another(tmp_path: Path, model_copy: Path, name: str)
     assert cmg_mj(*sweep).complaint == f"{tmp_path / 'out' / 'chunks' / '000000.parquet'}: {complaint}{CURE}"
 
 
-def test_an_edited_track_is_another(tmp_path: Path) -> None:
-    track = tmp_path / "track.csv"
-    track.write_text("t,a\n0,0.1\n1,0.2\n", encoding="utf-8")
-    sweep = [*SWEEP[:-1], "--set", f"pivot=[{{kind='track', file='{track}'}}]", "--out", tmp_path / "out"]
+@pytest.mark.parametrize("varied", [False, True], ids=["of the scenario", "varied"])
+def test_an_edited_track_is_another(tmp_path: Path, *, varied: bool) -> None:
+    first, track = tmp_path / "first.csv", tmp_path / "track.csv"
+    for file in (first, track):
+        file.write_text("t,a\n0,0.1\n1,0.2\n", encoding="utf-8")
+    pivot = ["--set", f"pivot=[{{kind='track', file='{first if varied else track}'}}]"]
+    vary = ["--vary", f"pivot.0.file={first},{track}"] if varied else []
+    sweep = [*SWEEP[:-1], *pivot, *vary, "--out", tmp_path / "out"]
     assert cmg_mj(*sweep).status == 0
     track.write_text("t,a\n0,0.1\n1,0.3\n", encoding="utf-8")
     complaint = "was computed with a model file or a track that has changed since"
