@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 LONGEST_DEADLINE_MS = 60_000.0
 """Longest deadline of a tick [ms]."""
+HIGHEST_BAUD = 12_000_000
+"""Highest baud rate of the usual converters [1/s]."""
 
 _OPTIONS = all_of(
     click.option(
@@ -69,21 +71,24 @@ class WireOptions:
             raise InputError(f"--port {self.port}: goes with --driver board, not {driver}")
         if not self.port:
             raise InputError("--port '': name a serial port such as /dev/ttyACM0, or tcp:HOST:PORT")
-        if self.baud is not None and self.baud < 1:
-            raise InputError(f"--baud {self.baud}: must be 1 or more")
+        if self.baud is not None and not 0 < self.baud <= HIGHEST_BAUD:
+            raise InputError(f"--baud {self.baud}: must be 1 to {HIGHEST_BAUD}")
         if self.deadline_ms is not None and not 0.0 < self.deadline_ms <= LONGEST_DEADLINE_MS:
             raise InputError(
                 f"--deadline-ms {self.deadline_ms:g}: must be above 0 and at most {LONGEST_DEADLINE_MS:g} ms"
             )
-        if self.max_lost is not None and self.max_lost < 1:
-            raise InputError(f"--max-lost {self.max_lost}: must be 1 or more")
+        if self.max_lost is not None:
+            from cmg_mj.codegen.board.wired_board import LARGEST_MAX_LOST
+
+            if not 0 < self.max_lost <= LARGEST_MAX_LOST:
+                raise InputError(f"--max-lost {self.max_lost}: must be 1 to {LARGEST_MAX_LOST}")
 
     def connect(self, experiment: Experiment) -> WiredBoard | None:
         """Connect to the board until the command ends; None without a port."""
         if self.port is None:
             return None
         from cmg_mj.codegen.board import on_a_wire
-        from cmg_mj.codegen.board.wired_board import MOST_LOST
+        from cmg_mj.codegen.board.wired_board import MAX_LOST
 
         controller = experiment.axis_controller()
         connection = on_a_wire(
@@ -91,7 +96,7 @@ class WireOptions:
             self.port,
             baud=self.baud,
             deadline_s=None if self.deadline_ms is None else 1e-3 * self.deadline_ms,
-            most_lost=MOST_LOST if self.max_lost is None else self.max_lost,
+            max_lost=MAX_LOST if self.max_lost is None else self.max_lost,
         )
         board = click.get_current_context().with_resource(connection)
         if not board.checksum_compared:

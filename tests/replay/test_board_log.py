@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +90,33 @@ def test_what_is_missing_and_damaged_is_said(tmp_path: Path) -> None:
     np.testing.assert_allclose(log["y1_rad"], TILT, atol=1e-3)
 
 
+def test_a_sample_that_was_sent_twice_is_no_answer(tmp_path: Path) -> None:
+    parts = [hello(), *(sample(k) * (2 if k == 7 else 1) + answer(k) for k in range(N))]
+    log = read_log(write(tmp_path / "board.frames", parts))
+    assert log["u_rad_s"].tolist() == list(range(N))
+
+
+def test_a_rate_belongs_to_the_sample_of_its_number(tmp_path: Path) -> None:
+    parts = [hello(), *((b"" if k == 10 else sample(k) + answer(k)) + reference(k) for k in range(N))]
+    log = read_log(write(tmp_path / "board.frames", parts))
+    np.testing.assert_allclose(log["reference_rad_s"][[8, 9, 11]], RATE[[8, 9, 11]], atol=1e-6)
+
+
+def test_what_lies_behind_a_damaged_length_is_read(tmp_path: Path) -> None:
+    """The length of the last sample but two says that the frame goes on beyond the file's end."""
+    parts = whole()
+    spoiled = bytearray(parts[-3])
+    spoiled[3] = 255
+    log = read_log(write(tmp_path / "board.frames", [*parts[:-3], bytes(spoiled), *parts[-2:]]))
+    assert log["u_rad_s"][-2:].tolist() == [N - 2, N - 1]
+    assert "the board's log is damaged in 1 place" in log.notes
+
+
+def test_a_recording_may_begin_with_the_boards_start(tmp_path: Path) -> None:
+    started = Frame("!", 0, b"\0").encode()
+    assert len(read_log(write(tmp_path / "board.frames", [started, *whole()]))) == N
+
+
 def test_a_long_gap_parts_the_log(tmp_path: Path) -> None:
     log = read_log(write(tmp_path / "board.frames", whole(lacking=range(150, 300))))
     assert [len(range(*part.indices(N))) for part in log.parts] == [150, 100]
@@ -110,7 +138,9 @@ def test_its_options_are_a_users(tmp_path: Path) -> None:
     [
         ([hello()], "a board's log without a sample$"),
         ([Frame("h", 1, b"12345678who knows").encode(), sample(0)], "no firmware of cmg_mj: 'who knows'$"),
-        ([hello()[:20]], "a board's log without a sample$"),
+        ([hello()[:20]], "without its introduction, the frame 'h', or with a damaged one$"),
+        ([hello(), sample(0), hello(replace(WHO, rate_hz=400.0))], "the log of two boards, or of two controllers"),
+        ([hello(replace(WHO, version="99")), sample(0)], "firmware's version 99; this cmg_mj reads version 2$"),
     ],
 )
 def test_logs_that_are_none(tmp_path: Path, parts: list[bytes], message: str) -> None:

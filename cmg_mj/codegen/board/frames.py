@@ -85,3 +85,10 @@ class FrameReader:
         self._lost_track = True
         del self._held[0]
         return self.feed(b"")
+
+    def end(self) -> list[Frame]:
+        """Return the frames behind whatever the stream ends with that is none."""
+        frames = []
+        while self._held:
+            frames += self.resync()
+        return frames

@@ -56,11 +56,9 @@ class Identity:
         Raises:
             InputError: It is too long for a frame.
         """
-        turns = ",".join(f"{d:+g}@{z:.8g}" for d, z in zip(self.gimbals.directions, self.gimbals.zeros, strict=True))
-        radii = ",".join(f"{radius:.8g}" for radius in self.radii_m)
         text = (
             f"firmware={self.firmware} version={self.version} observer={self.observer} precision={self.precision} "
-            f"rate_hz={self.rate_hz:.9g} code={self.code} radii={radii} gimbals={turns}"
+            f"rate_hz={self.rate_hz:.9g} code={self.code} radii={self._radii} gimbals={self._turns}"
         )
         if len(text) > LONGEST_TEXT:
             raise InputError(
@@ -68,6 +66,14 @@ class Identity:
                 f"shorter name than {self.observer}, or fewer gimbals than {len(self.gimbals.zeros)}"
             )
         return text
+
+    @property
+    def _turns(self) -> str:
+        return ",".join(f"{d:+g}@{z:.8g}" for d, z in zip(self.gimbals.directions, self.gimbals.zeros, strict=True))
+
+    @property
+    def _radii(self) -> str:
+        return ",".join(f"{radius:.8g}" for radius in self.radii_m)
 
     def require(self, expected: Identity, place: str) -> None:
         """Refuse another firmware or controller than the expected one.
@@ -86,10 +92,12 @@ class Identity:
             ("observer", self.observer, expected.observer),
             ("precision", self.precision, expected.precision),
             ("rate", f"{self.rate_hz:g} Hz", f"{expected.rate_hz:g} Hz"),
+            ("radii of the accelerometers", f"{self._radii} m", f"{expected._radii} m"),
+            ("gimbals", self._turns, expected._turns),
         ):
             if value != other:
                 raise InputError(
-                    f"{place}: the board has {name} {shortened(value)}, the scenario wants {other}: {cure}"
+                    f"{place}: the board has {name} {shortened(value)}, the scenario wants {shortened(other)}: {cure}"
                 )
         if expected.code and self.code != expected.code:
             raise InputError(

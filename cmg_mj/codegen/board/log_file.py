@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from cmg_mj.codegen.board.frames import START_BYTE, Frame, FrameReader
-from cmg_mj.codegen.board.identity import FIRMWARE_NAME, HELLO, Identity, read_identity
-from cmg_mj.errors import InputError
+from cmg_mj.codegen.board.identity import FIRMWARE_NAME, FIRMWARE_VERSION, HELLO, Identity, read_identity
+from cmg_mj.errors import InputError, shortened
 
 READ = 1 << 20
 """Size of a piece in which a log is read [bytes]."""
@@ -54,7 +55,7 @@ class BoardLog(NamedTuple):
 
 def is_board_log(head: bytes) -> bool:
     """Return whether a file that begins so is a board's log."""
-    return head.startswith(START_BYTE + HELLO.encode())
+    return head.startswith((START_BYTE + HELLO.encode(), START_BYTE + b"!"))
 
 
 def read_board_log(path: Path, most_samples: int) -> BoardLog:
@@ -74,20 +75,30 @@ def read_board_log(path: Path, most_samples: int) -> BoardLog:
         InputError: The file cannot be read, is no such log, or is too long.
     """
     reader, rows = FrameReader(), None
-    try:
-        with path.open("rb") as file:
-            while piece := file.read(READ):
-                for frame in reader.feed(piece):
-                    if rows is None:
-                        rows = _Rows(read_identity(frame, str(path)), path, most_samples)
-                    else:
-                        rows.take(frame)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    if rows is None or not rows.samples:
+    for frame in _frames(path, reader):
+        if frame.kind == HELLO:
+            identity = read_identity(frame, str(path))
+            rows = rows or _Rows(identity, path, most_samples)
+            rows.require(identity)
+        elif rows is not None:
+            rows.take(frame)
+    if rows is None:
+        raise InputError(f"{path}: a board's log without its introduction, the frame 'h', or with a damaged one")
+    if not rows.samples:
         raise InputError(f"{path}: a board's log without a sample")
     columns = rows.columns()
     return BoardLog(rows.identity, columns, reader.damaged, rows.missing)
+
+
+def _frames(path: Path, reader: FrameReader) -> Iterator[Frame]:
+    """Yield a file's frames."""
+    try:
+        with path.open("rb") as file:
+            while piece := file.read(READ):
+                yield from reader.feed(piece)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    yield from reader.end()
 
 
 class _Rows:
@@ -96,11 +107,18 @@ class _Rows:
     def __init__(self, identity: Identity, path: Path, most_samples: int) -> None:
         if identity.firmware != FIRMWARE_NAME:
             raise InputError(f"{path}: a log of the firmware {identity.firmware!r}, not of {FIRMWARE_NAME}")
+        if identity.version != str(FIRMWARE_VERSION):
+            raise InputError(
+                f"{path}: a log of the firmware's version {shortened(identity.version)}; this cmg_mj reads version "
+                f"{FIRMWARE_VERSION}"
+            )
         self.identity, self._path, self._most = identity, path, most_samples
         real = "f" if identity.precision == "single" else "d"
         self._sample = struct.Struct(f"<{4 + len(identity.gimbals.zeros)}{real}")
         self._command, self._rate = struct.Struct(f"<3I{real}"), struct.Struct(f"<{real}")
+        self._least_answer = 12 + 5 * self._rate.size
         self._last: int | None = None
+        self._payload = b""
         self._answered = True
         self._held = 0.0
         self._tick = 0
@@ -110,16 +128,25 @@ class _Rows:
         self._commands: list[float] = []
         self._rates: list[float] = []
 
+    def require(self, identity: Identity) -> None:
+        """Refuse a log in which a board introduces itself as another."""
+        if identity != self.identity:
+            raise InputError(f"{self._path}: the log of two boards, or of two controllers: cut it in two")
+
     def take(self, frame: Frame) -> None:
         """Take a frame; kinds that are neither a sample, an answer nor a rate are passed over."""
         if frame.kind == "u" and frame.number != self._last:
             self._take_sample(frame)
-        elif frame.kind == "u" and not self._answered and len(frame.payload) > self._command.size:
+        elif frame.kind == "u" and self._is_answer(frame.payload):
             self._answered = True
             self._held = self._commands[-1] = self._command.unpack_from(frame.payload)[3]
-        elif frame.kind == "r" and self.samples and len(frame.payload) == self._rate.size:
+        elif frame.kind == "r" and frame.number == self._last and len(frame.payload) == self._rate.size:
             self._rates += [np.nan] * (len(self.samples) - len(self._rates))
             self._rates[-1] = self._rate.unpack(frame.payload)[0]
+
+    def _is_answer(self, payload: bytes) -> bool:
+        """Return whether this is the answer, and not the sample a second time."""
+        return not self._answered and payload != self._payload and len(payload) >= self._least_answer
 
     def _take_sample(self, frame: Frame) -> None:
         if len(frame.payload) != self._sample.size:
@@ -131,7 +158,7 @@ class _Rows:
             step = (frame.number - self._last) % 256
             self._tick += step
             self.missing += step - 1
-        self._last, self._answered = frame.number, False
+        self._last, self._payload, self._answered = frame.number, frame.payload, False
         self.samples.append(self._sample.unpack(frame.payload))
         self._ticks.append(self._tick)
         self._commands.append(self._held)

@@ -52,11 +52,16 @@ def open_port(name: str, baud: int | None = None) -> Port:
     Raises:
         InputError: There is no such port, it is in use, or pyserial is not installed.
     """
-    if name.startswith(TCP):
+    if is_tcp(name):
         if baud is not None:
             raise InputError(f"--baud {baud}: {name} has no baud rate; leave it out")
         return _TcpPort(name)
     return _SerialPort(name, baud or BAUD)
+
+
+def is_tcp(name: str) -> bool:
+    """Return whether a port is a TCP connection."""
+    return name.lower().startswith(TCP)
 
 
 class _SerialPort:
@@ -69,7 +74,7 @@ class _SerialPort:
 
         try:
             self._serial = serial.Serial(name, baud, timeout=POLL_S, write_timeout=CONNECT_S, exclusive=True)
-        except (OSError, ValueError) as error:  # pyserial's own errors are of these kinds
+        except (OSError, ValueError, OverflowError) as error:  # pyserial's own errors are of these kinds
             reason = getattr(error, "strerror", None) or " ".join(str(error).split())
             raise InputError(f"--port {name}: cannot be opened at {baud} baud: {reason}") from error
 
@@ -93,8 +98,8 @@ class _TcpPort:
     """A TCP connection."""
 
     def __init__(self, name: str) -> None:
-        host, _, port = name.removeprefix(TCP).rpartition(":")
-        if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        host, _, port = name[len(TCP) :].rpartition(":")
+        if not host or not port.isdecimal() or len(port) > 5 or not 0 < int(port) < 65536:
             raise InputError(f"--port {shown(name)}: write tcp:HOST:PORT, such as tcp:localhost:5555")
         try:
             self._socket = socket.create_connection((host.strip("[]"), int(port)), CONNECT_S)

@@ -16,7 +16,7 @@ import numpy as np
 
 from cmg_mj.codegen.board.frames import AROUND, Frame, FrameReader
 from cmg_mj.codegen.board.identity import HELLO, Identity, identity_of, read_identity
-from cmg_mj.codegen.board.ports import BAUD, TCP, Port, open_port, require_fit
+from cmg_mj.codegen.board.ports import BAUD, Port, is_tcp, open_port, require_fit
 from cmg_mj.codegen.board.qemu import NOT_FINITE, STATUSES, Board
 from cmg_mj.codegen.board.serial_line import Closed
 from cmg_mj.codegen.export import generate_code
@@ -32,8 +32,10 @@ PATIENCE_S = 3.0
 """Longest wait for an answer of the handshake [s]."""
 AGAIN_S = 0.25
 """A frame of the handshake is sent again after so long [s]."""
-MOST_LOST = 20
+MAX_LOST = 20
 """Number of ticks lost in a row that ends a run: 0.1 s at 200 Hz, in which an unstable rig's tilt doubles."""
+LARGEST_MAX_LOST = 127
+"""The largest of these: by its number, modulo 256, a board takes a later sample for one that it has had."""
 _COST = struct.Struct("<3I")
 
 
@@ -73,7 +75,7 @@ class WiredBoard:
         estimates: Parts of an estimate.
         deadline_s: Time from a sample to its answer [s].
         again_s: Time after which a sample is sent again; None for half of the deadline, so that it is sent twice [s].
-        most_lost: Number of ticks lost in a row that ends the run.
+        max_lost: Number of ticks lost in a row that ends the run.
 
     Attributes:
         identity: The board's own account of itself.
@@ -92,9 +94,9 @@ class WiredBoard:
         estimates: int,
         deadline_s: float,
         again_s: float | None = None,
-        most_lost: int = MOST_LOST,
+        max_lost: int = MAX_LOST,
     ) -> None:
-        self.name, self.deadline_s, self.most_lost = name, deadline_s, most_lost
+        self.name, self.deadline_s, self.max_lost = name, deadline_s, max_lost
         self._again_s = 0.5 * deadline_s if again_s is None else again_s
         self._port, self._reader, self._number = port, FrameReader(), 0
         self._waiting: list[Frame] = []
@@ -169,16 +171,17 @@ class WiredBoard:
             self._send(question)
             answer = self._await(frame, min(now + self._again_s, deadline), until_refused=first)
             now, first = time.perf_counter(), False
-            if answer is not None:
+            if answer is not None and now < deadline:
                 self.counts.round_trips_s.append(now - begun)
                 return answer
+            self.counts.late_or_doubled += answer is not None
         return None
 
     def _lose(self) -> None:
         self._lost_now += 1
         self.counts.lost += 1
         self.counts.lost_in_a_row = max(self.counts.lost_in_a_row, self._lost_now)
-        if self._lost_now >= self.most_lost:
+        if self._lost_now >= self.max_lost:
             ticks = f"{self._lost_now} ticks" if self._lost_now > 1 else "a tick"
             within = f"{1e3 * self.deadline_s:g} ms"
             raise RunStopped(f"{self.name}: the board has not answered for {ticks} in a row, within {within} each")
@@ -235,9 +238,8 @@ class WiredBoard:
                 f"{self.name}: the board's firmware knows no handshake: it is older than this cmg_mj; export and flash "
                 "it again"
             )
-        raise InputError(
-            f"{self.name}: no answer within {PATIENCE_S:g} s: is the firmware on it, and is the baud rate its own?"
-        )
+        other = "is no other program connected to it" if is_tcp(self.name) else "is the baud rate its own"
+        raise InputError(f"{self.name}: no answer within {PATIENCE_S:g} s: is the firmware on it, and {other}?")
 
     def _next(self, kind: str, payload: bytes) -> Frame:
         self._number = (self._number + 1) % 256
@@ -310,7 +312,7 @@ def on_a_wire(
     baud: int | None = None,
     deadline_s: float | None = None,
     again_s: float | None = None,
-    most_lost: int = MOST_LOST,
+    max_lost: int = MAX_LOST,
 ) -> Iterator[WiredBoard]:
     """Connect to a board that runs a controller, and check that it is this one.
 
@@ -320,7 +322,7 @@ def on_a_wire(
         baud: Baud rate of a serial port; None for `BAUD`.
         deadline_s: Time from a sample to its answer; None for the control period [s].
         again_s: Time after which a sample is sent again; None for half of the deadline [s].
-        most_lost: Number of ticks lost in a row that ends a run.
+        max_lost: Number of ticks lost in a row that ends a run.
 
     Yields:
         The board; the port is closed at the end.
@@ -335,14 +337,18 @@ def on_a_wire(
             "on its own estimate, 'observer'"
         )
     deadline_s = controller.law.dt if deadline_s is None else deadline_s
+    if not (0.0 < deadline_s < math.inf and 0 < max_lost <= LARGEST_MAX_LOST):
+        raise InputError(
+            f"deadline_s = {deadline_s:g}, max_lost = {max_lost}: must be above 0, and 1 to {LARGEST_MAX_LOST}"
+        )
     estimates = 3 + len(controller.extra_signals[0])
     sizes = (AROUND + 4 * (4 + len(controller.gimbal_angle.zeros)), AROUND + _COST.size + 4 * (2 + estimates))
-    if not port.startswith(TCP):
+    if not is_tcp(port):
         require_fit(baud or BAUD, sizes, deadline_s)
     expected = expected_identity(controller)
     line = open_port(port, baud)
     try:
-        yield WiredBoard(line, port, expected, estimates, deadline_s, again_s, most_lost)
+        yield WiredBoard(line, port, expected, estimates, deadline_s, again_s, max_lost)
     finally:
         line.close()
 

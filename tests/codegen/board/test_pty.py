@@ -101,7 +101,7 @@ def test_ticks_that_are_lost_hold_the_command_and_are_counted(tmp_path: Path) ->
     experiment = short("gyro_free", "duration_s=1.0")
     with (
         wire_to(experiment, tmp_path) as wire,
-        on_a_wire(experiment.axis_controller(), wire.name, deadline_s=4.0, most_lost=4) as board,
+        on_a_wire(experiment.axis_controller(), wire.name, deadline_s=4.0, max_lost=4) as board,
     ):
 
         def deafen(time_s: float) -> None:

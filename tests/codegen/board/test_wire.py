@@ -7,6 +7,7 @@ import math
 import socket
 import struct
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -25,8 +26,8 @@ from tests.command import cmg_mj
 ACCELERATIONS = (0.0, 9.8, 0.0, 9.8)
 
 
-def connect(board: PythonBoard, deadline_s: float = 5.0, again_s: float = 0.02, most_lost: int = 20) -> WiredBoard:
-    wired = WiredBoard(board, "the port", TOY, 3, deadline_s, again_s, most_lost)
+def connect(board: PythonBoard, deadline_s: float = 5.0, again_s: float = 0.02, max_lost: int = 20) -> WiredBoard:
+    wired = WiredBoard(board, "the port", TOY, 3, deadline_s, again_s, max_lost)
     wired.start()
     return wired
 
@@ -62,6 +63,8 @@ def test_an_identity_is_the_controllers() -> None:
         ("observer", "ltv", "the board has observer ltv, the scenario wants toy: export and flash it again"),
         ("precision", "double", "the board has precision double, the scenario wants single: export and flash it again"),
         ("rate_hz", 400.0, "the board has rate 400 Hz, the scenario wants 200 Hz: export and flash it again"),
+        ("radii_m", (0.1, 0.3), "the board has radii of the accelerometers 0.1,0.3 m, the scenario wants 0.1,0.2 m"),
+        ("gimbals", GimbalAngle((1.0,), (0.0,)), r"the board has gimbals \+1@0, the scenario wants "),
         (
             "code",
             "deadbeef",
@@ -164,10 +167,27 @@ def test_a_first_tick_that_is_lost_commands_nothing() -> None:
     assert update(wired, 1.0) == 2.0
 
 
+def test_an_answer_after_the_deadline_is_late_and_the_tick_lost() -> None:
+    """A read that takes longer than the deadline, as of a converter that collects bytes for 16 ms."""
+    board = PythonBoard()
+    wired = connect(board, 0.005, 0.005)
+    at_once = board.read
+
+    def slow(wait_s: float) -> bytes:
+        time.sleep(0.02)
+        return at_once(wait_s)
+
+    board.read = slow  # type: ignore[method-assign]
+    assert update(wired, 1.0) == 0.0
+    assert (wired.counts.lost, wired.counts.late_or_doubled) == (1, 1)
+    board.read = at_once  # type: ignore[method-assign]
+    assert update(wired, 1.0) == 2.0
+
+
 def test_too_many_lost_in_a_row_end_the_run() -> None:
     board = PythonBoard(answers=lambda frame, answer: [answer] * (frame.kind != "u" or frame.number % 3 == 0))
-    wired = connect(board, 0.01, 0.01, most_lost=3)
-    assert [update(wired, 1.0) for _ in range(9)][-1] == 9.0  # two in a row are borne
+    wired = connect(board, 0.01, 0.01, max_lost=3)
+    assert [update(wired, 1.0) for _ in range(9)][-1] == 9.0  # two in a row are no end
     board.answers = lambda frame, answer: []
     with pytest.raises(
         RunStopped, match=r"^the port: the board has not answered for 3 ticks in a row, within 10 ms each"
@@ -290,8 +310,10 @@ def test_a_connection_that_ends() -> None:
         ("--driver board --baud 115200", "--baud: goes with --port, the port of a real board"),
         ("--deadline-ms 5", "--deadline-ms: goes with --port, the port of a real board"),
         ("--max-lost 5", "--max-lost: goes with --port, the port of a real board"),
-        ("--driver board --port x --baud 0", "--baud 0: must be 1 or more"),
-        ("--driver board --port x --max-lost 0", "--max-lost 0: must be 1 or more"),
+        ("--driver board --port x --baud 0", "--baud 0: must be 1 to 12000000"),
+        ("--driver board --port x --baud 9999999999", "--baud 9999999999: must be 1 to 12000000"),
+        ("--driver board --port x --max-lost 0", "--max-lost 0: must be 1 to 127"),
+        ("--driver board --port x --max-lost 128", "--max-lost 128: must be 1 to 127"),
         ("--driver board --port x --deadline-ms nan", "--deadline-ms nan: must be above 0 and at most 60000 ms"),
     ],
 )
