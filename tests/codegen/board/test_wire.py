@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from cmg_mj.codegen.board import ports, wired_board
+from cmg_mj.codegen.board import on_a_wire, ports, wired_board
 from cmg_mj.codegen.board.frames import Frame, FrameReader
 from cmg_mj.codegen.board.identity import Identity, identity_of, read_identity
 from cmg_mj.codegen.board.ports import open_port, require_fit
@@ -83,6 +83,36 @@ def test_a_checksum_that_is_not_known_is_not_compared() -> None:
     assert connect(PythonBoard()).checksum_compared
 
 
+def test_without_a_checksum_radii_and_gimbals_are_compared_still() -> None:
+    unknown = dataclasses.replace(TOY, code="")
+    for field, value in (("radii_m", (0.1, 0.3)), ("gimbals", GimbalAngle((1.0, 1.0), (1.5, 1.5)))):
+        board = PythonBoard(dataclasses.replace(TOY, **{field: value}))
+        with pytest.raises(InputError, match=r"^the port: the board has (radii of the accelerometers|gimbals) "):
+            WiredBoard(board, "the port", unknown, 3, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("controller.notch_hz=12", r"^controller\.notch_hz = 12\.0: cannot be exported: C has no such option"),
+        ("controller.feedback=truth", r"^controller\.feedback = 'truth': a board has no such sensor"),
+    ],
+    ids=["notch", "feedback"],
+)
+def test_what_cannot_be_exported_is_refused_without_casadi(
+    setting: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before anything is opened: nobody is at that port."""
+    monkeypatch.setattr(wired_board, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=message), on_a_wire(short("gyro_free", setting).axis_controller(), "tcp:x:1"):
+        pass
+
+
+def test_a_line_that_sends_back_what_it_receives_is_no_board() -> None:
+    with pytest.raises(InputError, match=r"^the port: sends back what it receives: a loopback plug or an echoing term"):
+        connect(PythonBoard(answers=lambda frame, answer: [frame]))
+
+
 def test_who_does_not_answer_the_handshake(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wired_board, "PATIENCE_S", 0.02)
     monkeypatch.setattr(wired_board, "AGAIN_S", 0.005)
@@ -90,6 +120,8 @@ def test_who_does_not_answer_the_handshake(monkeypatch: pytest.MonkeyPatch) -> N
         InputError, match=r"^the port: no answer within 0\.02 s: is the firmware on it, and is the baud"
     ):
         connect(PythonBoard(answers=lambda frame, answer: []))
+    with pytest.raises(InputError, match=r"^TCP:x:1: no answer .*and is no other program connected to it\?$"):
+        WiredBoard(PythonBoard(answers=lambda frame, answer: []), "TCP:x:1", TOY, 3, 1.0)
     with pytest.raises(InputError, match="knows no handshake: it is older than this cmg_mj"):
         connect(PythonBoard(answers=lambda frame, answer: [Frame("?", frame.number, b"")]))
     other = PythonBoard(answers=lambda frame, answer: [Frame("h", frame.number, b"12345678hello, world")])
