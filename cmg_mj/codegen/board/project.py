@@ -11,7 +11,7 @@ from cmg_mj.controllers.controller import Controller
 EMULATED_PORT = 5555
 """TCP port of the emulated board that `make emulate` starts."""
 STRICT = ("-Werror", "-Wl,--fatal-warnings")
-"""Flags that a user's own compiler need not bear with."""
+"""Flags that are not for a user's own compiler."""
 NEVER_RUN = ("stm32f746",)
 """Machines whose firmware compiles and has never run on the chip."""
 HOW_TO_RUN = {
@@ -70,15 +70,19 @@ MACROS := {macros} -DBAUD=$(BAUD)u
 
 all: $(NAME).elf $(NAME).bin
 
-$(NAME).elf: {sources} {name}.h its.h port.h {board.script} Makefile
+$(NAME).elf: {sources} {name}.h its.h port.h {board.script} Makefile $(NAME).baud
 \t$(CC) $(FLAGS) $(MACROS) -I. -T {board.script} {sources} -lm -o $@
+
+# The rate of the last build, written where it changes.
+$(NAME).baud: always
+\t@test "$$(cat $@ 2>/dev/null)" = "$(BAUD)" || echo "$(BAUD)" > $@
 
 $(NAME).bin: $(NAME).elf
 \t{COMPILER.replace("gcc", "objcopy")} -O binary $< $@
 
 {HOW_TO_RUN[machine]}
 clean:
-\trm -f $(NAME).elf $(NAME).bin
+\trm -f $(NAME).elf $(NAME).bin $(NAME).baud
 
-.PHONY: all clean emulate flash
+.PHONY: all always clean emulate flash
 """
