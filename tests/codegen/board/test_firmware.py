@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 import shutil
+import signal
 import socket
 import struct
 import subprocess
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,7 +25,7 @@ from cmg_mj.codegen.board.qemu import emulator_command
 from cmg_mj.codegen.board.tools import available
 from tests.codegen.board.toy import needs_board, toy
 from tests.codegen.board.wire import TOY
-from tests.command import cmg_mj
+from tests.command import ROOT, cmg_mj
 
 pytestmark = needs_board
 
@@ -234,6 +238,12 @@ def test_registers_are_where_the_sources_have_them(tmp_path: Path) -> None:
     assert subprocess.run(command, capture_output=True, check=False).returncode
 
 
+def make(folder: Path, *arguments: str) -> bytes:
+    """Build a project; return its binary."""
+    subprocess.run(["make", "-s", "-C", folder, *arguments], check=True)
+    return (folder / "gyro_free.bin").read_bytes()
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not available() or shutil.which("make") is None, reason="no make, or no CasADi")
 @pytest.mark.parametrize("machine", MACHINES)
@@ -243,8 +253,14 @@ def test_the_project_builds(machine: str, tmp_path: Path) -> None:
     assert outcome.status == 0
     assert ("has never run on one" in outcome.err) == (machine != "mps2")
     assert {*project_files(machine), "gyro_free.c", "gyro_free.h"} <= {path.name for path in folder.iterdir()}
-    subprocess.run(["make", "-s", "-C", folder], check=True)
+    assert make(folder) == make(folder, "BAUD=460800")
     assert 4000 < (folder / "gyro_free.bin").stat().st_size < 20_000
+    if machine != "mps2":  # whose line has no rate
+        fast = make(folder, "BAUD=921600")
+        assert make(folder, "BAUD=921600") == fast != make(folder)
+        for rate in (1_647, 7_000_000):
+            with pytest.raises(subprocess.CalledProcessError):
+                make(folder, f"BAUD={rate}")
     again = cmg_mj("export", "gyro_free", "--firmware", machine, "--out", folder)
     assert again.status == 0
 
@@ -258,3 +274,40 @@ def test_what_a_firmware_cannot_be() -> None:
         "--name mine: the firmware's controller has the observer's own name; leave it out"
     )
     assert not Path("runs").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not available() or shutil.which("make") is None, reason="no make, or no CasADi")
+@pytest.mark.usefixtures("elsewhere")
+def test_what_the_export_says_can_be_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A user's class and settings that a shell would read; `make emulate` in one terminal, the run in another."""
+    shutil.copy(ROOT / "examples/own_observer.py", "own_observer.py")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = str(server.getsockname()[1])
+    monkeypatch.setenv("PORT", port)
+    settings = ["--set", "push=[]", "--set", "duration_s=0.5", "--set", "controller.gains=[36, 4, -1, 0.3]"]
+    outcome = cmg_mj(
+        *["export", "own_observer:HalfDifference", "--firmware", "mps2", "--out", "the firmware"], *settings
+    )
+    first, second = outcome.err.splitlines()[-2:]
+    blocking, run_it = first.partition("keeps busy: ")[2], second.partition("in this one: ")[2]
+    comments = Path("the firmware/Makefile").read_text().splitlines()[1:3]
+    assert [line[2:].replace("make ", "make -C 'the firmware' ") for line in comments] == [
+        first.partition(". ")[2],
+        second,
+    ]
+    command, *arguments = shlex.split(run_it.replace("5555", port))
+    assert command == "cmg-mj"
+    emulator = subprocess.Popen(shlex.split(blocking), start_new_session=True, stdout=subprocess.DEVNULL)
+    try:
+        for _ in range(600):
+            run = cmg_mj(*arguments, "--deadline-ms", "60000", "--out", "here")
+            if "Connection refused" not in run.err:
+                break
+            time.sleep(0.1)
+    finally:
+        os.killpg(emulator.pid, signal.SIGKILL)
+        emulator.wait()
+    assert run.status == 0
+    assert "100 ticks" in run.out
+    assert "update on the board" not in run.out  # the emulator knows no cycles
