@@ -65,8 +65,8 @@ def wire_line(summary: Mapping[str, SummaryValue]) -> str:
         else "no answer in time",
         f"{wire['sent_again']:,} sent again, {wire['lost']:,} lost with the command held (at most "
         f"{wire['lost_in_a_row']:,} in a row)",
-        f"{wire['late_or_doubled']:,} answers late or doubled, {wire['damaged_to_board']:,} frames damaged on the way "
-        f"to the board, {wire['damaged_from_board']:,} on the way back",
+        f"{wire['late_or_doubled']:,} answers late or doubled, {wire['refused_by_board']:,} refusals by the board, "
+        f"{wire['damaged_from_board']:,} frames damaged on the way back",
         *(
             [f"update on the board median {update['median']:.1f} us, most {update['most']:.1f}"]
             if isinstance(update, Mapping)

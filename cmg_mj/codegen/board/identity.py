@@ -39,7 +39,7 @@ class Identity:
         radii_m: Distances of the accelerometers from the pivot [m].
         gimbals: Directions and zeros of the gimbals.
         board: Name of the board, from its port layer.
-        cycles_per_second: Rate of its counter.
+        cycles_per_second: Rate of its counter; 0 if that does not measure time.
     """
 
     firmware: str

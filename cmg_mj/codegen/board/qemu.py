@@ -98,6 +98,7 @@ class Board:
             self.sizes = Sizes(*self._ask("i", b"", "<4I"))
             self._reals = "f" if self.sizes.real == 4 else "d"
             self._per_instruction, self._empty = self._calibrated() if counting else (0.0, {})
+            self.start()
         except BaseException:
             self.close()
             raise

@@ -17,7 +17,7 @@ import numpy as np
 
 from cmg_mj.codegen.board.frames import OVERHEAD, Frame, FrameReader
 from cmg_mj.codegen.board.identity import HELLO, Identity, identity_of, read_identity, require_own_estimate
-from cmg_mj.codegen.board.ports import BAUD, Port, is_tcp, open_port, require_fit
+from cmg_mj.codegen.board.ports import BAUD, Port, is_tcp, open_port, require_fit, wire_time
 from cmg_mj.codegen.board.qemu import STATUSES, Board, decision_of
 from cmg_mj.codegen.board.serial_line import Closed
 from cmg_mj.codegen.export import generate_code
@@ -38,8 +38,8 @@ MAX_LOST = 20
 """Number of ticks lost in a row that ends a run: 0.1 s at 200 Hz, in which an unstable rig's tilt doubles."""
 LARGEST_MAX_LOST = 127
 """The largest of these: by its number, modulo 256, a board takes a later sample for one that it has had."""
-EMULATED = ("mps2-an500",)
-"""Boards that are emulated: an update's time there is the emulator's, and says nothing of a processor."""
+USB_S = 0.001
+"""Time for which USB may hold bytes back: the length of one of its frames [s]."""
 _COST = struct.Struct("<3I")
 
 
@@ -52,7 +52,7 @@ class WireCounts:
         lost: Number of ticks without an answer in time.
         lost_in_a_row: Largest number of these in a row.
         late_or_doubled: Number of answers that nobody waited for any more.
-        refused: Number of frames that came damaged to the board.
+        refused: Number of refusals: the board refuses a frame that came damaged once its line is quiet.
         round_trips_s: Time from a sample to its answer, of each tick that was answered [s].
         counts: Counts of the board's counter that its update took, likewise.
     """
@@ -69,8 +69,9 @@ class WireCounts:
 class WiredBoard:
     """A board behind a port that takes the control decisions; see `on_a_wire`.
 
-    A sample that has no answer after `again_s`, or came damaged to the board, is sent again under the same number; the
-    board does not execute it again. Without an answer by the deadline the tick is lost: the last command is held.
+    A sample that has no answer after `again_s`, or that the board refuses, is sent again under the same number, unless
+    its answer could not come in time any more. The board does not execute it again. Without an answer by the deadline
+    the tick is lost: the last command is held.
 
     Args:
         port: The open port.
@@ -78,8 +79,9 @@ class WiredBoard:
         expected: The firmware and controller that the scenario asks for.
         estimates: Parts of an estimate.
         deadline_s: Time from a sample to its answer [s].
-        again_s: Time after which a sample is sent again; None for half of the deadline, so that it is sent twice [s].
+        again_s: Time after which a sample is sent again; None for half of the deadline, or longer on a slow line [s].
         max_lost: Number of ticks lost in a row that ends the run.
+        wire_s: Time that a sample and its answer take on the line [s].
 
     Attributes:
         identity: The board's own account of itself.
@@ -100,10 +102,12 @@ class WiredBoard:
         deadline_s: float,
         again_s: float | None = None,
         max_lost: int = MAX_LOST,
+        wire_s: float = 0.0,
     ) -> None:
         self.name, self.deadline_s, self.max_lost = name, deadline_s, max_lost
         self.settings = WireSettings(name)
-        self._again_s = 0.5 * deadline_s if again_s is None else again_s
+        self._wire_s = wire_s
+        self._again_s = max(0.5 * deadline_s, wire_s + USB_S) if again_s is None else again_s
         self._port, self._reader, self._number = port, FrameReader(), 0
         self._waiting: list[Frame] = []
         self._answer = struct.Struct(f"<{2 + estimates}f")
@@ -173,12 +177,15 @@ class WiredBoard:
         begun = now = time.perf_counter()
         deadline, first = begun + self.deadline_s, True
         awaited = question[:3] + bytes((_COST.size + self._answer.size,))
-        while now < deadline:
+        while now + self._wire_s < deadline:
             if not first:
                 self.counts.sent_again += 1
                 self._waiting += self._reader.resync(awaited)
             self._send(question)
-            answer = self._await(frame, min(now + self._again_s, deadline), until_refused=first)
+            until = now + self._again_s
+            if until + self._wire_s >= deadline:  # sent again then, it would be answered too late
+                until = deadline
+            answer = self._await(frame, until, until_refused=first)
             now, first = time.perf_counter(), False
             if answer is not None and now < deadline:
                 self.counts.round_trips_s.append(now - begun)
@@ -274,7 +281,7 @@ class WiredBoard:
             "lost": counts.lost,
             "lost_in_a_row": counts.lost_in_a_row,
             "late_or_doubled": counts.late_or_doubled,
-            "damaged_to_board": counts.refused,
+            "refused_by_board": counts.refused,
             "damaged_from_board": self._reader.damaged - self._damaged_before,
         }
         if len(trips):
@@ -283,7 +290,7 @@ class WiredBoard:
                 "percentile_99": float(np.percentile(trips, 99.0)),
                 "most": float(trips.max()),
             }
-        if len(counts.counts) and self.identity.cycles_per_second and self.identity.board not in EMULATED:
+        if len(counts.counts) and self.identity.cycles_per_second:
             a_microsecond = self.identity.cycles_per_second / 1e6
             figures["update_us"] = {
                 "median": statistics.median(counts.counts) / a_microsecond,
@@ -331,7 +338,7 @@ def on_a_wire(
         port: The name of a serial port, such as /dev/ttyACM0, or tcp:HOST:PORT.
         baud: Baud rate of a serial port; None for `BAUD`.
         deadline_s: Time from a sample to its answer; None for the control period [s].
-        again_s: Time after which a sample is sent again; None for half of the deadline [s].
+        again_s: Time after which a sample is sent again; None for half of the deadline, or longer on a slow line [s].
         max_lost: Number of ticks lost in a row that ends a run.
 
     Yields:
@@ -356,12 +363,14 @@ def on_a_wire(
         )
     estimates = 3 + len(controller.extra_signals[0])
     sizes = (OVERHEAD + 4 * (4 + len(controller.gimbal_angle.zeros)), OVERHEAD + _COST.size + 4 * (2 + estimates))
+    wire_s = 0.0
     if not is_tcp(port):
         require_fit(baud or BAUD, sizes, deadline_s)
+        wire_s = wire_time(baud or BAUD, sizes)
     expected = expected_identity(controller)
     line = open_port(port, baud)
     try:
-        board = WiredBoard(line, port, expected, estimates, deadline_s, again_s, max_lost)
+        board = WiredBoard(line, port, expected, estimates, deadline_s, again_s, max_lost, wire_s)
         board.settings = settings
         yield board
     finally:

@@ -284,14 +284,54 @@ def test_its_log_has_the_frames_and_the_rates() -> None:
 
 
 def test_frames_that_do_not_fit_are_refused() -> None:
-    require_fit(136_000, (30, 38), 0.005)
+    """There has to be time for one and a half times the frames; all that the message proposes is taken."""
+    require_fit(204_000, (30, 38), 0.005)
     with pytest.raises(
-        InputError, match=r"^--baud 115200: a tick's frames do not fit: 30 \+ 38 bytes take 5\.9 ms, the dea"
+        InputError,
+        match=r"^--baud 203999: a tick's frames do not fit: 30 \+ 38 bytes take 3\.33 ms, 5 with room for USB, and the "
+        r"deadline is 5 ms; take at least 204000 baud, such as 230400, a ",
+    ):
+        require_fit(203_999, (30, 38), 0.005)
+    with pytest.raises(
+        InputError, match=r"controller\.rate_hz of at most 112, or a --deadline-ms of at least 8\.9 where nothing moves"
     ):
         require_fit(115_200, (30, 38), 0.005)
-    with pytest.raises(InputError, match=r"take at least 136000 baud, such as 230400, a lower controller\.rate_hz, or"):
-        require_fit(135_999, (30, 38), 0.005)
-    require_fit(115_200, (30, 38), 0.006)
+    require_fit(115_200, (30, 38), 1.0 / 112.0)
+    require_fit(115_200, (30, 38), 0.0089)
+    with pytest.raises(InputError, match=r"take at least 204000 baud, such as 230400$"):
+        require_fit(1, (30, 38), 0.005)
+
+
+@pytest.mark.parametrize(
+    ("wire_s", "sent"),
+    [
+        pytest.param(0.0, [4, 4], id="in half of the deadline"),
+        pytest.param(0.024, [4, 4], id="as long as the line takes"),
+        pytest.param(0.028, [4], id="too late for an answer"),
+    ],
+)
+def test_a_sample_is_sent_again_where_its_answer_can_come_in_time(wire_s: float, sent: list[int]) -> None:
+    board = PythonBoard(answers=lambda frame, answer: [answer] * (frame.kind != "u"))
+    wired = WiredBoard(board, "the port", TOY, 3, 0.05, wire_s=wire_s)
+    wired.start()
+    assert update(wired, 1.0) == 0.0
+    assert [frame.number for frame in board.received if frame.kind == "u"] == sent
+    assert wired.counts.lost == 1
+
+
+def test_a_refusal_that_comes_too_late_sends_nothing_again() -> None:
+    def answers(frame: Frame, answer: Frame) -> list[Frame]:
+        if frame.kind != "u":
+            return [answer]
+        time.sleep(0.03)
+        return [Frame("?", frame.number, b"")]
+
+    board = PythonBoard(answers=answers)
+    wired = WiredBoard(board, "the port", TOY, 3, 0.05, wire_s=0.022)
+    wired.start()
+    assert update(wired, 1.0) == 0.0
+    assert [frame.number for frame in board.received if frame.kind == "u"] == [4]
+    assert (wired.counts.lost, wired.figures()["refused_by_board"]) == (1, 1)
 
 
 @pytest.mark.parametrize("name", ["tcp:", "tcp:5555", "tcp:here:", "tcp:here:x", "tcp:here:0", "tcp:here:65536"])
