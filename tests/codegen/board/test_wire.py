@@ -9,6 +9,7 @@ import struct
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -270,6 +271,19 @@ def test_frames_that_do_not_fit_are_refused() -> None:
         require_fit(1, (30, 38), 0.005)
 
 
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The host's clock, on which 0.1 ms passes with every look; one may put it on [s]."""
+    now = [0.0]
+
+    def look() -> float:
+        now[0] += 1e-4
+        return now[0]
+
+    monkeypatch.setattr(wired_board, "time", SimpleNamespace(perf_counter=look))
+    return now
+
+
 @pytest.mark.parametrize(
     ("wire_s", "sent"),
     [
@@ -278,6 +292,7 @@ def test_frames_that_do_not_fit_are_refused() -> None:
         pytest.param(0.028, [4], id="too late for an answer"),
     ],
 )
+@pytest.mark.usefixtures("clock")
 def test_a_sample_is_sent_again_where_its_answer_can_come_in_time(wire_s: float, sent: list[int]) -> None:
     board = PythonBoard(answers=lambda frame, answer: [answer] * (frame.kind != "u"))
     wired = WiredBoard(board, "the port", TOY, 3, 0.05, wire_s=wire_s)
@@ -287,11 +302,11 @@ def test_a_sample_is_sent_again_where_its_answer_can_come_in_time(wire_s: float,
     assert wired.counts.lost == 1
 
 
-def test_a_refusal_that_comes_too_late_sends_nothing_again() -> None:
+def test_a_refusal_that_comes_too_late_sends_nothing_again(clock: list[float]) -> None:
     def answers(frame: Frame, answer: Frame) -> list[Frame]:
         if frame.kind != "u":
             return [answer]
-        time.sleep(0.03)
+        clock[0] += 0.03
         return [Frame("?", frame.number, b"")]
 
     board = PythonBoard(answers=answers)
