@@ -302,6 +302,30 @@ def test_a_sample_is_sent_again_where_its_answer_can_come_in_time(wire_s: float,
     assert wired.counts.lost == 1
 
 
+def test_it_waits_for_the_line_before_it_sends_again(clock: list[float]) -> None:
+    sent: list[float] = []
+
+    def answers(frame: Frame, answer: Frame) -> list[Frame]:
+        if frame.kind == "u":
+            sent.append(clock[0])
+        return [answer] * (frame.kind != "u")
+
+    wired = WiredBoard(PythonBoard(answers=answers), "the port", TOY, 3, 0.005, wire_s=0.0018)
+    wired.start()
+    update(wired, 1.0)
+    assert sent[1] - sent[0] == pytest.approx(0.0018 + 0.001, abs=2.5e-4)
+
+
+def test_an_answer_is_waited_for_where_its_sample_is_not_sent_again(clock: list[float]) -> None:
+    board = PythonBoard()
+    wired = WiredBoard(board, "the port", TOY, 3, 0.05, wire_s=0.03)
+    wired.start()
+    at_once, begun = board.read, clock[0]
+    board.read = lambda wait_s: at_once(wait_s) if clock[0] > begun + 0.04 else b""  # type: ignore[method-assign]
+    assert update(wired, 1.0) == 1.0
+    assert (len(board.received), wired.counts.lost) == (4, 0)
+
+
 def test_a_refusal_that_comes_too_late_sends_nothing_again(clock: list[float]) -> None:
     def answers(frame: Frame, answer: Frame) -> list[Frame]:
         if frame.kind != "u":
