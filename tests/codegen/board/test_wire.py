@@ -20,6 +20,7 @@ from cmg_mj.codegen.board.ports import open_port, require_fit
 from cmg_mj.codegen.board.wired_board import WiredBoard
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
+from tests.codegen.board import wire
 from tests.codegen.board.toy import short
 from tests.codegen.board.wire import TOY, PythonBoard
 from tests.command import cmg_mj
@@ -273,14 +274,15 @@ def test_frames_that_do_not_fit_are_refused() -> None:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The host's clock, on which 0.1 ms passes with every look; one may put it on [s]."""
+    """The host's clock, on which 20 us pass with every look and nobody sleeps; one may put it on [s]."""
     now = [0.0]
 
     def look() -> float:
-        now[0] += 1e-4
+        now[0] += 2e-5
         return now[0]
 
     monkeypatch.setattr(wired_board, "time", SimpleNamespace(perf_counter=look))
+    monkeypatch.setattr(wire, "time", SimpleNamespace(sleep=lambda seconds: None))
     return now
 
 
@@ -313,7 +315,7 @@ def test_it_waits_for_the_line_before_it_sends_again(clock: list[float]) -> None
     wired = WiredBoard(PythonBoard(answers=answers), "the port", TOY, 3, 0.005, wire_s=0.0018)
     wired.start()
     update(wired, 1.0)
-    assert sent[1] - sent[0] == pytest.approx(0.0018 + 0.001, abs=2.5e-4)
+    assert sent[1] - sent[0] == pytest.approx(0.0018 + 0.001, abs=1.5e-4)
 
 
 def test_an_answer_is_waited_for_where_its_sample_is_not_sent_again(clock: list[float]) -> None:

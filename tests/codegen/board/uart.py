@@ -12,7 +12,7 @@ from cmg_mj.codegen.board.ports import BAUD, BITS_A_BYTE, POLL_S
 from tests.codegen.board.toy import HEADER, SOURCE
 from tests.codegen.board.wire import TOY
 
-UPDATE_NS = 40_000
+UPDATE_NS = 60_000
 """Time of an update with the painting of its stack: two bytes come meanwhile [ns]."""
 STEP_NS = 50_000
 """Longest time for which host and board do not look at each other [ns]."""
