@@ -246,10 +246,9 @@ def test_what_the_export_says_can_be_typed(monkeypatch: pytest.MonkeyPatch) -> N
     assert command == "cmg-mj"
     emulator = subprocess.Popen(shlex.split(blocking), start_new_session=True, stdout=subprocess.DEVNULL)
     try:
-        for _ in range(600):
-            run = cmg_mj(*arguments, "--deadline-ms", "60000", "--out", "here")
-            if "Connection refused" not in run.err:
-                break
+        arguments += ["--deadline-ms", "60000", "--out", "here"]
+        while "Connection refused" in (run := cmg_mj(*arguments)).err:
+            assert emulator.poll() is None
             time.sleep(0.1)
     finally:
         os.killpg(emulator.pid, signal.SIGKILL)

@@ -69,12 +69,30 @@ def test_a_loop_survives_answers_that_come_after_half_of_the_deadline(
     assert board.counts.sent_again == (150 if usb_ms > 0.4 else 0)
 
 
-@pytest.mark.parametrize("place", range(0, 30, 4), ids="byte {}".format)
+def test_two_copies_of_a_sample_back_to_back_are_one(firmware: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """USB holds the first until the second comes: bytes of the second are lost while the board executes the first."""
+    with connected(UartWire(firmware, 0.0001), monkeypatch, 0.5 * DEADLINE_S) as (wire, board):
+        commands = []
+        for k in range(50):
+            wire.wait(GAP_NS)
+            if k % 5 == 0:
+                wire.jammed_until = wire.now + 2_900_000
+            commands.append(board.update((0.0, 9.8, 0.0, 9.8), (float(k), 0.0)).u)
+        assert commands == each_once(50)
+        assert (board.counts.lost, board.counts.sent_again) == (0, 10)
+        assert wire.overruns >= 10
+
+
+@pytest.mark.parametrize("place", [0, 1, 2, 3, 4, 11, 12, 20, 28, 29], ids="byte {}".format)
 def test_a_byte_that_the_cable_loses_costs_no_tick(firmware: Path, place: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The board refuses the rest when the line is quiet, or is sent the sample again; the next is as ever."""
+    """The board refuses the rest when the line is quiet, and is sent the sample again.
+
+    Where it does not know the number, it is sent the sample after half of the deadline.
+    """
+    again_s = None if place < 3 else DEADLINE_S
     handshake = 3 * 6
     lost = frozenset({handshake + 10 * 30 + place})
-    with connected(UartWire(firmware, 0.0003, lost), monkeypatch) as (wire, board):
+    with connected(UartWire(firmware, 0.0003, lost), monkeypatch, again_s) as (wire, board):
         assert updates(wire, board, 40) == each_once(40)
     assert (board.counts.lost, board.counts.sent_again, wire.overruns) == (0, 1, 0)
 

@@ -12,7 +12,7 @@ from cmg_mj.codegen.board.ports import BAUD, BITS_A_BYTE, POLL_S
 from tests.codegen.board.toy import HEADER, SOURCE
 from tests.codegen.board.wire import TOY
 
-UPDATE_NS = 40_000
+UPDATE_NS = 60_000
 """Time of an update with the painting of its stack: two bytes come meanwhile [ns]."""
 STEP_NS = 50_000
 """Longest time for which host and board do not look at each other [ns]."""
@@ -63,12 +63,14 @@ class UartWire:
     Attributes:
         now: The time [ns].
         sent: Number of bytes that the host has sent.
+        jammed_until: Time before which no byte leaves the converter for the board [ns].
         overruns: Number of bytes that the board's USART has lost.
         pll: PLLCFGR.
     """
 
     def __init__(self, program: Path, usb_s: float, lost: frozenset[int] = frozenset()) -> None:
         self.now, self.sent, self.overruns, self.pll = 0, 0, 0, 0
+        self.jammed_until = 0
         self.usb = round(1e9 * usb_s)
         self.lost = lost
         self._byte = 1_000_000_000 * BITS_A_BYTE // BAUD
@@ -113,7 +115,7 @@ class UartWire:
         return bytes(received)
 
     def write(self, data: bytes) -> None:
-        at = max(self.now + self.usb, self._free)
+        at = max(self.now + self.usb, self.jammed_until, self._free)
         for byte in data:
             at += self._byte
             if self.sent not in self.lost:
