@@ -72,14 +72,16 @@ class FrameReader:
         del buffer[:at]
         return frames
 
-    def resync(self, beginning: bytes = b"") -> list[Frame]:
+    def resync(self, kind: str = "", size: int = 0) -> list[Frame]:
         """Give up the frame whose rest has not come, if any; return the frames that lie behind its first byte.
 
         Args:
-            beginning: First bytes of a frame that may be slow: one that begins so is not given up.
+            kind: Kind of a frame that may be slow, late answers included: one that begins so is not given up.
+            size: Size of its payload [bytes].
         """
         buffer = self._buffer
-        if not buffer or (beginning and beginning[: len(buffer)] == buffer[: len(beginning)]):
+        slow = START_BYTE + kind.encode() + buffer[2:3] + bytes((size,))
+        if not buffer or (kind and slow.startswith(buffer[:4])):
             return []
         self.damaged += not self._out_of_step
         self._out_of_step = True

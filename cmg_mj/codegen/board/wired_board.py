@@ -176,11 +176,10 @@ class WiredBoard:
         """Send a sample, again if need be, and return its answer; None if there is none by the deadline."""
         start = now = time.perf_counter()
         deadline, first = start + self.deadline_s, True
-        beginning = question[:3] + bytes((_COST.size + self._answer.size,))
         while now + self._wire_s < deadline:
             if not first:
                 self.counts.sent_again += 1
-                self._waiting += self._reader.resync(beginning)
+                self._waiting += self._reader.resync(frame.kind, _COST.size + self._answer.size)
             self._send(question)
             until = now + self._again_s
             if until + self._wire_s >= deadline:  # sent again then, it would be answered too late

@@ -66,10 +66,18 @@ def test_a_frame_whose_rest_does_not_come_is_given_up() -> None:
 def test_a_frame_that_is_slow_is_not_given_up_where_it_is_awaited() -> None:
     reader, whole = FrameReader(), FRAMES[3].encode()
     for count in (2, 7):
-        assert reader.feed(whole[:count]) == reader.resync(whole[:4]) == []
+        assert reader.feed(whole[:count]) == reader.resync("u", 38) == []
         assert reader.feed(whole[count:]) == [FRAMES[3]]
-    assert reader.feed(FRAMES[4].encode()[:7]) == reader.resync(whole[:4]) == []
+    assert reader.feed(FRAMES[4].encode()[:7]) == reader.resync("u", 37) == reader.resync("o", 38) == []
     assert reader.damaged == 1
+
+
+def test_a_late_answer_of_another_number_is_no_damage() -> None:
+    reader = FrameReader()
+    for frame in FRAMES[:5]:
+        assert reader.feed(frame.encode()[:20]) == reader.resync("u", 38) == []
+        assert reader.feed(frame.encode()[20:]) == [frame]
+    assert reader.damaged == 0
 
 
 @pytest.mark.parametrize(
