@@ -24,6 +24,7 @@ POLL_S = 0.001
 """Longest time a read of a serial line waits before the caller looks at the clock again [s]."""
 CONNECT_S = 5.0
 """Longest wait for a connection, and for a line that takes nothing [s]."""
+TAKES_NOTHING = f"the {{}} has taken no byte for {CONNECT_S:g} s: flow control, or a converter that has stopped"
 
 
 class Port(Protocol):
@@ -76,6 +77,7 @@ class _SerialPort:
         import serial
 
         try:
+            self._too_slow = serial.SerialTimeoutException
             self._serial = serial.Serial(name, baud, timeout=POLL_S, write_timeout=CONNECT_S, exclusive=True)
         except (OSError, ValueError, OverflowError) as error:  # pyserial's own errors are of these kinds
             reason = getattr(error, "strerror", None) or " ".join(str(error).split())
@@ -90,6 +92,8 @@ class _SerialPort:
     def write(self, data: bytes) -> None:
         try:
             self._serial.write(data)
+        except self._too_slow as error:  # one of OSError's kinds
+            raise Closed(TAKES_NOTHING.format("line")) from error
         except OSError as error:
             raise Closed("the cable is pulled, or the board is gone") from error
 
@@ -125,6 +129,8 @@ class _TcpPort:
     def write(self, data: bytes) -> None:
         try:
             self._socket.sendall(data)
+        except TimeoutError as error:
+            raise Closed(TAKES_NOTHING.format("connection")) from error
         except OSError as error:
             raise Closed("the connection is lost") from error
 

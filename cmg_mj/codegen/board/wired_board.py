@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import statistics
 import struct
 import time
@@ -14,19 +15,20 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from cmg_mj.codegen.board.frames import AROUND, Frame, FrameReader
-from cmg_mj.codegen.board.identity import HELLO, Identity, identity_of, read_identity
+from cmg_mj.codegen.board.frames import OVERHEAD, Frame, FrameReader
+from cmg_mj.codegen.board.identity import HELLO, Identity, identity_of, read_identity, require_own_estimate
 from cmg_mj.codegen.board.ports import BAUD, Port, is_tcp, open_port, require_fit, wire_time
-from cmg_mj.codegen.board.qemu import NOT_FINITE, STATUSES, Board
+from cmg_mj.codegen.board.qemu import STATUSES, Board, decision_of
 from cmg_mj.codegen.board.serial_line import Closed
 from cmg_mj.codegen.export import generate_code
 from cmg_mj.codegen.export.names import name_of
+from cmg_mj.codegen.export.refusals import refuse_unexported
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.processor import Decision, Processor
-from cmg_mj.errors import InputError, RunStopped, shown
+from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import Summary
-from cmg_mj.results.wire import WireReport
+from cmg_mj.results.wire import WireReport, WireSettings
 
 PATIENCE_S = 3.0
 """Longest wait for an answer of the handshake [s]."""
@@ -84,6 +86,7 @@ class WiredBoard:
     Attributes:
         identity: The board's own account of itself.
         counts: What has gone over the wire since `start`.
+        settings: The settings of the wire that a rerun needs.
         checksum_compared: Whether the checksum of the controller's C was compared.
 
     Raises:
@@ -102,6 +105,7 @@ class WiredBoard:
         wire_s: float = 0.0,
     ) -> None:
         self.name, self.deadline_s, self.max_lost = name, deadline_s, max_lost
+        self.settings = WireSettings(name)
         self._wire_s = wire_s
         self._again_s = max(0.5 * deadline_s, wire_s + USB_S) if again_s is None else again_s
         self._port, self._reader, self._number = port, FrameReader(), 0
@@ -110,6 +114,10 @@ class WiredBoard:
         self._nothing = Decision(0.0, 0.0, (0.0,) * estimates)
         self._begin()
         self._hello = self._shake(HELLO)
+        if not self._hello.payload:  # the question, which carries nothing
+            raise InputError(
+                f"{name}: sends back what it receives: a loopback plug or an echoing terminal is there, and no board"
+            )
         self.identity = read_identity(self._hello, name)
         self.identity.require(expected, name)
         self.checksum_compared = bool(expected.code)
@@ -157,13 +165,12 @@ class WiredBoard:
             raise RunStopped(f"{self.name}: the board answered something else than what was asked")
         counts, _, status = _COST.unpack_from(answer.payload)
         self.counts.counts.append(counts)
-        if status:
-            raise RunStopped(f"the controller on the board has stopped: {NOT_FINITE.get(status, f'status {status}')}")
         u, x_e, *estimate = self._answer.unpack_from(answer.payload, _COST.size)
+        decision = decision_of(status, u, x_e, estimate)
         if not all(map(math.isfinite, (u, *estimate))):  # a law without an integrator has none
             raise RunStopped(f"{self.name}: the board answered a number that is not finite")
-        self._decision = Decision(u, x_e, tuple(estimate))
-        return self._decision
+        self._decision = decision
+        return decision
 
     def _exchange(self, frame: Frame, question: bytes) -> Frame | None:
         """Send a sample, again if need be, and return its answer; None if there is none by the deadline."""
@@ -267,6 +274,7 @@ class WiredBoard:
         figures: Summary = {
             "port": self.name,
             "board": self.identity.board,
+            "options": shlex.join(self.settings.options()),
             "deadline_ms": 1e3 * self.deadline_s,
             "ticks": len(self._exchanges),
             "sent_again": counts.sent_again,
@@ -308,7 +316,7 @@ def result_of(processor: Processor, result: Result) -> Result:
     """Return the result of a run with what its processor adds: that it was a board, and what went over its wire."""
     if isinstance(processor, WiredBoard):
         rates = () if result.trajectory is None else result.trajectory["x2_rad_s"].tolist()
-        wire = WireReport(processor.name, processor.figures(), processor.log(rates))
+        wire = WireReport(processor.settings, processor.figures(), processor.log(rates))
         return replace(result, driver="board", wire=wire)
     return replace(result, driver="board") if isinstance(processor, Board) else result
 
@@ -340,18 +348,21 @@ def on_a_wire(
         InputError: The port cannot be opened, the frames do not fit the baud rate, nobody answers, or the board has
             another firmware or controller.
     """
-    if controller.feedback != "observer":
-        raise InputError(
-            f"controller.feedback = {shown(controller.feedback)}: a board has no such sensor; it closes the loop "
-            "on its own estimate, 'observer'"
-        )
+    require_own_estimate(controller)
+    refuse_unexported(controller)
+    settings = WireSettings(
+        port,
+        baud,
+        None if deadline_s is None else 1e3 * deadline_s,
+        None if max_lost == MAX_LOST else max_lost,
+    )
     deadline_s = controller.law.dt if deadline_s is None else deadline_s
     if not (0.0 < deadline_s < math.inf and 0 < max_lost <= LARGEST_MAX_LOST):
         raise InputError(
             f"deadline_s = {deadline_s:g}, max_lost = {max_lost}: must be above 0, and 1 to {LARGEST_MAX_LOST}"
         )
     estimates = 3 + len(controller.extra_signals[0])
-    sizes = (AROUND + 4 * (4 + len(controller.gimbal_angle.zeros)), AROUND + _COST.size + 4 * (2 + estimates))
+    sizes = (OVERHEAD + 4 * (4 + len(controller.gimbal_angle.zeros)), OVERHEAD + _COST.size + 4 * (2 + estimates))
     wire_s = 0.0
     if not is_tcp(port):
         require_fit(baud or BAUD, sizes, deadline_s)
@@ -359,7 +370,9 @@ def on_a_wire(
     expected = expected_identity(controller)
     line = open_port(port, baud)
     try:
-        yield WiredBoard(line, port, expected, estimates, deadline_s, again_s, max_lost, wire_s)
+        board = WiredBoard(line, port, expected, estimates, deadline_s, again_s, max_lost, wire_s)
+        board.settings = settings
+        yield board
     finally:
         line.close()
 

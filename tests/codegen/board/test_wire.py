@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import socket
 import struct
-import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from cmg_mj.codegen.board import ports, wired_board
+from cmg_mj.codegen.board import on_a_wire, wired_board
 from cmg_mj.codegen.board.frames import Frame, FrameReader
 from cmg_mj.codegen.board.identity import Identity, identity_of, read_identity
-from cmg_mj.codegen.board.ports import open_port, require_fit
+from cmg_mj.codegen.board.ports import require_fit
 from cmg_mj.codegen.board.wired_board import WiredBoard
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
@@ -85,6 +83,36 @@ def test_a_checksum_that_is_not_known_is_not_compared() -> None:
     assert connect(PythonBoard()).checksum_compared
 
 
+def test_without_a_checksum_radii_and_gimbals_are_compared_still() -> None:
+    unknown = dataclasses.replace(TOY, code="")
+    for field, value in (("radii_m", (0.1, 0.3)), ("gimbals", GimbalAngle((1.0, 1.0), (1.5, 1.5)))):
+        board = PythonBoard(dataclasses.replace(TOY, **{field: value}))
+        with pytest.raises(InputError, match=r"^the port: the board has (radii of the accelerometers|gimbals) "):
+            WiredBoard(board, "the port", unknown, 3, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("controller.notch_hz=12", r"^controller\.notch_hz = 12\.0: cannot be exported: C has no such option"),
+        ("controller.feedback=truth", r"^controller\.feedback = 'truth': a board has no such sensor"),
+    ],
+    ids=["notch", "feedback"],
+)
+def test_what_cannot_be_exported_is_refused_without_casadi(
+    setting: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before anything is opened: nobody is at that port."""
+    monkeypatch.setattr(wired_board, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=message), on_a_wire(short("gyro_free", setting).axis_controller(), "tcp:x:1"):
+        pass
+
+
+def test_a_line_that_sends_back_what_it_receives_is_no_board() -> None:
+    with pytest.raises(InputError, match=r"^the port: sends back what it receives: a loopback plug or an echoing term"):
+        connect(PythonBoard(answers=lambda frame, answer: [frame]))
+
+
 def test_who_does_not_answer_the_handshake(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wired_board, "PATIENCE_S", 0.02)
     monkeypatch.setattr(wired_board, "AGAIN_S", 0.005)
@@ -92,6 +120,8 @@ def test_who_does_not_answer_the_handshake(monkeypatch: pytest.MonkeyPatch) -> N
         InputError, match=r"^the port: no answer within 0\.02 s: is the firmware on it, and is the baud"
     ):
         connect(PythonBoard(answers=lambda frame, answer: []))
+    with pytest.raises(InputError, match=r"^TCP:x:1: no answer .*and is no other program connected to it\?$"):
+        WiredBoard(PythonBoard(answers=lambda frame, answer: []), "TCP:x:1", TOY, 3, 1.0)
     with pytest.raises(InputError, match="knows no handshake: it is older than this cmg_mj"):
         connect(PythonBoard(answers=lambda frame, answer: [Frame("?", frame.number, b"")]))
     other = PythonBoard(answers=lambda frame, answer: [Frame("h", frame.number, b"12345678hello, world")])
@@ -341,46 +371,6 @@ def test_a_refusal_that_comes_too_late_sends_nothing_again(clock: list[float]) -
     assert update(wired, 1.0) == 0.0
     assert [frame.number for frame in board.received if frame.kind == "u"] == [4]
     assert (wired.counts.lost, wired.figures()["refused_by_board"]) == (1, 1)
-
-
-@pytest.mark.parametrize("name", ["tcp:", "tcp:5555", "tcp:here:", "tcp:here:x", "tcp:here:0", "tcp:here:65536"])
-def test_a_tcp_port_that_is_none(name: str) -> None:
-    with pytest.raises(InputError, match=r"^--port '?tcp:.*: write tcp:HOST:PORT, such as tcp:localhost:5555$"):
-        open_port(name)
-
-
-def test_ports_that_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        free = server.getsockname()[1]
-    with pytest.raises(InputError, match=rf"^--port tcp:127\.0\.0\.1:{free}: cannot be reached: Connection refused$"):
-        open_port(f"tcp:127.0.0.1:{free}")
-    with pytest.raises(InputError, match=r"^--baud 9600: tcp:here:1 has no baud rate; leave it out$"):
-        open_port("tcp:here:1", 9600)
-    monkeypatch.setattr(ports, "find_spec", lambda name: None)
-    with pytest.raises(
-        InputError, match=r'^--port COM3: pyserial is not installed: python -m pip install "cmg_mj\[board\]"$'
-    ):
-        open_port("COM3")
-
-
-def test_a_serial_port_that_is_none() -> None:
-    pytest.importorskip("serial")
-    with pytest.raises(InputError, match=r"^--port /dev/none: cannot be opened at 460800 baud: .*No such file"):
-        open_port("/dev/none")
-
-
-def test_a_connection_that_ends() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = open_port(f"tcp:127.0.0.1:{server.getsockname()[1]}")
-        other, _ = server.accept()
-        answering = threading.Thread(target=lambda: (other.sendall(other.recv(5)[::-1]), other.close()))
-        answering.start()
-        port.write(b"hello")
-        assert port.read(5.0) == b"olleh"
-        answering.join()
-        with pytest.raises(ports.Closed, match="the connection is closed"):
-            port.read(5.0)
-        port.close()
 
 
 @pytest.mark.usefixtures("elsewhere")
