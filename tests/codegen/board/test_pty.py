@@ -48,7 +48,7 @@ def few_signals_and_patience(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @contextmanager
 def wire_to(experiment: Experiment, folder: Path, faults: Faults | None = None) -> Iterator[PtyWire]:
-    """A pty to the board with an experiment's controller."""
+    """Start a board with an experiment's controller behind a pty."""
     with temporary_export(experiment.axis_controller()) as files:
         image = build(files.observer, files.folder, identity=files.identity).path.rename(folder / "board.elf")
     with PtyWire(image, faults) as wire:
@@ -71,7 +71,7 @@ def test_a_toy_behind_a_pty(tmp_path: Path) -> None:
         board.start()
         commands = [board.update((0.0, 9.8, 0.0, 9.8), (0.0, 0.0)).u for _ in range(60)]
         port.close()
-        assert min(faults.made.values()) > 0
+        assert min(faults.counts.values()) > 0
     assert commands == [100.0 * (i + 1) for i in range(60)]
     assert board.counts.sent_again > 0
 
@@ -79,7 +79,7 @@ def test_a_toy_behind_a_pty(tmp_path: Path) -> None:
 @pytest.mark.slow
 @needs_export
 def test_a_minute_over_a_bad_line_is_the_minute_over_a_good_one(tmp_path: Path) -> None:
-    """60 s at 200 Hz. What is lost, doubled or delayed on the way changes not a bit of the run."""
+    """60 s at 200 Hz in lockstep: the deadline is 300 s. What is lost, doubled or delayed changes not a bit of the run."""
     experiment = prepare(load_scenario("push_recovery", ["duration_s=60"], "gyro_free"))
     faults = Faults(7, lose=1e-4, double=1e-4, delay=1e-4, delay_s=0.002)
     with (
@@ -90,7 +90,7 @@ def test_a_minute_over_a_bad_line_is_the_minute_over_a_good_one(tmp_path: Path) 
     assert wired.wire is not None
     figures = wired.wire.figures
     assert (figures["ticks"], figures["lost"], figures["board"]) == (12_000, 0, "mps2-an500")
-    assert min(faults.made.values()) > 50
+    assert min(faults.counts.values()) > 50
     assert isinstance(figures["sent_again"], int)
     assert figures["sent_again"] > 50
     assert same(wired, experiment.run(driver="board"))

@@ -94,6 +94,7 @@ class Faults:
         double: Share of bytes that come twice.
         delay: Share of bytes before which the line waits.
         delay_s: For how long [s].
+        counts: Number of mistakes of each kind.
     """
 
     seed: int
@@ -101,7 +102,7 @@ class Faults:
     double: float = 0.0
     delay: float = 0.0
     delay_s: float = 0.0
-    made: dict[str, int] = field(default_factory=lambda: dict.fromkeys(("lose", "double", "delay"), 0))
+    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(("lose", "double", "delay"), 0))
 
     def __post_init__(self) -> None:
         self._random = random.Random(self.seed)
@@ -112,16 +113,16 @@ class Faults:
         for byte in data:
             chance = self._random.random()
             if chance < self.lose:
-                self.made["lose"] += 1
+                self.counts["lose"] += 1
                 continue
             if chance < self.lose + self.delay:
-                self.made["delay"] += 1
+                self.counts["delay"] += 1
                 yield bytes(out)
                 out.clear()
                 time.sleep(self.delay_s)
             out.append(byte)
             if chance > 1.0 - self.double:
-                self.made["double"] += 1
+                self.counts["double"] += 1
                 out.append(byte)
         yield bytes(out)
 
