@@ -79,7 +79,7 @@ def test_a_toy_behind_a_pty(tmp_path: Path) -> None:
 @pytest.mark.slow
 @needs_export
 def test_a_minute_over_a_bad_line_is_the_minute_over_a_good_one(tmp_path: Path) -> None:
-    """60 s at 200 Hz in lockstep: the deadline is 300 s. What is lost, doubled or delayed changes not a bit of the run."""
+    """60 s at 200 Hz in lockstep: the deadline is 300 s. What is lost, doubled or delayed changes not a bit."""
     experiment = prepare(load_scenario("push_recovery", ["duration_s=60"], "gyro_free"))
     faults = Faults(7, lose=1e-4, double=1e-4, delay=1e-4, delay_s=0.002)
     with (
