@@ -32,8 +32,8 @@ class WireSettings(NamedTuple):
     def options(self) -> list[str]:
         """Return the options with which a command runs over this wire."""
         numbers = (("--baud", self.baud), ("--deadline-ms", self.deadline_ms), ("--max-lost", self.max_lost))
-        given = [word for option, value in numbers if value is not None for word in (option, f"{value:.12g}")]
-        return ["--port", self.port, *given]
+        words = [word for option, value in numbers if value is not None for word in (option, f"{value:.12g}")]
+        return ["--port", self.port, *words]
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ class ExportedFiles(NamedTuple):
 
 
 @contextmanager
-def exported(controller: Controller) -> Iterator[ExportedFiles]:
+def temporary_export(controller: Controller) -> Iterator[ExportedFiles]:
     """Export a controller to a temporary folder.
 
     Args:
@@ -76,7 +76,7 @@ def on_a_board(controller: Controller, *, counting: bool = False) -> Iterator[Bo
         RunStopped: The board does not start.
     """
     require()
-    with exported(controller) as files:
+    with temporary_export(controller) as files:
         board = Board(build(files.observer, files.folder).path, counting=counting)
     with board:  # it has loaded its image: the files may go
         yield board

@@ -49,10 +49,10 @@ class FrameReader:
         self._out_of_step = False
         self.damaged = 0
 
-    def feed(self, received: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[Frame]:
         """Take bytes and return the frames that have come whole with them."""
         buffer, frames, at = self._buffer, [], 0
-        buffer += received
+        buffer += data
         while at < len(buffer):
             if buffer[at] == START_BYTE[0]:
                 if len(buffer) - at < 4:
@@ -72,14 +72,14 @@ class FrameReader:
         del buffer[:at]
         return frames
 
-    def resync(self, awaited: bytes = b"") -> list[Frame]:
+    def resync(self, beginning: bytes = b"") -> list[Frame]:
         """Give up the frame whose rest has not come, if any; return the frames that lie behind its first byte.
 
         Args:
-            awaited: Beginning of a frame that may be slow: one that begins so is not given up.
+            beginning: First bytes of a frame that may be slow: one that begins so is not given up.
         """
         buffer = self._buffer
-        if not buffer or (awaited and awaited[: len(buffer)] == buffer[: len(awaited)]):
+        if not buffer or (beginning and beginning[: len(buffer)] == buffer[: len(beginning)]):
             return []
         self.damaged += not self._out_of_step
         self._out_of_step = True

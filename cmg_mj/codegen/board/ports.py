@@ -119,12 +119,12 @@ class _TcpPort:
         try:
             if not select.select([self._socket], [], [], max(0.0, wait_s))[0]:
                 return b""
-            received = self._socket.recv(4096)
+            data = self._socket.recv(4096)
         except OSError as error:
             raise Closed("the connection is lost") from error
-        if not received:
+        if not data:
             raise Closed("the connection is closed")
-        return received
+        return data
 
     def write(self, data: bytes) -> None:
         try:

@@ -71,10 +71,10 @@ class SerialLine:
         """Receive the next message."""
         try:
             while not self._waiting:
-                received = self._line.recv(4096)
-                if not received:
+                data = self._line.recv(4096)
+                if not data:
                     raise Closed("the board is gone")
-                self._waiting += self._reader.feed(received)
+                self._waiting += self._reader.feed(data)
                 if self._reader.damaged:
                     raise RunStopped("the board sent a message that was damaged on the line, or bytes that are none")
         except TimeoutError as error:

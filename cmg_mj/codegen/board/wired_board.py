@@ -174,13 +174,13 @@ class WiredBoard:
 
     def _exchange(self, frame: Frame, question: bytes) -> Frame | None:
         """Send a sample, again if need be, and return its answer; None if there is none by the deadline."""
-        begun = now = time.perf_counter()
-        deadline, first = begun + self.deadline_s, True
-        awaited = question[:3] + bytes((_COST.size + self._answer.size,))
+        start = now = time.perf_counter()
+        deadline, first = start + self.deadline_s, True
+        beginning = question[:3] + bytes((_COST.size + self._answer.size,))
         while now + self._wire_s < deadline:
             if not first:
                 self.counts.sent_again += 1
-                self._waiting += self._reader.resync(awaited)
+                self._waiting += self._reader.resync(beginning)
             self._send(question)
             until = now + self._again_s
             if until + self._wire_s >= deadline:  # sent again then, it would be answered too late
@@ -188,7 +188,7 @@ class WiredBoard:
             answer = self._await(frame, until, until_refused=first)
             now, first = time.perf_counter(), False
             if answer is not None and now < deadline:
-                self.counts.round_trips_s.append(now - begun)
+                self.counts.round_trips_s.append(now - start)
                 return answer
             self.counts.late_or_doubled += answer is not None
         return None
@@ -205,20 +205,20 @@ class WiredBoard:
     def _await(self, frame: Frame, until: float, *, until_refused: bool = False) -> Frame | None:
         """Return the answer to a frame; None if none comes in time, or if the board has refused it."""
         while True:
-            for received in self._received(until):
-                if received.kind == "!" and frame.kind == "u":
-                    why = STATUSES.get(received.payload[0], "") if received.payload else ""
+            for reply in self._received(until):
+                if reply.kind == "!" and frame.kind == "u":
+                    why = STATUSES.get(reply.payload[0], "") if reply.payload else ""
                     raise RunStopped(
                         f"{self.name}: the board has started again, and its controller's state is lost"
                         f"{': ' + why if why else ''}"
                     )
-                if received.kind == frame.kind and received.number == frame.number:
-                    return received
-                if received.kind == "?":
+                if reply.kind == frame.kind and reply.number == frame.number:
+                    return reply
+                if reply.kind == "?":
                     self.counts.refused += 1
-                    if until_refused and received.number == frame.number:
+                    if until_refused and reply.number == frame.number:
                         return None
-                elif received.kind == frame.kind:
+                elif reply.kind == frame.kind:
                     self.counts.late_or_doubled += 1
             if time.perf_counter() >= until:
                 return None
@@ -226,9 +226,9 @@ class WiredBoard:
     def _received(self, until: float) -> Iterator[Frame]:
         """Yield frames that have come, and then those that come within a moment."""
         if not self._waiting:
-            left = until - time.perf_counter()
+            wait_s = until - time.perf_counter()
             try:
-                self._waiting += self._reader.feed(self._port.read(max(0.0, left)))
+                self._waiting += self._reader.feed(self._port.read(max(0.0, wait_s)))
             except Closed as error:
                 raise RunStopped(f"{self.name}: {error}") from error
         while self._waiting:
@@ -241,9 +241,9 @@ class WiredBoard:
             InputError: There is none.
         """
         frame = self._next(kind, b"")
-        begun = time.perf_counter()
+        start = time.perf_counter()
         refused = self.counts.refused
-        while time.perf_counter() < begun + PATIENCE_S:
+        while time.perf_counter() < start + PATIENCE_S:
             self._send(frame.encode())
             answer = self._await(frame, time.perf_counter() + AGAIN_S)
             if answer is not None:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.codegen.board import on_a_wire
-from cmg_mj.codegen.board.deploy import exported
+from cmg_mj.codegen.board.deploy import temporary_export
 from cmg_mj.codegen.board.image import build
 from cmg_mj.codegen.board.log_file import read_board_log
 from cmg_mj.codegen.board.ports import open_port
@@ -49,7 +49,7 @@ def few_signals_and_patience(monkeypatch: pytest.MonkeyPatch) -> None:
 @contextmanager
 def wire_to(experiment: Experiment, folder: Path, faults: Faults | None = None) -> Iterator[PtyWire]:
     """A pty to the board with an experiment's controller."""
-    with exported(experiment.axis_controller()) as files:
+    with temporary_export(experiment.axis_controller()) as files:
         image = build(files.observer, files.folder, identity=files.identity).path.rename(folder / "board.elf")
     with PtyWire(image, faults) as wire:
         yield wire
@@ -144,7 +144,7 @@ def test_a_board_behind_a_tcp_port(tmp_path: Path) -> None:
     experiment = prepare(load_scenario("push_recovery", ["duration_s=2.5"], "gyro_free"))
     run = ["run", "push_recovery", "--driver", "board", "--observer", "gyro_free", "--set", "duration_s=2.5"]
     wire = ["--deadline-ms", "60000", "--max-lost", "7"]
-    with exported(experiment.axis_controller()) as files:
+    with temporary_export(experiment.axis_controller()) as files:
         image = build(files.observer, files.folder, identity=files.identity).path.rename(tmp_path / "board.elf")
     with tcp_board(image) as port:
         wired = cmg_mj(*run, "--port", port, *wire, "--out", "here")

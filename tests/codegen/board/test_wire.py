@@ -6,7 +6,6 @@ import dataclasses
 import math
 import struct
 import time
-from pathlib import Path
 
 import pytest
 
@@ -19,7 +18,6 @@ from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from tests.codegen.board.toy import short
 from tests.codegen.board.wire import TOY, PythonBoard
-from tests.command import cmg_mj
 
 ACCELERATIONS = (0.0, 9.8, 0.0, 9.8)
 
@@ -298,33 +296,3 @@ def test_frames_that_do_not_fit_are_refused() -> None:
     require_fit(115_200, (30, 38), 0.0089)
     with pytest.raises(InputError, match=r"take at least 204000 baud, such as 230400$"):
         require_fit(1, (30, 38), 0.005)
-
-
-@pytest.mark.usefixtures("elsewhere")
-@pytest.mark.parametrize(
-    ("options", "complaint"),
-    [
-        ("--port /dev/ttyACM0", "--port /dev/ttyACM0: goes with --driver board, not native"),
-        ("--driver board --baud 115200", "--baud: goes with --port, the port of a real board"),
-        ("--deadline-ms 5", "--deadline-ms: goes with --port, the port of a real board"),
-        ("--max-lost 5", "--max-lost: goes with --port, the port of a real board"),
-        ("--driver board --port x --baud 0", "--baud 0: must be 1 to 12000000"),
-        ("--driver board --port x --baud 9999999999", "--baud 9999999999: must be 1 to 12000000"),
-        ("--driver board --port x --max-lost 0", "--max-lost 0: must be 1 to 127"),
-        ("--driver board --port x --max-lost 128", "--max-lost 128: must be 1 to 127"),
-        ("--driver board --port x --deadline-ms nan", "--deadline-ms nan: must be above 0 and at most 60000 ms"),
-    ],
-)
-def test_options_that_do_not_fit(options: str, complaint: str) -> None:
-    assert cmg_mj(*f"run push_recovery {options}".split()).complaint == complaint
-    assert not Path("runs").exists()
-
-
-SLOW = "/dev/none --baud 115200"
-
-
-@pytest.mark.usefixtures("elsewhere")
-def test_the_command_refuses_a_slow_line_before_it_opens_it() -> None:
-    complaint = cmg_mj(*f"run push_recovery --driver board --port {SLOW}".split()).complaint
-    assert complaint.startswith("--baud 115200: a tick's frames do not fit: 30 + 38 bytes take 5.9 ms")
-    assert not Path("runs").exists()
