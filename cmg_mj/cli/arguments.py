@@ -19,6 +19,7 @@ from cmg_mj.errors import InputError, nearest
 if TYPE_CHECKING:
     from cmg_mj.results.result import Driver
     from cmg_mj.results.run_folder import RunFolder
+    from cmg_mj.results.wire import WireSettings
     from cmg_mj.scenario.schema import Scenario
     from cmg_mj.simulation.experiment import Experiment
 
@@ -63,7 +64,7 @@ class RunArguments:
         experiment: Experiment,
         driver: Driver = "native",
         world: int = 0,
-        port: str = "",
+        wire: WireSettings | None = None,
     ) -> RunFolder:
         """Claim the folder for files: --out, or one in runs/ named for the scenario, the label and the settings."""
         from cmg_mj.scenario.differences import folder_suffix, safe_name
@@ -76,7 +77,7 @@ class RunArguments:
             *([f"world{world}"] if world else []),
         )
         name = "-".join(parts) + folder_suffix(experiment.differences)
-        return claim_output(self.out, name, names, request_toml=experiment.as_toml(driver, world, port))
+        return claim_output(self.out, name, names, request_toml=experiment.as_toml(driver, world, wire))
 
 
 def _as_utf8(argument: str) -> str:

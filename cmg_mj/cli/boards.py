@@ -56,7 +56,7 @@ def export(
 
     The C code is compared with Python on random signals before it is written.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.codegen.board.project import COMMANDS, NEVER_RUN, project, project_files
+    from cmg_mj.codegen.board.project import NEVER_RUN, PORTS, project, project_files, then
     from cmg_mj.codegen.export import check_installed, generate_code, write_code
     from cmg_mj.codegen.export.names import export_files, name_of
     from cmg_mj.codegen.export.pipeline import export_table
@@ -80,8 +80,15 @@ def export(
     label = f"export-{name}-{firmware or precision}"
     with claim_output(out, label, [*export_files(name), *(project_files(firmware) if firmware else [])]) as folder:
         code = generate_code(controller, precision, name)
+        run_it = ""
         if firmware is not None:
-            code = code._replace(files={**code.files, **project(controller, name, code.files[f"{name}.c"], firmware)})
+            options = [word for setting in settings for word in ("--set", setting)]
+            run_it = shell_command(
+                *["cmg-mj", "run", scenario, "--driver", "board", "--observer", observer, *options],
+                *["--port", PORTS[firmware]],
+            )
+            around = project(controller, name, code.files[f"{name}.c"], firmware, run_it)
+            code = code._replace(files={**code.files, **around})
         files = write_code(folder, code)
     figures = code.figures
     show(figures, export_table(figures), as_json)
@@ -94,12 +101,9 @@ def export(
         note(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer makes so much of a last digit")
     at = files[0].parent
     if firmware is not None:
-        command, port = COMMANDS[firmware]
-        after = f"cmg-mj run push_recovery --driver board --observer {name} --port {port}"
         if firmware in NEVER_RUN:
             note("the firmware compiles for this board, and has never run on one (docs/board.md)")
-        enter = shell_command("cd", at)
-        say_written(folder, at, f"Then: ({enter} && {command}); {after}", as_json)
+        say_written(folder, at, then(firmware, f"{shell_command('make', '-C', at)} ", run_it), as_json)
         return
     compile_it = shell_command("cc", "-std=c99", at / f"{name}.c", at / f"{name}_example.c", "-lm")
     say_written(folder, at, f"Try it: {compile_it} && ./a.out", as_json)

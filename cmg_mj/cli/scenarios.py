@@ -100,8 +100,9 @@ def run(
     board = wire.connect(experiment)
     label = runs.file_name(scenario.observer.kind)
     files = runs.files_of_run(experiment, plot=plot, wired=board is not None)
-    folder = arguments.folder(label, files, experiment, driver, world, wire.port or "")
-    live_view = live_run(experiment, live, connect, pace, driver, world)
+    settings = None if board is None else board.settings
+    folder = arguments.folder(label, files, experiment, driver, world, settings)
+    live_view = live_run(experiment, live, connect, pace, driver, world, settings)
     with CtrlC() as ctrl_c, live_view or nullcontext():
         with progress(scenario.title or arguments.name, scenario.duration_s, ctrl_c) as on_progress:
             options: SimulationOptions = (

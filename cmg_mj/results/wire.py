@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from cmg_mj.results.summary_keys import Summary, SummaryValue
 
@@ -13,17 +14,39 @@ BOARD_LOG = "board.frames"
 """File of the frames of a run, as `replay` takes it."""
 
 
+class WireSettings(NamedTuple):
+    """The settings of a wire; None for the default of one.
+
+    Attributes:
+        port: The board's port.
+        baud: Baud rate of a serial port [1/s].
+        deadline_ms: Time for an answer [ms].
+        max_lost: Number of ticks lost in a row that ends a run.
+    """
+
+    port: str
+    baud: int | None = None
+    deadline_ms: float | None = None
+    max_lost: int | None = None
+
+    def options(self) -> list[str]:
+        """Return the options with which a command runs over this wire."""
+        numbers = (("--baud", self.baud), ("--deadline-ms", self.deadline_ms), ("--max-lost", self.max_lost))
+        words = [word for option, value in numbers if value is not None for word in (option, f"{value:.12g}")]
+        return ["--port", self.port, *words]
+
+
 @dataclass(frozen=True)
 class WireReport:
     """A run's exchange with a real board.
 
     Attributes:
-        port: The board's port.
+        settings: The settings of the wire.
         figures: Deadlines, losses and round trips, as `--json` prints them.
         log: The frames, as `replay` takes them.
     """
 
-    port: str
+    settings: WireSettings
     figures: Summary
     log: bytes
 
@@ -42,8 +65,8 @@ def wire_line(summary: Mapping[str, SummaryValue]) -> str:
         else "no answer in time",
         f"{wire['sent_again']:,} sent again, {wire['lost']:,} lost with the command held (at most "
         f"{wire['lost_in_a_row']:,} in a row)",
-        f"{wire['late_or_doubled']:,} answers late or doubled, {wire['damaged_to_board']:,} frames damaged on the way "
-        f"to the board, {wire['damaged_from_board']:,} on the way back",
+        f"{wire['late_or_doubled']:,} answers late or doubled, {wire['refused_by_board']:,} refusals by the board, "
+        f"{wire['damaged_from_board']:,} frames damaged on the way back",
         *(
             [f"update on the board median {update['median']:.1f} us, most {update['most']:.1f}"]
             if isinstance(update, Mapping)

@@ -23,6 +23,7 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.rerun_head import rerun_head
 from cmg_mj.results.result import Driver, Result
+from cmg_mj.results.wire import WireSettings
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import base_of
@@ -308,9 +309,9 @@ class Experiment:
             bundled = prepare(base)
         return law_change | differences(bundled.resolved(), self.resolved())
 
-    def as_toml(self, driver: Driver = "native", world: int = 0, port: str = "") -> str:
+    def as_toml(self, driver: Driver = "native", world: int = 0, wire: WireSettings | None = None) -> str:
         """The resolved scenario: running it again gives the same run; its head says if that needs options."""
-        return rerun_head(driver, world, port) + tomli_w.dumps(self.resolved())
+        return rerun_head(driver, world, wire) + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path) -> None:
         """Write it as TOML."""

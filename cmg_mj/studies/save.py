@@ -17,7 +17,7 @@ from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
 from cmg_mj.results.terminal_tables import run_title
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.results.wire import BOARD_LOG, WIRE, WireReport
+from cmg_mj.results.wire import BOARD_LOG, WIRE, WireReport, WireSettings
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.compare.comparison import ComparedObserver
 from cmg_mj.studies.compare.statistics import standings, worlds_table
@@ -71,7 +71,7 @@ def report_run(experiment: Experiment, result: Result, *, several: bool = False)
     if world:
         origin["world"] = world
     if result.wire is not None:
-        origin["port"] = result.wire.port
+        origin["port"] = result.wire.settings.port
     reason: Summary = {"reason": outcome.reason} if outcome.reason else {}
     wire: Summary = {WIRE: result.wire.figures} if result.wire is not None else {}
     summary = finite(
@@ -134,8 +134,8 @@ def save_run(folder: RunFolder | Path, report: RunReport, *, plot: bool = False)
     from cmg_mj.visualization.recording import write_recording
 
     names = files_of_run(report.experiment, plot=plot, wired=report.wire is not None)
-    log, port = (b"", "") if report.wire is None else (report.wire.log, report.wire.port)
-    header = recording_header(report.experiment, report.driver, report.world, port)
+    log, wire = (b"", None) if report.wire is None else (report.wire.log, report.wire.settings)
+    header = recording_header(report.experiment, report.driver, report.world, wire)
     writers = (
         report.trajectory.save,
         lambda path: _write_json(path, report.summary),
@@ -224,7 +224,7 @@ def _plot(path: Path, run: Run, experiment: Experiment) -> None:
 
 
 def recording_header(
-    experiment: Experiment, driver: Driver = "native", world: int = 0, port: str = ""
+    experiment: Experiment, driver: Driver = "native", world: int = 0, wire: WireSettings | None = None
 ) -> RecordingHeader:
     """Collect what a recording shows of an experiment; the title says if it ran on the board."""
     from cmg_mj.visualization.recording import RecordingHeader
@@ -236,7 +236,7 @@ def recording_header(
         pushes=scenario.push,
         settings=scenario.metrics,
         rate_limit_rad_s=experiment.law.rate_limit,
-        scenario_toml=experiment.as_toml(driver, world, port),
+        scenario_toml=experiment.as_toml(driver, world, wire),
     )
 
 

@@ -7,7 +7,7 @@ import struct
 from typing import NamedTuple
 
 START_BYTE = b"\xa5"
-AROUND = 6
+OVERHEAD = 6
 """Bytes of a frame beside its payload."""
 LONGEST = 255
 """Longest payload [bytes]."""
@@ -45,50 +45,52 @@ class FrameReader:
     """
 
     def __init__(self) -> None:
-        self._held = bytearray()
-        self._lost_track = False
+        self._buffer = bytearray()
+        self._out_of_step = False
         self.damaged = 0
 
-    def feed(self, received: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[Frame]:
         """Take bytes and return the frames that have come whole with them."""
-        held, frames, at = self._held, [], 0
-        held += received
-        while at < len(held):
-            if held[at] == START_BYTE[0]:
-                if len(held) - at < 4:
+        buffer, frames, at = self._buffer, [], 0
+        buffer += data
+        while at < len(buffer):
+            if buffer[at] == START_BYTE[0]:
+                if len(buffer) - at < 4:
                     break
-                end = at + held[at + 3] + AROUND
-                if len(held) < end:
+                end = at + buffer[at + 3] + OVERHEAD
+                if len(buffer) < end:
                     break
-                if checksum(held[at + 1 : end - 2]) == held[end - 2 : end]:
-                    frames.append(Frame(chr(held[at + 1]), held[at + 2], bytes(held[at + 4 : end - 2])))
-                    self._lost_track = False
+                if checksum(buffer[at + 1 : end - 2]) == buffer[end - 2 : end]:
+                    frames.append(Frame(chr(buffer[at + 1]), buffer[at + 2], bytes(buffer[at + 4 : end - 2])))
+                    self._out_of_step = False
                     at = end
                     continue
-            self.damaged += not self._lost_track
-            self._lost_track = True
-            start = held.find(START_BYTE, at + 1)
-            at = len(held) if start < 0 else start
-        del held[:at]
+            self.damaged += not self._out_of_step
+            self._out_of_step = True
+            start = buffer.find(START_BYTE, at + 1)
+            at = len(buffer) if start < 0 else start
+        del buffer[:at]
         return frames
 
-    def resync(self, awaited: bytes = b"") -> list[Frame]:
+    def resync(self, kind: str = "", size: int = 0) -> list[Frame]:
         """Give up the frame whose rest has not come, if any; return the frames that lie behind its first byte.
 
         Args:
-            awaited: Beginning of a frame that may be slow: one that begins so is not given up.
+            kind: Kind of a frame that may be slow, late answers included: one that begins so is not given up.
+            size: Size of its payload [bytes].
         """
-        held = self._held
-        if not held or (awaited and awaited[: len(held)] == held[: len(awaited)]):
+        buffer = self._buffer
+        slow = START_BYTE + kind.encode() + buffer[2:3] + bytes((size,))
+        if not buffer or (kind and slow.startswith(buffer[:4])):
             return []
-        self.damaged += not self._lost_track
-        self._lost_track = True
-        del self._held[0]
+        self.damaged += not self._out_of_step
+        self._out_of_step = True
+        del self._buffer[0]
         return self.feed(b"")
 
     def end(self) -> list[Frame]:
         """Return the frames behind whatever the stream ends with that is none."""
         frames = []
-        while self._held:
+        while self._buffer:
             frames += self.resync()
         return frames

@@ -7,18 +7,21 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-from cmg_mj.codegen.board.frames import Frame
+from cmg_mj.codegen.board.frames import LONGEST, Frame
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.errors import InputError, shortened
+from cmg_mj.errors import InputError, shortened, shown
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
 
 FIRMWARE_NAME = "cmg_mj"
 FIRMWARE_VERSION = 2
 """Version of the firmware's messages: raised whenever a host and a board of different versions misunderstand."""
-LONGEST_TEXT = 215
-"""Longest introduction: a frame less two numbers and the board's own name [characters]."""
 HELLO = "h"
 """Kind of the frame in which a board introduces itself."""
+LONGEST_BOARD_NAME = 24
+"""Longest name of a board, as firmware/board.c has it [characters]."""
+_NUMBERS = struct.Struct("<2I")
+LONGEST_TEXT = LONGEST - _NUMBERS.size - len(" board=") - LONGEST_BOARD_NAME - 1
+"""Longest introduction: a payload less two numbers, the board's own name and C's end of a text [characters]."""
 _FIELDS = re.compile(r"(\w+)=(\S*)")
 
 
@@ -36,7 +39,7 @@ class Identity:
         radii_m: Distances of the accelerometers from the pivot [m].
         gimbals: Directions and zeros of the gimbals.
         board: Name of the board, from its port layer.
-        cycles_per_second: Rate of its counter.
+        cycles_per_second: Rate of its counter; 0 if that does not measure time.
     """
 
     firmware: str
@@ -106,6 +109,19 @@ class Identity:
             )
 
 
+def require_own_estimate(controller: Controller) -> None:
+    """Refuse a controller that feeds back what a board cannot measure.
+
+    Raises:
+        InputError: It feeds back another rate than its observer's.
+    """
+    if controller.feedback != "observer":
+        raise InputError(
+            f"controller.feedback = {shown(controller.feedback)}: a board has no such sensor; it closes the loop "
+            "on its own estimate, 'observer'"
+        )
+
+
 def identity_of(controller: Controller, observer: str, code: str = "") -> Identity:
     """Collect the identity of an exported controller.
 
@@ -137,10 +153,10 @@ def read_identity(frame: Frame, place: str) -> Identity:
     Raises:
         InputError: It is no such introduction.
     """
-    text = frame.payload[8:].decode("ascii", "replace")
+    text = frame.payload[_NUMBERS.size :].decode("ascii", "replace")
     fields = dict(_FIELDS.findall(text))
     try:
-        cycles, _ = struct.unpack_from("<2I", frame.payload)
+        cycles, _ = _NUMBERS.unpack_from(frame.payload)
         inner, outer = map(float, fields["radii"].split(","))
         turns = [turn.split("@") for turn in fields["gimbals"].split(",")]
         gimbals = GimbalAngle(tuple(float(d) for d, _ in turns), tuple(float(z) for _, z in turns))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import select
 import socket
 from importlib.util import find_spec
@@ -17,10 +18,13 @@ BAUDS = (9_600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600, 1_00
 """Usual baud rates [1/s]."""
 BITS_A_BYTE = 10
 """Bits of a byte on a serial line: 8, a start bit and a stop bit."""
+HEADROOM = 1.5
+"""Least deadline, in times that a sample and its answer take on the line: the rest is for USB and the update."""
 POLL_S = 0.001
 """Longest time a read of a serial line waits before the caller looks at the clock again [s]."""
 CONNECT_S = 5.0
 """Longest wait for a connection, and for a line that takes nothing [s]."""
+TAKES_NOTHING = f"the {{}} has taken no byte for {CONNECT_S:g} s: flow control, or a converter that has stopped"
 
 
 class Port(Protocol):
@@ -73,6 +77,7 @@ class _SerialPort:
         import serial
 
         try:
+            self._too_slow = serial.SerialTimeoutException
             self._serial = serial.Serial(name, baud, timeout=POLL_S, write_timeout=CONNECT_S, exclusive=True)
         except (OSError, ValueError, OverflowError) as error:  # pyserial's own errors are of these kinds
             reason = getattr(error, "strerror", None) or " ".join(str(error).split())
@@ -87,6 +92,8 @@ class _SerialPort:
     def write(self, data: bytes) -> None:
         try:
             self._serial.write(data)
+        except self._too_slow as error:  # one of OSError's kinds
+            raise Closed(TAKES_NOTHING.format("line")) from error
         except OSError as error:
             raise Closed("the cable is pulled, or the board is gone") from error
 
@@ -112,16 +119,18 @@ class _TcpPort:
         try:
             if not select.select([self._socket], [], [], max(0.0, wait_s))[0]:
                 return b""
-            received = self._socket.recv(4096)
+            data = self._socket.recv(4096)
         except OSError as error:
             raise Closed("the connection is lost") from error
-        if not received:
+        if not data:
             raise Closed("the connection is closed")
-        return received
+        return data
 
     def write(self, data: bytes) -> None:
         try:
             self._socket.sendall(data)
+        except TimeoutError as error:
+            raise Closed(TAKES_NOTHING.format("connection")) from error
         except OSError as error:
             raise Closed("the connection is lost") from error
 
@@ -129,26 +138,40 @@ class _TcpPort:
         self._socket.close()
 
 
-def require_fit(baud: int, bytes_a_tick: tuple[int, int], deadline_s: float) -> None:
-    """Refuse a baud rate at which the frames of a tick take longer than they may.
+def wire_time(baud: int, bytes_a_tick: tuple[int, int]) -> float:
+    """Compute the time that a sample and its answer take on a serial line [s].
 
     Args:
-        baud: The baud rate [1/s].
+        baud: Baud rate [1/s].
+        bytes_a_tick: Bytes of a sample's frame and of its answer's.
+    """
+    return BITS_A_BYTE * sum(bytes_a_tick) / baud
+
+
+def require_fit(baud: int, bytes_a_tick: tuple[int, int], deadline_s: float) -> None:
+    """Refuse a baud rate at which the frames of a tick, with headroom, take longer than they may.
+
+    Args:
+        baud: Baud rate [1/s].
         bytes_a_tick: Bytes of a sample's frame and of its answer's.
         deadline_s: Time from the sample to the answer [s].
 
     Raises:
         InputError: They do not fit.
     """
-    bits = BITS_A_BYTE * sum(bytes_a_tick)
-    if bits <= baud * deadline_s:
+    needed_s = HEADROOM * wire_time(baud, bytes_a_tick)
+    if needed_s <= deadline_s * (1.0 + 1e-9):
         return
-    least = bits / deadline_s
+    least = math.ceil(baud * needed_s / deadline_s - 1e-6)
     usual = next((rate for rate in BAUDS if rate >= least), None)
-    example = f", such as {usual}" if usual else ""
     sample, answer = bytes_a_tick
+    cures = f"at least {least} baud{f', such as {usual}' if usual else ''}"
+    if needed_s <= 1.0:
+        least_ms = math.ceil(1e4 * needed_s - 1e-6) / 10.0
+        cures += f", a controller.rate_hz of at most {math.floor(1.0 / needed_s + 1e-9)}"
+        cures += f", or a --deadline-ms of at least {least_ms:g} where nothing moves in real time"
     raise InputError(
-        f"--baud {baud}: a tick's frames do not fit: {sample} + {answer} bytes take {1e3 * bits / baud:.3g} ms, the "
-        f"deadline is {1e3 * deadline_s:g} ms; take at least {least:.0f} baud{example}, a lower controller.rate_hz, or "
-        "a later --deadline-ms where nothing moves in real time"
+        f"--baud {baud}: a tick's frames do not fit: {sample} + {answer} bytes take "
+        f"{1e3 * needed_s / HEADROOM:.3g} ms, {1e3 * needed_s:.3g} with room for USB, and the deadline is "
+        f"{1e3 * deadline_s:g} ms; take {cures}"
     )

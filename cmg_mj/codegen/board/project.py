@@ -11,7 +11,7 @@ from cmg_mj.controllers.controller import Controller
 EMULATED_PORT = 5555
 """TCP port of the emulated board that `make emulate` starts."""
 STRICT = ("-Werror", "-Wl,--fatal-warnings")
-"""Flags that a user's own compiler need not bear with."""
+"""Flags that are not for a user's own compiler."""
 NEVER_RUN = ("stm32f746",)
 """Machines whose firmware compiles and has never run on the chip."""
 HOW_TO_RUN = {
@@ -24,8 +24,21 @@ HOW_TO_RUN = {
 """,
 }
 """Machine -> the Makefile's rule that brings the firmware to run."""
-COMMANDS = {"mps2": ("make emulate", f"tcp:localhost:{EMULATED_PORT}"), "stm32f746": ("make flash", "/dev/ttyACM0")}
-"""Machine -> the command that brings the firmware to run, and the port on which it answers then."""
+PORTS = {"mps2": f"tcp:localhost:{EMULATED_PORT}", "stm32f746": "/dev/ttyACM0"}
+"""Machine -> the port on which the firmware answers."""
+
+
+def then(machine: str, make: str, run_it: str) -> str:
+    """Say how to bring the firmware to run, and what to do then.
+
+    Args:
+        machine: The board, one of `MACHINES`.
+        make: The command that makes a target of the project, up to the target.
+        run_it: The command that runs the scenario on the board.
+    """
+    if machine == "mps2":
+        return f"Then, in a terminal of its own, which it keeps busy: {make}emulate\nAnd in this one: {run_it}"
+    return f"Then: {make}flash && {run_it}"
 
 
 def project_files(machine: str) -> list[str]:
@@ -34,7 +47,7 @@ def project_files(machine: str) -> list[str]:
     return ["board.c", "its.h", "port.h", "startup.c", board.sources, board.script, "Makefile"]
 
 
-def project(controller: Controller, name: str, code: str, machine: str) -> dict[str, str]:
+def project(controller: Controller, name: str, code: str, machine: str, run_it: str) -> dict[str, str]:
     """Write the files of a project beside those of the export.
 
     Args:
@@ -42,24 +55,25 @@ def project(controller: Controller, name: str, code: str, machine: str) -> dict[
         name: The observer's name in C.
         code: Text of its .c file, in single precision.
         machine: The board, one of `MACHINES`.
+        run_it: The command that runs the scenario on the board.
 
     Returns:
         Name -> text.
     """
     *sources, _ = project_files(machine)
     files = {file: (FIRMWARE / file).read_text(encoding="utf-8") for file in sources}
-    return {**files, "Makefile": _makefile(name, machine, identity_of(controller, name, code).text())}
+    return {**files, "Makefile": _makefile(name, machine, identity_of(controller, name, code).text(), run_it)}
 
 
-def _makefile(name: str, machine: str, identity: str) -> str:
+def _makefile(name: str, machine: str, identity: str, run_it: str) -> str:
     board = MACHINES[machine]
     flags = " ".join(flag for flag in FLAGS if flag not in STRICT)
     macros = " ".join(f"'-D{macro}'" for macro in macros_of(name, machine, identity))
     sources = f"startup.c {board.sources} board.c {name}.c"
-    command, port = COMMANDS[machine]
+    how = "\n".join(f"# {line}" for line in then(machine, "make ", " ".join(run_it.split())).splitlines())
     warning = "# The firmware compiles. It has never run on this chip.\n" if machine in NEVER_RUN else ""
     return f"""# {name} on {board.title}; written by cmg_mj, whose docs/board.md says more.
-# {command}, then: cmg-mj run push_recovery --driver board --observer {name} --port {port}
+{how}
 {warning}
 NAME := {name}
 BAUD ?= {BAUD}
@@ -70,15 +84,19 @@ MACROS := {macros} -DBAUD=$(BAUD)u
 
 all: $(NAME).elf $(NAME).bin
 
-$(NAME).elf: {sources} {name}.h its.h port.h {board.script} Makefile
+$(NAME).elf: {sources} {name}.h its.h port.h {board.script} Makefile $(NAME).baud
 \t$(CC) $(FLAGS) $(MACROS) -I. -T {board.script} {sources} -lm -o $@
+
+# The rate of the last build, written where it changes.
+$(NAME).baud: always
+\t@test "$$(cat $@ 2>/dev/null)" = "$(BAUD)" || echo "$(BAUD)" > $@
 
 $(NAME).bin: $(NAME).elf
 \t{COMPILER.replace("gcc", "objcopy")} -O binary $< $@
 
 {HOW_TO_RUN[machine]}
 clean:
-\trm -f $(NAME).elf $(NAME).bin
+\trm -f $(NAME).elf $(NAME).bin $(NAME).baud
 
-.PHONY: all clean emulate flash
+.PHONY: all always clean emulate flash
 """

@@ -98,6 +98,7 @@ class Board:
             self.sizes = Sizes(*self._ask("i", b"", "<4I"))
             self._reals = "f" if self.sizes.real == 4 else "d"
             self._per_instruction, self._empty = self._calibrated() if counting else (0.0, {})
+            self.start()
         except BaseException:
             self.close()
             raise
@@ -135,9 +136,7 @@ class Board:
         payload = self._packed(*accelerations, *encoders)
         counts, stack, status, u, x_e, *estimate = self._ask("u", payload, f"<3I{numbers}{self._reals}")
         self.costs.append(self._cost("u", counts, stack))
-        if status:
-            raise RunStopped(f"the controller on the board has stopped: {NOT_FINITE.get(status, f'status {status}')}")
-        return Decision(u, x_e, tuple(estimate))
+        return decision_of(status, u, x_e, estimate)
 
     def init(self, y1: float, y2: float, acceleration: float) -> Cost:
         """Start the separate observer, which is not the controller's."""
@@ -191,6 +190,17 @@ class Board:
                 return f"{EMULATOR} was ended by signal {-status}"
             return STATUSES.get(status, f"{EMULATOR} has ended with status {status}")
         return "it has closed the line"
+
+
+def decision_of(status: int, u: float, x_e: float, estimate: Sequence[float]) -> Decision:
+    """Return the decision of an update's answer.
+
+    Raises:
+        RunStopped: Its status says that a number was not finite.
+    """
+    if status:
+        raise RunStopped(f"the controller on the board has stopped: {NOT_FINITE.get(status, f'status {status}')}")
+    return Decision(u, x_e, tuple(estimate))
 
 
 def emulator_command(image: Path) -> list[str]:

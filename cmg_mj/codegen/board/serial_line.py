@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import struct
 
-from cmg_mj.codegen.board.frames import START_BYTE, Frame, checksum
+from cmg_mj.codegen.board.frames import Frame, FrameReader
 from cmg_mj.errors import RunStopped
 
 
@@ -28,6 +28,7 @@ class SerialLine:
     def __init__(self, line: socket.socket, patience_s: float) -> None:
         self._line = line
         self._line.settimeout(patience_s)
+        self._reader, self._waiting = FrameReader(), list[Frame]()
         self._number = 0
         self.patience_s = patience_s
 
@@ -69,23 +70,15 @@ class SerialLine:
     def _message(self) -> Frame:
         """Receive the next message."""
         try:
-            head = self._receive(4)
-            if head[:1] != START_BYTE:
-                raise RunStopped(f"the board sent the byte {head[0]:#04x} where a message should begin")
-            rest = self._receive(head[3] + 2)
+            while not self._waiting:
+                data = self._line.recv(4096)
+                if not data:
+                    raise Closed("the board is gone")
+                self._waiting += self._reader.feed(data)
+                if self._reader.damaged:
+                    raise RunStopped("the board sent a message that was damaged on the line, or bytes that are none")
         except TimeoutError as error:
             raise Silent(f"the board has not answered for {self.patience_s:g} s") from error
         except OSError as error:
             raise Closed("the board is gone") from error
-        if checksum(head[1:] + rest[:-2]) != rest[-2:]:
-            raise RunStopped("the board sent a message that was damaged on the line")
-        return Frame(chr(head[1]), head[2], rest[:-2])
-
-    def _receive(self, count: int) -> bytes:
-        received = b""
-        while len(received) < count:
-            more = self._line.recv(count - len(received))
-            if not more:
-                raise Closed("the board is gone")
-            received += more
-        return received
+        return self._waiting.pop(0)

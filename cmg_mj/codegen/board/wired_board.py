@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import statistics
 import struct
 import time
@@ -14,19 +15,20 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from cmg_mj.codegen.board.frames import AROUND, Frame, FrameReader
-from cmg_mj.codegen.board.identity import HELLO, Identity, identity_of, read_identity
-from cmg_mj.codegen.board.ports import BAUD, Port, is_tcp, open_port, require_fit
-from cmg_mj.codegen.board.qemu import NOT_FINITE, STATUSES, Board
+from cmg_mj.codegen.board.frames import OVERHEAD, Frame, FrameReader
+from cmg_mj.codegen.board.identity import HELLO, Identity, identity_of, read_identity, require_own_estimate
+from cmg_mj.codegen.board.ports import BAUD, Port, is_tcp, open_port, require_fit, wire_time
+from cmg_mj.codegen.board.qemu import STATUSES, Board, decision_of
 from cmg_mj.codegen.board.serial_line import Closed
 from cmg_mj.codegen.export import generate_code
 from cmg_mj.codegen.export.names import name_of
+from cmg_mj.codegen.export.refusals import refuse_unexported
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.processor import Decision, Processor
-from cmg_mj.errors import InputError, RunStopped, shown
+from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import Summary
-from cmg_mj.results.wire import WireReport
+from cmg_mj.results.wire import WireReport, WireSettings
 
 PATIENCE_S = 3.0
 """Longest wait for an answer of the handshake [s]."""
@@ -36,6 +38,8 @@ MAX_LOST = 20
 """Number of ticks lost in a row that ends a run: 0.1 s at 200 Hz, in which an unstable rig's tilt doubles."""
 LARGEST_MAX_LOST = 127
 """The largest of these: by its number, modulo 256, a board takes a later sample for one that it has had."""
+USB_S = 0.001
+"""Time for which USB may hold bytes back: the length of one of its frames [s]."""
 _COST = struct.Struct("<3I")
 
 
@@ -48,7 +52,7 @@ class WireCounts:
         lost: Number of ticks without an answer in time.
         lost_in_a_row: Largest number of these in a row.
         late_or_doubled: Number of answers that nobody waited for any more.
-        refused: Number of frames that came damaged to the board.
+        refused: Number of refusals: the board refuses a frame that came damaged once its line is quiet.
         round_trips_s: Time from a sample to its answer, of each tick that was answered [s].
         counts: Counts of the board's counter that its update took, likewise.
     """
@@ -65,8 +69,9 @@ class WireCounts:
 class WiredBoard:
     """A board behind a port that takes the control decisions; see `on_a_wire`.
 
-    A sample that has no answer after `again_s`, or came damaged to the board, is sent again under the same number; the
-    board does not execute it again. Without an answer by the deadline the tick is lost: the last command is held.
+    A sample that has no answer after `again_s`, or that the board refuses, is sent again under the same number, unless
+    its answer could not come in time any more. The board does not execute it again. Without an answer by the deadline
+    the tick is lost: the last command is held.
 
     Args:
         port: The open port.
@@ -74,12 +79,14 @@ class WiredBoard:
         expected: The firmware and controller that the scenario asks for.
         estimates: Parts of an estimate.
         deadline_s: Time from a sample to its answer [s].
-        again_s: Time after which a sample is sent again; None for half of the deadline, so that it is sent twice [s].
+        again_s: Time after which a sample is sent again; None for half of the deadline, or longer on a slow line [s].
         max_lost: Number of ticks lost in a row that ends the run.
+        wire_s: Time that a sample and its answer take on the line [s].
 
     Attributes:
         identity: The board's own account of itself.
         counts: What has gone over the wire since `start`.
+        settings: The settings of the wire that a rerun needs.
         checksum_compared: Whether the checksum of the controller's C was compared.
 
     Raises:
@@ -95,15 +102,22 @@ class WiredBoard:
         deadline_s: float,
         again_s: float | None = None,
         max_lost: int = MAX_LOST,
+        wire_s: float = 0.0,
     ) -> None:
         self.name, self.deadline_s, self.max_lost = name, deadline_s, max_lost
-        self._again_s = 0.5 * deadline_s if again_s is None else again_s
+        self.settings = WireSettings(name)
+        self._wire_s = wire_s
+        self._again_s = max(0.5 * deadline_s, wire_s + USB_S) if again_s is None else again_s
         self._port, self._reader, self._number = port, FrameReader(), 0
         self._waiting: list[Frame] = []
         self._answer = struct.Struct(f"<{2 + estimates}f")
         self._nothing = Decision(0.0, 0.0, (0.0,) * estimates)
         self._begin()
         self._hello = self._shake(HELLO)
+        if not self._hello.payload:  # the question, which carries nothing
+            raise InputError(
+                f"{name}: sends back what it receives: a loopback plug or an echoing terminal is there, and no board"
+            )
         self.identity = read_identity(self._hello, name)
         self.identity.require(expected, name)
         self.checksum_compared = bool(expected.code)
@@ -151,28 +165,29 @@ class WiredBoard:
             raise RunStopped(f"{self.name}: the board answered something else than what was asked")
         counts, _, status = _COST.unpack_from(answer.payload)
         self.counts.counts.append(counts)
-        if status:
-            raise RunStopped(f"the controller on the board has stopped: {NOT_FINITE.get(status, f'status {status}')}")
         u, x_e, *estimate = self._answer.unpack_from(answer.payload, _COST.size)
+        decision = decision_of(status, u, x_e, estimate)
         if not all(map(math.isfinite, (u, *estimate))):  # a law without an integrator has none
             raise RunStopped(f"{self.name}: the board answered a number that is not finite")
-        self._decision = Decision(u, x_e, tuple(estimate))
-        return self._decision
+        self._decision = decision
+        return decision
 
     def _exchange(self, frame: Frame, question: bytes) -> Frame | None:
         """Send a sample, again if need be, and return its answer; None if there is none by the deadline."""
-        begun = now = time.perf_counter()
-        deadline, first = begun + self.deadline_s, True
-        awaited = question[:3] + bytes((_COST.size + self._answer.size,))
-        while now < deadline:
+        start = now = time.perf_counter()
+        deadline, first = start + self.deadline_s, True
+        while now + self._wire_s < deadline:
             if not first:
                 self.counts.sent_again += 1
-                self._waiting += self._reader.resync(awaited)
+                self._waiting += self._reader.resync(frame.kind, _COST.size + self._answer.size)
             self._send(question)
-            answer = self._await(frame, min(now + self._again_s, deadline), until_refused=first)
+            until = now + self._again_s
+            if until + self._wire_s >= deadline:  # sent again then, it would be answered too late
+                until = deadline
+            answer = self._await(frame, until, until_refused=first)
             now, first = time.perf_counter(), False
             if answer is not None and now < deadline:
-                self.counts.round_trips_s.append(now - begun)
+                self.counts.round_trips_s.append(now - start)
                 return answer
             self.counts.late_or_doubled += answer is not None
         return None
@@ -189,20 +204,20 @@ class WiredBoard:
     def _await(self, frame: Frame, until: float, *, until_refused: bool = False) -> Frame | None:
         """Return the answer to a frame; None if none comes in time, or if the board has refused it."""
         while True:
-            for received in self._received(until):
-                if received.kind == "!" and frame.kind == "u":
-                    why = STATUSES.get(received.payload[0], "") if received.payload else ""
+            for reply in self._received(until):
+                if reply.kind == "!" and frame.kind == "u":
+                    why = STATUSES.get(reply.payload[0], "") if reply.payload else ""
                     raise RunStopped(
                         f"{self.name}: the board has started again, and its controller's state is lost"
                         f"{': ' + why if why else ''}"
                     )
-                if received.kind == frame.kind and received.number == frame.number:
-                    return received
-                if received.kind == "?":
+                if reply.kind == frame.kind and reply.number == frame.number:
+                    return reply
+                if reply.kind == "?":
                     self.counts.refused += 1
-                    if until_refused and received.number == frame.number:
+                    if until_refused and reply.number == frame.number:
                         return None
-                elif received.kind == frame.kind:
+                elif reply.kind == frame.kind:
                     self.counts.late_or_doubled += 1
             if time.perf_counter() >= until:
                 return None
@@ -210,9 +225,9 @@ class WiredBoard:
     def _received(self, until: float) -> Iterator[Frame]:
         """Yield frames that have come, and then those that come within a moment."""
         if not self._waiting:
-            left = until - time.perf_counter()
+            wait_s = until - time.perf_counter()
             try:
-                self._waiting += self._reader.feed(self._port.read(max(0.0, left)))
+                self._waiting += self._reader.feed(self._port.read(max(0.0, wait_s)))
             except Closed as error:
                 raise RunStopped(f"{self.name}: {error}") from error
         while self._waiting:
@@ -225,9 +240,9 @@ class WiredBoard:
             InputError: There is none.
         """
         frame = self._next(kind, b"")
-        begun = time.perf_counter()
+        start = time.perf_counter()
         refused = self.counts.refused
-        while time.perf_counter() < begun + PATIENCE_S:
+        while time.perf_counter() < start + PATIENCE_S:
             self._send(frame.encode())
             answer = self._await(frame, time.perf_counter() + AGAIN_S)
             if answer is not None:
@@ -258,13 +273,14 @@ class WiredBoard:
         figures: Summary = {
             "port": self.name,
             "board": self.identity.board,
+            "options": shlex.join(self.settings.options()),
             "deadline_ms": 1e3 * self.deadline_s,
             "ticks": len(self._exchanges),
             "sent_again": counts.sent_again,
             "lost": counts.lost,
             "lost_in_a_row": counts.lost_in_a_row,
             "late_or_doubled": counts.late_or_doubled,
-            "damaged_to_board": counts.refused,
+            "refused_by_board": counts.refused,
             "damaged_from_board": self._reader.damaged - self._damaged_before,
         }
         if len(trips):
@@ -299,7 +315,7 @@ def result_of(processor: Processor, result: Result) -> Result:
     """Return the result of a run with what its processor adds: that it was a board, and what went over its wire."""
     if isinstance(processor, WiredBoard):
         rates = () if result.trajectory is None else result.trajectory["x2_rad_s"].tolist()
-        wire = WireReport(processor.name, processor.figures(), processor.log(rates))
+        wire = WireReport(processor.settings, processor.figures(), processor.log(rates))
         return replace(result, driver="board", wire=wire)
     return replace(result, driver="board") if isinstance(processor, Board) else result
 
@@ -321,7 +337,7 @@ def on_a_wire(
         port: The name of a serial port, such as /dev/ttyACM0, or tcp:HOST:PORT.
         baud: Baud rate of a serial port; None for `BAUD`.
         deadline_s: Time from a sample to its answer; None for the control period [s].
-        again_s: Time after which a sample is sent again; None for half of the deadline [s].
+        again_s: Time after which a sample is sent again; None for half of the deadline, or longer on a slow line [s].
         max_lost: Number of ticks lost in a row that ends a run.
 
     Yields:
@@ -331,24 +347,31 @@ def on_a_wire(
         InputError: The port cannot be opened, the frames do not fit the baud rate, nobody answers, or the board has
             another firmware or controller.
     """
-    if controller.feedback != "observer":
-        raise InputError(
-            f"controller.feedback = {shown(controller.feedback)}: a board has no such sensor; it closes the loop "
-            "on its own estimate, 'observer'"
-        )
+    require_own_estimate(controller)
+    refuse_unexported(controller)
+    settings = WireSettings(
+        port,
+        baud,
+        None if deadline_s is None else 1e3 * deadline_s,
+        None if max_lost == MAX_LOST else max_lost,
+    )
     deadline_s = controller.law.dt if deadline_s is None else deadline_s
     if not (0.0 < deadline_s < math.inf and 0 < max_lost <= LARGEST_MAX_LOST):
         raise InputError(
             f"deadline_s = {deadline_s:g}, max_lost = {max_lost}: must be above 0, and 1 to {LARGEST_MAX_LOST}"
         )
     estimates = 3 + len(controller.extra_signals[0])
-    sizes = (AROUND + 4 * (4 + len(controller.gimbal_angle.zeros)), AROUND + _COST.size + 4 * (2 + estimates))
+    sizes = (OVERHEAD + 4 * (4 + len(controller.gimbal_angle.zeros)), OVERHEAD + _COST.size + 4 * (2 + estimates))
+    wire_s = 0.0
     if not is_tcp(port):
         require_fit(baud or BAUD, sizes, deadline_s)
+        wire_s = wire_time(baud or BAUD, sizes)
     expected = expected_identity(controller)
     line = open_port(port, baud)
     try:
-        yield WiredBoard(line, port, expected, estimates, deadline_s, again_s, max_lost)
+        board = WiredBoard(line, port, expected, estimates, deadline_s, again_s, max_lost, wire_s)
+        board.settings = settings
+        yield board
     finally:
         line.close()
 

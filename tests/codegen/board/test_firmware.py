@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 import shutil
+import signal
 import socket
 import struct
 import subprocess
+import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -20,7 +25,7 @@ from cmg_mj.codegen.board.qemu import emulator_command
 from cmg_mj.codegen.board.tools import available
 from tests.codegen.board.toy import needs_board, toy
 from tests.codegen.board.wire import TOY
-from tests.command import cmg_mj
+from tests.command import ROOT, cmg_mj
 
 pytestmark = needs_board
 
@@ -58,6 +63,14 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def line(image: Path) -> Iterator[RawLine]:
+    with emulated(image) as line:
+        line.answers(Frame("s", 0, b"").encode(), 1)
+        yield line
+
+
+@contextmanager
+def emulated(image: Path) -> Iterator[RawLine]:
+    """A board that has just begun."""
     host, board = socket.socketpair()
     with board:
         process = subprocess.Popen(emulator_command(image), stdin=board.fileno(), stdout=board.fileno())
@@ -97,7 +110,7 @@ def test_a_frame_sent_again_is_not_executed_again(line: RawLine) -> None:
 def test_it_introduces_itself(line: RawLine) -> None:
     (hello,) = line.answers(Frame("h", 1, b"").encode(), 1)
     identity = read_identity(hello, "")
-    assert (identity.board, identity.cycles_per_second) == ("mps2-an500", 25_000_000)
+    assert (identity.board, identity.cycles_per_second) == ("mps2-an500", 0)
     assert identity.text() == TOY.text()
     times = [struct.unpack_from("<2I", line.answers(Frame("h", n, b"").encode(), 1)[0].payload)[1] for n in (2, 3)]
     assert 0 < times[1] - times[0] < 60_000_000
@@ -120,11 +133,24 @@ def test_a_mistake_costs_one_frame_and_not_the_next(line: RawLine, fault: str) -
         assert commands([frame for frame in frames if frame.kind == "u"])[-1] == (number, angle + 100.0 * executed)
 
 
-def test_an_unknown_message_is_refused_at_once(line: RawLine) -> None:
-    assert line.answers(Frame("x", 9, b"").encode() + Frame("u", 8, b"1234").encode(), 2) == [
-        Frame("?", 9, b""),
-        Frame("?", 8, b""),
-    ]
+def test_an_unknown_message_is_refused_once_the_line_is_quiet(line: RawLine) -> None:
+    unknown = Frame("x", 9, b"").encode() + Frame("u", 8, b"1234").encode()
+    line.line.sendall(unknown)
+    assert line.first() == Frame("?", 9, b"")  # once; the emulated board waits for a second
+    assert line.answers(unknown, 0) == []  # what comes whole behind it is answered instead
+    line.line.sendall(sample(7, 1.0)[:-1])
+    assert line.first() == Frame("?", 7, b"")
+    assert line.answers(sample(7, 1.0)[-1:], 0) == []  # the rest comes too late
+
+
+def test_a_board_that_has_started_again_says_so_until_it_is_put_at_its_start(image: Path) -> None:
+    """Its first message may be lost, and it must not go on with a fresh controller in the middle of a run."""
+    with emulated(image) as line:
+        ready = Frame("!", 0, b"")
+        assert line.answers(sample(17, 1.0) + sample(17, 1.0) + sample(18, 1.0), 3) == [ready] * 3
+        start = Frame("s", 19, b"")
+        assert line.answers(start.encode(), 1) == [start]
+        assert commands(line.answers(sample(20, 1.0), 1)) == [(20, 101.0)]
 
 
 def objects(machine: str, folder: Path) -> list[str]:
@@ -158,58 +184,10 @@ def test_the_flashed_image_lies_where_the_chip_begins(tmp_path: Path) -> None:
     assert b"STM32F746G-DISCO" in binary.read_bytes()
 
 
-SOURCES = {
-    # CMSIS Device F7 1.2.9, stm32f746xx.h: base + offset in the peripheral's structure
-    "TIM2_CNT": 0x40000024,
-    "TIM2_PSC": 0x40000028,
-    "TIM2_ARR": 0x4000002C,
-    "TIM2_EGR": 0x40000014,
-    "PWR_CR1": 0x40007000,
-    "PWR_CSR1": 0x40007004,
-    "USART1_CR1": 0x40011000,
-    "USART1_BRR": 0x4001100C,
-    "USART1_ISR": 0x4001101C,
-    "USART1_ICR": 0x40011020,
-    "USART1_RDR": 0x40011024,
-    "USART1_TDR": 0x40011028,
-    "RCC_CR": 0x40023800,
-    "RCC_PLLCFGR": 0x40023804,
-    "RCC_CFGR": 0x40023808,
-    "RCC_AHB1ENR": 0x40023830,
-    "RCC_APB1ENR": 0x40023840,
-    "RCC_APB2ENR": 0x40023844,
-    "FLASH_ACR": 0x40023C00,
-    "GPIO_AFRH(GPIOA)": 0x40020024,
-    "GPIO_AFRL(GPIOB)": 0x40020420,
-    "GPIO_PUPDR(GPIOB)": 0x4002040C,
-    # CMSIS Core, core_cm7.h: SCB 0xE000ED00, DWT 0xE0001000, CoreDebug 0xE000EDF0
-    "SCB_VTOR": 0xE000ED08,
-    "SCB_AIRCR": 0xE000ED0C,
-    "SCB_CCR": 0xE000ED14,
-    "SCB_CCSIDR": 0xE000ED80,
-    "SCB_CSSELR": 0xE000ED84,
-    "SCB_ICIALLU": 0xE000EF50,
-    "SCB_DCISW": 0xE000EF60,
-    "DEMCR": 0xE000EDFC,
-    "DWT_CTRL": 0xE0001000,
-    "DWT_CYCCNT": 0xE0001004,
-    "DWT_LAR": 0xE0001FB0,
-}
-"""Register of stm32f746.c -> its address, written down from the sources a second time."""
-
-
-def test_registers_are_where_the_sources_have_them(tmp_path: Path) -> None:
-    """The compiler works the addresses out; a wrong one does not compile."""
-    source = (FIRMWARE / "stm32f746.c").read_text()
-    checks = "".join(
-        f'_Static_assert((uint32_t)&({name}) == {address:#x}u, "{name}");\n' for name, address in SOURCES.items()
-    )
-    test = tmp_path / "addresses.c"
-    test.write_text(source + checks)
-    command = ["arm-none-eabi-gcc", "-mcpu=cortex-m7", "-fsyntax-only", "-I", FIRMWARE, test]
-    subprocess.run(command, check=True)
-    test.write_text(test.read_text().replace("0x40011028u,", "0x4001102cu,"))
-    assert subprocess.run(command, capture_output=True, check=False).returncode
+def make(folder: Path, *arguments: str) -> bytes:
+    """Build a project; return its binary."""
+    subprocess.run(["make", "-s", "-C", folder, *arguments], check=True)
+    return (folder / "gyro_free.bin").read_bytes()
 
 
 @pytest.mark.slow
@@ -221,8 +199,14 @@ def test_the_project_builds(machine: str, tmp_path: Path) -> None:
     assert outcome.status == 0
     assert ("has never run on one" in outcome.err) == (machine != "mps2")
     assert {*project_files(machine), "gyro_free.c", "gyro_free.h"} <= {path.name for path in folder.iterdir()}
-    subprocess.run(["make", "-s", "-C", folder], check=True)
+    assert make(folder) == make(folder, "BAUD=460800")
     assert 4000 < (folder / "gyro_free.bin").stat().st_size < 20_000
+    if machine != "mps2":  # whose line has no rate
+        fast = make(folder, "BAUD=921600")
+        assert make(folder, "BAUD=921600") == fast != make(folder)
+        for rate in (1_647, 7_000_000):
+            with pytest.raises(subprocess.CalledProcessError):
+                make(folder, f"BAUD={rate}")
     again = cmg_mj("export", "gyro_free", "--firmware", machine, "--out", folder)
     assert again.status == 0
 
@@ -236,3 +220,39 @@ def test_what_a_firmware_cannot_be() -> None:
         "--name mine: the firmware's controller has the observer's own name; leave it out"
     )
     assert not Path("runs").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not available() or shutil.which("make") is None, reason="no make, or no CasADi")
+@pytest.mark.usefixtures("elsewhere")
+def test_what_the_export_says_can_be_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A user's class and settings that a shell would read; `make emulate` in one terminal, the run in another."""
+    shutil.copy(ROOT / "examples/own_observer.py", "own_observer.py")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = str(server.getsockname()[1])
+    monkeypatch.setenv("PORT", port)
+    settings = ["--set", "push=[]", "--set", "duration_s=0.5", "--set", "controller.gains=[36, 4, -1, 0.3]"]
+    outcome = cmg_mj(
+        *["export", "own_observer:HalfDifference", "--firmware", "mps2", "--out", "the firmware"], *settings
+    )
+    first, second = outcome.err.splitlines()[-2:]
+    blocking, run_it = first.partition("keeps busy: ")[2], second.partition("in this one: ")[2]
+    comments = Path("the firmware/Makefile").read_text().splitlines()[1:3]
+    assert [line[2:].replace("make ", "make -C 'the firmware' ") for line in comments] == [
+        first.partition(". ")[2],
+        second,
+    ]
+    command, *arguments = shlex.split(run_it.replace("5555", port))
+    assert command == "cmg-mj"
+    emulator = subprocess.Popen(shlex.split(blocking), start_new_session=True, stdout=subprocess.DEVNULL)
+    try:
+        arguments += ["--deadline-ms", "60000", "--out", "here"]
+        while "Connection refused" in (run := cmg_mj(*arguments)).err:
+            assert emulator.poll() is None
+            time.sleep(0.1)
+    finally:
+        os.killpg(emulator.pid, signal.SIGKILL)
+        emulator.wait()
+    assert run.status == 0
+    assert "100 ticks" in run.out
+    assert "update on the board" not in run.out  # the emulator knows no cycles

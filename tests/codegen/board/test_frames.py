@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import random
+import socket
 
 import pytest
 
 from cmg_mj.codegen.board.frames import Frame, FrameReader
+from cmg_mj.codegen.board.serial_line import SerialLine
+from cmg_mj.errors import RunStopped
 
 FRAMES = [Frame("u", number, bytes(random.Random(number).randbytes(38))) for number in range(200)]
 STREAM = b"".join(frame.encode() for frame in FRAMES)
@@ -63,7 +66,34 @@ def test_a_frame_whose_rest_does_not_come_is_given_up() -> None:
 def test_a_frame_that_is_slow_is_not_given_up_where_it_is_awaited() -> None:
     reader, whole = FrameReader(), FRAMES[3].encode()
     for count in (2, 7):
-        assert reader.feed(whole[:count]) == reader.resync(whole[:4]) == []
+        assert reader.feed(whole[:count]) == reader.resync("u", 38) == []
         assert reader.feed(whole[count:]) == [FRAMES[3]]
-    assert reader.feed(FRAMES[4].encode()[:7]) == reader.resync(whole[:4]) == []
+    assert reader.feed(FRAMES[4].encode()[:7]) == reader.resync("u", 37) == reader.resync("o", 38) == []
     assert reader.damaged == 1
+
+
+def test_a_late_answer_of_another_number_is_no_damage() -> None:
+    reader = FrameReader()
+    for frame in FRAMES[:5]:
+        assert reader.feed(frame.encode()[:20]) == reader.resync("u", 38) == []
+        assert reader.feed(frame.encode()[20:]) == [frame]
+    assert reader.damaged == 0
+
+
+@pytest.mark.parametrize(
+    ("received", "message"),
+    [
+        (b"\xa5u\x01\x00\x00\x00", "damaged on the line, or bytes that are none$"),
+        (b"hello" + Frame("u", 1, b"").encode(), "damaged on the line, or bytes that are none$"),
+        (Frame("?", 1, b"").encode(), "knows no message 'u' of 0 bytes"),
+        (Frame("u", 2, b"").encode(), "answered something else than what 'u' asked$"),
+        (b"\xa5u\x01", "has not answered for 0.05 s$"),
+    ],
+    ids=["damaged", "noise", "unknown", "number", "half"],
+)
+def test_an_emulated_boards_line_makes_no_mistakes(received: bytes, message: str) -> None:
+    host, board = socket.socketpair()
+    with host, board:
+        board.sendall(received)
+        with pytest.raises(RunStopped, match=message):
+            SerialLine(host, 0.05).ask("u", b"", "<")

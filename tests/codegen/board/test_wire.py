@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import socket
 import struct
-import threading
 import time
-from pathlib import Path
 
 import pytest
 
-from cmg_mj.codegen.board import ports, wired_board
+from cmg_mj.codegen.board import on_a_wire, wired_board
 from cmg_mj.codegen.board.frames import Frame, FrameReader
 from cmg_mj.codegen.board.identity import Identity, identity_of, read_identity
-from cmg_mj.codegen.board.ports import open_port, require_fit
+from cmg_mj.codegen.board.ports import require_fit
 from cmg_mj.codegen.board.wired_board import WiredBoard
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from tests.codegen.board.toy import short
 from tests.codegen.board.wire import TOY, PythonBoard
-from tests.command import cmg_mj
 
 ACCELERATIONS = (0.0, 9.8, 0.0, 9.8)
 
@@ -83,6 +79,36 @@ def test_a_checksum_that_is_not_known_is_not_compared() -> None:
     assert connect(PythonBoard()).checksum_compared
 
 
+def test_without_a_checksum_radii_and_gimbals_are_compared_still() -> None:
+    unknown = dataclasses.replace(TOY, code="")
+    for field, value in (("radii_m", (0.1, 0.3)), ("gimbals", GimbalAngle((1.0, 1.0), (1.5, 1.5)))):
+        board = PythonBoard(dataclasses.replace(TOY, **{field: value}))
+        with pytest.raises(InputError, match=r"^the port: the board has (radii of the accelerometers|gimbals) "):
+            WiredBoard(board, "the port", unknown, 3, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("controller.notch_hz=12", r"^controller\.notch_hz = 12\.0: cannot be exported: C has no such option"),
+        ("controller.feedback=truth", r"^controller\.feedback = 'truth': a board has no such sensor"),
+    ],
+    ids=["notch", "feedback"],
+)
+def test_what_cannot_be_exported_is_refused_without_casadi(
+    setting: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before anything is opened: nobody is at that port."""
+    monkeypatch.setattr(wired_board, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=message), on_a_wire(short("gyro_free", setting).axis_controller(), "tcp:x:1"):
+        pass
+
+
+def test_a_line_that_sends_back_what_it_receives_is_no_board() -> None:
+    with pytest.raises(InputError, match=r"^the port: sends back what it receives: a loopback plug or an echoing term"):
+        connect(PythonBoard(answers=lambda frame, answer: [frame]))
+
+
 def test_who_does_not_answer_the_handshake(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wired_board, "PATIENCE_S", 0.02)
     monkeypatch.setattr(wired_board, "AGAIN_S", 0.005)
@@ -90,6 +116,8 @@ def test_who_does_not_answer_the_handshake(monkeypatch: pytest.MonkeyPatch) -> N
         InputError, match=r"^the port: no answer within 0\.02 s: is the firmware on it, and is the baud"
     ):
         connect(PythonBoard(answers=lambda frame, answer: []))
+    with pytest.raises(InputError, match=r"^TCP:x:1: no answer .*and is no other program connected to it\?$"):
+        WiredBoard(PythonBoard(answers=lambda frame, answer: []), "TCP:x:1", TOY, 3, 1.0)
     with pytest.raises(InputError, match="knows no handshake: it is older than this cmg_mj"):
         connect(PythonBoard(answers=lambda frame, answer: [Frame("?", frame.number, b"")]))
     other = PythonBoard(answers=lambda frame, answer: [Frame("h", frame.number, b"12345678hello, world")])
@@ -252,81 +280,19 @@ def test_its_log_has_the_frames_and_the_rates() -> None:
 
 
 def test_frames_that_do_not_fit_are_refused() -> None:
-    require_fit(136_000, (30, 38), 0.005)
+    """There has to be time for one and a half times the frames; all that the message proposes is taken."""
+    require_fit(204_000, (30, 38), 0.005)
     with pytest.raises(
-        InputError, match=r"^--baud 115200: a tick's frames do not fit: 30 \+ 38 bytes take 5\.9 ms, the dea"
+        InputError,
+        match=r"^--baud 203999: a tick's frames do not fit: 30 \+ 38 bytes take 3\.33 ms, 5 with room for USB, and the "
+        r"deadline is 5 ms; take at least 204000 baud, such as 230400, a ",
+    ):
+        require_fit(203_999, (30, 38), 0.005)
+    with pytest.raises(
+        InputError, match=r"controller\.rate_hz of at most 112, or a --deadline-ms of at least 8\.9 where nothing moves"
     ):
         require_fit(115_200, (30, 38), 0.005)
-    with pytest.raises(InputError, match=r"take at least 136000 baud, such as 230400, a lower controller\.rate_hz, or"):
-        require_fit(135_999, (30, 38), 0.005)
-    require_fit(115_200, (30, 38), 0.006)
-
-
-@pytest.mark.parametrize("name", ["tcp:", "tcp:5555", "tcp:here:", "tcp:here:x", "tcp:here:0", "tcp:here:65536"])
-def test_a_tcp_port_that_is_none(name: str) -> None:
-    with pytest.raises(InputError, match=r"^--port '?tcp:.*: write tcp:HOST:PORT, such as tcp:localhost:5555$"):
-        open_port(name)
-
-
-def test_ports_that_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        free = server.getsockname()[1]
-    with pytest.raises(InputError, match=rf"^--port tcp:127\.0\.0\.1:{free}: cannot be reached: Connection refused$"):
-        open_port(f"tcp:127.0.0.1:{free}")
-    with pytest.raises(InputError, match=r"^--baud 9600: tcp:here:1 has no baud rate; leave it out$"):
-        open_port("tcp:here:1", 9600)
-    monkeypatch.setattr(ports, "find_spec", lambda name: None)
-    with pytest.raises(
-        InputError, match=r'^--port COM3: pyserial is not installed: python -m pip install "cmg_mj\[board\]"$'
-    ):
-        open_port("COM3")
-
-
-def test_a_serial_port_that_is_none() -> None:
-    pytest.importorskip("serial")
-    with pytest.raises(InputError, match=r"^--port /dev/none: cannot be opened at 460800 baud: .*No such file"):
-        open_port("/dev/none")
-
-
-def test_a_connection_that_ends() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = open_port(f"tcp:127.0.0.1:{server.getsockname()[1]}")
-        other, _ = server.accept()
-        answering = threading.Thread(target=lambda: (other.sendall(other.recv(5)[::-1]), other.close()))
-        answering.start()
-        port.write(b"hello")
-        assert port.read(5.0) == b"olleh"
-        answering.join()
-        with pytest.raises(ports.Closed, match="the connection is closed"):
-            port.read(5.0)
-        port.close()
-
-
-@pytest.mark.usefixtures("elsewhere")
-@pytest.mark.parametrize(
-    ("options", "complaint"),
-    [
-        ("--port /dev/ttyACM0", "--port /dev/ttyACM0: goes with --driver board, not native"),
-        ("--driver board --baud 115200", "--baud: goes with --port, the port of a real board"),
-        ("--deadline-ms 5", "--deadline-ms: goes with --port, the port of a real board"),
-        ("--max-lost 5", "--max-lost: goes with --port, the port of a real board"),
-        ("--driver board --port x --baud 0", "--baud 0: must be 1 to 12000000"),
-        ("--driver board --port x --baud 9999999999", "--baud 9999999999: must be 1 to 12000000"),
-        ("--driver board --port x --max-lost 0", "--max-lost 0: must be 1 to 127"),
-        ("--driver board --port x --max-lost 128", "--max-lost 128: must be 1 to 127"),
-        ("--driver board --port x --deadline-ms nan", "--deadline-ms nan: must be above 0 and at most 60000 ms"),
-    ],
-)
-def test_options_that_do_not_fit(options: str, complaint: str) -> None:
-    assert cmg_mj(*f"run push_recovery {options}".split()).complaint == complaint
-    assert not Path("runs").exists()
-
-
-SLOW = "/dev/none --baud 115200"
-
-
-@pytest.mark.usefixtures("elsewhere")
-def test_the_command_refuses_a_slow_line_before_it_opens_it() -> None:
-    complaint = cmg_mj(*f"run push_recovery --driver board --port {SLOW}".split()).complaint
-    assert complaint.startswith("--baud 115200: a tick's frames do not fit: 30 + 38 bytes take 5.9 ms")
-    assert not Path("runs").exists()
+    require_fit(115_200, (30, 38), 1.0 / 112.0)
+    require_fit(115_200, (30, 38), 0.0089)
+    with pytest.raises(InputError, match=r"take at least 204000 baud, such as 230400$"):
+        require_fit(1, (30, 38), 0.005)

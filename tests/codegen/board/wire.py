@@ -13,6 +13,7 @@ import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -93,6 +94,7 @@ class Faults:
         double: Share of bytes that come twice.
         delay: Share of bytes before which the line waits.
         delay_s: For how long [s].
+        counts: Number of mistakes of each kind.
     """
 
     seed: int
@@ -100,27 +102,27 @@ class Faults:
     double: float = 0.0
     delay: float = 0.0
     delay_s: float = 0.0
-    made: dict[str, int] = field(default_factory=lambda: dict.fromkeys(("lose", "double", "delay"), 0))
+    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(("lose", "double", "delay"), 0))
 
     def __post_init__(self) -> None:
         self._random = random.Random(self.seed)
 
-    def applied(self, data: bytes) -> Iterator[bytes]:
-        """What comes of some bytes, piece by piece."""
+    def pieces(self, data: bytes) -> Iterator[bytes]:
+        """Make mistakes in some bytes; yield what comes of them, piece by piece."""
         out = bytearray()
         for byte in data:
             chance = self._random.random()
             if chance < self.lose:
-                self.made["lose"] += 1
+                self.counts["lose"] += 1
                 continue
             if chance < self.lose + self.delay:
-                self.made["delay"] += 1
+                self.counts["delay"] += 1
                 yield bytes(out)
                 out.clear()
                 time.sleep(self.delay_s)
             out.append(byte)
             if chance > 1.0 - self.double:
-                self.made["double"] += 1
+                self.counts["double"] += 1
                 out.append(byte)
         yield bytes(out)
 
@@ -136,12 +138,16 @@ class PtyWire:
         name: The port to open.
         pulled_after: Number of bytes from the host after which the cable is pulled.
         deaf: While it is above 0, so many bytes from the host are lost.
+        late_s: Time for which what the board sends is held back [s].
+        recorded: All bytes of both directions, in their order.
     """
 
     def __init__(self, image: Path, faults: Faults | None = None) -> None:
         self.faults = faults
         self.pulled_after: int | None = None
         self.deaf = 0
+        self.late_s = 0.0
+        self.recorded = bytearray()
         self._socket, board = socket.socketpair()
         with board:
             self.process = subprocess.Popen(
@@ -175,18 +181,54 @@ class PtyWire:
             for source in select.select([self._master, self._socket], [], [], 0.02)[0]:
                 if source is self._socket:
                     data = self._socket.recv(4096)
-                    for piece in self.faults.applied(data) if self.faults else [data]:
+                    self.recorded += data
+                    time.sleep(self.late_s)
+                    for piece in self.faults.pieces(data) if self.faults else [data]:
                         os.write(self._master, piece)
                     continue
                 data = os.read(self._master, 4096)
                 sent += len(data)
+                self.recorded += data
                 if self.pulled_after is not None and sent > self.pulled_after:
                     self._pulled.set()
                     break
                 if self.deaf:
                     self.deaf = max(0, self.deaf - len(data))
                     continue
-                for piece in self.faults.applied(data) if self.faults else [data]:
+                for piece in self.faults.pieces(data) if self.faults else [data]:
                     self._socket.sendall(piece)
         os.close(self._slave)
         os.close(self._master)
+
+
+@contextmanager
+def tcp_board(image: Path) -> Iterator[str]:
+    """The emulated board behind a TCP port, as a serial server has it; yields the port to open."""
+    processes: list[subprocess.Popen[bytes]] = []
+
+    def serve() -> None:
+        with suppress(OSError):
+            while True:
+                line, _ = server.accept()
+                with line:
+                    line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                    processes.append(
+                        subprocess.Popen(
+                            emulator_command(image),
+                            stdin=line.fileno(),
+                            stdout=line.fileno(),
+                            stderr=subprocess.DEVNULL,
+                        )
+                    )
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        try:
+            yield f"tcp:127.0.0.1:{server.getsockname()[1]}"
+        finally:
+            server.shutdown(socket.SHUT_RDWR)
+            thread.join()
+            for process in processes:
+                process.kill()
+                process.wait()

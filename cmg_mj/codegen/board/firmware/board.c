@@ -19,12 +19,14 @@
  *   'c'   -                                                  costs of no, 100, 1000 instructions in a row
  *
  * Its first message, '!', nobody has asked for: the board is ready. It carries why the board began, a byte of port.h's. The
- * emulated board must not be sent anything before that.
+ * emulated board must not be sent anything before that. Until the first 's' the board answers a 'u' with '!' too: where a
+ * board starts again in the middle of a run and its '!' is lost, the next sample brings another.
  *
  * A message that comes again (the same number and check as the last one) is answered again and not executed again: the
  * answer may have been lost. A 'u' whose number lies behind the last one is neither. After bytes that were lost or damaged
- * the board looks for the next message in what it has already received. It waits for the rest of a message as long as it
- * takes: whoever sends again brings it.
+ * the board looks for the next message in what it has already received. Once the line has been quiet for GAP_US, the rest of
+ * a message does not come any more: the board drops what it has. Only then does it send '?', so that it never talks into
+ * what is still on its way, and only where no message has come whole since.
  *
  * A cost is two uint32: counts of port_cycles, and bytes of stack. */
 #include <string.h>
@@ -37,6 +39,10 @@
 #endif
 #ifndef QUIET_US
 #define QUIET_US 0 /* how long nobody may talk before the board starts again; 0: for ever */
+#endif
+
+#ifndef GAP_US
+#define GAP_US (1000u + 4u * 10u * 1000000u / BAUD) /* four bytes' time more than a frame of USB, which may split a message */
 #endif
 
 enum { FIRST = 0xa5, LONGEST = 255, AROUND = 6, PAINT = 0x5aa5c33c };
@@ -272,11 +278,24 @@ static void reply(uint8_t kind, uint8_t number, const void *carries, uint32_t le
     port_write(whole, length + AROUND);
 }
 
+static uint8_t why_begun; /* port_init has said it */
+static int is_started;    /* by an 's' */
+
+static void announce(void)
+{
+    reply('!', 0, &why_begun, why_begun ? 1 : 0);
+}
+
 static void take(uint8_t kind, uint8_t number, uint32_t check)
 {
     static uint32_t last_check = 0x10000; /* no message has it */
     static uint8_t last;
 
+    is_started |= kind == 's';
+    if (kind == 'u' && !is_started) {
+        announce();
+        return;
+    }
     if (check != last_check || number != last) {
         if (kind == 'u' && (uint8_t)(number - last) > 127)
             return; /* an old one that comes late */
@@ -291,10 +310,27 @@ static void take(uint8_t kind, uint8_t number, uint32_t check)
 static uint8_t line[LONGEST + AROUND]; /* what has come and is not dealt with */
 static uint32_t held;                  /* bytes of it */
 
+static uint8_t refused;                /* number of the first message that came damaged */
+static int is_refused;                 /* there is one, and none has come whole since */
+
 static void drop(uint32_t count)
 {
     held -= count;
     memmove(line, line + count, held);
+}
+
+/* Gives up what the line begins with, and goes to where a message may begin behind it. */
+static void skip(void)
+{
+    uint32_t next = 1;
+
+    if (line[0] == FIRST && held > 2 && !is_refused) {
+        refused = line[2];
+        is_refused = 1;
+    }
+    while (next < held && line[next] != FIRST)
+        next++;
+    drop(next);
 }
 
 /* Deals with every message that has come whole. */
@@ -302,7 +338,7 @@ static void deal(void)
 {
     while (held) {
         const uint32_t length = line[3];
-        uint32_t check, next = 1;
+        uint32_t check;
 
         if (line[0] == FIRST) {
             if (held < 4)
@@ -312,30 +348,43 @@ static void deal(void)
                     return;
                 check = line[4 + length] | (uint32_t)line[5 + length] << 8;
                 if (check == check_of(line + 1, length + 3)) {
+                    is_refused = 0;
                     message = line + 4;
                     take(line[1], line[2], check);
                     drop(length + AROUND);
                     continue;
                 }
             }
-            reply('?', line[2], "", 0);
         }
-        while (next < held && line[next] != FIRST)
-            next++;
-        drop(next);
+        skip();
     }
+}
+
+/* The line is quiet. A whole message may lie behind the beginning of another. */
+static void settle(void)
+{
+    while (held) {
+        skip();
+        deal();
+    }
+    if (is_refused)
+        reply('?', refused, "", 0);
+    is_refused = 0;
 }
 
 int main(void)
 {
-    const uint8_t why = (uint8_t)port_init();
-
+    why_begun = (uint8_t)port_init();
     ITS(_start)(&controller);
-    reply('!', 0, &why, why ? 1 : 0);
+    announce();
     for (;;) {
-        if (port_read(line + held, QUIET_US ? QUIET_US : A_WHILE_US)) {
+        const int is_amid = held || is_refused;
+
+        if (port_read(line + held, is_amid ? GAP_US : QUIET_US ? QUIET_US : A_WHILE_US)) {
             held++;
             deal();
+        } else if (is_amid) {
+            settle();
         } else if (QUIET_US) {
             port_reset(NOBODY_TALKS);
         }

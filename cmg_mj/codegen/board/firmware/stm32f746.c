@@ -12,10 +12,6 @@
  *   [R] ST's reference manual RM0385: the order of over-drive and wait states, before the clock is raised */
 #include "port.h"
 
-#ifndef BAUD
-#define BAUD 460800u
-#endif
-
 #define WORD(address) (*(volatile uint32_t *)(address))
 
 /* [H] */
@@ -82,7 +78,15 @@ enum {
 #define BYTE_HAS_COME (1u << 5)
 #define MAY_SEND (1u << 7)
 
-enum { CLOCK_MHZ = 216, TIMER_MHZ = 108, LINE_MHZ = 108 }; /* APB2's clock; APB1's timers run at twice APB1's */
+#define KEEP_PLL_RESERVED (1u << 29) /* [R]: to be kept as a reset leaves it, and a reset leaves 0x24003010 */
+
+enum { CLOCK_MHZ = 216, TIMER_MHZ = 108 }; /* APB1's timers run at twice APB1's clock */
+
+#define LINE_HZ 108000000u /* APB2's clock */
+#define LINE_DIVIDER ((LINE_HZ + BAUD / 2u) / BAUD)
+#if LINE_DIVIDER < 16u || LINE_DIVIDER > 65535u /* [R] */
+#error "BAUD: USART1 can do 1648 to 6750000"
+#endif
 
 const char port_name[] = "STM32F746G-DISCO";
 const uint32_t port_cycles_a_second = CLOCK_MHZ * 1000000u;
@@ -103,7 +107,7 @@ static void clock_up(void) /* [T], [R] */
     }
     RCC_APB1ENR |= 1u << 28; /* power control */
     (void)RCC_APB1ENR;
-    RCC_PLLCFGR = 25u | 432u << 6 | 0u << 16 /* halved */ | PLL_FROM_HSE | 9u << 24;
+    RCC_PLLCFGR = 25u | 432u << 6 | 0u << 16 /* halved */ | PLL_FROM_HSE | 9u << 24 | KEEP_PLL_RESERVED;
     RCC_CR |= PLL_ON;
     PWR_CR1 |= OVERDRIVE_ON; /* the voltage scale is 1 after a reset */
     while (!(PWR_CSR1 & OVERDRIVE_READY)) {
@@ -151,7 +155,7 @@ static void line_on(void) /* [B] */
     GPIO_AFRL(GPIOB) = (GPIO_AFRL(GPIOB) & ~(0xfu << 28)) | 7u << 28; /* PB7, pulled up: a line that nobody drives is idle */
     GPIO_PUPDR(GPIOB) = (GPIO_PUPDR(GPIOB) & ~(3u << 14)) | 1u << 14;
     GPIO_MODER(GPIOB) = (GPIO_MODER(GPIOB) & ~(3u << 14)) | 2u << 14;
-    USART1_BRR = (LINE_MHZ * 1000000u + BAUD / 2u) / BAUD;
+    USART1_BRR = LINE_DIVIDER;
     USART1_CR1 = SENDS_RECEIVES_IS_ON; /* 8 bits, no parity, one stop bit */
 }
 
@@ -182,17 +186,33 @@ int port_init(void)
     return why;
 }
 
+/* What has come and nobody has read: the USART itself has room for one byte, and a message may come while another goes. */
+enum { ROOM = 512 };
+static uint8_t ring[ROOM];
+static uint32_t came, went; /* bytes; the ring's places are these modulo ROOM */
+
+static void receive(void)
+{
+    const uint32_t state = USART1_ISR;
+
+    if (state & LINE_ERRORS)
+        USART1_ICR = LINE_ERRORS; /* an overrun would stop the line; the lost byte shows in a frame's check */
+    if (state & BYTE_HAS_COME) {
+        const uint8_t byte = (uint8_t)USART1_RDR;
+
+        if (came - went < ROOM)
+            ring[came++ % ROOM] = byte;
+    }
+}
+
 int port_read(uint8_t *byte, uint32_t wait_us)
 {
     const uint32_t start = port_time();
 
     do {
-        const uint32_t state = USART1_ISR;
-
-        if (state & LINE_ERRORS)
-            USART1_ICR = LINE_ERRORS; /* an overrun would stop the line; the lost byte shows in a frame's check */
-        if (state & BYTE_HAS_COME) {
-            *byte = (uint8_t)USART1_RDR;
+        receive();
+        if (came != went) {
+            *byte = ring[went++ % ROOM];
             return 1;
         }
     } while (port_time() - start < wait_us);
@@ -202,8 +222,9 @@ int port_read(uint8_t *byte, uint32_t wait_us)
 void port_write(const uint8_t *bytes, uint32_t count)
 {
     while (count--) {
-        while (!(USART1_ISR & MAY_SEND)) {
-        }
+        do
+            receive();
+        while (!(USART1_ISR & MAY_SEND));
         USART1_TDR = *bytes++;
     }
 }
