@@ -269,3 +269,13 @@ def loop(kind: str, *settings: str) -> float:
 def test_in_the_loop_it_keeps_to_its_share_of_gyro_free(setting: str, most: float) -> None:
     """docs/studies/free_pivot_grid.py has all cells on 100 worlds."""
     assert loop("free_pivot", setting) < most * loop("gyro_free", setting)
+
+
+def test_without_noise_the_pivots_variance_has_a_floor() -> None:
+    """Without one y1 would have no variance at all, by which a rise is divided."""
+    silent = TiltNoise(0.0, 0.0, 0.0)
+    with pytest.raises(ValueError, match="pivot_floor = 0: with sensors without noise it must be positive"):
+        FreePivot(DT, PAPER, silent, pivot_start=0.0, pivot_floor=0.0)
+    *_, y1, a = motion(50, np.random.default_rng(3), bias=0.0)
+    estimates, _ = walk(FreePivot(DT, PAPER, silent, pivot_start=0.0, pivot_floor=1e-6), y1, a)
+    assert np.isfinite(estimates).all()
