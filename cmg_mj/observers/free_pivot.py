@@ -18,7 +18,6 @@ from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.sensors.tilt import TiltNoise
 
-
 Scalars: TypeAlias = tuple[Scalar, ...]
 
 
@@ -47,10 +46,11 @@ class State(NamedTuple):
     pivot: Scalar
     """Variance of w [rad^2]."""
     share: Scalar
-    """How much of it the next sample has."""
+    """Weight of the next sample in it."""
     y1: Scalar
-    """That of the sample before, and by how much it differed from the one before that."""
+    """y1 of the sample before."""
     step: Scalar
+    """Its difference from y1 of the sample before that."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -230,7 +230,7 @@ class FreePivot:
 
     @cached_property
     def _fade(self) -> float:
-        """What remains of w after a sample period."""
+        """Share of w that remains after a sample period."""
         return math.exp(-2.0 * math.pi * self.pivot_hz * self.dt)
 
     @cached_property

@@ -145,8 +145,8 @@ class Plant:
             set_turn_rate(self.model, self.key, settings.turn_rate_rad_s, self.path)
         vary(self.model, settings, self.path, self.axes, held)
         speeds = [abs(module.speed) for axis in self.axes for module in axis.modules]
-        shaken = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
-        self.largest_step = largest_step(self.model, self.key, float(self.model.opt.timestep), shaken)
+        shake_rate = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
+        self.largest_step = largest_step(self.model, self.key, float(self.model.opt.timestep), shake_rate)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "

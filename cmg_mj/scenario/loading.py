@@ -115,7 +115,7 @@ def find_model(scenario: Scenario, beside: Path) -> Scenario:
 
 
 def find_tracks(scenario: Scenario, beside: Path) -> Scenario:
-    """The same with the whole paths of the pivot's tracks, which a scenario file names relative to itself."""
+    """Return the scenario with the whole paths of its tracks, which a scenario file names relative to itself."""
     pivots = []
     for pivot in scenario.pivot:
         if pivot.file is not None:

@@ -1,4 +1,4 @@
-"""Which observer stands on a cart that slides freely, and how light that may be: the tables of docs/mount.md.
+"""Observers that stand on a cart that slides freely, and how light that may be: the tables of docs/mount.md.
 
 python docs/studies/light_cart.py (about five minutes on a quiet core)
 python docs/studies/light_cart.py --rubbing (what the cart slides on is not free of friction; about three minutes)
@@ -58,7 +58,7 @@ def mounted(mass: float, friction: float = 0.0, damping: float = 5e-4) -> tuple[
 
 
 def standing(experiment: Experiment, limits: Prospects, loop: tuple[str, str, str], worlds: int = WORLDS) -> str:
-    """How many worlds stand, in a cell's words."""
+    """Count the worlds that stand, in a cell's words."""
     about, name, angle_source = loop
     observer, feedback = RATES[name]
     settings = {

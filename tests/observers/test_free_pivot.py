@@ -38,7 +38,7 @@ def walk(estimator: FreePivot, y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarra
 
 
 def shares_of_y1(n: int, sigma: float, hz: float, rng: np.random.Generator) -> np.ndarray:
-    """What a pivot that moves adds to y1: first-order noise."""
+    """Make the part of y1 that a moving pivot adds: first-order noise."""
     f, w = math.exp(-2.0 * math.pi * hz * DT), [rng.normal(0.0, sigma)]
     for _ in range(n - 1):
         w.append(f * w[-1] + rng.normal(0.0, sigma * math.sqrt(1.0 - f * f)))

@@ -27,7 +27,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Plant:
 
 @pytest.fixture(scope="module")
 def known(plant: Plant) -> Plant:
-    """The same, whose tilt estimate knows that the pivot slides."""
+    """The cart again, whose tilt estimate knows that the pivot slides."""
     return plant.changed(dataclasses.replace(plant.settings, pivot_slides=True))
 
 
@@ -60,7 +60,7 @@ def y1_of(plant: Plant, tilt: float, gimbal_rate: float) -> float:
 
 
 def test_it_is_the_common_mass_centre_that_stays(plant: Plant) -> None:
-    """By MuJoCo's own mass centre of all; and the inertia left is J - (m h)^2/M."""
+    """MuJoCo's own mass centre of all says so; and the inertia left is J - (m h)^2/M."""
     model, data = plant.reduced, plant.new_data()
     pivot = float(data.joint("hinge").xanchor[2])
     J, mh, M, weight = inertias(plant)

@@ -202,7 +202,7 @@ def test_a_users_own_loop_moves_it_as_the_docs_say() -> None:
     np.testing.assert_array_equal(tilts, expected["x1_rad"])
 
 
-def test_it_runs_again_from_its_own_folder_and_check_says_what_is_left_out(tmp_path: Path) -> None:
+def test_it_runs_again_from_its_own_folder_and_check_names_what_is_omitted(tmp_path: Path) -> None:
     scenario, track = tmp_path / "mine.toml", tmp_path / "walk.csv"
     track.write_text("t,a\n0,0.1\n0.2,-0.2\n", encoding="utf-8")
     scenario.write_text(
@@ -216,7 +216,7 @@ def test_it_runs_again_from_its_own_folder_and_check_says_what_is_left_out(tmp_p
     assert first.out == again.out
     checked = cmg_mj("check", scenario).out
     assert f"pivot       track, {track}, times 1, across, from 0 s" in checked
-    assert "left out    the pivot's acceleration: not in the reduced model, its loop, the ceiling" in checked
+    assert "omitted     the pivot's acceleration: not in the reduced model, its loop, the ceiling" in checked
 
 
 def test_figures_do_not_depend_on_the_physics_step() -> None:
