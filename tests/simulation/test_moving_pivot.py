@@ -266,6 +266,7 @@ def test_there_is_no_floor_of_y1_with_its_acceleration() -> None:
         ('{kind="step", acceleration_m_s2=1.0, direction="up"}', "must be one of 'across', 'along', 'vertical'"),
         ('{kind="step", acceleration_m_s2=1.0, start_s=2.0}', "pivot.0.start_s = 2: must be less than duration_s = 1"),
         ('{kind="step", acceleration_m_s2=1.0, axis="roll"}', "pivot.0.axis = 'roll': the rig has one axis"),
+        ('{kind="step", acceleration_m_s2=1.0, direction="vertical", axis=""}', "pivot.0.axis = '': the rig has one"),
         ('{kind="sine", acceleration_m_s2=1.0, frequency_hz=30.0}', "must be a number greater than 0 and at most 20"),
     ],
 )
@@ -273,6 +274,14 @@ def test_what_no_pivot_does_is_refused(pivot: str, message: str) -> None:
     with pytest.raises(InputError) as refused:
         experiment(f"pivot=[{pivot}]")
     assert message in str(refused.value)
+
+
+def test_a_track_that_is_scaled_beyond_all_recordings_is_named(tmp_path: Path) -> None:
+    track = tmp_path / "walk.csv"
+    track.write_text("t,a\n0,0.1\n0.2,-2.0\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"pivot.0.scale = -600: .*walk.csv times this reaches 1.2e\+03 m/s2; at most"):
+        experiment(f'pivot=[{{kind="track", file="{track}", scale=-600.0}}]')
+    experiment(f'pivot=[{{kind="track", file="{track}", scale=-400.0}}]')
 
 
 def test_a_frequency_that_the_control_rate_cannot_follow_is_refused() -> None:
