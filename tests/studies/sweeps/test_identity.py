@@ -23,7 +23,7 @@ BIAS = "plant.equilibrium_bias_deg"
 SHORT = ["--set", "push=[]", "--set", "duration_s=0.2", "--worlds", "2"]
 SWEEP = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--observers", "linear,gyro_free", *SHORT, "--out"]
 CURE = "; delete it, and it is computed again, or name another folder"
-MOTIONS = "pivot=[[{{kind='track', file='{}'}}], [{{kind='track', file='{}', scale=2.0}}]]"
+MOTIONS = "pivot=[{{kind='track', file='{}'}}],[{{kind='track', file='{}', scale=2.0}}]"
 VERSION_RULE = "while trials are missing they must be the same: name another folder"
 
 
