@@ -109,7 +109,7 @@ def test_y1_of_a_frame_that_bends_on_a_cart_is_mujocos(
     assert linear is not None
     y1 = linear.bending.C[0]
 
-    def shown(state: np.ndarray) -> float:
+    def y1_at(state: np.ndarray) -> float:
         data = bending.new_data()
         mujoco.mj_integratePos(model, data.qpos, state[: model.nv], 1.0)
         data.qvel += state[model.nv : 2 * model.nv]
@@ -117,7 +117,7 @@ def test_y1_of_a_frame_that_bends_on_a_cart_is_mujocos(
         mujoco.mj_forward(model, data)
         return bending.radial_tilt(*bending.axis.ideal(data.sensordata.tolist(), data.qvel).accelerations)
 
-    slopes = [(shown(SMALL * column) - shown(-SMALL * column)) / (2.0 * SMALL) for column in np.eye(len(y1))]
+    slopes = [(y1_at(SMALL * column) - y1_at(-SMALL * column)) / (2.0 * SMALL) for column in np.eye(len(y1))]
     np.testing.assert_allclose(slopes, y1, rtol=1e-5, atol=1e-4)
     # The words on sliding are those of a rigid frame.
     slide = bending.parameters.slide
