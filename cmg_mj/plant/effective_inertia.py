@@ -84,8 +84,8 @@ def free_motions(model: mujoco.MjModel, data: mujoco.MjData, dofs: Sequence[int]
     """
     moving = sorted({*dofs, *_free_dofs(model, data)})
     basis = np.eye(model.nv)[:, moving]
-    held = np.concatenate([_contacts(model, data), _weld_jacobian(model, data)]) @ basis
-    return basis @ _null_space(held) if held.size else basis
+    constraints = np.concatenate([_contacts(model, data), _weld_jacobian(model, data)]) @ basis
+    return basis @ _null_space(constraints) if constraints.size else basis
 
 
 def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, joint: int, speed: float) -> np.ndarray:
