@@ -156,10 +156,10 @@ def mount(
             with_plugin=with_plugin,
         )
     lines = list(mount_report_lines(result))
-    tuned = _tuned(result) if with_tuning else Tuned()
-    if tuned.tuning:
-        lines.append(tuned.tuning.line())
-    show(result.figures() | (tuned.tuning.figures() if tuned.tuning else {}), "\n".join(lines), as_json)
+    outcome = _tune(result) if with_tuning else TuningOutcome()
+    if outcome.tuning:
+        lines.append(outcome.tuning.line())
+    show(result.figures() | (outcome.tuning.figures() if outcome.tuning else {}), "\n".join(lines), as_json)
     if not as_json:
         note_hints(result.hints)
         run_it = shell_command("cmg-mj", "run", result.scenario_path)
@@ -167,21 +167,21 @@ def mount(
         if result.plugin:
             example = result.plugin.model.with_name(f"{result.plugin.model.stem}_example.py")
             note(f"wrote {result.plugin.model.parent}; try: {shell_command('python', example)}")
-    if tuned.error:
-        raise tuned.error
-    if tuned.interrupted:
+    if outcome.error:
+        raise outcome.error
+    if outcome.interrupted:
         end_interrupted(f"interrupted; {result.path} and {result.scenario_path} are whole")
 
 
-class Tuned(NamedTuple):
-    """What has become of the tuning."""
+class TuningOutcome(NamedTuple):
+    """The tuning, or what ended it."""
 
     tuning: MountTuning | None = None
     error: InputError | None = None
     interrupted: bool = False
 
 
-def _tuned(result: MountResult) -> Tuned:
+def _tune(result: MountResult) -> TuningOutcome:
     """Tune the observer of a robot that is mounted; a Ctrl-C ends the search, and a second one leaves all as it was."""
     from cmg_mj.studies.push_limits.mount_tuning import tune_mounted
 
@@ -189,7 +189,7 @@ def _tuned(result: MountResult) -> Tuned:
         try:
             tuning = tune_mounted(result.scenario_path, stop=lambda: ctrl_c.noted, on_share=on_progress)
         except InputError as error:
-            return Tuned(error=InputError(f"mounted, but --tune: {error}"))
+            return TuningOutcome(error=InputError(f"mounted, but --tune: {error}"))
         except KeyboardInterrupt:
-            return Tuned(interrupted=True)
-    return Tuned(tuning, interrupted=ctrl_c.noted)
+            return TuningOutcome(interrupted=True)
+    return TuningOutcome(tuning, interrupted=ctrl_c.noted)

@@ -141,10 +141,12 @@ def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
 
 def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
+    from cmg_mj.inputs.bundled import find
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
     from cmg_mj.studies.sweeps.study import SweepStudy, sampling
     from cmg_mj.studies.sweeps.study_file import axes_of, design_of, scenario_of, study_file
+    from cmg_mj.studies.sweeps.varied_tracks import locate_tracks
 
     design = sampling(options["sample"], options["sobol"], prefix="--")
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in options["varied"]]
@@ -158,6 +160,8 @@ def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
             scenario = scenario.model_copy(update={"seed": arguments.seed})
         settings = fields.get("sweep", {})
         axes = axes or axes_of(arguments.name, fields)
+    beside = find("scenarios", arguments.name, ".toml", "scenario").parent
+    axes = [locate_tracks(axis, beside) for axis in axes]
     order = options["order"]
     names = options["observers"] or settings.get("observers", [scenario.observer.kind])
     expected = settings.get("order", []) if order is None else [name.strip() for name in order.split(",")]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, TypeAlias
 
 from pydantic.dataclasses import dataclass
 
@@ -17,6 +17,8 @@ from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
 from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.sensors.tilt import TiltNoise
+
+Scalars: TypeAlias = tuple[Scalar, ...]
 
 
 class State(NamedTuple):
@@ -44,10 +46,11 @@ class State(NamedTuple):
     pivot: Scalar
     """Variance of w [rad^2]."""
     share: Scalar
-    """How much of it the next sample has."""
+    """Weight of the next sample in it."""
     y1: Scalar
-    """That of the sample before, and by how much it differed from the one before that."""
+    """y1 of the sample before."""
     step: Scalar
+    """Its difference from y1 of the sample before that."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -120,6 +123,8 @@ class FreePivot:
     def __post_init__(self) -> None:
         if not (self.noise.tilt or self.noise.acceleration or self.bias_walk or self.jerk):
             raise ValueError("bias_walk = 0 and jerk = 0: with sensors without noise one of them must be positive")
+        if not (self.noise.tilt or self.pivot_floor):
+            raise ValueError("pivot_floor = 0: with sensors without noise it must be positive")
 
     def init(self, y: Measurement) -> State:
         """Start at rest at the measured tilt, with no bias; of the tilt nothing else is known."""
@@ -141,17 +146,38 @@ class FreePivot:
 
     def _sample(self, state: State, y: Measurement) -> tuple[State, Scalar, Scalar]:
         """Correct what was expected of a sample by what it shows, and advance to the next; x1 and x2 between both."""
-        h, d, f = self.dt, 1.0 / 6.0, self._fade
-        p, z, b, w, pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, scale, pivot, share, before, step_before = state
-
         # Learn the noise that there is.
-        c, nn, rest, per_bend = self._noise
-        step = y.y1 - before
-        bend = step - step_before
-        scale = scale + self._shares[2] * (per_bend * bend * bend - scale)
-        r = where(scale > 1.0, scale, 1.0)
+        step = y.y1 - state.y1
+        bend = step - state.step
+        scale = state.scale + self._shares[2] * (self._noise[3] * bend * bend - state.scale)
 
-        # Correct p, z, b, w, n by e = y1 - p - w - d alpha.
+        e, ee, means, covariance = self._correct(state, y, where(scale > 1.0, scale, 1.0))
+        alpha, p, z, _, w = means
+        x1, x2 = p + 1.0 / 6.0 * alpha, (z + 0.5 * alpha) * (1.0 / self.dt)
+
+        # Learn how strongly the pivot moves.
+        ww, pivot, share = covariance[9], state.pivot, state.share
+        rise = share * (w * w + ww + pivot * (self.surprise * (e * e / ee) - (1.0 + self.surprise)))
+        early = share * where(rise > 0.0, rise, 0.0)
+        pivot = pivot + rise + self.hurry * early
+        floor = self.pivot_floor**2
+        pivot = where(pivot > floor, pivot, floor)
+        slower = share / (1.0 + share)
+        share = where(slower > self._shares[0], slower, self._shares[0])
+
+        return self._advance(means, covariance, early, (scale, pivot, share, y.y1, step)), x1, x2
+
+    def _correct(self, state: State, y: Measurement, r: Scalar) -> tuple[Scalar, Scalar, Scalars, Scalars]:
+        """Correct p, z, b, w, n by e = y1 - p - w - d alpha.
+
+        Returns:
+            e, its variance, the means of alpha, p, z, b, w, and the covariance of p, z, b, w and of m = b + n, which is
+            alpha's error: its rows.
+        """
+        h, d = self.dt, 1.0 / 6.0
+        c, nn, rest, _ = self._noise
+        p, z, b, w, pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, *_ = state
+
         a = h * h * y.acceleration
         e = y.y1 - p - w - d * (a - b)
         ep, ez, eb, ew = pp + pw - d * pb, pz + zw - d * zb, pb + bw - d * bb, pw + ww - d * bw
@@ -159,31 +185,28 @@ class FreePivot:
         ee = ep + ew - d * eb + r * ((c - d) * (c - d) * nn + rest)
         kp, kz, kb, kw, kn = ep / ee, ez / ee, eb / ee, ew / ee, en / ee
         p, z, b, w, n = p + kp * e, z + kz * e, b + kb * e, w + kw * e, kn * e
-        alpha = a - b - n
-        x1, x2 = p + d * alpha, (z + 0.5 * alpha) * (1.0 / h)
 
-        # What remains uncertain: of p, z, b, w, and of m = b + n, which is alpha's error.
         pp, pz, zz = pp - kp * ep, pz - kp * ez, zz - kz * ez
         pb, zb, bb = pb - kp * eb, zb - kz * eb, bb - kb * eb
         pw, zw, bw, ww = pw - kp * ew, zw - kz * ew, bw - kb * ew, ww - kw * ew
         pm, zm, bm, wm = pb - kp * en, zb - kz * en, bb - kb * en, bw - kw * en
         mm = bm - kn * eb + r * nn - kn * en + (h * h * self.jerk) ** 2
+        return e, ee, (a - b - n, p, z, b, w), (pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, pm, zm, bm, wm, mm)
 
-        # Learn how strongly the pivot moves.
-        rise = share * (w * w + ww + pivot * (self.surprise * (e * e / ee) - (1.0 + self.surprise)))
-        early = share * where(rise > 0.0, rise, 0.0)
-        pivot = pivot + rise + self.hurry * early
-        floor = self.pivot_floor**2
-        pivot = where(pivot > floor, pivot, floor)
+    def _advance(self, means: Scalars, covariance: Scalars, early: Scalar, learnt: Scalars) -> State:
+        """Doubt early samples, and advance: p+ = r + alpha with r = p + z, z+ = z + alpha, w+ = f w + white."""
+        h, f = self.dt, self._fade
+        alpha, p, z, b, w = means
+        pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, pm, zm, bm, wm, mm = covariance
+        scale, pivot, share, y1, step = learnt
+
         doubt = self.doubt * early
         pp, pw, ww = pp + doubt, pw - doubt, ww + doubt
         inflate = 1.0 + self.inflation * early / (pivot + self.noise.tilt**2)
         pp, pz, zz = inflate * pp, inflate * pz, inflate * zz
-        slower = share / (1.0 + share)
 
-        # Advance: p+ = r + alpha with r = p + z, z+ = z + alpha, w+ = f w + white.
         r, rz, rb, rw, rm = p + z, pz + zz, pb + zb, pw + zw, pm + zm
-        ahead = State(
+        return State(
             p=r + alpha,
             z=z + alpha,
             b=b,
@@ -200,15 +223,14 @@ class FreePivot:
             ww=f * f * (ww - pivot) + pivot,
             scale=scale,
             pivot=pivot,
-            share=where(slower > self._shares[0], slower, self._shares[0]),
-            y1=y.y1,
+            share=share,
+            y1=y1,
             step=step,
         )
-        return ahead, x1, x2
 
     @cached_property
     def _fade(self) -> float:
-        """What remains of w after a sample period."""
+        """Share of w that remains after a sample period."""
         return math.exp(-2.0 * math.pi * self.pivot_hz * self.dt)
 
     @cached_property

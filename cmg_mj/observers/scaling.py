@@ -29,7 +29,7 @@ Number: TypeAlias = "float | tuple[Number, ...]"
 
 
 class Owner(Enum):
-    """What a parameter describes."""
+    """The thing that a parameter describes."""
 
     RIG = "rig"
     """The rig's motion: it goes with the rig's units."""
@@ -142,11 +142,11 @@ def scales_of(model: ReducedModel) -> Scales:
     return Scales(tau, model.gimbals * model.J1 / PAPERS_INERTIA)
 
 
-def carried(value: Number, unit: Units, scales: Scales) -> Number:
+def scale_value(value: Number, unit: Units, scales: Scales) -> Number:
     """Multiply a parameter, or each number in it, by the power of the scales that its unit has."""
     if isinstance(value, tuple):
         assert isinstance(unit, tuple)
-        return tuple(carried(part, its, scales) for part, its in zip(value, unit, strict=True))
+        return tuple(scale_value(part, its, scales) for part, its in zip(value, unit, strict=True))
     assert isinstance(unit, Unit)
     return value * unit.factor(scales)
 
@@ -168,7 +168,7 @@ def scaled_parameters(kind: str, model: ReducedModel) -> dict[str, Number]:
         Those that are not what they are on the papers' rig: `scaled_names`.
     """
     scales, defaults = scales_of(model), OBSERVER_CLASSES.takes(kind)
-    return {name: carried(defaults[name].default, UNITS[kind][name], scales) for name in scaled_names(kind)}
+    return {name: scale_value(defaults[name].default, UNITS[kind][name], scales) for name in scaled_names(kind)}
 
 
 def _flat(unit: Units) -> list[Unit]:

@@ -16,7 +16,7 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.effective_inertia import inertia_about
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import TILT_ELEMENT, Module, element_id
-from cmg_mj.plant.tilt_line import Addressed, Line, line_at_site, line_of_joint
+from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_at_site, line_of_joint
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.tilt import RadialTilt
@@ -26,7 +26,6 @@ _new = tuple.__new__  # a named tuple's own takes twice as long
 QUARTER_TURN = math.pi / 2.0
 LEAST_ARM_M = 1e-4
 """A pivot that moves by less for a tilt of 1 rad is at rest [m]."""
-UP = np.array([0.0, 0.0, 1.0])
 TURNS_ALIKE = 1e-6
 """A frame whose rate differs from the hinge's by less turns with the hinge."""
 
@@ -236,17 +235,33 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n, arm)
 
 
-def _pivot_arm(model: mujoco.MjModel, key: int, axis: Axis, rates: np.ndarray) -> float:
-    """Find how far the pivot slides back, across the axis, for a tilt of 1 rad while the joints have these rates [m].
+def pivot_rows(model: mujoco.MjModel, key: int, axis: Axis) -> tuple[np.ndarray, np.ndarray]:
+    """Find how the pivot and what it belongs to move with the joints' rates, at a keyframe.
 
-    It is 0 where the pivot is at rest, and where what the hinge hangs on turns with it: that is no sliding pivot.
+    Args:
+        model: The compiled model.
+        key: The keyframe.
+        axis: The axis.
+
+    Returns:
+        The pivot's velocity across the axis, to the side a positive tilt leans to, (nv,); the frame's rate about the
+        axis, (nv,).
     """
     data = at_keyframe(model, key)
     turn = data.xmat[axis.frame].reshape(3, 3)
     slides, turns = np.zeros((3, model.nv)), np.zeros((3, model.nv))
     mujoco.mj_jac(model, data, slides, turns, data.xpos[axis.frame] + turn @ axis.point, axis.frame)
     line = turn @ axis.direction
-    if abs(float(line @ turns @ rates) - 1.0) > TURNS_ALIKE:
+    return np.cross(line, UP) @ slides, line @ turns
+
+
+def _pivot_arm(model: mujoco.MjModel, key: int, axis: Axis, rates: np.ndarray) -> float:
+    """Find how far the pivot slides back, across the axis, for a tilt of 1 rad while the joints have these rates [m].
+
+    It is 0 where the pivot is at rest, and where what the hinge hangs on turns with it: that is no sliding pivot.
+    """
+    across, about = pivot_rows(model, key, axis)
+    if abs(float(about @ rates) - 1.0) > TURNS_ALIKE:
         return 0.0
-    arm = -float(np.cross(line, UP) @ slides @ rates)
+    arm = -float(across @ rates)
     return arm if arm > LEAST_ARM_M else 0.0

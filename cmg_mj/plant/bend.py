@@ -11,7 +11,8 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.plant.axis import find_axis
+from cmg_mj.plant.axis import Axis, find_axis
+from cmg_mj.plant.effective_inertia import free_motions
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import BEND_JOINT, EQUILIBRIUM_KEY, SENSORS, element_id, joint_sizes
 from cmg_mj.plant.tilt_line import HingeLine
@@ -40,32 +41,20 @@ def bend_frame(
 
     Args:
         spec: The parsed rig, which is changed.
-        rigid: The same, compiled.
+        rigid: The rig, compiled.
         settings: The mode.
         axes: The axes that are not locked, each with its modules.
         path: The file, for messages.
 
     Raises:
-        InputError: The rig has several axes or does not tilt about a hinge of its frame, or the frame has not so much
-            inertia to share.
+        InputError: The rig has several axes or does not tilt about a hinge of its frame, the frame has not so much
+            inertia to share, or that hinge has friction or a spring which would act beyond the bend.
     """
-    setting = f"plant.bend_frequency_hz = {settings.bend_frequency_hz:g}: {path}"
-    if len(axes) > 1:
-        last = list(axes)[-1]
-        raise InputError(
-            f"{setting} tilts about several axes, and a bend takes one; lock the others, as with "
-            f'--set plant.locked_axes=["{last}"]'
-        )
-    if element_id(rigid, "joint", BEND_JOINT) >= 0 or element_id(rigid, "body", BEND_JOINT) >= 0:
-        raise InputError(f"{setting} has a body or joint {BEND_JOINT!r} already, which is what a bend adds")
     key = element_id(rigid, "key", EQUILIBRIUM_KEY)
-    (name, modules), *_ = axes.items()
-    axis = find_axis(rigid, key, name, modules)
-    if not isinstance(axis.line, HingeLine) or int(rigid.jnt_bodyid[axis.line.joint]) != axis.frame:
-        raise InputError(
-            f"{setting} does not tilt about a hinge of the body that carries its sensors; a bend takes one"
-        )
-    part = _leaf_part(rigid, key, axis.frame, axis.line, settings, path)
+    axis, line = _axis_to_bend(rigid, key, settings, axes, path)
+    if settings.bend_beyond != "sensors":
+        _refuse_torques_of_hinge(rigid, line, settings, path)
+    part = _leaf_part(rigid, key, axis.frame, line, settings, path)
     frame = next(body for body in spec.bodies if body.name == rigid.body(axis.frame).name)
     leaf = frame.add_body(name=BEND_JOINT)
     for body, share in ((frame, 1.0 - part), (leaf, part)):
@@ -80,10 +69,52 @@ def bend_frame(
     if settings.bend_beyond != "both":
         _move_sites(spec, rigid, leaf, axis.prefix)
     _extend_keyframes(spec)
-    inertia = reduced_inertia(spec.compile(), key, axis.line)
+    inertia = mode_inertia(spec.compile(), key, line, slides=axis.reduced.pivot_arm > 0.0)
     omega = 2.0 * math.pi * settings.bend_frequency_hz
     joint.stiffness[0] = inertia * omega**2
     joint.damping[0] = 2.0 * settings.bend_damping_ratio * inertia * omega
+
+
+def _axis_to_bend(
+    rigid: mujoco.MjModel, key: int, settings: PlantSettings, axes: Mapping[str, Sequence[str]], path: Path
+) -> tuple[Axis, HingeLine]:
+    """Find the only axis and its hinge, or say why the rig cannot bend."""
+    setting = f"plant.bend_frequency_hz = {settings.bend_frequency_hz:g}: {path}"
+    if len(axes) > 1:
+        last = list(axes)[-1]
+        raise InputError(
+            f"{setting} tilts about several axes, and a bend takes one; lock the others, as with "
+            f'--set plant.locked_axes=["{last}"]'
+        )
+    if element_id(rigid, "joint", BEND_JOINT) >= 0 or element_id(rigid, "body", BEND_JOINT) >= 0:
+        raise InputError(f"{setting} has a body or joint {BEND_JOINT!r} already, which is what a bend adds")
+    (name, modules), *_ = axes.items()
+    axis = find_axis(rigid, key, name, modules)
+    if not isinstance(axis.line, HingeLine) or int(rigid.jnt_bodyid[axis.line.joint]) != axis.frame:
+        raise InputError(
+            f"{setting} does not tilt about a hinge of the body that carries its sensors; a bend takes one"
+        )
+    return axis, axis.line
+
+
+def _refuse_torques_of_hinge(rigid: mujoco.MjModel, line: HingeLine, settings: PlantSettings, path: Path) -> None:
+    """Refuse what the model's file has at the tilt's hinge, which would act on the modules, beyond the bend."""
+    # The settings' own friction and damping replace the file's; `step_for_bend` refuses those.
+    torques = {
+        "damping": settings.tilt_damping_n_m_s is None and rigid.dof_damping[line.dof],
+        "frictionloss": settings.tilt_friction_n_m is None and rigid.dof_frictionloss[line.dof],
+        "nonlinear damping": rigid.dof_dampingpoly[line.dof].any(),
+        "stiffness": rigid.jnt_stiffness[line.joint] or rigid.jnt_stiffnesspoly[line.joint].any(),
+        "armature": rigid.dof_armature[line.dof],
+    }
+    cures = {"damping": "set plant.tilt_damping_n_m_s=0", "frictionloss": "set plant.tilt_friction_n_m=0"}
+    for attribute, acts in torques.items():
+        if acts:
+            raise InputError(
+                f"plant.bend_beyond = {settings.bend_beyond!r}: {path}: the {attribute} of joint "
+                f"{rigid.joint(line.joint).name!r} would act on the part with the modules, beyond the bend; "
+                f"{cures.get(attribute, 'take it out of the file')}, or take plant.bend_beyond=sensors"
+            )
 
 
 def step_for_bend(settings: PlantSettings, step: float, path: Path) -> float:
@@ -125,12 +156,23 @@ def step_for_bend(settings: PlantSettings, step: float, path: Path) -> float:
     return min(step, longest)
 
 
-def reduced_inertia(model: mujoco.MjModel, key: int, line: HingeLine) -> float:
-    """The inertia that the spring of a bend feels with the tilt's hinge free: J_1 J_2/(J_1 + J_2) [kg m^2]."""
+def mode_inertia(model: mujoco.MjModel, key: int, line: HingeLine, *, slides: bool) -> float:
+    """Compute the inertia that the spring of a bend feels with the tilt's hinge free: J_1 J_2/(J_1 + J_2) [kg m^2].
+
+    Args:
+        model: The compiled model, with the bend.
+        key: The keyframe.
+        line: The tilt's hinge.
+        slides: Whether the pivot slides freely. It then gives way, with all that nothing holds.
+    """
     data = at_keyframe(model, key)
     dense = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, dense)
     dofs = [line.dof, int(model.joint(BEND_JOINT).dofadr[0])]
+    if slides:
+        motions = free_motions(model, data, dofs)
+        bend = motions[dofs[1]]
+        return float(1.0 / (bend @ np.linalg.solve(motions.T @ dense @ motions, bend)))
     return float(1.0 / np.linalg.inv(dense[np.ix_(dofs, dofs)])[1, 1])
 
 
@@ -154,11 +196,13 @@ def _leaf_part(
             f"plant.bend_share: {path}: the body {rigid.body(frame).name!r} has no mass of its own to share (give the "
             "model's compiler fusestatic=\"true\", so that the modules' halves become part of it)"
         )
-    most = RIGID_SHARE * own / whole
-    limit = f"at most {most:.3f}" if is_mast else f"at least {1.0 - most:.3f}"
+    most = RIGID_SHARE * own / whole  # rounded so that it is allowed
+    limit = (
+        f"at most {math.floor(1e3 * most) / 1e3:g}" if is_mast else f"at least {math.ceil(1e3 * (1 - most)) / 1e3:g}"
+    )
     raise InputError(
         f"plant.bend_share = {settings.bend_share:g}: {path}: gimbals and flywheels, which stay with the modules, have "
-        f"the rest of the inertia; with plant.bend_beyond = {settings.bend_beyond!r} it is {limit}"
+        f"too much of the inertia; with plant.bend_beyond = {settings.bend_beyond!r} set plant.bend_share to {limit}"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -68,6 +69,23 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
         rates = motion.copy()
         rates[loose] -= way if ways is None else ways @ way
     return Inertia(row, float(line_inertia), rates)
+
+
+def free_motions(model: mujoco.MjModel, data: mujoco.MjData, dofs: Sequence[int]) -> np.ndarray:
+    """Find the motions of some degrees of freedom and of all that neither servos, constraints nor contacts hold.
+
+    Args:
+        model: The compiled model.
+        data: Its state after a forward pass.
+        dofs: Degrees of freedom that are free, whatever holds them.
+
+    Returns:
+        A basis, (nv, n).
+    """
+    moving = sorted({*dofs, *_free_dofs(model, data)})
+    basis = np.eye(model.nv)[:, moving]
+    constraints = np.concatenate([_contacts(model, data), _weld_jacobian(model, data)]) @ basis
+    return basis @ _null_space(constraints) if constraints.size else basis
 
 
 def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, joint: int, speed: float) -> np.ndarray:

@@ -10,9 +10,8 @@ import numpy as np
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.plant import Plant
+from cmg_mj.plant.tilt_line import UP
 from cmg_mj.scenario.pivot import Pivot
-
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def pivot_directions(plant: Plant, pivots: Sequence[Pivot]) -> list[list[float]]:

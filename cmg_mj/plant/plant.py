@@ -32,7 +32,7 @@ from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse_drawn
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, element_id
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, JOINT_KINDS, element_id
 from cmg_mj.plant.sliding_model import sliding_model
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
@@ -47,10 +47,6 @@ from cmg_mj.sensors.ideal import MultiAxisReading
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt
 
-JOINT_KINDS = {
-    int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name for name in ("hinge", "slide", "ball", "free")
-}
-
 
 class Plant:
     """A compiled rig with its names resolved.
@@ -64,7 +60,11 @@ class Plant:
         yaw: Address of q_a, or None if the thrust bearing is locked.
         largest_step: The largest physics step that is accurate enough [s].
         backlash: Between the servos' motors and the gimbals [rad].
+        above_centre_m: So much above the common mass centre lies the point that the tilt estimate of a pivot that
+            slides takes to be at rest: an error of the estimate, which settings made from this plant keep [m].
     """
+
+    above_centre_m = 0.0
 
     def __init__(
         self,
@@ -131,7 +131,7 @@ class Plant:
                 axis,
                 bias=math.radians(axis_settings.equilibrium_bias_deg),
                 initial_tilt=math.radians(axis_settings.initial_tilt_deg),
-                radial_tilt=place_accelerometers(self.model, axis_settings, axis, self.path),
+                radial_tilt=place_accelerometers(self.model, axis_settings, axis, self.path, self.above_centre_m),
                 misplaced=axis_settings.has_misplaced,
             )
             if speed is not None:
@@ -145,8 +145,8 @@ class Plant:
             set_turn_rate(self.model, self.key, settings.turn_rate_rad_s, self.path)
         vary(self.model, settings, self.path, self.axes, held)
         speeds = [abs(module.speed) for axis in self.axes for module in axis.modules]
-        shaken = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
-        self.largest_step = largest_step(self.model, self.key, float(self.model.opt.timestep), shaken)
+        shake_rate = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
+        self.largest_step = largest_step(self.model, self.key, float(self.model.opt.timestep), shake_rate)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "

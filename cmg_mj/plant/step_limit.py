@@ -17,21 +17,21 @@ OTHERS_LIMIT_S = 0.001
 """Largest step of MuJoCo's other integrators; none is as accurate at any step that costs less [s]."""
 
 
-def largest_step(model: mujoco.MjModel, key: int, own_s: float, shaken: float = 0.0) -> float:
+def largest_step(model: mujoco.MjModel, key: int, own_s: float, shake_rate: float = 0.0) -> float:
     """The largest physics step that is accurate enough for a rig [s].
 
     Args:
         model: The compiled model, with its friction and its integrator.
         key: The keyframe at which it is judged.
         own_s: The model file's own step [s], which is never exceeded: it knows about contacts, say.
-        shaken: How fast something shakes the rig, which none of its poles shows [rad/s]: an unbalanced flywheel.
+        shake_rate: Rate at which an unbalanced flywheel shakes the rig, which none of its poles shows [rad/s].
 
     Returns:
         The step [s].
     """
     if int(model.opt.integrator) != int(mujoco.mjtIntegrator.mjINT_RK4):
         return min(own_s, OTHERS_LIMIT_S)
-    return min(own_s, RK4_LIMIT / max(fastest_rate(model, key), shaken, RK4_LIMIT / own_s))
+    return min(own_s, RK4_LIMIT / max(fastest_rate(model, key), shake_rate, RK4_LIMIT / own_s))
 
 
 def fastest_rate(model: mujoco.MjModel, key: int) -> float:

@@ -133,7 +133,9 @@ def set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> N
     model.key_qvel[key, model.jnt_dofadr[joint]] = model.key_ctrl[key, servo] = rate
 
 
-def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path) -> RadialTilt:
+def place_accelerometers(
+    model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path, above_centre: float = 0.0
+) -> RadialTilt:
     """Move the accelerometers of an axis along the radial line.
 
     Args:
@@ -141,6 +143,8 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
         settings: Their distances from the tilt axis, what is left out stays; and how far off these they sit.
         axis: The axis, as its file has it.
         path: The model's file, for messages.
+        above_centre: Height above the common mass centre of the point that the tilt estimate of a pivot that slides
+            takes to be at rest [m].
 
     Returns:
         The tilt estimate for their new places, as far as it knows them.
@@ -149,7 +153,7 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
         InputError: The outer one is no farther out than the inner one.
     """
     as_filed = axis.radial_tilt
-    height = _still_height(settings, axis, path)
+    height = _still_height(settings, axis, path, above_centre)
     distances = {
         "accelerometer_inner": (settings.accelerometer_inner_m, as_filed.r_inner),
         "accelerometer_outer": (settings.accelerometer_outer_m, as_filed.r_outer),
@@ -179,14 +183,14 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
     return RadialTilt(*known).about(height)
 
 
-def _still_height(settings: PlantSettings, axis: Axis, path: Path) -> float:
+def _still_height(settings: PlantSettings, axis: Axis, path: Path, above_centre: float) -> float:
     """Height above the pivot of the point that the tilt estimate takes to be at rest [m]."""
     if not settings.pivot_slides:
         return 0.0
     if not axis.reduced.pivot_arm:
         about = f" of axis {axis.name!r}" if axis.name else ""
         raise InputError(f"plant.pivot_slides = true: {path}: the pivot{about} does not slide freely; leave it out")
-    return axis.reduced.pivot_arm
+    return axis.reduced.pivot_arm + above_centre
 
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:

@@ -11,8 +11,8 @@ from cmg_mj.errors import TomlValue
 from cmg_mj.scenario.bend_cures import NEAR, Trial, cure_among, is_near, loop_of, trials
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
-from cmg_mj.scenario.left_out import left_out
 from cmg_mj.scenario.linear_rig import rk4_energy_loss
+from cmg_mj.scenario.omissions import omissions
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.plant_settings import BendBeyond
 from cmg_mj.scenario.resolve import resolved
@@ -70,9 +70,9 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
     rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
     rows += [("pivot", pivot.words) for pivot in scenario.pivot]
     rows += _pivot_rows(rig)
-    missing = list(left_out(scenario).values())
+    missing = list(omissions(scenario).values())
     if missing:
-        rows.append(("left out", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
+        rows.append(("omitted", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
     rows += _bend_rows(scenario, rig)
     return lines(
         f"{name}{f', axis {axis}' if axis else ''}: valid",

@@ -115,14 +115,19 @@ def find_model(scenario: Scenario, beside: Path) -> Scenario:
 
 
 def find_tracks(scenario: Scenario, beside: Path) -> Scenario:
-    """The same with the whole paths of the pivot's tracks, which a scenario file names relative to itself."""
+    """Return the scenario with the whole paths of its tracks, which a scenario file names relative to itself."""
     pivots = []
     for pivot in scenario.pivot:
         if pivot.file is not None:
-            paths = [path for path in (beside / pivot.file, Path(pivot.file)) if _is_file(path)]
-            pivot = dataclasses.replace(pivot, file=str(paths[0].resolve()) if paths else pivot.file)
+            pivot = dataclasses.replace(pivot, file=find_track(pivot.file, beside))
         pivots.append(pivot)
     return scenario.model_copy(update={"pivot": pivots}) if pivots else scenario
+
+
+def find_track(file: str, beside: Path) -> str:
+    """Return the whole path of a track, which may start from a folder; a file that is nowhere keeps its name."""
+    paths = [path for path in (beside / file, Path(file)) if _is_file(path)]
+    return str(paths[0].resolve()) if paths else file
 
 
 def _is_file(path: Path) -> bool:

@@ -92,7 +92,7 @@ class PlantSettings:
 
     @property
     def bends(self) -> bool:
-        """Whether the frame bends."""
+        """True if the frame bends."""
         return self.bend_frequency_hz > 0.0
 
     def changes(self) -> dict[str, float]:
@@ -111,5 +111,5 @@ class PlantSettings:
 
     @property
     def has_misplaced(self) -> bool:
-        """Whether an accelerometer sits elsewhere than the tilt estimate knows."""
+        """True if an accelerometer sits elsewhere than the tilt estimate knows."""
         return bool(self.accelerometer_inner_misplaced_mm or self.accelerometer_outer_misplaced_mm)

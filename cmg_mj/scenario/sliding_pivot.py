@@ -90,9 +90,28 @@ def loop_words(pole: float) -> str:
 
 
 def sliding_hint(scenario: Scenario, law: object, rig: PlantParameters) -> str | None:
-    """Clause for a rig whose pivot slides, where the tilt is taken about the pivot or the loop is unstable anyway."""
+    """Clauses for a rig whose pivot slides: what its tilt is taken about, and a `[[pivot]]` that does nothing."""
     if not rig.reduced.pivot_arm:
         return None
+    clauses = [_tilt_clause(scenario, law, rig), _across_clause(scenario)]
+    return "; ".join(clause for clause in clauses if clause) or None
+
+
+def _across_clause(scenario: Scenario) -> str:
+    """Name the motions across: they accelerate what the pivot slides on, which friction alone hands on."""
+    names = [
+        f"pivot.{i}" for i, pivot in enumerate(scenario.pivot) if pivot.direction == "across" and np.any(pivot.size)
+    ]
+    if not names:
+        return ""
+    return (
+        f"{', '.join(names)}: accelerates across what the pivot slides on, and moves the rig by no more than friction "
+        'and damping there hand on; direction = "vertical" does move it'
+    )
+
+
+def _tilt_clause(scenario: Scenario, law: object, rig: PlantParameters) -> str | None:
+    """Clause where the tilt is taken about the pivot, or the loop is unstable anyway."""
     measured = scenario.controller.angle_source == "measured"
     poles = sliding_poles(law, rig) if measured else None
     if rig.tilt.height:

@@ -118,7 +118,7 @@ class Accelerometer:
 
     @property
     def vibrates(self) -> bool:
-        """Whether the accelerometers of one world vibrate."""
+        """True if the accelerometers of one world vibrate."""
         return bool(self.vibration_mg) or any(self.wheel_harmonics_mg)
 
     @property
@@ -203,13 +203,13 @@ class Accelerometer:
     def make_reading_function(
         self,
         drift: Callable[[], Forces] | None = None,
-        shaken: Callable[[IdealReading], Forces] | None = None,
+        vibration: Callable[[IdealReading], Forces] | None = None,
     ) -> Callable[[IdealReading, Sequence[Scalar]], Forces]:
         """The parts at work: to be called once for every sample that they take (`raw_rate_hz`).
 
         Args:
             drift: What the 1/f noise adds to the next sample, four numbers or an array (4, n_worlds) [m/s^2].
-            shaken: The true forces with those of the vibration at the next sample [m/s^2].
+            vibration: The true forces with those of the vibration at the next sample [m/s^2].
 
         Returns:
             A function (ideal reading, standard normals) -> reading: inner x, z, outer x, z [m/s^2]. It remembers its
@@ -228,7 +228,7 @@ class Accelerometer:
             return filters[number](x)
 
         def measure(ideal: IdealReading, normal: Sequence[Scalar]) -> Forces:
-            forces = erring(shaken(ideal) if shaken else ideal.accelerations)
+            forces = erring(vibration(ideal) if vibration else ideal.accelerations)
             wander = drift() if drift else None
             if isinstance(forces, np.ndarray):
                 raw = forces + sigma * np.asarray(normal)

@@ -208,13 +208,13 @@ def sampled_sensors(
     pair = sensors.accelerometer
     flicker_noise = noise(NoiseStream.FLICKER, len(CORNERS_HZ) * pair.channels)
     drift = _flicker_source(pair, flicker_noise) if pair.bias_instability_ug else None
-    shaken = _vibration_source(pair, noise)
+    vibration = _vibration_source(pair, noise)
     kind = UnevenPair if pair.skew_s or pair.bandwidth_hz else SampledSensor[Forces]
     encoder, fog = sensors.encoder, sensors.fog
     pair_noise = noise(NoiseStream.ACCELEROMETER, pair.channels)
     encoder_noise, fog_noise = noise(NoiseStream.ENCODER, encoder.channels), noise(NoiseStream.FOG, fog.channels)
     return (
-        kind(pair, timestep, pair_noise, "sensors.accelerometer", pair.make_reading_function(drift, shaken)),
+        kind(pair, timestep, pair_noise, "sensors.accelerometer", pair.make_reading_function(drift, vibration)),
         SampledSensor(encoder, timestep, encoder_noise, "sensors.encoder", encoder.make_reading_function()),
         SampledSensor(fog, timestep, fog_noise, "sensors.fog", fog.make_reading_function()),
     )

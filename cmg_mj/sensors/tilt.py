@@ -52,7 +52,7 @@ class RadialTilt:
     height: float = 0.0
 
     def about(self, height: float) -> RadialTilt:
-        """The same accelerometers, at distances from a point of the ray above the pivot [m]."""
+        """Return the estimate with distances from a point of the ray above the pivot [m]."""
         if not height:
             return self
         return RadialTilt(self.r_inner - height, self.r_outer - height, height)

@@ -98,7 +98,7 @@ class WheelTones:
 def vibration(
     broadband: BroadbandVibration | None, rms: Scalar, tones: WheelTones | None
 ) -> Callable[[IdealReading], Forces] | None:
-    """Make what vibration adds to each sample of the specific forces.
+    """Make the function that adds vibration to each sample of the specific forces.
 
     Args:
         broadband: Vibration of RMS 1, if there is any.
@@ -111,7 +111,7 @@ def vibration(
     if broadband is None and tones is None:
         return None
 
-    def shaken(ideal: IdealReading) -> Forces:
+    def with_vibration(ideal: IdealReading) -> Forces:
         added: list[Scalar] = [0.0] * AXES
         if broadband is not None:
             added = [rms * part for part in broadband.advance()]
@@ -122,4 +122,4 @@ def vibration(
             return forces + np.array(added)
         return tuple(force + part for force, part in zip(forces, added, strict=True))
 
-    return shaken
+    return with_vibration

@@ -6,7 +6,7 @@ from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.bundled import folder
 from cmg_mj.plant.moving_pivot import pivot_directions
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.scenario.pivot_track import read_track
+from cmg_mj.scenario.pivot_track import MOST_RECORDED_M_S2, read_track
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import TimeGrid, time_grid
 
@@ -51,9 +51,15 @@ def check_scenario(scenario: Scenario, plant: Plant) -> None:
             )
         if pivot.file is not None:
             try:
-                read_track(pivot.file, pivot.column)
+                track = read_track(pivot.file, pivot.column)
             except InputError as error:
                 raise InputError(f"pivot.{i}.file: {error}") from error
+            largest = abs(pivot.scale) * float(abs(track.accelerations).max())
+            if largest > MOST_RECORDED_M_S2:
+                raise InputError(
+                    f"pivot.{i}.scale = {pivot.scale:g}: {pivot.file} times this reaches {largest:.3g} m/s2; at most "
+                    f"{MOST_RECORDED_M_S2:g}"
+                )
     pivot_directions(plant, scenario.pivot)
 
 
@@ -71,8 +77,9 @@ def check_axes(scenario: Scenario, plant: Plant) -> None:
             raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
     torques = [(f"push.{i}.axis", push.axis) for i, push in enumerate(scenario.push)]
     torques += [(f"swing.{i}.axis", swing.axis) for i, swing in enumerate(scenario.swing)]
-    pivots = [(i, pivot) for i, pivot in enumerate(scenario.pivot) if pivot.direction != "vertical" or pivot.axis]
-    torques += [(f"pivot.{i}.axis", pivot.axis) for i, pivot in pivots]
+    for i, pivot in enumerate(scenario.pivot):
+        if pivot.direction != "vertical" or pivot.axis is not None:
+            torques.append((f"pivot.{i}.axis", pivot.axis))
     for field, axis in torques:
         if axis is None and len(known) > 1:
             raise InputError(f"{field}: the rig has several axes: which of {', '.join(known)}?")

@@ -1,4 +1,4 @@
-"""What `free_pivot` and every other observer are worth on rigs that are not at rest: one factor at a time.
+"""The worth of `free_pivot` and every other observer on rigs that are not at rest: one factor at a time.
 
     python docs/studies/free_pivot_grid.py [--worlds 100] [--parts open,loop] [--jobs 2] [--only pivot] [--seed 130000]
         [--keep FOLDER]
@@ -260,10 +260,10 @@ def open_rows(cell: Cell, seed: int, worlds: int) -> list[list[str]]:
     return [row, [cell.name, *(f"{means[name]:.1f}" for name in [*OBSERVERS, "zero"])]]
 
 
-def kept(work: Callable[[Cell, int, int], Row], folder: str, cell: Cell, seed: int, worlds: int) -> Row:
+def read_or_compute(work: Callable[[Cell, int, int], Row], folder: str, cell: Cell, seed: int, worlds: int) -> Row:
     """A cell's rows, computed unless they are in the folder already, of this very cell and observer."""
-    of = hashlib.sha256(f"{cell} {inspect.getsource(FreePivot)}".encode()).hexdigest()[:8]
-    name = re.sub(r"[^a-z0-9.]+", "_", f"{work.__name__} {cell.name} {seed} {worlds} {of}".lower())
+    identity = hashlib.sha256(f"{cell} {inspect.getsource(FreePivot)}".encode()).hexdigest()[:8]
+    name = re.sub(r"[^a-z0-9.]+", "_", f"{work.__name__} {cell.name} {seed} {worlds} {identity}".lower())
     file = Path(folder, f"{name}.json") if folder else None
     if file is not None and file.exists():
         return json.loads(file.read_text(encoding="utf-8"))
@@ -322,7 +322,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen, counts = [cell for _, cell in cells], [options.worlds] * len(cells)
     with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
         if "open" in options.parts:
-            work = partial(kept, open_rows, options.keep)
+            work = partial(read_or_compute, open_rows, options.keep)
             rows = list(pool.map(work, chosen, seeds, counts))
             print(f"\nOpen loop, the law fed the true rate, {options.worlds} worlds [1e-3 rad/s]:\n")
             headings = ["cell", "zero", f"`{BASE}`", f"`{OURS}`", "best other", "by it", f"by `{BASE}`", "bound"]
@@ -339,7 +339,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print("\nAll observers, the same worlds [1e-3 rad/s]:\n")
             print(table(["cell", *(f"`{name}`" for name in OBSERVERS), "`zero`"], [row for _, row in rows]), flush=True)
         if "loop" in options.parts:
-            work = partial(kept, loop_rows, options.keep)
+            work = partial(read_or_compute, loop_rows, options.keep)
             rows = list(pool.map(work, chosen, seeds, counts))
             print(f"\nEach in its own loop, {options.worlds} worlds; errors of the worlds that stood [1e-3 rad/s]:\n")
             headings = ["cell", f"`{OURS}` fell", f"`{BASE}` fell", "fewest falls of another", "p", f"`{OURS}`"]

@@ -1,4 +1,4 @@
-"""What each number of `free_pivot` is worth, on worlds that it was tuned on: the table of docs/assumptions.md.
+"""The worth of each number of `free_pivot`, on worlds that it was tuned on: the table of docs/assumptions.md.
 
     python docs/studies/free_pivot_tuning.py [--worlds 32] [--falls 300] [--jobs 2] [--seed 60000]
 

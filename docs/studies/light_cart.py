@@ -1,4 +1,4 @@
-"""Which observer stands on a cart that slides freely, and how light that may be: the tables of docs/mount.md.
+"""Observers that stand on a cart that slides freely, and how light that may be: the tables of docs/mount.md.
 
 python docs/studies/light_cart.py (about five minutes on a quiet core)
 python docs/studies/light_cart.py --rubbing (what the cart slides on is not free of friction; about three minutes)
@@ -20,7 +20,6 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import mujoco
 
 from cmg_mj import mount
-from cmg_mj.plant import variations
 from cmg_mj.results.markdown import table
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits.mount_files import write_scenario
@@ -58,7 +57,7 @@ def mounted(mass: float, friction: float = 0.0, damping: float = 5e-4) -> tuple[
 
 
 def standing(experiment: Experiment, limits: Prospects, loop: tuple[str, str, str], worlds: int = WORLDS) -> str:
-    """How many worlds stand, in a cell's words."""
+    """Count the worlds that stand, in a cell's words."""
     about, name, angle_source = loop
     observer, feedback = RATES[name]
     settings = {
@@ -113,10 +112,10 @@ def main() -> None:
         print(table(["dry friction [N]", "damping [N s/m]", *names_of(RUBBED)], rows, text_columns=1))
         return
     if options.height:
-        loops, rows, right = RUBBED[:4], [], variations._still_height
+        loops, rows, cart = RUBBED[:4], [], mounted(1.0)
         for off in HEIGHTS_M:
-            variations._still_height = lambda *one, off=off: right(*one) + (off if one[0].pivot_slides else 0.0)
-            rows.append([f"{off:g}", *(standing(*mounted(1.0), loop, worlds) for loop in loops)])
+            cart[0].plant.above_centre_m = off
+            rows.append([f"{off:g}", *(standing(*cart, loop, worlds) for loop in loops)])
         print(table(["above the mass centre [m]", *names_of(loops)], rows, text_columns=1))
         return
     carts = {mass: mounted(mass) for mass in masses}

@@ -105,7 +105,7 @@ def fits(experiment: Experiment, kind: str, held: Recorded) -> dict:
     return row
 
 
-def tuned(experiment: Experiment, kind: str, recorded: Callable[..., Recorded]) -> dict:
+def fit_tuned(experiment: Experiment, kind: str, recorded: Callable[..., Recorded]) -> dict:
     """The fit of tuned parameters on the held-out worlds."""
     end = time.process_time() + TUNING_S
     level = tune(
@@ -172,7 +172,7 @@ class OnRobot:
 
     @cached_property
     def held(self) -> Recorded:
-        """The worlds that nothing is tuned on."""
+        """Worlds that nothing is tuned on."""
         scenario, worlds = self.experiment.scenario, range(WORLDS, 2 * WORLDS)
         density = scenario.sensors.accelerometer.noise_density_ug_rthz
         return self.recorded(scenario, worlds, noise_ug_rthz=density, warm_up_s=WARM_UP_S)
@@ -184,7 +184,7 @@ class OnRobot:
         if part == "E":
             return margins(self.experiment, kind, self.ceiling)
         if part == "tuned":
-            return tuned(self.experiment, kind, self.recorded)
+            return fit_tuned(self.experiment, kind, self.recorded)
         if kind == RIG:
             tau = scales_of(self.experiment.plant.reduced).time
             return {"tau": tau, "motion": self.held.zero_rms, **floors(self.experiment, self.held)}
@@ -216,8 +216,8 @@ def main() -> None:
     wanted = [name for name in ROBOTS if not parts or any(part in name for part in parts)]
     end = time.monotonic() + 60.0 * float(options.get("--minutes", "inf"))
     file = Path(options["--keep"]) if "--keep" in options else None
-    kept = file.read_text(encoding="utf-8").splitlines() if file and file.exists() else []
-    rows: dict[str, dict] = dict(json.loads(line) for line in kept)
+    lines = file.read_text(encoding="utf-8").splitlines() if file and file.exists() else []
+    rows: dict[str, dict] = dict(json.loads(line) for line in lines)
 
     def keep(name: str, row: dict) -> None:
         rows[name] = row

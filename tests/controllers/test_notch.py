@@ -15,7 +15,7 @@ DT = 0.005
 
 
 def gain(hz: float, middle_hz: float) -> complex:
-    """What is left of a sine after the notch has settled."""
+    """The amplitude of a sine after the notch has settled."""
     inputs = np.exp(2.0j * math.pi * hz * DT * np.arange(4000))
     real, imaginary = (_through(Notch(middle_hz, DT, math.inf), part) for part in (np.real(inputs), np.imag(inputs)))
     return complex(np.mean(((real + 1j * imaginary) / inputs)[2000:]))

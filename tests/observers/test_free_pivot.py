@@ -38,7 +38,7 @@ def walk(estimator: FreePivot, y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarra
 
 
 def shares_of_y1(n: int, sigma: float, hz: float, rng: np.random.Generator) -> np.ndarray:
-    """What a pivot that moves adds to y1: first-order noise."""
+    """Make the part of y1 that a moving pivot adds: first-order noise."""
     f, w = math.exp(-2.0 * math.pi * hz * DT), [rng.normal(0.0, sigma)]
     for _ in range(n - 1):
         w.append(f * w[-1] + rng.normal(0.0, sigma * math.sqrt(1.0 - f * f)))
@@ -269,3 +269,13 @@ def loop(kind: str, *settings: str) -> float:
 def test_in_the_loop_it_keeps_to_its_share_of_gyro_free(setting: str, most: float) -> None:
     """docs/studies/free_pivot_grid.py has all cells on 100 worlds."""
     assert loop("free_pivot", setting) < most * loop("gyro_free", setting)
+
+
+def test_without_noise_the_pivots_variance_has_a_floor() -> None:
+    """Without one y1 would have no variance at all, by which a rise is divided."""
+    silent = TiltNoise(0.0, 0.0, 0.0)
+    with pytest.raises(ValueError, match="pivot_floor = 0: with sensors without noise it must be positive"):
+        FreePivot(DT, PAPER, silent, pivot_start=0.0, pivot_floor=0.0)
+    *_, y1, a = motion(50, np.random.default_rng(3), bias=0.0)
+    estimates, _ = walk(FreePivot(DT, PAPER, silent, pivot_start=0.0, pivot_floor=1e-6), y1, a)
+    assert np.isfinite(estimates).all()

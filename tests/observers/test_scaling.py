@@ -13,7 +13,7 @@ from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
 from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.observers.scaling import PURE, TORQUE, UNITS, Owner, Scales, Unit, carried, scaled_parameters, scales_of
+from cmg_mj.observers.scaling import PURE, TORQUE, UNITS, Owner, Scales, Unit, scale_value, scaled_parameters, scales_of
 from tests.observers.reference import DT, HEAVY, NOISE, PAPER, rough_signals
 
 EXTRA = {"bias_rad": PURE}
@@ -44,11 +44,11 @@ def other_rig(model: ReducedModel, s: Scales) -> ReducedModel:
 def of_all(kind: str, values: dict[str, Any], scales: Scales) -> dict[str, Any]:
     """Every parameter in the other rig's units, whatever it describes."""
     units = UNITS[kind]
-    return {name: carried(value, units[name], scales) if name in units else value for name, value in values.items()}
+    return {name: scale_value(value, units[name], scales) if name in units else value for name, value in values.items()}
 
 
 def estimates(kind: str, scales: Scales, model: ReducedModel) -> np.ndarray:
-    """What an observer on the other rig estimates of the same trajectory, in the papers' rig's units."""
+    """Estimate the same trajectory by an observer on the other rig, in the papers' rig's units."""
     signature = OBSERVER_CLASSES.takes(kind)
     names = [name for name in signature if name not in OBSERVER_CLASSES.bench_parameters]
     values = {name: signature[name].default for name in names} | OTHER.get(kind, {})

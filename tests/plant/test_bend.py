@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -196,8 +197,12 @@ def test_floors_that_a_bend_would_belie_are_not_printed() -> None:
             "plant.timestep_s = 0.005: does not follow a bend of 20 Hz, which takes at most 0.00",
         ),
         (["integrator=implicitfast"], "plant.integrator = 'implicitfast': follows no bend"),
-        (["bend_share=0.7"], "plant.bend_share = 0.7: .* with plant.bend_beyond = 'sensors' it is at most 0.694"),
-        (["bend_share=0.2", "bend_beyond=both"], "plant.bend_share = 0.2: .* it is at least 0.306"),
+        (
+            ["bend_share=0.7"],
+            "plant.bend_share = 0.7: .* with plant.bend_beyond = 'sensors' set plant.bend_share to at most 0.694",
+        ),
+        (["bend_beyond=both"], "plant.bend_share = 0.2: .* = 'both' set plant.bend_share to at least 0.306"),
+        (["bend_beyond=modules"], "plant.bend_share = 0.2: .* = 'modules' set plant.bend_share to at least 0.306"),
         (["bend_beyond=modules", "bend_share=0.8", "tilt_friction_n_m=0.1"], "plant.tilt_friction_n_m = 0.1: .* leave"),
         (["bend_beyond=top"], "plant.bend_beyond = 'top': must be one of 'sensors', 'modules', 'both'"),
         (["bend_frequency_hz=-1"], "plant.bend_frequency_hz = -1: must be a number greater than or equal to 0"),
@@ -212,6 +217,38 @@ def test_floors_that_a_bend_would_belie_are_not_printed() -> None:
 def test_what_does_not_go_with_a_bend(settings: list[str], words: str) -> None:
     with pytest.raises(InputError, match=words):
         prepare(load_scenario("push_recovery", ["plant.bend_frequency_hz=20", *(f"plant.{one}" for one in settings)]))
+
+
+@pytest.mark.parametrize(("beyond", "share"), [("sensors", 0.694), ("modules", 0.306)])
+def test_the_share_that_a_refusal_names_is_allowed(beyond: str, share: float) -> None:
+    assert bending(20.0, beyond, share).settings.bends
+
+
+HINGE_TORQUES: dict[str, tuple[str, Any, str | None]] = {
+    "damping": ("damping", [0.1, 0.0, 0.0], "tilt_damping_n_m_s"),
+    "frictionloss": ("frictionloss", 0.1, "tilt_friction_n_m"),
+    "stiffness": ("stiffness", [0.1, 0.0, 0.0], None),
+    "armature": ("armature", 0.1, None),
+    "nonlinear damping": ("damping", [0.0, 0.1, 0.0], None),
+}
+
+
+@pytest.mark.parametrize("torque", HINGE_TORQUES)
+def test_torques_of_the_hinge_in_the_file_do_not_act_beyond_a_bend(tmp_path: Path, torque: str) -> None:
+    """They are refused by name, if the settings do not take them away; before the bend they stay."""
+    attribute, value, field = HINGE_TORQUES[torque]
+    spec = mujoco.MjSpec.from_file(str(load_plant().path))
+    setattr(spec.joint("tilt"), attribute, value)
+    model = tmp_path / "rig.xml"
+    model.write_text(spec.to_xml(), encoding="utf-8")
+    words = rf"plant.bend_beyond = 'both': .*rig.xml: the {torque} of joint 'tilt' would act on .*; "
+    with pytest.raises(InputError, match=words + (f"set plant.{field}=0, or take" if field else "take it out of")):
+        bending(20.0, "both", 0.5, model=str(model))
+    bending(20.0, "sensors", 0.5, model=str(model))
+    if field:
+        without = bending(20.0, "both", 0.5, model=str(model), **{field: 0.0})
+        assert not without.model.dof_damping[without.axis.line.dof]
+        assert not without.model.dof_frictionloss[without.axis.line.dof]
 
 
 def test_one_axis_of_two_may_bend() -> None:

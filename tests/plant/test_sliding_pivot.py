@@ -12,8 +12,11 @@ import pytest
 
 from cmg_mj import mount
 from cmg_mj.errors import InputError
+from cmg_mj.plant.parts import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.scenario.plant_settings import BendBeyond
 from cmg_mj.studies.push_limits.largest_push import ReducedPhysics
+from tests.plant.test_bend import frequency, ring
 from tests.studies.push_limits.robots import cart_pole
 
 SMALL = 1e-6
@@ -27,7 +30,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Plant:
 
 @pytest.fixture(scope="module")
 def known(plant: Plant) -> Plant:
-    """The same, whose tilt estimate knows that the pivot slides."""
+    """The cart again, whose tilt estimate knows that the pivot slides."""
     return plant.changed(dataclasses.replace(plant.settings, pivot_slides=True))
 
 
@@ -60,7 +63,7 @@ def y1_of(plant: Plant, tilt: float, gimbal_rate: float) -> float:
 
 
 def test_it_is_the_common_mass_centre_that_stays(plant: Plant) -> None:
-    """By MuJoCo's own mass centre of all; and the inertia left is J - (m h)^2/M."""
+    """MuJoCo's own mass centre of all says so; and the inertia left is J - (m h)^2/M."""
     model, data = plant.reduced, plant.new_data()
     pivot = float(data.joint("hinge").xanchor[2])
     J, mh, M, weight = inertias(plant)
@@ -84,6 +87,44 @@ def test_the_linearisation_is_mujocos(plant: Plant) -> None:
     assert sliding[gimbals] @ both == pytest.approx(-model.pivot_arm * (tilting[gimbals] @ both), rel=1e-6)
     c1, d = model.measured_tilt(0.0, plant.gravity)
     assert (rig.C[0, hinge], rig.C[0, gimbals] @ both) == pytest.approx((c1, d), rel=1e-6)
+
+
+@pytest.mark.parametrize("slides", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("beyond", "share"),
+    [
+        pytest.param("sensors", 0.02, marks=pytest.mark.slow),
+        pytest.param("modules", 0.98, marks=pytest.mark.slow),
+        ("both", 0.98),
+    ],
+)
+def test_y1_of_a_frame_that_bends_on_a_cart_is_mujocos(
+    plant: Plant, beyond: BendBeyond, share: float, slides: bool
+) -> None:
+    """The output matrix against differences of what perfect accelerometers show, state by state."""
+    settings = dataclasses.replace(plant.settings, pivot_slides=slides, tilt_damping_n_m_s=0.0)
+    bend = {"bend_frequency_hz": 20.0, "bend_beyond": beyond, "bend_share": share, "bend_damping_ratio": 0.0}
+    bending = load_plant(dataclasses.replace(settings, **bend))
+    model, linear = bending.model, bending.parameters.bend
+    assert linear is not None
+    y1 = linear.bending.C[0]
+
+    def y1_at(state: np.ndarray) -> float:
+        data = bending.new_data()
+        mujoco.mj_integratePos(model, data.qpos, state[: model.nv], 1.0)
+        data.qvel += state[model.nv : 2 * model.nv]
+        data.act += state[2 * model.nv :]
+        mujoco.mj_forward(model, data)
+        return bending.radial_tilt(*bending.axis.ideal(data.sensordata.tolist(), data.qvel).accelerations)
+
+    slopes = [(y1_at(SMALL * column) - y1_at(-SMALL * column)) / (2.0 * SMALL) for column in np.eye(len(y1))]
+    np.testing.assert_allclose(slopes, y1, rtol=1e-5, atol=1e-4)
+    # The words on sliding are those of a rigid frame.
+    slide = bending.parameters.slide
+    assert slide is not None
+    dof = int(model.joint(BEND_JOINT).dofadr[0])
+    assert not slide().A[model.nv + dof].any()
+    assert frequency(ring(bending)[0], bending.timestep) == pytest.approx(20.0, rel=1e-3)
 
 
 @pytest.mark.slow

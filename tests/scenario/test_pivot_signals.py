@@ -26,7 +26,7 @@ def held(pivot: Pivot, n: int, h: float = H, worlds: int | list[int] = 0, seed: 
 
 
 def midpoints(pivot: Pivot, slope, n: int, parts: int = 400) -> np.ndarray:
-    """The same by the midpoint rule."""
+    """Integrate by the midpoint rule."""
     t = (np.arange(n * parts) + 0.5) * H / parts
     last = math.inf if pivot.duration_s is None else pivot.start_s + pivot.duration_s
     values = np.where((t >= pivot.start_s) & (t < last), slope(t - pivot.start_s), 0.0)

@@ -187,10 +187,10 @@ def test_a_world_without_vibration_has_the_floor_and_the_others_do_not() -> None
 @pytest.mark.slow
 def test_four_mg_cost_gyro_free_what_as_much_noise_costs() -> None:
     """4 mg behind no low-pass are to samples at 200 Hz as white as 400 ug/rtHz are: the error grows by root two."""
-    still, shaken = (
+    still, vibrating = (
         experiment("duration_s=6.0", f"sensors.accelerometer.vibration_mg={rms}").run_many(4) for rms in (0, 4)
     )
-    errors = [result.values("velocity_rms_error_rad_s").mean() for result in (still, shaken)]
+    errors = [result.values("velocity_rms_error_rad_s").mean() for result in (still, vibrating)]
     assert errors[1] / errors[0] == pytest.approx(math.sqrt(2.0), rel=0.12)
 
 

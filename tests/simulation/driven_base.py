@@ -67,10 +67,10 @@ class DrivenBase:
         )
 
     def sensordata(self) -> np.ndarray:
-        """What perfect sensors show at the present state."""
+        """Read perfect sensors at the present state."""
         mujoco.mj_forward(self.model, self.data)
         return self.data.sensordata.copy()
 
     def travelled(self) -> np.ndarray:
-        """How far the base has moved, x, y, z [m]."""
+        """Displacement of the base, x, y, z [m]."""
         return np.array([self.data.joint(name).qpos[0] for name in SLIDES])

@@ -202,7 +202,7 @@ def test_a_users_own_loop_moves_it_as_the_docs_say() -> None:
     np.testing.assert_array_equal(tilts, expected["x1_rad"])
 
 
-def test_it_runs_again_from_its_own_folder_and_check_says_what_is_left_out(tmp_path: Path) -> None:
+def test_it_runs_again_from_its_own_folder_and_check_names_what_is_omitted(tmp_path: Path) -> None:
     scenario, track = tmp_path / "mine.toml", tmp_path / "walk.csv"
     track.write_text("t,a\n0,0.1\n0.2,-0.2\n", encoding="utf-8")
     scenario.write_text(
@@ -216,7 +216,7 @@ def test_it_runs_again_from_its_own_folder_and_check_says_what_is_left_out(tmp_p
     assert first.out == again.out
     checked = cmg_mj("check", scenario).out
     assert f"pivot       track, {track}, times 1, across, from 0 s" in checked
-    assert "left out    the pivot's acceleration: not in the reduced model, its loop, the ceiling" in checked
+    assert "omitted     the pivot's acceleration: not in the reduced model, its loop, the ceiling" in checked
 
 
 def test_figures_do_not_depend_on_the_physics_step() -> None:
@@ -266,6 +266,7 @@ def test_there_is_no_floor_of_y1_with_its_acceleration() -> None:
         ('{kind="step", acceleration_m_s2=1.0, direction="up"}', "must be one of 'across', 'along', 'vertical'"),
         ('{kind="step", acceleration_m_s2=1.0, start_s=2.0}', "pivot.0.start_s = 2: must be less than duration_s = 1"),
         ('{kind="step", acceleration_m_s2=1.0, axis="roll"}', "pivot.0.axis = 'roll': the rig has one axis"),
+        ('{kind="step", acceleration_m_s2=1.0, direction="vertical", axis=""}', "pivot.0.axis = '': the rig has one"),
         ('{kind="sine", acceleration_m_s2=1.0, frequency_hz=30.0}', "must be a number greater than 0 and at most 20"),
     ],
 )
@@ -273,6 +274,14 @@ def test_what_no_pivot_does_is_refused(pivot: str, message: str) -> None:
     with pytest.raises(InputError) as refused:
         experiment(f"pivot=[{pivot}]")
     assert message in str(refused.value)
+
+
+def test_a_track_that_is_scaled_beyond_all_recordings_is_named(tmp_path: Path) -> None:
+    track = tmp_path / "walk.csv"
+    track.write_text("t,a\n0,0.1\n0.2,-2.0\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"pivot.0.scale = -600: .*walk.csv times this reaches 1.2e\+03 m/s2; at most"):
+        experiment(f'pivot=[{{kind="track", file="{track}", scale=-600.0}}]')
+    experiment(f'pivot=[{{kind="track", file="{track}", scale=-400.0}}]')
 
 
 def test_a_frequency_that_the_control_rate_cannot_follow_is_refused() -> None:

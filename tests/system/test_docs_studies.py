@@ -55,7 +55,7 @@ def test_the_table_of_the_numbers_of_free_pivot() -> None:
     study = STEPS.with_name("free_pivot_tuning.py")
     arguments = "--worlds 2 --falls 2 --jobs 1"
     process = subprocess.run([sys.executable, study, *arguments.split()], capture_output=True, text=True, check=True)
-    assert re.search(r"\| as it is +(\| \d\.\d\d +){6}\| \d +\|", process.stdout)
+    assert re.search(r"\| as it is +(\| +\d\.\d\d ){6}\| +\d \|", process.stdout)
     assert process.stdout.count("\n") == 12
 
 

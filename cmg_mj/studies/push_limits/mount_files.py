@@ -66,7 +66,7 @@ SUITS_EVERY_RIG = "finite_difference"
 
 
 class RigSettings(NamedTuple):
-    """What a scenario says of the robot that carries the pair, besides its model.
+    """The robot that carries the pair, as a scenario has it besides its model.
 
     Attributes:
         sliding: Axes whose pivot slides freely.
@@ -331,10 +331,10 @@ def scenario_text(
     )
     if not observers:
         return text
-    return commented(text, SCALED_COMMENT, "[axes" if len(observers) > 1 else "[observer]")
+    return with_comment(text, SCALED_COMMENT, "[axes" if len(observers) > 1 else "[observer]")
 
 
-def commented(text: str, comment: str, header: str) -> str:
+def with_comment(text: str, comment: str, header: str) -> str:
     """Put a comment above the first header in a TOML text that begins so."""
     return text.replace(f"\n{header}", f"\n{comment}\n{header}", 1)
 
@@ -342,12 +342,13 @@ def commented(text: str, comment: str, header: str) -> str:
 def observer_parameters(kind: str, experiment: Experiment) -> AxesParameters:
     """Carry an observer's parameters to a robot, axis by axis, in the digits that its scenario shows."""
     parts = experiment.parts
-    return {part.plant.axis.name: _shown(scaled_parameters(kind, part.plant.reduced)) for part in parts}
+    return {
+        part.plant.axis.name: {
+            name: _round(value) for name, value in scaled_parameters(kind, part.plant.reduced).items()
+        }
+        for part in parts
+    }
 
 
-def _shown(parameters: Mapping[str, Number]) -> dict[str, Number]:
-    return {name: _rounded(value) for name, value in parameters.items()}
-
-
-def _rounded(value: Number) -> Number:
-    return tuple(map(_rounded, value)) if isinstance(value, tuple) else float(f"{value:.{DIGITS}g}")
+def _round(value: Number) -> Number:
+    return tuple(map(_round, value)) if isinstance(value, tuple) else float(f"{value:.{DIGITS}g}")

@@ -17,7 +17,7 @@ from cmg_mj.results.signed_text import is_as_written, signed
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.push_limits.largest_push import push_margin
-from cmg_mj.studies.push_limits.mount_files import commented
+from cmg_mj.studies.push_limits.mount_files import with_comment
 from cmg_mj.studies.tuning import NoiseLevelResult, TuningResult, tune, tuned_scenario
 from cmg_mj.studies.tuning.parameters import plain
 
@@ -35,11 +35,11 @@ class MountTuning(NamedTuple):
     margin: float
     """E of the reduced model, as mounted [N m s]."""
     tuned_margin: float
-    """The same with the tuned parameters."""
+    """With the tuned parameters."""
     in_use: bool
-    """Whether the scenario has the tuned parameters now."""
+    """True if the scenario has the tuned parameters now."""
     whole: bool
-    """Whether the search came to its end."""
+    """True if the search came to its end."""
 
     @property
     def level(self) -> NoiseLevelResult:
@@ -125,4 +125,4 @@ def _write(path: Path, level: NoiseLevelResult) -> None:
     fields = tomllib.loads(path.read_text(encoding="utf-8"))
     fields["observer"] |= plain(level.parameters)
     with whole_file(path) as temporary:
-        temporary.write_bytes(signed(commented(tomli_w.dumps(fields), TUNED_COMMENT, "[observer]"), ".toml"))
+        temporary.write_bytes(signed(with_comment(tomli_w.dumps(fields), TUNED_COMMENT, "[observer]"), ".toml"))

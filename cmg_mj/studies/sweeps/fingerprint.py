@@ -18,6 +18,7 @@ from cmg_mj.inputs.includes import check_files
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.sweeps.axes import FieldValue
 from cmg_mj.studies.sweeps.study import SweepStudy
+from cmg_mj.studies.sweeps.varied_tracks import varied_tracks
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -117,15 +118,13 @@ def hash_of_models(study: SweepStudy) -> str:
                     f"plant.model = {model!r}: {path} cannot be read: {error.strerror or error}"
                 ) from error
             digest.update(f"{path.name} {len(content)}\n".encode() + content)
-    for i, pivot in enumerate(study.scenario.pivot):
-        field = f"pivot.{i}.file"
-        varied = [str(value) for axis in study.axes if field in axis.fields for value in axis.values]
-        for file in varied or ([] if pivot.file is None else [pivot.file]):
-            try:
-                content = Path(file).read_bytes()
-            except OSError as error:
-                raise InputError(f"{field} = {file!r}: cannot be read: {error.strerror or error}") from error
-            digest.update(f"track {i} {len(content)}\n".encode() + content)
+    tracks = [(f"pivot.{i}.file", pivot.file) for i, pivot in enumerate(study.scenario.pivot) if pivot.file is not None]
+    for field, file in [*tracks, *(track for axis in study.axes for track in varied_tracks(axis))]:
+        try:
+            content = Path(file).read_bytes()
+        except OSError as error:
+            raise InputError(f"{field} = {file!r}: cannot be read: {error.strerror or error}") from error
+        digest.update(f"track {field} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 

@@ -1,4 +1,4 @@
-"""Who leads at a point of a sweep: the observer of the least error, and the baselines that have less."""
+"""The leader at a point of a sweep: the observer of the least error, and the baselines that have less."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CLOSE = 1.2
 
 
 class LeadRow(NamedTuple):
-    """How often an observer leads, or a baseline is ahead of the leader.
+    """Numbers of points at which an observer leads, or a baseline is ahead of the leader.
 
     Attributes:
         name: The observer, or the baseline.

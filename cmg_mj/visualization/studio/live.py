@@ -67,7 +67,7 @@ class StudioSession:
         self.pushes = Pushes(scenario.push, scenario.swing, self.plant.axis_names, self.timestep)
         self._pivot = PivotSignals(scenario.pivot, pivot_directions(self.plant, scenario.pivot), scenario.seed, 0)
         self._still = self.model.opt.gravity.copy()
-        self._held: tuple[int, int] | None = None if scenario.pivot else (0, sys.maxsize)
+        self._pivot_steps: tuple[int, int] | None = None if scenario.pivot else (0, sys.maxsize)
         """The steps between which the present acceleration of the pivot is held; for ever if it is at rest."""
         self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=PLOTTED_TICKS)
         self._begin(0)
@@ -140,10 +140,10 @@ class StudioSession:
 
     def _accelerate(self, step: int) -> None:
         """Set the pivot's acceleration during a physics step, which is held as long as a swinging torque."""
-        if self._held is not None and self._held[0] <= step < self._held[1]:
+        if self._pivot_steps is not None and self._pivot_steps[0] <= step < self._pivot_steps[1]:
             return
-        self._held = self.pushes.interval(step, self.controller.steps_per_sample)
-        start, end = self._held
+        self._pivot_steps = self.pushes.interval(step, self.controller.steps_per_sample)
+        start, end = self._pivot_steps
         self.model.opt.gravity[:] = self._still - self._pivot.mean(start * self.timestep, end * self.timestep)
 
     def _control(self, data: mujoco.MjData, step: int, torques: Sequence[float]) -> bool:

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
 import pytest
 
 from cmg_mj.plant.mounting import mount
 from cmg_mj.results.summary_keys import section
+from cmg_mj.scenario.stability_check import hints
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits import simulated_push
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
@@ -81,6 +83,26 @@ def test_the_loops_pole_about_the_pivot_says_who_stands(cart_kg: float, stands: 
 
 def _standing(experiment: Experiment, settings: dict[str, Any]) -> int:
     return int(experiment.with_settings(settings).run_many(2 * WORLDS, keep_trajectory=False).stood.sum())
+
+
+def test_a_motion_across_moves_what_the_cart_slides_on_alone(light_cart: Experiment) -> None:
+    """Damping of 5e-4 N s/m hands on next to nothing, and the hint says so; vertically the motion is felt."""
+    settings: dict[str, Any] = {"duration_s": 3.0, "plant.initial_tilt_deg": 0.5}
+    settings |= {"sensors.accelerometer.noise_density_ug_rthz": 0.0, "sensors.accelerometer.counts_per_g": 0.0}
+    motion = {"kind": "sine", "acceleration_m_s2": 1.0, "frequency_hz": 2.0}
+
+    def tilts(*pivots: dict[str, Any]) -> np.ndarray:
+        trajectory = light_cart.with_settings({**settings, "pivot": list(pivots)}).run().trajectory
+        assert trajectory is not None
+        return np.asarray(trajectory["x1_rad"])
+
+    across, vertical = ({**motion, "direction": direction} for direction in ("across", "vertical"))
+    still = tilts()
+    assert abs(tilts(across) - still).max() < 0.05 * abs(tilts(vertical) - still).max()
+    for pivot, count in ((across, 1), (vertical, 0), ({**across, "acceleration_m_s2": 0.0}, 0)):
+        experiment = light_cart.with_settings({"pivot": [pivot]})
+        clauses = hints(experiment.scenario, experiment.design, experiment.plant.parameters)
+        assert sum("pivot.0: accelerates across what the pivot slides on" in hint for hint in clauses) == count
 
 
 def test_mount_and_check_say_what_the_pivot_does() -> None:

@@ -1,4 +1,4 @@
-"""Who leads at a point of a sweep, and the baselines beside the observers."""
+"""The leader at a point of a sweep, and the baselines beside the observers."""
 
 from __future__ import annotations
 

@@ -12,8 +12,8 @@ IN_THE_MODEL = (
 """Those of them that the plant's MuJoCo model itself has, whoever steps it."""
 
 
-def left_out(scenario: Scenario) -> dict[str, str]:
-    """Find what the reduced model, the loop's margins, the ceiling and the floor of y1 with its acceleration leave out.
+def omissions(scenario: Scenario) -> dict[str, str]:
+    """Find what the reduced model, margins, the ceiling and the floor of y1 with its acceleration know nothing of.
 
     Args:
         scenario: The scenario of one axis.
