@@ -19,6 +19,7 @@ from cmg_mj.cli.arguments import (
     observer_option,
     observers_option,
     run_options,
+    settings_option,
     worlds_option,
 )
 from cmg_mj.cli.live import live_options, live_run
@@ -232,15 +233,18 @@ def list_names(what: str | None) -> None:
 
 @click.command(short_help="Check a scenario file, or a model file, without running it.")
 @click.argument("file")
+@settings_option("Set a field of the scenario, as cmg-mj run does.")
 @users_code()
-def check(file: str) -> None:
+def check(file: str, settings: tuple[str, ...]) -> None:
     """Check a scenario file, or a model file (.xml), without running it, and print its main parameters."""
     from cmg_mj.scenario.description import description, rig_description
     from cmg_mj.scenario.loading import load_scenario, parse_scenario
     from cmg_mj.simulation.experiment import prepare
 
     is_model = Path(file).suffix.lower() in (".xml", ".mjb")
-    scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file)
+    if is_model and settings:
+        raise InputError(f"--set {settings[0]}: is for a scenario; {file} is a model")
+    scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file, settings)
     describe = partial(rig_description, own=_scenario_beside(Path(file))) if is_model else description
     parts = prepare(scenario).parts
     texts = [describe(file, part.scenario, part.design, part.plant.parameters, part.plant.axis.name) for part in parts]

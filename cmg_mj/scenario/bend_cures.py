@@ -1,8 +1,7 @@
-"""Margins of a loop around a frame that bends, and which settings cure a loop that the bend makes swing."""
+"""Stability and margins of a loop around a frame that bends, and settings that cure a loop that the bend fells."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from cmg_mj.controllers.laws import LAWS
 from cmg_mj.controllers.laws.lqg import Lqg
 from cmg_mj.observers import OBSERVERS
+from cmg_mj.scenario.bend_decay import Decay, Motion, decay
 from cmg_mj.scenario.bend_loop import BentLoop, bent_loop
 from cmg_mj.scenario.design import design
 from cmg_mj.scenario.plant_parameters import PlantParameters
@@ -23,50 +23,100 @@ CURED = 0.2
 """A loop that comes nearer to -1 is not cured: an eighth of a turn more of phase, or less gain, fells it."""
 NOTCHES = (1.08, 1.0, 0.92)
 """Middles of the notches that are tried, over the mode's frequency."""
-SOFTER = 10.0
-"""So many times Table 2's weight of the command stands for a lower bandwidth."""
+SOFT_INPUT_COST = 10.0
+"""Weight of the command for a lower bandwidth; Table 2's gains have 1."""
+MOTION_WORDS: dict[Motion, str] = {
+    "decays": "stable",
+    "decays if small": "stable for small motions, but NOT for its own initial tilt, bias and push",
+    "swings": "UNSTABLE",
+    "falls": "UNSTABLE",
+}
+
+
+Changes = dict[str, Any]
+"""Fields of [controller] -> their values."""
 
 
 class Margins(NamedTuple):
     """Stability margins, by python-control.
 
     Attributes:
-        rise: Factor by which the gain may rise; infinite if by any.
-        fall: Factor to which it may fall; 0 if by any.
+        largest_gain: Factor to which the gain may rise; infinite if to any.
+        least_gain: Factor to which the gain may fall; 0 if to any.
         phase_deg: The least phase margin [deg]; infinite if the transfer never has the size 1.
-        at_hz: The frequency of that [Hz].
+        phase_at_hz: The frequency of the phase margin [Hz].
     """
 
-    rise: float
-    fall: float
+    largest_gain: float
+    least_gain: float
     phase_deg: float
-    at_hz: float
+    phase_at_hz: float
 
     @property
     def words(self) -> str:
         """The margins, for one line."""
-        fall = f" or fall to {self.fall:.2f} times" if self.fall > 0.0 else ""
-        rise = f"rise to {self.rise:.2f} times" if np.isfinite(self.rise) else "rise without limit"
-        phase = f", phase margin {self.phase_deg:.0f} deg at {self.at_hz:.3g} Hz" if np.isfinite(self.phase_deg) else ""
+        least, largest, phase = self.least_gain, self.largest_gain, ""
+        fall = f" or fall to {least:.2f} times" if least > 0.0 else ""
+        rise = f"rise to {largest:.2f} times" if np.isfinite(largest) else "rise without limit"
+        if np.isfinite(self.phase_deg):
+            phase = f", phase margin {self.phase_deg:.0f} deg at {self.phase_at_hz:.3g} Hz"
         return f"its gain may {rise}{fall}{phase}"
 
 
 class Trial(NamedTuple):
-    """Settings that were tried, as `--set` takes them, and the loop that they make."""
+    """A loop that was tried.
+
+    Attributes:
+        settings: The settings that were changed for it, as `--set` takes them.
+        decay: Whether its motions decay.
+        loop: Its transfer; None where it has no margins: of an unstable loop, or at a very low control rate.
+    """
 
     settings: tuple[str, ...]
-    loop: BentLoop
+    decay: Decay
+    loop: BentLoop | None = None
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether the loop is stable with the bend."""
+        return self.decay.bending == "decays"
+
+    @property
+    def is_stable_rigid(self) -> bool:
+        """Whether the loop is stable with a rigid frame, as far as is known."""
+        return self.decay.rigid in ("decays", None)
+
+    @property
+    def distance(self) -> float:
+        """The least distance of the transfer from -1; 0 without a transfer."""
+        return 0.0 if self.loop is None else self.loop.distance
+
+    @property
+    def is_cure(self) -> bool:
+        """Whether the loop is stable, bending and rigid, with some margin."""
+        return self.is_stable and self.is_stable_rigid and self.distance >= CURED
+
+    @property
+    def is_near(self) -> bool:
+        """Whether the bend makes a stable loop unstable, or takes its margin."""
+        if not self.is_stable_rigid:
+            return False
+        if not self.is_stable:
+            return True
+        return self.loop is not None and self.loop.distance < min(NEAR, BENDS_SHARE * self.loop.rigid_distance)
 
     @property
     def words(self) -> str:
         """The verdict, for one line."""
-        if not self.loop.is_stable:
-            return "UNSTABLE"
-        return f"stable, nearest to -1 {self.loop.distance:.2g}; {margins(self.loop).words}"
+        text = MOTION_WORDS[self.decay.bending]
+        if self.loop is not None:
+            text += f", nearest to -1 {self.loop.distance:.2g}; {margins(self.loop).words}"
+        rigid = self.decay.rigid
+        return text if rigid in ("decays", None) else f"{text} (with a rigid frame: {MOTION_WORDS[rigid]})"
 
 
 def margins(loop: BentLoop) -> Margins:
-    """Compute a stable loop's margins; an unstable one's mean nothing."""
+    """Compute a stable loop's margins."""
     import control
 
     data = control.frd(loop.transfer, 2.0 * np.pi * loop.frequencies_hz)
@@ -81,61 +131,78 @@ def margins(loop: BentLoop) -> Margins:
 
 
 def can_be_tried(scenario: Scenario) -> bool:
-    """Whether law and observer are this package's: code of a user's may hold to floats."""
+    """Return whether law and observer are this package's: code of a user's may take floats only."""
     return scenario.controller.kind in LAWS and scenario.observer.kind in OBSERVERS
 
 
-def loop_of(scenario: Scenario, rig: PlantParameters) -> BentLoop | None:
-    """The loop of a scenario on a rig that bends; None of a rigid one, or of code of a user's."""
+def try_loop(scenario: Scenario, rig: PlantParameters, settings: tuple[str, ...] = ()) -> Trial | None:
+    """Try the loop of a scenario.
+
+    Args:
+        scenario: The scenario of one axis.
+        rig: The parameters of the plant.
+        settings: The settings that were changed in it, as `--set` takes them. Then a fall with the bend says enough.
+
+    Returns:
+        The trial; None for a rigid frame, or code of a user's.
+    """
     if rig.bend is None or not can_be_tried(scenario):
         return None
-    return bent_loop(design(scenario, rig), rig.bend)
+    parts = design(scenario, rig)
+    motions = decay(parts, rig.bend, until_fall=bool(settings))
+    has_margins = {*motions} <= {"decays", "decays if small"}
+    return Trial(settings, motions, bent_loop(parts, rig.bend) if has_margins else None)
 
 
 def trials(scenario: Scenario, rig: PlantParameters) -> list[Trial]:
-    """Try what may cure a loop that a bend makes swing, the fewest settings first; of notches the best is told."""
-    result = []
-    for alternatives in _candidates(scenario, rig):
-        tried = []
-        for changes in alternatives:
-            controller = scenario.controller.model_copy(update=changes)
-            loop = loop_of(scenario.model_copy(update={"controller": controller}), rig)
-            settings = tuple(_setting(name, value) for name, value in changes.items() if value is not None)
-            tried += [] if loop is None else [Trial(settings, loop)]
-        if tried:
-            result.append(max(tried, key=lambda trial: trial.loop.distance if trial.loop.is_stable else -1.0))
-    return result
+    """Try settings that may cure a loop, the fewest first; of several notches return the best."""
+    assert rig.bend is not None
+
+    def best(alternatives: list[Changes]) -> list[tuple[Trial, Changes]]:
+        loops = [(_changed(scenario, rig, changes), changes) for changes in alternatives]
+        found = [(trial, changes) for trial, changes in loops if trial is not None]
+        return [max(found, key=lambda pair: (pair[0].is_stable, pair[0].distance))] if found else []
+
+    notches, others = _notches(scenario, rig.bend.frequency_hz), _other_changes(scenario)
+    result = best(notches)
+    if result and result[0][0].is_stable:
+        notches = [result[0][1]]
+    for other in others:
+        result += best([other])
+    for other in others:
+        result += best([{**notch, **other} for notch in notches])
+    return [trial for trial, _ in result]
+
+
+def _changed(scenario: Scenario, rig: PlantParameters, changes: Changes) -> Trial | None:
+    """Try a scenario with changes in its section [controller]."""
+    controller = scenario.controller.model_copy(update=changes)
+    settings = tuple(_setting(name, value) for name, value in changes.items() if value is not None)
+    return try_loop(scenario.model_copy(update={"controller": controller}), rig, settings)
 
 
 def cure_among(tried: list[Trial]) -> Trial | None:
-    """The first trial that leaves a loop with some margin; None if nothing cures it."""
-    return next((trial for trial in tried if trial.loop.is_stable and trial.loop.distance >= CURED), None)
+    """Return the first trial that is a cure; None if there is none."""
+    return next((trial for trial in tried if trial.is_cure), None)
 
 
-def is_near(loop: BentLoop) -> bool:
-    """Whether the mode is near the loop's bandwidth: it is unstable there, or has little margin."""
-    return not loop.is_stable or loop.distance < min(NEAR, BENDS_SHARE * loop.rigid_distance)
-
-
-Changes = dict[str, Any]
-"""Fields of [controller] -> their values."""
-
-
-def _candidates(scenario: Scenario, rig: PlantParameters) -> Iterator[list[Changes]]:
-    assert rig.bend is not None
+def _notches(scenario: Scenario, mode_hz: float) -> list[Changes]:
+    """List notches near a mode; none for a controller that has one."""
     controller = scenario.controller
-    middles = [float(f"{share * rig.bend.frequency_hz:.3g}") for share in NOTCHES]
-    middles = [] if controller.notch_hz else [hz for hz in middles if hz < 0.5 * controller.rate_hz]
-    notches: list[Changes] = [{"notch_hz": hz} for hz in middles]
-    others: list[Changes] = []
+    middles = [float(f"{share * mode_hz:.3g}") for share in NOTCHES]
+    return [{"notch_hz": hz} for hz in middles if hz < 0.5 * controller.rate_hz and not controller.notch_hz]
+
+
+def _other_changes(scenario: Scenario) -> list[Changes]:
+    """List the other changes that the law takes: the estimated angle, a lower bandwidth."""
+    controller = scenario.controller
+    result: list[Changes] = []
     takes_estimate = controller.feedback == "observer" and controller.kind != "lqg"
     if takes_estimate and controller.angle_source != "estimated":
-        others.append({"angle_source": "estimated"})
+        result.append({"angle_source": "estimated"})
     if controller.kind == "state_feedback":
-        others.append({"gains": None, "lqr": LqrSettings(state_cost=Lqg.state_cost, input_cost=SOFTER)})
-    yield notches
-    yield from ([other] for other in others)
-    yield from ([{**notch, **other} for notch in notches] for other in others)
+        result.append({"gains": None, "lqr": LqrSettings(state_cost=Lqg.state_cost, input_cost=SOFT_INPUT_COST)})
+    return result
 
 
 def _setting(name: str, value: Any) -> str:

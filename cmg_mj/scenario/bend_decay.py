@@ -11,114 +11,160 @@ import numpy as np
 from cmg_mj.controllers.controller import Controller, PlantInterface
 from cmg_mj.controllers.make_controller import make_controller
 from cmg_mj.elementwise import Scalar
-from cmg_mj.scenario.linear_rig import BendModel
 from cmg_mj.scenario.design import Design
+from cmg_mj.scenario.linear_rig import BendModel
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt
 
-STARTS_RAD_S = (0.003, 0.03, 0.3)
+STARTS_RAD_S = (0.003, 0.03)
 """Tilt rates from which the motion has to decay: observers that are not linear answer to sizes."""
-SMALL_STARTS = 2
-"""The first so many starts are small: the gimbals' rate limit has no part in a motion that decays from there."""
 DURATION_S = 10.0
-LONG_DURATION_S = 60.0
-"""Duration of a motion that has neither decayed nor fallen after `DURATION_S`."""
+LONG_DURATION_S = 30.0
+"""Duration of a motion that has neither decayed nor grown after `DURATION_S`."""
 WINDOW_S = 2.0
 """The size of a motion is its RMS over such a time."""
-DECAY = 0.5
-"""A motion decays that at the end has this share of its largest size, or less."""
+PUSH_S = 2.0
+"""The scenario's strongest push begins here."""
+DECAY, GROWTH = 0.5, 2.0
+"""A motion has decayed to at most this share of its largest size, or grown to at least so many times its first."""
 NEGLIGIBLE_RAD_S, NEGLIGIBLE_RAD = 0.002, 0.002
 """Rate of the tilt and angle of the gimbals that count as rest: the sensors' noise causes as much."""
 
 Motion = Literal["decays", "decays if small", "swings", "falls"]
-"""`decays if small`: from the largest start it swings or falls, because the gimbals' rate has a limit. `swings`: it
-neither decays nor falls."""
+"""`decays if small`: it swings or falls with the scenario's own initial tilt, equilibrium bias and push.
+`swings`: from a small start it neither decays nor falls."""
 
 
 class Decay(NamedTuple):
-    """The motions of a loop from small starts.
+    """The motions of a loop.
 
     Attributes:
         bending: The motion with the bend.
-        rigid: The motion of the same loop with a rigid frame.
+        rigid: The motion of the same loop with a rigid frame; None if it was not marched to its end.
     """
 
     bending: Motion
-    rigid: Motion
+    rigid: Motion | None
 
 
-def decay(design: Design, bend: BendModel) -> Decay:
-    """March a scenario's controller in closed loop with the linear plant, bending and rigid, from small tilt rates.
+def decay(design: Design, bend: BendModel, *, until_fall: bool = False) -> Decay:
+    """March a scenario's controller in closed loop with the linear plant, bending and rigid.
 
     Observer, law, notch and rate limit are those of a run; the sensors keep their rates, latencies and low-pass, and
-    lose noise, resolution and mounting errors. The plant is linearised upright, and marched exactly between samples.
+    lose noise, resolution and mounting errors. The plant is linearised upright and marched exactly between samples,
+    but for its torque, which goes with the cosine of the gimbals' angle.
+
+    It starts from small tilt rates, and once as the scenario does, with its strongest push.
 
     Args:
         design: The law and the observers.
         bend: The plant.
+        until_fall: Whether a fall from a small start, with the bend, is all that matters.
 
     Returns:
         The motions.
     """
     march = _March(design, bend)
-    motions = march.motions(DURATION_S)
-    if "swings" in motions:
-        motions = march.motions(LONG_DURATION_S)
-    return Decay(*motions)
+    march.advance(DURATION_S, until_fall)
+    if until_fall and march.has_fallen:
+        return Decay("falls", None)
+    if march.is_undecided:
+        march.advance(LONG_DURATION_S, until_fall)
+    return Decay(*march.motions)
 
 
 class _March:
-    """The closed loop of bending and rigid plants, a world for each start, (2, n_starts) worlds."""
+    """The closed loop: a bending and a rigid plant for each small start, and for the scenario's own as the last."""
 
     def __init__(self, design: Design, bend: BendModel) -> None:
-        self._rig = design.rig
-        self._controller = _quiet_controller(design)
+        scenario, self._rig = design.scenario, design.rig
+        shape = 2, len(STARTS_RAD_S) + 1
+        self._controller = _quiet_controller(design, math.prod(shape))
         self._interval = self._controller.steps_per_sample * design.rig.timestep
         plants = (bend.bending, bend.rigid)
         F, G = zip(*(plant.held(self._interval) for plant in plants), strict=True)
         self._F, self._G, self._C = np.array(F), np.array(G), np.array([plant.C for plant in plants])
-        tilt_rate = bend.bending.C[3]
-        self._x = np.stack(2 * [np.outer(tilt_rate / (tilt_rate @ tilt_rate), STARTS_RAD_S)])
-        self._u = np.zeros((2, 1, len(STARTS_RAD_S)))
+        rate = bend.bending.C[3] / (bend.bending.C[3] @ bend.bending.C[3])
+        angles = np.flatnonzero(bend.bending.C[4])[0] - np.flatnonzero(bend.bending.C[0])[0]  # before the rates
+        tilt = math.radians(scenario.plant.initial_tilt_deg) * np.roll(rate, -angles)
+        starts = [*np.outer(STARTS_RAD_S, rate), tilt]
+        self._x = np.stack(2 * [np.transpose(starts)])
+        self._bias = np.zeros(shape)
+        self._bias[:, -1] = math.radians(scenario.plant.equilibrium_bias_deg)
+        impulses = [(push.torque_n_m * push.duration_s, push.duration_s) for push in scenario.push]
+        impulse, push_s = max(impulses, key=lambda push: abs(push[0]), default=(0.0, self._interval))
+        self._push_ends = PUSH_S + push_s
+        self._kick = np.zeros_like(self._x)
+        inertia = design.rig.reduced.J1 * design.rig.reduced.gimbals
+        self._kick[:, :, -1] = rate * impulse * self._interval / (push_s * inertia)
+        self._u, self._y2, self._fell = np.zeros(shape), np.zeros(shape), np.zeros(shape, bool)
         self._step = 0
-        self._fell = np.zeros((2, len(STARTS_RAD_S)), bool)
-        self._fall_angle = math.radians(design.scenario.metrics.fall_angle_deg)
+        self._fall_angle = math.radians(scenario.metrics.fall_angle_deg)
         self._sizes: list[np.ndarray] = []
 
-    def motions(self, until: float) -> list[Motion]:
-        """March until a time [s], or until all have fallen, and judge the motions of both plants."""
+    @property
+    def _time(self) -> float:
+        return self._step * self._rig.timestep
+
+    def advance(self, until: float, until_fall: bool) -> None:
+        """March until a time [s], or until all have fallen, or one from a small start with the bend."""
         with np.errstate(all="ignore"):
-            while not self._fell.all() and self._step * self._rig.timestep < until:
+            while not self._fell.all() and not (until_fall and self.has_fallen) and self._time < until:
                 self._sizes.append(self._window())
-        sizes = np.array(self._sizes)  # (n_windows, 2 signals, 2 plants, n_starts)
-        rest = np.array([NEGLIGIBLE_RAD_S, NEGLIGIBLE_RAD])[:, None, None]
-        decays = np.all((sizes[-1] <= DECAY * sizes.max(axis=0)) | (sizes[-1] <= rest), axis=0) & ~self._fell
-        return [_motion(*states) for states in zip(decays, self._fell, strict=True)]
+
+    @property
+    def has_fallen(self) -> bool:
+        """Whether the bending plant has fallen from a small start."""
+        return bool(self._fell[0, :-1].any())
+
+    @property
+    def _decays(self) -> np.ndarray:
+        """Whether each motion has decayed, (2, n_starts); of the scenario's own the tilt's rate alone counts."""
+        sizes, rest = np.array(self._sizes), np.array([NEGLIGIBLE_RAD_S, NEGLIGIBLE_RAD])[:, None, None]
+        small = (sizes[-1] <= DECAY * sizes.max(axis=0)) | (sizes[-1] <= rest)
+        small[1, :, -1] = True
+        return np.all(small, axis=0) & ~self._fell
+
+    @property
+    def is_undecided(self) -> bool:
+        """Whether a plant's small motions have neither all decayed nor grown."""
+        grown = np.any(self._sizes[-1] >= GROWTH * self._sizes[0], axis=0) | self._fell
+        waits = ~self._decays[:, :-1].all(axis=1) & ~grown[:, :-1].any(axis=1)
+        return bool(waits.any())
+
+    @property
+    def motions(self) -> list[Motion]:
+        """The motions of both plants."""
+        return [_motion(*states) for states in zip(self._decays, self._fell, strict=True)]
 
     def _window(self) -> np.ndarray:
         """March over a window, and return the RMS of the tilt's rate and of the gimbals' angle."""
-        ticks = max(round(WINDOW_S / self._interval), self._controller.period // self._controller.steps_per_sample)
+        controller = self._controller
+        ticks = math.ceil(max(WINDOW_S, 4.0 * controller.law.dt) / self._interval)
         squares = np.zeros((2, *self._fell.shape))
         for _ in range(ticks):
-            y1, acceleration, y2, rate, gyro = np.moveaxis(self._C @ self._x, 1, 0)
-            fell = ~(np.abs(y1) < self._fall_angle)  # true where it is not a number
-            self._fell |= fell
-            squares += np.square([rate, y2])
-            reading = _reading(self._rig.tilt, self._rig.gravity, *map(np.ravel, (y1, acceleration, y2, rate, gyro)))
-            if self._controller.update(self._step, reading):
-                self._u = np.reshape(self._controller.gimbal_rate, self._u.shape)
-            self._x = np.where(self._fell[:, None, :], 0.0, self._F @ self._x + self._G @ self._u)
-            self._step += self._controller.steps_per_sample
+            y1, acceleration, _, rate, gyro = np.moveaxis(self._C @ self._x, 1, 0)
+            self._fell |= ~(np.abs(y1) < self._fall_angle)  # true where it is not a number
+            squares += np.square([rate, self._y2])
+            signals = (y1 - self._bias, acceleration, self._y2, rate, gyro)
+            if controller.update(self._step, _reading(self._rig.tilt, self._rig.gravity, *map(np.ravel, signals))):
+                self._u = np.reshape(controller.gimbal_rate, self._u.shape)
+            x = self._F @ self._x + self._G * (self._u * np.cos(self._y2))[:, None, :]
+            if PUSH_S <= self._time < self._push_ends:
+                x = x + self._kick
+            self._x = np.where(self._fell[:, None, :], 0.0, x)
+            self._y2 = np.where(self._fell, 0.0, self._y2 + self._interval * self._u)
+            self._step += controller.steps_per_sample
         return np.sqrt(squares / ticks)
 
 
 def _motion(decays: np.ndarray, fell: np.ndarray) -> Motion:
     """Name the motion of one plant by those from its starts, (n_starts,)."""
-    if decays[:SMALL_STARTS].all():
-        return "decays" if decays.all() else "decays if small"
-    return "falls" if fell.any() else "swings"
+    if decays[:-1].all():
+        return "decays" if decays[-1] else "decays if small"
+    return "falls" if fell[:-1].any() else "swings"
 
 
 def _reading(
@@ -130,15 +176,15 @@ def _reading(
     return IdealReading(np.array(forces), [y2], gyro, rate)
 
 
-def _quiet_controller(design: Design) -> Controller:
-    """Make the controller of a run with sensors that show what is there, for both plants and all starts."""
+def _quiet_controller(design: Design, worlds: int) -> Controller:
+    """Make the controller of a run, in so many worlds, with sensors that show what is there."""
     settings = design.scenario.controller
     return make_controller(
         design.observer(),
         design.fresh_law(),
         _quiet(design.scenario.sensors),
         PlantInterface(design.rig.tilt, GimbalAngle((1.0,), (0.0,)), design.rig.timestep),
-        worlds=range(2 * len(STARTS_RAD_S)),
+        worlds=range(worlds),
         feedback=settings.feedback,
         angle_source=settings.angle_source,
         notch_hz=settings.notch_hz,

@@ -1,4 +1,4 @@
-"""Checks the gains against the rig: the control law on its reduced model, sampled and delayed as the scenario says."""
+"""Checks the gains against the plant: the law on its reduced model, sampled and delayed as the scenario says."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
+from cmg_mj.controllers.notch import Notch
 from cmg_mj.errors import InputError, shown
 from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
-from cmg_mj.scenario.bend_cures import is_near, loop_of
+from cmg_mj.scenario.bend_cures import Trial, try_loop
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
@@ -27,12 +28,13 @@ class Loop(NamedTuple):
     """The closed loop on the reduced model's linearisation (6), with the true state as its input.
 
     Attributes:
-        poles: Of the sampled loop, as poles of a continuous one [1/s].
-        damping: The least damping ratio of its modes, those left out that have faded within the loop's own lag.
+        poles: Of the sampled loop, as poles of a continuous one, a notch's two among them [1/s].
+        damping: The least damping ratio of its modes, but for those that have faded within the loop's own lag.
         distance: The least distance of the loop transfer from -1; 1 or a little less for every LQR.
         period: Of the slowest of the control and the sensors that it uses [s].
         delay: The longest latency of these sensors [s].
-        suited: Whether the gains would do without sampling and delay.
+        suited: Whether the gains would do without sampling, delay and notch.
+        notch_hz: The middle of the notch in the loop; 0 without one, or if these samples cannot show it [Hz].
     """
 
     poles: np.ndarray
@@ -41,6 +43,7 @@ class Loop(NamedTuple):
     period: float
     delay: float
     suited: bool
+    notch_hz: float = 0.0
 
     @property
     def slowest(self) -> float:
@@ -55,9 +58,10 @@ class Loop(NamedTuple):
     @property
     def hint(self) -> str | None:
         """The fault of the gains, if they have one."""
-        remedy = (
-            "a higher rate or less latency is needed" if self.suited else "[controller.lqr] solves for gains that suit"
-        )
+        remedy = "[controller.lqr] solves for gains that suit"
+        if self.suited:
+            other = f", or a notch above {self.notch_hz:g} Hz" if self.notch_hz else ""
+            remedy = f"a higher rate or less latency{other} is needed"
         late = f", {self.delay:g} s late" if self.delay else ""
         where = f"on this rig's reduced model, sampled every {self.period:g} s{late}"
         if self.slowest >= MARGIN:
@@ -112,25 +116,37 @@ def _closed_loop(scenario: Scenario, law: StateFeedback, model: ReducedModel) ->
     A = after[0] @ before[0]
     newer, older = after[1], after[0] @ before[1]  # what u of `late` periods ago does, and the one before it
     n, waiting = len(A), late + 1
-    F = np.zeros((n + waiting, n + waiting))
+    notch_hz = scenario.controller.notch_hz if scenario.controller.notch_hz * period < 0.5 else 0.0
+    notch = Notch(notch_hz, period, math.inf) if notch_hz else None
+    size = n + waiting
+    F = np.zeros((size + 2, size + 2) if notch else (size, size))
     F[:n, :n] = A
     F[n, :n] = -K
-    F[n + 1 :, n:-1] = np.eye(waiting - 1)
+    if notch:
+        (b0, *b), (_, *a) = notch.numerator, notch.denominator
+        F[n, :n], F[n, size] = -b0 * K, 1.0
+        F[size:, :n] = -np.outer(b, K)
+        F[size:, size:] = [[0.0, 1.0], [0.0, 0.0]]
+        F[size:] -= np.outer(a, F[n])
+    F[n + 1 : size, n : size - 1] = np.eye(waiting - 1)
     F[:n, n + late] += older[:, 0]
     if late:
         F[:n, n + late - 1] += newer[:, 0]
     else:
-        F[:n, :n] -= newer @ K
+        F[:n] += newer @ F[n : n + 1]
     z = np.linalg.eigvals(F)
     poles = np.log(np.where(z == 0.0, np.finfo(float).tiny, z).astype(complex)) / period
     around = np.exp(1j * np.geomspace(1e-4, math.pi, 2000))
-    distance = _distance(K, A, newer + older / around[:, None, None], around, around**-late)
+    delayed = around**-late
+    if notch:
+        delayed = delayed * np.polyval(notch.numerator, around) / np.polyval(notch.denominator, around)
+    distance = _distance(K, A, newer + older / around[:, None, None], around, delayed)
     swinging = poles[(-poles.real * (period + delay) < 1.0) & (np.abs(poles) > MARGIN)]
     damping = float(np.min(-swinging.real / np.abs(swinging), initial=1.0))
     up = 1j * np.geomspace(1e-3, 1e4, 2000)
     ideal = _distance(K, model.A_e, model.B_e, up, 1.0)
     suited = ideal >= POOR_DISTANCE and is_hurwitz(closed_loop_poles(model, law.gains))
-    return Loop(poles, damping, distance, period, delay, suited)
+    return Loop(poles, damping, distance, period, delay, suited, notch_hz)
 
 
 def _distance(K: np.ndarray, A: np.ndarray, B: np.ndarray, along: np.ndarray, delayed: Any) -> float:
@@ -142,31 +158,40 @@ def _distance(K: np.ndarray, A: np.ndarray, B: np.ndarray, along: np.ndarray, de
 
 
 def hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]:
-    """Find what is no mistake and yet likely to make a plant fall.
+    """Find settings that are no mistake and yet likely to make a plant fall.
 
     Args:
         scenario: The scenario.
         design: The law and the observers.
-        rig: What they were made for.
+        rig: The parameters of the plant.
 
     Returns:
         Clauses.
     """
+    return [*plant_hints(scenario, design, rig), *bend_hint(rig, try_loop(scenario, rig))]
+
+
+def plant_hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]:
+    """Find the `hints` that have nothing to do with a bend."""
     law = design.law
     loop = closed_loop(scenario, law, rig.reduced).hint if isinstance(law, StateFeedback) else None
-    bend, slide = _bend_hint(scenario, rig), sliding_hint(scenario, law, rig)
-    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *(hint for hint in (loop, bend, slide) if hint)]
+    slide = sliding_hint(scenario, law, rig)
+    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *(hint for hint in (loop, slide) if hint)]
 
 
-def _bend_hint(scenario: Scenario, rig: PlantParameters) -> str | None:
-    loop = loop_of(scenario, rig)
-    if rig.bend is None or loop is None or not is_near(loop):
-        return None
-    fault = f"comes within {loop.distance:.2f} of -1" if loop.is_stable else "is unstable"
-    return (
+def bend_hint(rig: PlantParameters, trial: Trial | None) -> list[str]:
+    """Find the hint about the loop with a bend, if there is one."""
+    if rig.bend is None or trial is None:
+        return []
+    if not trial.is_stable_rigid:
+        return ["controller, observer: the loop is not stable with a rigid frame either; `cmg-mj check` says more"]
+    if not trial.is_near:
+        return []
+    fault = f"comes within {trial.distance:.2f} of -1" if trial.is_stable else "is not stable"
+    return [
         f"plant.bend_frequency_hz = {rig.bend.frequency_hz:g}: with that bend the loop {fault}; `cmg-mj check` "
-        "tries what may cure it"
-    )
+        "tries settings that may cure it"
+    ]
 
 
 def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:
