@@ -18,7 +18,7 @@ from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt
 
-STARTS_RAD_S = (0.003, 0.03)
+STARTS_RAD_S = (0.01, 0.05)
 """Tilt rates from which the motion has to decay: observers that are not linear answer to sizes."""
 DURATION_S = 10.0
 LONG_DURATION_S = 30.0
@@ -29,8 +29,10 @@ PUSH_S = 2.0
 """The scenario's strongest push begins here."""
 DECAY, GROWTH = 0.5, 2.0
 """A motion has decayed to at most this share of its largest size, or grown to at least so many times its first."""
-NEGLIGIBLE_RAD_S, NEGLIGIBLE_RAD = 0.002, 0.002
-"""Rate of the tilt and angle of the gimbals that count as rest: the sensors' noise causes as much."""
+NEGLIGIBLE_RAD_S, NEGLIGIBLE_RAD = 0.01, 0.005
+"""Rate of the tilt and angle of the gimbals that count as rest unless they grow: the sensors' noise causes more."""
+STEADY = 1.2
+"""A size grows that is more than so many times the size a window before."""
 
 Motion = Literal["decays", "decays if small", "swings", "falls"]
 """`decays if small`: it swings or falls with the scenario's own initial tilt, equilibrium bias and push.
@@ -87,7 +89,7 @@ class _March:
         F, G = zip(*(plant.held(self._interval) for plant in plants), strict=True)
         self._F, self._G, self._C = np.array(F), np.array(G), np.array([plant.C for plant in plants])
         rate = bend.bending.C[3] / (bend.bending.C[3] @ bend.bending.C[3])
-        angles = np.flatnonzero(bend.bending.C[4])[0] - np.flatnonzero(bend.bending.C[0])[0]  # before the rates
+        angles = int(np.argmax(bend.bending.A[0]))  # so many stand before their rates
         tilt = math.radians(scenario.plant.initial_tilt_deg) * np.roll(rate, -angles)
         starts = [*np.outer(STARTS_RAD_S, rate), tilt]
         self._x = np.stack(2 * [np.transpose(starts)])
@@ -123,7 +125,7 @@ class _March:
     def _decays(self) -> np.ndarray:
         """Whether each motion has decayed, (2, n_starts); of the scenario's own the tilt's rate alone counts."""
         sizes, rest = np.array(self._sizes), np.array([NEGLIGIBLE_RAD_S, NEGLIGIBLE_RAD])[:, None, None]
-        small = (sizes[-1] <= DECAY * sizes.max(axis=0)) | (sizes[-1] <= rest)
+        small = (sizes[-1] <= DECAY * sizes.max(axis=0)) | ((sizes[-1] <= rest) & (sizes[-1] <= STEADY * sizes[-2:][0]))
         small[1, :, -1] = True
         return np.all(small, axis=0) & ~self._fell
 

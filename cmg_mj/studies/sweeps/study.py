@@ -11,6 +11,8 @@ from typing import Literal
 
 import numpy as np
 
+from cmg_mj.controllers.laws import LAW_CLASSES
+from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.overrides import assign
@@ -30,6 +32,8 @@ CHUNK = 1024
 """Trials of a chunk: so many fill a batch, and take minutes at most."""
 BASELINE_LOOP = "linear"
 """Observer that runs where a baseline's trials have the true rate in the loop; nothing depends on it."""
+BASELINE_SETTINGS = {"feedback": "truth", "angle_source": "measured", "bias_trim_s": 0.0}
+"""Fields of [controller] of a baseline's loop: with others the loop would depend on `BASELINE_LOOP`."""
 MOST_ALONE = 200
 """Values of a field that is varied alone that are tried before the sweep, at 5 ms each; the last one is, too."""
 
@@ -205,12 +209,23 @@ class SweepStudy:
         return closing or list(range(len(self.observers)))
 
     def scenario_with(self, observer: str) -> Scenario:
-        """Return the scenario with an observer in the loop; with the true rate there for a baseline."""
+        """Return the scenario with an observer in the loop; for a baseline with the true rate and measured angles.
+
+        Raises:
+            InputError: The law takes no rate, so that a baseline has no loop.
+        """
         alone = self.scenario.model_copy(update={"open_loop_observers": []})
         if observer not in RATES:
             return alone.with_observer(observer)
+        law = alone.controller.kind
+        if not needs(LAW_CLASSES.find(law)):
+            raise InputError(
+                f"{observer}: a baseline's trials have the true rate in the loop, and controller.kind = {law!r} takes "
+                f"none; leave {observer} out, or take another law"
+            )
         by_truth = alone.with_observer(BASELINE_LOOP).as_fields()
-        assign(by_truth, "controller.feedback", "truth", observer)
+        for name, value in BASELINE_SETTINGS.items():
+            assign(by_truth, f"controller.{name}", value, observer)
         return parse_scenario(by_truth, f"the baseline {observer}")
 
     @property

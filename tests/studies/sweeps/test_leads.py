@@ -14,10 +14,12 @@ from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.sweeps.api import sweep
+from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.cells import cells_of
 from cmg_mj.studies.sweeps.leads import lead_rows
 from cmg_mj.studies.sweeps.pictures import pictures_of
 from cmg_mj.studies.sweeps.report_sections import leads
+from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.visualization.plots.colours import BASELINE_COLOURS
 from cmg_mj.visualization.plots.run_plot import draw
 from tests.command import cmg_mj
@@ -123,6 +125,16 @@ def test_a_baselines_trials_are_those_beside_the_true_rate() -> None:
         rows = [row for row in table.to_pylist() if row["observer"] == name and row[BIAS] == 0.5]
         assert [row[VELOCITY] for row in rows] == run.values(VELOCITY, name).tolist()
     assert np.all(run.values(VELOCITY, "zero") > 0.0)
+
+
+def test_a_baselines_loop_does_not_depend_on_an_observer() -> None:
+    scenario = load_scenario("push_recovery", ["controller.angle_source=estimated", "controller.bias_trim_s=0.5"])
+    axes = (parse_axis(BIAS, "0,1", BIAS),)
+    controller = SweepStudy(scenario, axes, ("zero", "kalman"), 1).scenario_with("zero").controller
+    assert (controller.feedback, controller.angle_source, controller.bias_trim_s) == ("truth", "measured", 0.0)
+    by_lqg = SweepStudy(load_scenario("push_recovery", ["controller.kind=lqg"]), axes, ("zero", "kalman"), 1)
+    with pytest.raises(InputError, match="zero: a baseline's trials have the true rate in the loop, and controller"):
+        by_lqg.scenario_with("zero")
 
 
 def test_what_a_baseline_cannot_do_is_refused() -> None:
