@@ -30,9 +30,10 @@ PUSH_S = 2.0
 DECAY, GROWTH = 0.5, 2.0
 """A motion has decayed to at most this share of its largest size, or grown to at least so many times its first."""
 NEGLIGIBLE_RAD_S, NEGLIGIBLE_RAD = 0.01, 0.005
-"""Rate of the tilt and angle of the gimbals that count as rest unless they grow: the sensors' noise causes more."""
-STEADY = 1.2
-"""A size grows that is more than so many times the size a window before."""
+"""Rate of the tilt and angle of the gimbals that count as rest unless they grow: noise causes more."""
+GROWING_WINDOWS = 4
+"""A size that rises over so many windows grows, however small it is, down to `TAIL` of its largest."""
+TAIL = 0.003
 
 Motion = Literal["decays", "decays if small", "swings", "falls"]
 """`decays if small`: it swings or falls with the scenario's own initial tilt, equilibrium bias and push.
@@ -86,7 +87,7 @@ class _March:
         self._controller = _quiet_controller(design, math.prod(shape))
         self._interval = self._controller.steps_per_sample * design.rig.timestep
         plants = (bend.bending, bend.rigid)
-        F, G = zip(*(plant.held(self._interval) for plant in plants), strict=True)
+        F, G = zip(*(plant.hold(self._interval) for plant in plants), strict=True)
         self._F, self._G, self._C = np.array(F), np.array(G), np.array([plant.C for plant in plants])
         rate = bend.bending.C[3] / (bend.bending.C[3] @ bend.bending.C[3])
         angles = int(np.argmax(bend.bending.A[0]))  # so many stand before their rates
@@ -125,7 +126,9 @@ class _March:
     def _decays(self) -> np.ndarray:
         """Whether each motion has decayed, (2, n_starts); of the scenario's own the tilt's rate alone counts."""
         sizes, rest = np.array(self._sizes), np.array([NEGLIGIBLE_RAD_S, NEGLIGIBLE_RAD])[:, None, None]
-        small = (sizes[-1] <= DECAY * sizes.max(axis=0)) | ((sizes[-1] <= rest) & (sizes[-1] <= STEADY * sizes[-2:][0]))
+        largest, latest = sizes.max(axis=0), sizes[-GROWING_WINDOWS:]
+        grows = (sizes[-1] > TAIL * largest) & (np.diff(latest, axis=0) > 0.0).all(axis=0)
+        small = ((sizes[-1] <= DECAY * largest) | (sizes[-1] <= rest)) & (~grows | (len(sizes) < GROWING_WINDOWS))
         small[1, :, -1] = True
         return np.all(small, axis=0) & ~self._fell
 

@@ -1,4 +1,4 @@
-"""A rig that bends as matrices: from the gimbals' command to what its sensors show, bending and rigid."""
+"""A linear plant as matrices: from the gimbals' command to what its sensors show, bending and rigid."""
 
 from __future__ import annotations
 
@@ -40,20 +40,20 @@ class LinearRig(NamedTuple):
     C: np.ndarray
 
     def response(self, frequencies_hz: np.ndarray, dt: float) -> Response:
-        """The answers to a command that is sampled and held.
+        """Compute the answers to a command that is sampled and held.
 
         Args:
             frequencies_hz: Frequencies below half the sample rate, (n_frequencies,) [Hz].
             dt: Sample period [s].
         """
         n = len(self.A)
-        F, G = self.held(dt)
+        F, G = self.hold(dt)
         z = np.exp(2j * np.pi * frequencies_hz * dt)
         states = np.linalg.solve(z[:, None, None] * np.eye(n) - F, np.broadcast_to(G, (len(z), n, 1)))
         return Response(*(self.C @ states)[:, :, 0].T)
 
-    def held(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """The rig after a time [s] with the command held: x+ = F x + G u."""
+    def hold(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """Advance by a time [s] with the command held: F and G of x+ = F x + G u."""
         from scipy.linalg import expm
 
         n = len(self.A)
@@ -63,19 +63,19 @@ class LinearRig(NamedTuple):
         return whole[:n, :n], whole[:n, n:]
 
     def lightly_damped(self, ratio: float = 0.3) -> np.ndarray:
-        """Poles of poorly damped modes, one of each pair, (n_modes,) complex [1/s]."""
+        """Find the poles of poorly damped modes, one of each pair, (n_modes,) complex [1/s]."""
         poles = np.linalg.eigvals(self.A)
         return poles[(poles.imag > 1.0) & (np.abs(poles.real) < ratio * np.abs(poles))]
 
 
 class BendModel(NamedTuple):
-    """A rig that bends.
+    """A plant that bends, linearised.
 
     Attributes:
-        frequency_hz: Of the mode, as the scenario asks for it [Hz].
-        damping_ratio: Its damping ratio.
-        bending: The rig.
-        rigid: The same rig with a rigid frame.
+        frequency_hz: The mode's frequency, as the scenario asks for it [Hz].
+        damping_ratio: The mode's damping ratio.
+        bending: The plant.
+        rigid: The plant with a rigid frame.
     """
 
     frequency_hz: float
@@ -85,15 +85,17 @@ class BendModel(NamedTuple):
 
     @property
     def energy_loss(self) -> float:
-        """Share of the mode's energy that its damping takes in a second: 1 - exp(-2 zeta omega)."""
+        """The share of the mode's energy that its damping takes in a second: 1 - exp(-2 zeta omega)."""
         return -math.expm1(-4.0 * math.pi * self.damping_ratio * self.frequency_hz)
 
 
 def rk4_energy_loss(frequency_hz: float, step: float) -> float:
-    """Share of an undamped mode's energy that RK4 takes in a second: of z = omega h, |R(iz)|^2 = 1 - z^6/72 + z^8/576.
+    """Compute the share of an undamped mode's energy that RK4 takes in a second.
+
+    With z = omega h, |R(iz)|^2 = 1 - z^6/72 + z^8/576.
 
     Args:
-        frequency_hz: The mode's [Hz].
+        frequency_hz: The mode's frequency [Hz].
         step: The physics step h [s].
     """
     z = 2.0 * math.pi * frequency_hz * step

@@ -48,7 +48,7 @@ def measured_tilt_pole(law: StateFeedback, rig: LinearRig, height: float, gravit
     y1, acceleration, y2, rate, _ = rig.C
     k1, k2, k3, k4 = law.gains
     gains = k1 * (y1 - height / gravity * acceleration) + k2 * rate + k3 * y2
-    F, G = rig.held(law.dt)
+    F, G = rig.hold(law.dt)
     n = len(F)
     closed = np.eye(n + 1)
     closed[:n, :n], closed[:n, n] = F - np.outer(G, gains), -k4 * G[:, 0]

@@ -80,12 +80,12 @@ class Loop(NamedTuple):
 
 
 def closed_loop(scenario: Scenario, law: StateFeedback, model: ReducedModel) -> Loop:
-    """The loop that a scenario's gains make.
+    """Compute the loop that a scenario's gains make.
 
     Args:
         scenario: The scenario: its rates, its latencies and which signals the law uses.
         law: The law.
-        model: The rig's reduced model.
+        model: The plant's reduced model.
 
     Returns:
         The loop.
@@ -112,7 +112,7 @@ def _closed_loop(scenario: Scenario, law: StateFeedback, model: ReducedModel) ->
     K = np.array([law.gains])
     late = min(math.floor(delay / period + 1e-9), MOST_PERIODS_LATE)  # whole periods, and the rest of one
     rest = max(delay - late * period, 0.0) if late < MOST_PERIODS_LATE else 0.0
-    before, after = _held(model, rest), _held(model, period - rest)
+    before, after = _hold(model, rest), _hold(model, period - rest)
     A = after[0] @ before[0]
     newer, older = after[1], after[0] @ before[1]  # what u of `late` periods ago does, and the one before it
     n, waiting = len(A), late + 1
@@ -150,7 +150,7 @@ def _closed_loop(scenario: Scenario, law: StateFeedback, model: ReducedModel) ->
 
 
 def _distance(K: np.ndarray, A: np.ndarray, B: np.ndarray, along: np.ndarray, delayed: Any) -> float:
-    """The least distance from -1 of K (s - A)^-1 B, (n_points,) values of s or z along the border of stability."""
+    """Return the least distance from -1 of K (s - A)^-1 B, for values of s or z along the border of stability."""
     transfer = K @ np.linalg.solve(
         along[:, None, None] * np.eye(len(A)) - A, np.broadcast_to(B, (len(along), len(A), 1))
     )
@@ -201,7 +201,7 @@ def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:
 
     Args:
         law: The law, fed by the true state without delay.
-        model: The rig's reduced model.
+        model: The plant's reduced model.
 
     Raises:
         InputError: The loop sampled so seldom is unstable; the message has the lowest stable rate.
@@ -223,15 +223,15 @@ def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:
 
 def _sampled_pole(law: StateFeedback, model: ReducedModel, period: float) -> float:
     """Return the slowest pole of the loop sampled so often, as a continuous one's [1/s]."""
-    A, B = _held(model, period)
+    A, B = _hold(model, period)
     closed = A - B @ np.array([law.gains])
     if not np.all(np.isfinite(closed)):
         return math.inf
     return math.log(max(float(np.abs(np.linalg.eigvals(closed)).max()), np.finfo(float).tiny)) / period
 
 
-def _held(model: ReducedModel, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """The linearisation (6) with the integrator after a time with the command held: x+ = A x + B u."""
+def _hold(model: ReducedModel, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return A and B of x+ = A x + B u: the linearisation (6) with the integrator, u held for a time."""
     from scipy.linalg import expm
 
     n = len(model.A_e)

@@ -1,6 +1,7 @@
 """Prints the tables of docs/real_rigs.md about a frame that bends: who stands, as is and with each cure.
 
 python docs/studies/bending_frame.py [WORLDS]
+python docs/studies/bending_frame.py --border    # check's verdicts beside the simulation, near the border of stability
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 
 from cmg_mj import load_scenario, prepare
+from cmg_mj.scenario.bend_cures import try_loop
 
 WORLDS = 20
 RATES = {
@@ -75,8 +77,39 @@ def rows(worlds: int) -> list[Row]:
     return result
 
 
+NEAR_THE_BORDER: dict[str, tuple[list[str], tuple[float, ...]]] = {
+    "mast, gyro_free": ([*PLACES["mast"], *RATES["gyro_free"]], (18.0, 20.0, 21.0, 22.0, 24.0, 26.0)),
+    "mast, gyro_free, notch": (
+        [*PLACES["mast"], *RATES["gyro_free"], *CURES["notch"]],
+        (5.0, 5.5, 6.0, 6.5, 7.0),
+    ),
+    "mast, homogeneous": ([*PLACES["mast"], *RATES["homogeneous"]], (5.5, 6.0, 6.5, 7.0, 8.0)),
+    "base, kalman": ([*PLACES["base"], *RATES["kalman"]], (14.0, 16.0, 17.0, 18.0, 20.0)),
+}
+"""Settings, and frequencies of the mode about the one at which the loop becomes stable."""
+
+
+def border() -> None:
+    """Print the verdicts of `check` beside falls, or the command's RMS, of three worlds in 12 s."""
+    print("| loop | bend [Hz] | check | nearest to -1 | simulation |")
+    for name, (settings, frequencies) in NEAR_THE_BORDER.items():
+        for hz in frequencies:
+            changes = [f"plant.bend_frequency_hz={hz:g}", *(setting.replace("{hz}", f"{hz:g}") for setting in settings)]
+            experiment = prepare(load_scenario("push_recovery", ["duration_s=12.0", "seed=23", *changes]))
+            trial = try_loop(experiment.scenario, experiment.plant.parameters)
+            assert trial is not None
+            result = experiment.run_many(3)
+            falls, rms = int(sum(result.fell)), result.mean("command_rms_rad_s")
+            motion = f"{falls} fall" if falls else f"{rms:.2f}"
+            verdict = "stable" if trial.is_stable else "unstable"
+            distance = f"{trial.distance:.2f}" if trial.loop else "-"
+            print(f"| {name} | {hz:g} | {verdict} | {distance} | {motion} |", flush=True)
+
+
 def main() -> None:
     """Print the tables."""
+    if "--border" in sys.argv:
+        return border()
     worlds = int(sys.argv[1]) if len(sys.argv) > 1 else WORLDS
     table = rows(worlds)
     print(f"{worlds} worlds a cell; falls, or the RMS of the command [rad/s]")

@@ -13,7 +13,7 @@ from cmg_mj import load_plant, load_scenario, prepare
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.controllers.notch import Notch
 from cmg_mj.inputs.bundled import bundled, folder
-from cmg_mj.scenario.stability_check import Loop, _held, closed_loop
+from cmg_mj.scenario.stability_check import Loop, _hold, closed_loop
 from tests.command import cmg_mj
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -136,7 +136,7 @@ def test_a_notch_is_in_the_rigid_loop() -> None:
     plain, notched = loop(), loop("controller.notch_hz=8")
     assert (len(plain.poles), plain.notch_hz, len(notched.poles), notched.notch_hz) == (5, 0.0, 7, 8.0)
     model, K, notch = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3]), Notch(8.0, 0.005, math.inf)
-    A, B = _held(model, 0.005)
+    A, B = _hold(model, 0.005)
     x, tilts = np.array([0.01, 0.0, 0.0, 0.0]), []
     for _ in range(40):
         tilts.append(float(x[0]))
