@@ -78,12 +78,12 @@ class Trial(NamedTuple):
 
     @property
     def is_stable(self) -> bool:
-        """Whether the loop is stable with the bend."""
+        """True if the loop is stable with the bend."""
         return self.decay.bending == "decays"
 
     @property
     def is_stable_rigid(self) -> bool:
-        """Whether the loop is stable with a rigid frame, as far as is known."""
+        """True if the loop is stable with a rigid frame, as far as is known."""
         return self.decay.rigid in ("decays", None)
 
     @property
@@ -93,12 +93,12 @@ class Trial(NamedTuple):
 
     @property
     def is_cure(self) -> bool:
-        """Whether the loop is stable, bending and rigid, with some margin."""
+        """True if the loop is stable, bending and rigid, with some margin."""
         return self.is_stable and self.is_stable_rigid and self.distance >= CURED
 
     @property
     def is_near(self) -> bool:
-        """Whether the bend makes a stable loop unstable, or takes its margin."""
+        """True if the bend makes a stable loop unstable, or takes its margin."""
         if not self.is_stable_rigid:
             return False
         if not self.is_stable:
@@ -160,8 +160,8 @@ def trials(scenario: Scenario, rig: PlantParameters) -> list[Trial]:
 
     def best(alternatives: list[Changes]) -> list[tuple[Trial, Changes]]:
         loops = [(_changed(scenario, rig, changes), changes) for changes in alternatives]
-        found = [(trial, changes) for trial, changes in loops if trial is not None]
-        return [max(found, key=lambda pair: (pair[0].is_stable, pair[0].distance))] if found else []
+        pairs = [(trial, changes) for trial, changes in loops if trial is not None]
+        return [max(pairs, key=lambda pair: (pair[0].is_stable, pair[0].distance))] if pairs else []
 
     notches, others = _notches(scenario, rig.bend.frequency_hz), _other_changes(scenario)
     result = best(notches)
@@ -187,10 +187,10 @@ def cure_among(tried: list[Trial]) -> Trial | None:
 
 
 def _notches(scenario: Scenario, mode_hz: float) -> list[Changes]:
-    """List notches near a mode; none for a controller that has one."""
+    """List notches near a mode, but for the one that the controller has."""
     controller = scenario.controller
     middles = [float(f"{share * mode_hz:.3g}") for share in NOTCHES]
-    return [{"notch_hz": hz} for hz in middles if hz < 0.5 * controller.rate_hz and not controller.notch_hz]
+    return [{"notch_hz": hz} for hz in middles if hz < 0.5 * controller.rate_hz and hz != controller.notch_hz]
 
 
 def _other_changes(scenario: Scenario) -> list[Changes]:

@@ -29,8 +29,8 @@ PUSH_S = 2.0
 """The scenario's strongest push begins here."""
 DECAY, GROWTH = 0.5, 2.0
 """A motion has decayed to at most this share of its largest size, or grown to at least so many times its first."""
-NEGLIGIBLE_RAD_S, NEGLIGIBLE_RAD = 0.01, 0.005
-"""Rate of the tilt and angle of the gimbals that count as rest unless they grow: noise causes more."""
+REST = np.array([0.01, 0.005])[:, None, None]
+"""Rate of the tilt [rad/s] and angle of the gimbals [rad] that count as rest unless they grow: noise causes more."""
 GROWING_WINDOWS = 4
 """A size that rises over so many windows grows, however small it is, down to `TAIL` of its largest."""
 TAIL = 0.003
@@ -119,23 +119,24 @@ class _March:
 
     @property
     def has_fallen(self) -> bool:
-        """Whether the bending plant has fallen from a small start."""
+        """True if the bending plant has fallen from a small start."""
         return bool(self._fell[0, :-1].any())
 
     @property
     def _decays(self) -> np.ndarray:
-        """Whether each motion has decayed, (2, n_starts); of the scenario's own the tilt's rate alone counts."""
-        sizes, rest = np.array(self._sizes), np.array([NEGLIGIBLE_RAD_S, NEGLIGIBLE_RAD])[:, None, None]
+        """True for each motion that has decayed, (2, n_starts); of the scenario's own the tilt's rate alone counts."""
+        sizes = np.array(self._sizes)
         largest, latest = sizes.max(axis=0), sizes[-GROWING_WINDOWS:]
         grows = (sizes[-1] > TAIL * largest) & (np.diff(latest, axis=0) > 0.0).all(axis=0)
-        small = ((sizes[-1] <= DECAY * largest) | (sizes[-1] <= rest)) & (~grows | (len(sizes) < GROWING_WINDOWS))
+        small = ((sizes[-1] <= DECAY * largest) | (sizes[-1] <= REST)) & (~grows | (len(sizes) < GROWING_WINDOWS))
         small[1, :, -1] = True
         return np.all(small, axis=0) & ~self._fell
 
     @property
     def is_undecided(self) -> bool:
-        """Whether a plant's small motions have neither all decayed nor grown."""
-        grown = np.any(self._sizes[-1] >= GROWTH * self._sizes[0], axis=0) | self._fell
+        """True if a plant's small motions have neither all decayed nor grown."""
+        first, last = self._sizes[0], self._sizes[-1]
+        grown = np.any((last >= GROWTH * first) & (last > REST), axis=0) | self._fell
         waits = ~self._decays[:, :-1].all(axis=1) & ~grown[:, :-1].any(axis=1)
         return bool(waits.any())
 

@@ -27,11 +27,11 @@ PLACES = {
     "mast": ["plant.bend_beyond=sensors", "plant.bend_share=0.2"],
     "base": ["plant.bend_beyond=both", "plant.bend_share=0.5"],
 }
-SOFTER = "controller.lqr={state_cost=[405.6, 2.26, 0.223, 0.096], input_cost=10.0}"
+LOW_BANDWIDTH = "controller.lqr={state_cost=[405.6, 2.26, 0.223, 0.096], input_cost=10.0}"
 CURES = {
     "as is": [],
     "estimated angle": ["controller.angle_source=estimated"],
-    "lower bandwidth": [SOFTER],
+    "lower bandwidth": [LOW_BANDWIDTH],
     "notch": ["controller.notch_hz={hz}"],
 }
 FREQUENCIES_HZ = {"mast": (5.0, 10.0, 20.0, 40.0), "base": (5.0, 10.0)}
