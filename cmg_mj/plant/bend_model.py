@@ -6,7 +6,7 @@ import mujoco
 
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.linearisation import hold_bend, output_matrix, state_and_input
-from cmg_mj.scenario.linear_rig import BendModel, LinearRig
+from cmg_mj.scenario.linear_plant import BendModel, LinearPlant
 from cmg_mj.scenario.plant_settings import PlantSettings
 
 
@@ -27,7 +27,7 @@ def bend_model(model: mujoco.MjModel, key: int, axis: Axis, settings: PlantSetti
     A, B = state_and_input(model, key, axis)
     on_mast, height = settings.bend_beyond != "both", axis.radial_tilt.height
     rigs = [
-        LinearRig(A, B, output_matrix(model, key, axis, A, on_mast=on_mast, height=height))
+        LinearPlant(A, B, output_matrix(model, key, axis, A, on_mast=on_mast, height=height))
         for A, B in ((A, B), (hold_bend(model, key, A), hold_bend(model, key, B)))
     ]
     return BendModel(settings.bend_frequency_hz, settings.bend_damping_ratio, *rigs)

@@ -12,7 +12,7 @@ from cmg_mj.controllers.controller import Controller, PlantInterface
 from cmg_mj.controllers.make_controller import make_controller
 from cmg_mj.elementwise import Scalar
 from cmg_mj.scenario.design import Design
-from cmg_mj.scenario.linear_rig import BendModel
+from cmg_mj.scenario.linear_plant import BendModel
 from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.sampled import Sensors

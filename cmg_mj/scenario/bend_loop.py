@@ -13,7 +13,7 @@ from cmg_mj.controllers.notch import Notch
 from cmg_mj.elementwise import Scalar
 from cmg_mj.observers.protocol import Measurement
 from cmg_mj.scenario.design import Design
-from cmg_mj.scenario.linear_rig import BendModel, Response
+from cmg_mj.scenario.linear_plant import BendModel, Response
 
 AMPLITUDE_RAD_S = 0.05
 """Amplitude of the tilt rate at the sensors: observers that are not linear answer to sizes."""

@@ -11,7 +11,7 @@ from cmg_mj.errors import TomlValue
 from cmg_mj.scenario.bend_cures import NEAR, Trial, cure_among, trials, try_loop
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
-from cmg_mj.scenario.linear_rig import rk4_energy_loss
+from cmg_mj.scenario.linear_plant import rk4_energy_loss
 from cmg_mj.scenario.omissions import omissions
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.plant_settings import BendBeyond

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.scenario.linear_rig import BendModel, LinearRig
+from cmg_mj.scenario.linear_plant import BendModel, LinearPlant
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 
@@ -40,7 +40,7 @@ class PlantParameters(NamedTuple):
     largest_step: float
     hints: tuple[str, ...]
     bend: BendModel | None = None
-    slide: Callable[[], LinearRig] | None = None
+    slide: Callable[[], LinearPlant] | None = None
 
     def noise(self, sensors: Sensors) -> TiltNoise:
         """The noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""

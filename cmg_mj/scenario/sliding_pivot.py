@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.controllers.laws.state_feedback import StateFeedback
 from cmg_mj.observers.reduced_model import MARGIN
-from cmg_mj.scenario.linear_rig import LinearRig
+from cmg_mj.scenario.linear_plant import LinearPlant
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
 
@@ -33,7 +33,7 @@ class SlidingPoles(NamedTuple):
     about_pivot: float
 
 
-def measured_tilt_pole(law: StateFeedback, rig: LinearRig, height: float, gravity: float) -> float:
+def measured_tilt_pole(law: StateFeedback, rig: LinearPlant, height: float, gravity: float) -> float:
     """Find the slowest pole of the loop whose law is fed y1 and the true rate, by sensors without noise and delay.
 
     Args:

@@ -26,7 +26,7 @@ class Response(NamedTuple):
     gyro: np.ndarray
 
 
-class LinearRig(NamedTuple):
+class LinearPlant(NamedTuple):
     """x' = A x + B u, and the outputs C x in the order of `Response`.
 
     Attributes:
@@ -80,8 +80,8 @@ class BendModel(NamedTuple):
 
     frequency_hz: float
     damping_ratio: float
-    bending: LinearRig
-    rigid: LinearRig
+    bending: LinearPlant
+    rigid: LinearPlant
 
     @property
     def energy_loss(self) -> float:
