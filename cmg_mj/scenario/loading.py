@@ -48,8 +48,7 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
     for setting in overrides:
         changes.append(f"--set {setting}")
         override(fields, setting)
-    if _kind_of(fields, "controller") != law:
-        _drop_gains(fields, overrides)
+    _drop_gains(fields, overrides, _kind_of(fields, "controller") != law)
     scenario = parse_scenario(fields, " ".join([name, *(["with"] if changes else []), *changes]))
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in overrides):
         scenario = find_model(scenario, path.parent)
@@ -68,11 +67,16 @@ def _take_observer(fields: dict[str, Any], observer: str) -> None:
         fields["observer"] = {"kind": observer}
 
 
-def _drop_gains(fields: dict[str, Any], overrides: Iterable[str]) -> None:
-    """The file's gains are its law's: another law, which --set names, does without unless --set gives it some."""
+def _drop_gains(fields: dict[str, Any], overrides: Iterable[str], has_law_changed: bool) -> None:
+    """Take the file's gains out where --set names another law, and of gains and lqr the one that --set does not give."""
     set_fields = [setting.partition("=")[0].strip() for setting in overrides]
-    for name in ("gains", "lqr"):
-        if not any(f"{field}.".startswith(f"controller.{name}.") for field in set_fields):
+    unset = [
+        name
+        for name in ("gains", "lqr")
+        if not any(f"{field}.".startswith(f"controller.{name}.") for field in set_fields)
+    ]
+    if has_law_changed or len(unset) == 1:
+        for name in unset:
             fields["controller"].pop(name, None)
 
 
