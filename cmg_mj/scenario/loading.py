@@ -68,7 +68,7 @@ def _take_observer(fields: dict[str, Any], observer: str) -> None:
 
 
 def _drop_gains(fields: dict[str, Any], overrides: Iterable[str], has_law_changed: bool) -> None:
-    """Take the file's gains out where --set names another law, and of gains and lqr the one that --set does not give."""
+    """Take the file's gains out where --set names another law; of gains and lqr, the one that --set does not give."""
     set_fields = [setting.partition("=")[0].strip() for setting in overrides]
     unset = [
         name
