@@ -13,6 +13,7 @@ import cmg_mj
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.observers.free_pivot import FreePivot, State
 from cmg_mj.sensors.tilt import TiltNoise
+from tests.observers.double_integrator import integrator_rows
 from tests.observers.reference import DT, NOISE, PAPER
 from tests.observers.test_gyro_free import gyro_free, motion
 from tests.observers.test_gyro_free import walk as walk_gyro_free
@@ -62,14 +63,7 @@ def least_squares(estimator: FreePivot, y1: np.ndarray, a: np.ndarray) -> tuple[
     """
     n = len(y1)
     unknown = 3 + 2 * n
-    alpha = np.zeros((n, unknown + 1))  # the last column is what is known
-    alpha[:, 2], alpha[:, -1] = -1.0, a
-    alpha[np.arange(n), 3 + np.arange(n)] = -1.0
-    x1, x2 = np.zeros((n, unknown + 1)), np.zeros((n, unknown + 1))
-    x1[0, 0] = x2[0, 1] = 1.0
-    for k in range(1, n):
-        x2[k] = x2[k - 1] + 0.5 * DT * (alpha[k - 1] + alpha[k])
-        x1[k] = x1[k - 1] + DT * x2[k - 1] + DT**2 * (alpha[k - 1] / 3.0 + alpha[k] / 6.0)
+    x1, x2 = integrator_rows(a, unknown, DT)
     noise, w = np.eye(n, unknown + 1, 3), np.eye(n, unknown + 1, 3 + n)
     f, sigma = math.exp(-2.0 * math.pi * estimator.pivot_hz * DT), estimator.pivot_start
     reading = x1 + w + C * noise
