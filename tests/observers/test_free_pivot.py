@@ -63,18 +63,14 @@ def least_squares(estimator: FreePivot, y1: np.ndarray, a: np.ndarray) -> tuple[
     """
     n = len(y1)
     unknown = 3 + 2 * n
-    x1, x2 = integrator_rows(a, unknown, DT)
+    x1, x2, start = integrator_rows(y1, a, unknown, DT, estimator.rate_start, estimator.bias_start)
     noise, w = np.eye(n, unknown + 1, 3), np.eye(n, unknown + 1, 3 + n)
     f, sigma = math.exp(-2.0 * math.pi * estimator.pivot_hz * DT), estimator.pivot_start
     reading = x1 + w + C * noise
     reading[:, -1] -= y1
     reading /= NOISE.tilt * math.sqrt(1.0 - NOISE.correlation**2)
-    start_p = x1[:1] - DT**2 / 6.0 * alpha[:1]
-    start_p[:, -1] -= y1[0] - DT**2 / 6.0 * a[0]
-    start_z = (x2[:1] - 0.5 * DT * alpha[:1]) / estimator.rate_start
-    start_b = np.eye(1, unknown + 1, 2) / estimator.bias_start
     renewed = (w[1:] - f * w[:-1]) / (sigma * math.sqrt(1.0 - f * f))
-    rows = np.vstack([reading, noise / NOISE.acceleration, start_p, start_z, start_b, w[:1] / sigma, renewed])
+    rows = np.vstack([reading, noise / NOISE.acceleration, start, w[:1] / sigma, renewed])
     solution = np.append(np.linalg.lstsq(rows[:, :-1], -rows[:, -1], rcond=None)[0], 1.0)
     return float(x1[-1] @ solution), float(x2[-1] @ solution), float(w[-1] @ solution)
 

@@ -51,16 +51,12 @@ def least_squares(estimator: GyroFree, y1: np.ndarray, a: np.ndarray) -> tuple[f
     """
     n = len(y1)
     unknown = 3 + n
-    x1, x2 = integrator_rows(a, unknown, DT)
+    x1, x2, start = integrator_rows(y1, a, unknown, DT, estimator.rate_start, estimator.bias_start)
     n_rows = np.eye(n, unknown + 1, 3)
     reading = x1 + C * n_rows
     reading[:, -1] -= y1
     reading /= NOISE.tilt * math.sqrt(1.0 - NOISE.correlation**2)
-    start_p = x1[:1] - DT**2 / 6.0 * alpha[:1]
-    start_p[:, -1] -= y1[0] - DT**2 / 6.0 * a[0]
-    start_z = (x2[:1] - 0.5 * DT * alpha[:1]) / estimator.rate_start
-    start_b = np.eye(1, unknown + 1, 2) / estimator.bias_start
-    rows = np.vstack([reading, n_rows / NOISE.acceleration, start_p, start_z, start_b])
+    rows = np.vstack([reading, n_rows / NOISE.acceleration, start])
     solution = np.linalg.lstsq(rows[:, :-1], -rows[:, -1], rcond=None)[0]
     coefficients = np.append(solution, 1.0)
     return float(x1[-1] @ coefficients), float(x2[-1] @ coefficients)
