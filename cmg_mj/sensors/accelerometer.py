@@ -28,6 +28,8 @@ MOST_HARMONICS = 20
 """No flywheel's tones beyond this multiple of its speed."""
 
 Share = Annotated[float, Field(gt=-1.0, lt=1.0)]
+NoiseSize = Annotated[float, Field(ge=0.0, le=1e6)]
+"""No part is noisier than 1 g/rtHz [ug/rtHz], or shaken by more than 1000 g [mg]."""
 VibrationFrequency = Annotated[float, Field(ge=0.1, le=1e5)]
 Angle = Annotated[float, Field(gt=-45.0, lt=45.0)]
 
@@ -64,7 +66,7 @@ class Accelerometer:
     """
 
     rate_hz: Rate = 200.0
-    noise_density_ug_rthz: Annotated[NonNegative, Batched()] = 400.0
+    noise_density_ug_rthz: Annotated[NoiseSize, Batched()] = 400.0
     bias_mg: Annotated[tuple[float, float], Batched()] = (0.0, 0.0)
     range_g: Positive = 2.0
     counts_per_g: NonNegative = 16384.0
@@ -73,9 +75,9 @@ class Accelerometer:
     misalignment_deg: tuple[Angle, Angle] = (0.0, 0.0)
     cross_axis: tuple[Share, Share] = (0.0, 0.0)
     skew_s: Annotated[NonNegative, OnGrid("s")] = 0.0
-    bias_instability_ug: NonNegative = 0.0
+    bias_instability_ug: NoiseSize = 0.0
     bandwidth_hz: Annotated[float, Field(ge=0.0, lt=INSIDE_HZ / 2.0)] = 0.0
-    vibration_mg: Annotated[NonNegative, Batched()] = 0.0
+    vibration_mg: Annotated[NoiseSize, Batched()] = 0.0
     vibration_band_hz: tuple[VibrationFrequency, VibrationFrequency] = (20.0, 500.0)
     wheel_harmonics_mg: tuple[NonNegative, ...] = ()
 

@@ -139,7 +139,8 @@ def test_the_table_of_gymnasium() -> None:
 
 
 @pytest.mark.slow
-def test_a_cell_of_the_bending_frames_table() -> None:
+def test_a_cell_of_the_bending_frames_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(STUDIES)
     study = importlib.import_module("bending_frame")
     settings = [*study.bend(10.0, "mast"), *study.RATES["gyro_free"]]
     assert study.cell((settings, 2)) == "2 fall"
@@ -171,7 +172,7 @@ def test_the_bound_of_a_pivot_at_rest_is_that_of_the_acceleration(monkeypatch: p
     )
     assert at_rest.error == pytest.approx(acceleration_floor(noise, 0.005), rel=1e-9)
     assert at_rest.error == sine.error < weak.error < strong.error
-    assert at_rest.start < weak.start < strong.start
+    assert at_rest.early < weak.early < strong.early
 
 
 @pytest.mark.slow
