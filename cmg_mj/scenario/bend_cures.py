@@ -182,8 +182,19 @@ def _changed(scenario: Scenario, rig: PlantParameters, changes: Changes) -> Tria
 
 
 def cure_among(tried: list[Trial]) -> Trial | None:
-    """Return the first trial that is a cure; None if there is none."""
-    return next((trial for trial in tried if trial.is_cure), None)
+    """Return a cure with the fewest settings: the first that has some margin, else the one that has most.
+
+    Args:
+        tried: The trials.
+
+    Returns:
+        The cure; None if there is none.
+    """
+    cures = [trial for trial in tried if trial.is_cure]
+    fewest = min((len(trial.settings) for trial in cures), default=0)
+    simplest = [trial for trial in cures if len(trial.settings) == fewest]
+    ample = [trial for trial in simplest if trial.distance >= NEAR]
+    return ample[0] if ample else max(simplest, key=lambda trial: trial.distance, default=None)
 
 
 def _notches(scenario: Scenario, mode_hz: float) -> list[Changes]:

@@ -99,9 +99,9 @@ class _March:
         impulses = [(push.torque_n_m * push.duration_s, push.duration_s) for push in scenario.push]
         impulse, push_s = max(impulses, key=lambda push: abs(push[0]), default=(0.0, self._interval))
         self._push_ends = PUSH_S + push_s
-        self._kick = np.zeros_like(self._x)
-        inertia = design.rig.reduced.J1 * design.rig.reduced.gimbals
-        self._kick[:, :, -1] = rate * impulse * self._interval / (push_s * inertia)
+        self._push = np.zeros(shape)
+        self._push[:, -1] = impulse / (push_s * design.rig.reduced.J1 * design.rig.reduced.gimbals)
+        self._kick = self._interval * rate[:, None] * self._push[:, None, :]
         self._u, self._y2, self._fell = np.zeros(shape), np.zeros(shape), np.zeros(shape, bool)
         self._step = 0
         self._fall_angle = math.radians(scenario.metrics.fall_angle_deg)
@@ -152,13 +152,16 @@ class _March:
         squares = np.zeros((2, *self._fell.shape))
         for _ in range(ticks):
             y1, acceleration, _, rate, gyro = np.moveaxis(self._C @ self._x, 1, 0)
+            is_pushed = PUSH_S <= self._time < self._push_ends
+            if is_pushed:
+                acceleration = acceleration + self._push  # the accelerometers show it at once
             self._fell |= ~(np.abs(y1) < self._fall_angle)  # true where it is not a number
             squares += np.square([rate, self._y2])
             signals = (y1 - self._bias, acceleration, self._y2, rate, gyro)
             if controller.update(self._step, _reading(self._rig.tilt, self._rig.gravity, *map(np.ravel, signals))):
                 self._u = np.reshape(controller.gimbal_rate, self._u.shape)
             x = self._F @ self._x + self._G * (self._u * np.cos(self._y2))[:, None, :]
-            if PUSH_S <= self._time < self._push_ends:
+            if is_pushed:
                 x = x + self._kick
             self._x = np.where(self._fell[:, None, :], 0.0, x)
             self._y2 = np.where(self._fell, 0.0, self._y2 + self._interval * self._u)

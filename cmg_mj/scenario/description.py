@@ -13,6 +13,7 @@ from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.linear_plant import rk4_energy_loss
 from cmg_mj.scenario.omissions import omissions
+from cmg_mj.scenario.pivot_track import read_track
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.plant_settings import BendBeyond
 from cmg_mj.scenario.resolve import resolved
@@ -68,7 +69,10 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
         *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
     rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
-    rows += [("pivot", pivot.words) for pivot in scenario.pivot]
+    for pivot in scenario.pivot:
+        rows.append(("pivot", pivot.words))
+        if pivot.file is not None:
+            rows.append(("", read_track(pivot.file, pivot.column).words))
     rows += _pivot_rows(rig)
     missing = list(omissions(scenario).values())
     if missing:

@@ -32,6 +32,12 @@ class Track(NamedTuple):
     accelerations: np.ndarray
     velocities: np.ndarray
 
+    @property
+    def words(self) -> str:
+        """Samples, length and size, for one line."""
+        rms = math.sqrt(float(np.mean(np.square(self.accelerations))))
+        return f"{len(self.times)} samples over {self.times[-1]:g} s, {rms:.3g} m/s2 rms before its scale"
+
     def velocity(self, time: float) -> float:
         """Integral of the acceleration from the first sample to a time [m/s]; before and after it rests."""
         if time <= 0.0:
@@ -75,7 +81,7 @@ def _read_track(path: Path, column: str | None, _changed_ns: int, _size: int) ->
         raise InputError(f"{path}: no CSV: {error} (line {rows.line_num})") from error
     if len(lines) < 2:
         raise InputError(f"{path}: too few samples ({len(lines)}); a track has at least two")
-    numbers = np.array([_numbers(path, line, row, number) for line, row in lines])
+    numbers = np.array([_numbers(path, line, row, number, len(heading)) for line, row in lines])
     times, accelerations = numbers.T
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):
@@ -110,10 +116,10 @@ def _column(path: Path, heading: list[str], column: str | None) -> int:
     return 1 + names.index(column)
 
 
-def _numbers(path: Path, line: int, row: list[str], column: int) -> tuple[float, float]:
+def _numbers(path: Path, line: int, row: list[str], column: int, columns: int) -> tuple[float, float]:
     """Read the time and the acceleration of a line."""
-    if len(row) <= column:
-        raise InputError(f"{path}: line {line}: {len(row)} values, too few")
+    if len(row) != columns:
+        raise InputError(f"{path}: line {line}: {len(row)} values; the heading has {columns}")
     values = []
     for text in (row[0], row[column]):
         if not _is_number(text) or not math.isfinite(float(text)):

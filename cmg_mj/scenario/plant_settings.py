@@ -95,6 +95,14 @@ class PlantSettings:
         """True if the frame bends."""
         return self.bend_frequency_hz > 0.0
 
+    @property
+    def unused_bend_fields(self) -> list[str]:
+        """Fields of the bend that were set while the frame is rigid."""
+        if self.bends:
+            return []
+        fields = [field for field in dataclasses.fields(self) if field.name.startswith("bend_")]
+        return [field.name for field in fields if getattr(self, field.name) != field.default]
+
     def changes(self) -> dict[str, float]:
         """Return the changed numbers of gimbals, servos, accelerometers, tilt and flywheels: field -> value."""
         prefixes = ("gimbal", "servo", "accelerometer", "tilt", "flywheel")

@@ -14,6 +14,7 @@ from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
 from cmg_mj.scenario.bend_cures import Trial, try_loop
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_parameters import PlantParameters
+from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.sliding_pivot import sliding_hint
 
@@ -174,9 +175,22 @@ def hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]
 def plant_hints(scenario: Scenario, design: Design, rig: PlantParameters) -> list[str]:
     """Find the `hints` that have nothing to do with a bend."""
     law = design.law
-    loop = closed_loop(scenario, law, rig.reduced).hint if isinstance(law, StateFeedback) else None
-    slide = sliding_hint(scenario, law, rig)
-    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *(hint for hint in (loop, slide) if hint)]
+    loop = _loop_hint(scenario, law, rig) if isinstance(law, StateFeedback) else None
+    others = loop, sliding_hint(scenario, law, rig), _unused_hint(scenario.plant)
+    return [*(f"{rig.path}: {hint}" for hint in rig.hints), *(hint for hint in others if hint)]
+
+
+def _loop_hint(scenario: Scenario, law: StateFeedback, rig: PlantParameters) -> str | None:
+    """Return the fault of the loop on the reduced model; the margin that a notch takes for a bend's sake is none."""
+    loop = closed_loop(scenario, law, rig.reduced)
+    is_for_bend = rig.bend is not None and scenario.controller.notch_hz > 0.0
+    return None if is_for_bend and loop.slowest < -MARGIN else loop.hint
+
+
+def _unused_hint(plant: PlantSettings) -> str | None:
+    """Name the settings of a bend that a rigid frame does not use."""
+    names = [f"plant.{name}" for name in plant.unused_bend_fields]
+    return f"{', '.join(names)}: without effect while plant.bend_frequency_hz = 0, a rigid frame" if names else None
 
 
 def bend_hint(rig: PlantParameters, trial: Trial | None) -> list[str]:

@@ -92,6 +92,17 @@ def test_a_motion_that_only_its_size_fells_is_told_apart() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("torque", "stands"), [(2.0, True), (3.0, True), (3.5, False), (4.0, False)])
+def test_the_push_that_fells_it_is_the_simulations(torque: float, stands: bool) -> None:
+    """The accelerometers show a push at once: an observer that uses them is not late."""
+    settings = ["observer.kind=gyro_free", f"push.0.torque_n_m={torque}"]
+    assert decay_of(*settings, "plant.bend_frequency_hz=60", "plant.bend_share=0.02").rigid == (
+        "decays" if stands else "decays if small"
+    )
+    assert (not experiment(*settings, "duration_s=8").run_many(2).fell.any()) == stands
+
+
+@pytest.mark.slow
 def test_sensors_that_are_late_are_in_the_loop() -> None:
     settings = ["plant.bend_frequency_hz=20", "observer.kind=gyro_free", "controller.notch_hz=20"]
     assert decay_of(*settings) == ("decays", "decays")

@@ -81,7 +81,7 @@ def test_margins_are_those_of_an_integrator_behind_a_delay() -> None:
     assert result.least_gain == 0.0
 
 
-def test_the_cure_is_the_first_that_is_stable_with_a_margin() -> None:
+def test_the_cure_has_the_fewest_settings_and_then_margin() -> None:
     hz = np.array([1.0, 2.0])
 
     def trial(name: str, distance: float, bending: Motion = "decays", rigid: Motion = "decays") -> Trial:
@@ -89,7 +89,9 @@ def test_the_cure_is_the_first_that_is_stable_with_a_margin() -> None:
         return Trial((name,), Decay(bending, rigid), loop)
 
     bad, poor, good = trial("bad", 0.05), trial("poor", 0.3), trial("good", 0.8)
-    assert cure_among([bad, poor, good]) == poor
+    assert cure_among([bad, poor, good]) == good
+    assert cure_among([bad, poor, trial("poorer", 0.25)]) == poor
+    assert cure_among([bad, poor, good._replace(settings=("a", "b"))]) == poor
     assert cure_among([bad]) is None
     assert cure_among([trial("falls", 0.8, "falls"), trial("falls rigid", 0.8, rigid="swings"), good]) == good
     assert poor.is_near

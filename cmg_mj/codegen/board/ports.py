@@ -27,6 +27,15 @@ CONNECT_S = 5.0
 TAKES_NOTHING = f"the {{}} has taken no byte for {CONNECT_S:g} s: flow control, or a converter that has stopped"
 
 
+def _reason(error: Exception) -> str:
+    """Return the system's words behind an error of pyserial's, which repeats the port and its number."""
+    cause = error.__context__ or error
+    text = getattr(cause, "strerror", None) or (cause.args[1] if len(cause.args) > 1 else cause)
+    if text == "Inappropriate ioctl for device":
+        return "it is no serial port"
+    return " ".join(str(text).split())
+
+
 class Port(Protocol):
     """A stream of bytes in both directions; every method raises `Closed` when there is nobody at the other end."""
 
@@ -80,8 +89,7 @@ class _SerialPort:
             self._too_slow = serial.SerialTimeoutException
             self._serial = serial.Serial(name, baud, timeout=POLL_S, write_timeout=CONNECT_S, exclusive=True)
         except (OSError, ValueError, OverflowError) as error:  # pyserial's own errors are of these kinds
-            reason = getattr(error, "strerror", None) or " ".join(str(error).split())
-            raise InputError(f"--port {name}: cannot be opened at {baud} baud: {reason}") from error
+            raise InputError(f"--port {name}: cannot be opened at {baud} baud: {_reason(error)}") from error
 
     def read(self, wait_s: float) -> bytes:
         try:

@@ -199,7 +199,10 @@ class WiredBoard:
         if self._lost_now >= self.max_lost:
             ticks = f"{self._lost_now} ticks" if self._lost_now > 1 else "a tick"
             within = f"{1e3 * self.deadline_s:g} ms"
-            raise RunStopped(f"{self.name}: the board has not answered for {ticks} in a row, within {within} each")
+            raise RunStopped(
+                f"{self.name}: the board has not answered for {ticks} in a row, within {within} each (--deadline-ms "
+                "allows more)"
+            )
 
     def _await(self, frame: Frame, until: float, *, until_refused: bool = False) -> Frame | None:
         """Return the answer to a frame; None if none comes in time, or if the board has refused it."""

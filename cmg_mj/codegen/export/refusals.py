@@ -18,7 +18,10 @@ SIMULATION_OPTIONS = ("seed", "worlds", "axis", "open_loop_observers")
 """Options that concern the simulation around a controller alone."""
 EXPORTED_LAW_FIELDS = ("dt", "gains", "rate_limit")
 """Fields of the law (8) that its C has; another law is traced whole."""
-REASONS = {"feedback": "what is exported has the observer's rate alone"}
+REASONS = {
+    "feedback": "what is exported has the observer's rate alone",
+    "notch_hz": "no notch is exported, so that a frame that needs one has to be stiffer, or another setting cures it",
+}
 """Option of a `Controller` -> why its C has none, where that is known."""
 
 

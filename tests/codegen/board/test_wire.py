@@ -90,7 +90,7 @@ def test_without_a_checksum_radii_and_gimbals_are_compared_still() -> None:
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("controller.notch_hz=12", r"^controller\.notch_hz = 12\.0: cannot be exported: C has no such option"),
+        ("controller.notch_hz=12", r"^controller\.notch_hz = 12\.0: cannot be exported: no notch is exported"),
         ("controller.feedback=truth", r"^controller\.feedback = 'truth': a board has no such sensor"),
     ],
     ids=["notch", "feedback"],
