@@ -19,6 +19,7 @@ from cmg_mj.errors import InputError, nearest
 if TYPE_CHECKING:
     from cmg_mj.results.result import Driver
     from cmg_mj.results.run_folder import RunFolder
+    from cmg_mj.results.wire import WireSettings
     from cmg_mj.scenario.schema import Scenario
     from cmg_mj.simulation.experiment import Experiment
 
@@ -57,7 +58,13 @@ class RunArguments:
         return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
 
     def folder(
-        self, label: str, names: Sequence[str], experiment: Experiment, driver: Driver = "native", world: int = 0
+        self,
+        label: str,
+        names: Sequence[str],
+        experiment: Experiment,
+        driver: Driver = "native",
+        world: int = 0,
+        wire: WireSettings | None = None,
     ) -> RunFolder:
         """Claim the folder for files: --out, or one in runs/ named for the scenario, the label and the settings."""
         from cmg_mj.scenario.differences import folder_suffix, safe_name
@@ -70,7 +77,7 @@ class RunArguments:
             *([f"world{world}"] if world else []),
         )
         name = "-".join(parts) + folder_suffix(experiment.differences)
-        return claim_output(self.out, name, names, request_toml=experiment.as_toml(driver, world))
+        return claim_output(self.out, name, names, request_toml=experiment.as_toml(driver, world, wire))
 
 
 def _as_utf8(argument: str) -> str:
@@ -141,28 +148,30 @@ def observer_option(role: str = "in the loop", default: str | None = None, *, re
     return option(required=True) if required else option(default=default, show_default=True)  # None is a default, too
 
 
-def observers_option(otherwise: str = "", *, distinct: bool = True) -> Decorator:
+def observers_option(otherwise: str = "", *, distinct: bool = True, baselines: bool = False) -> Decorator:
     """Make the option `--observers`, whose value is a list of names.
 
     Args:
         otherwise: The default in words, for the value None; without them it is all observers.
         distinct: Whether a repeated name counts once.
+        baselines: Whether baselines that give a rate, such as `zero`, may be named too.
     """
 
     def parse(context: click.Context, parameter: click.Parameter, text: str | None) -> list[str] | None:
         if text is None:
             return None
-        names = observer_names(text)
+        names = observer_names(text, baselines=baselines)
         return list(dict.fromkeys(names)) if distinct else names
 
     default = f"  [default: {otherwise}]" if otherwise else ""
+    more = "; baselines: zero, mems_as_bought, mems_gyro, mems_fused" if baselines else ""
     return click.option(
         "--observers",
         default=None if otherwise else "all",
         show_default=True,
         metavar="NAMES",
         callback=parse,
-        help=f"Observers separated by commas, or all; your own as package.module:Class.{default}",
+        help=f"Observers separated by commas, or all; your own as package.module:Class{more}.{default}",
     )
 
 
@@ -223,22 +232,25 @@ def names_in(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
-def observer_names(text: str) -> list[str]:
-    """Parse observers separated by commas, or `all`; repeated names stay."""
+def observer_names(text: str, *, baselines: bool = False) -> list[str]:
+    """Parse observers separated by commas, or `all`; repeated names stay, and baselines where they are allowed."""
     from cmg_mj.observers import OBSERVERS
+    from cmg_mj.results.baselines import RATES
 
     names = list(OBSERVERS) if text == "all" else names_in(text)
     if not names:
         raise InputError(f"--observers {text!r}: give names separated by commas, or all")
-    return [check_observer("--observers", name) for name in names]
+    allowed = RATES if baselines else ()
+    return [name if name in allowed else check_observer("--observers", name, allowed) for name in names]
 
 
-def check_observer(option: str, name: str) -> str:
-    """Refuse an observer that does not exist, or return its name."""
+def check_observer(option: str, name: str, others: Sequence[str] = ()) -> str:
+    """Refuse an observer that does not exist, or return its name; the message knows others that are allowed."""
     from cmg_mj.observers import OBSERVERS
 
     if ":" not in name and name not in OBSERVERS:
         raise InputError(
-            f"{option} {name!r}: no such observer; {nearest(name, OBSERVERS)}, or your own as package.module:Class"
+            f"{option} {name!r}: no such observer; {nearest(name, [*OBSERVERS, *others])}, or your own as "
+            "package.module:Class"
         )
     return name

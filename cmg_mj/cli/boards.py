@@ -8,6 +8,7 @@ import click
 
 from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
 from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, show, users_code
+from cmg_mj.errors import InputError
 
 
 @click.command(short_help="Write an observer and the control law around it as C code.")
@@ -16,9 +17,12 @@ from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, sh
 @click.option(
     "--precision",
     type=click.Choice(["double", "single"]),
-    default="double",
-    show_default=True,
-    help="Precision of all numbers in the C code.",
+    help="Precision of all numbers in the C code.  [default: double; with --firmware single]",
+)
+@click.option(
+    "--firmware",
+    type=click.Choice(["mps2", "stm32f746"]),
+    help="Write a project around it to build and flash: for QEMU's mps2-an500, or ST's 32F746GDISCOVERY.",
 )
 @click.option("--name", metavar="NAME", help="Prefix of files, types and functions.  [default: OBSERVER's name]")
 @click.option(
@@ -34,7 +38,8 @@ from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, sh
 def export(
     observer: str,
     out: str | None,
-    precision: Literal["double", "single"],
+    precision: Literal["double", "single"] | None,
+    firmware: str | None,
     name: str | None,
     scenario: str,
     settings: tuple[str, ...],
@@ -47,9 +52,11 @@ def export(
       NAME.h, NAME.c      init, step: the observer; update: the controller, sensors to gimbal rate
       NAME_example.c      program that compares the C code with the test vector
       NAME_test_vector.h  test vector
+      Makefile, ...       with --firmware: the firmware around it (docs/board.md)
 
     The C code is compared with Python on random signals before it is written.
     """  # noqa: D301  (click wants the character itself)
+    from cmg_mj.codegen.board.project import NEVER_RUN, PORTS, project, project_files, then
     from cmg_mj.codegen.export import check_installed, generate_code, write_code
     from cmg_mj.codegen.export.names import export_files, name_of
     from cmg_mj.codegen.export.pipeline import export_table
@@ -58,6 +65,11 @@ def export(
     from cmg_mj.simulation.experiment import prepare
 
     check_installed()
+    if firmware is not None and precision == "double":
+        raise InputError("--precision double: the firmware's controller is in single precision; leave it out")
+    if firmware is not None and name is not None:
+        raise InputError(f"--name {name}: the firmware's controller has the observer's own name; leave it out")
+    precision = precision or ("double" if firmware is None else "single")
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
     experiment.require_single_axis("export")
     if isinstance(experiment.law, StateFeedback):
@@ -65,8 +77,18 @@ def export(
     note_hints(experiment.hints)
     controller = experiment.axis_controller()
     name = name_of(controller.observer, name)
-    with claim_output(out, f"export-{name}-{precision}", export_files(name)) as folder:
+    label = f"export-{name}-{firmware or precision}"
+    with claim_output(out, label, [*export_files(name), *(project_files(firmware) if firmware else [])]) as folder:
         code = generate_code(controller, precision, name)
+        run_it = ""
+        if firmware is not None:
+            options = [word for setting in settings for word in ("--set", setting)]
+            run_it = shell_command(
+                *["cmg-mj", "run", scenario, "--driver", "board", "--observer", observer, *options],
+                *["--port", PORTS[firmware]],
+            )
+            around = project(controller, name, code.files[f"{name}.c"], firmware, run_it)
+            code = code._replace(files={**code.files, **around})
         files = write_code(folder, code)
     figures = code.figures
     show(figures, export_table(figures), as_json)
@@ -78,5 +100,10 @@ def export(
         off = (figures["c_off_by"] or {})[part]
         note(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer makes so much of a last digit")
     at = files[0].parent
+    if firmware is not None:
+        if firmware in NEVER_RUN:
+            note("the firmware compiles for this board, and has never run on one (docs/board.md)")
+        say_written(folder, at, then(firmware, f"{shell_command('make', '-C', at)} ", run_it), as_json)
+        return
     compile_it = shell_command("cc", "-std=c99", at / f"{name}.c", at / f"{name}_example.c", "-lm")
     say_written(folder, at, f"Try it: {compile_it} && ./a.out", as_json)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack
 
 import click
 
 from cmg_mj.cli.arguments import json_option, observer_option
-from cmg_mj.cli.terminal import CtrlC, note, note_hints, progress, shell_command, show, users_code
+from cmg_mj.cli.terminal import CtrlC, end_interrupted, note, note_hints, progress, shell_command, show, users_code
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.plant.mounting.axes import AxisLike
     from cmg_mj.plant.mounting.held_joints import Hold
     from cmg_mj.plant.mounting.request import Base
+    from cmg_mj.studies.push_limits.mount_files import MountResult
+    from cmg_mj.studies.push_limits.mount_tuning import MountTuning
 
 
 class MountOptions(TypedDict):
@@ -108,6 +110,13 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     help="Write a plugin of MuJoCo too, into FILE_plugin: the controller as a library, and the model that names it.",
 )
 @click.option("--quick", is_flag=True, help="Print E of the reduced model, and try nothing in MuJoCo (up to a minute).")
+@click.option(
+    "--tune",
+    "with_tuning",
+    is_flag=True,
+    help="Then tune the observer's parameters on the robot in MuJoCo (up to two minutes), and write them if they are "
+    "better on other worlds and stand no less.",
+)
 @json_option()
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount; not what has changed since.")
 @users_code()
@@ -117,6 +126,7 @@ def mount(
     observer: str,
     with_plugin: bool,
     quick: bool,
+    with_tuning: bool,
     as_json: bool,
     overwrite: bool,
     **options: Unpack[MountOptions],
@@ -132,6 +142,8 @@ def mount(
     from cmg_mj.studies.push_limits.mount_report import mount_report_lines
     from cmg_mj.studies.push_limits.simulated_push import LONGEST_S, TimeLimit
 
+    if with_tuning and with_plugin:
+        raise InputError("--tune: not with --plugin, which would keep the parameters from before; then cmg-mj plugin")
     with CtrlC() as ctrl_c, nullcontext() if quick else progress("no push", LONGEST_S, ctrl_c) as on_progress:
         time_limit = None if quick else TimeLimit(on_progress=on_progress)
         result = mount_and_write(
@@ -143,7 +155,11 @@ def mount(
             time_limit=time_limit,
             with_plugin=with_plugin,
         )
-    show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
+    lines = list(mount_report_lines(result))
+    outcome = _tune(result) if with_tuning else TuningOutcome()
+    if outcome.tuning:
+        lines.append(outcome.tuning.line())
+    show(result.figures() | (outcome.tuning.figures() if outcome.tuning else {}), "\n".join(lines), as_json)
     if not as_json:
         note_hints(result.hints)
         run_it = shell_command("cmg-mj", "run", result.scenario_path)
@@ -151,3 +167,29 @@ def mount(
         if result.plugin:
             example = result.plugin.model.with_name(f"{result.plugin.model.stem}_example.py")
             note(f"wrote {result.plugin.model.parent}; try: {shell_command('python', example)}")
+    if outcome.error:
+        raise outcome.error
+    if outcome.interrupted:
+        end_interrupted(f"interrupted; {result.path} and {result.scenario_path} are whole")
+
+
+class TuningOutcome(NamedTuple):
+    """The tuning, or what ended it."""
+
+    tuning: MountTuning | None = None
+    error: InputError | None = None
+    interrupted: bool = False
+
+
+def _tune(result: MountResult) -> TuningOutcome:
+    """Tune the observer of a robot that is mounted; a Ctrl-C ends the search, and a second one leaves all as it was."""
+    from cmg_mj.studies.push_limits.mount_tuning import tune_mounted
+
+    with CtrlC() as ctrl_c, progress(f"tuning {result.observer}", 1.0) as on_progress:
+        try:
+            tuning = tune_mounted(result.scenario_path, stop=lambda: ctrl_c.noted, on_share=on_progress)
+        except InputError as error:
+            return TuningOutcome(error=InputError(f"mounted, but --tune: {error}"))
+        except KeyboardInterrupt:
+            return TuningOutcome(interrupted=True)
+    return TuningOutcome(tuning, interrupted=ctrl_c.noted)

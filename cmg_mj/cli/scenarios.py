@@ -19,6 +19,7 @@ from cmg_mj.cli.arguments import (
     observer_option,
     observers_option,
     run_options,
+    settings_option,
     worlds_option,
 )
 from cmg_mj.cli.live import live_options, live_run
@@ -36,6 +37,7 @@ from cmg_mj.cli.terminal import (
     show,
     users_code,
 )
+from cmg_mj.cli.wire import WireOptions, wire_options
 from cmg_mj.errors import InputError, RunStopped
 
 if TYPE_CHECKING:
@@ -59,6 +61,7 @@ if TYPE_CHECKING:
     largest=2**63 - 1,  # tables hold it in 64 bits
     default=0,
 )
+@wire_options
 @click.option("--plot", is_flag=True, help="Also write plot.png.")
 @live_options
 @users_code()
@@ -67,6 +70,7 @@ def run(
     observer: str | None,
     driver: Driver,
     world: int,
+    wire: WireOptions,
     plot: bool,
     live: bool,
     connect: str | None,
@@ -79,6 +83,7 @@ def run(
       trajectory.parquet  all signals, a row for each control tick
       recording.rrd       rerun recording
       scenario.toml       scenario with all defaults, which reruns to the same numbers
+      board.frames        with --port: what went over the wire, which cmg-mj replay takes
 
     A rerun needs the same --driver board and --world, if they were given.
     """  # noqa: D301  (click wants the character itself)
@@ -88,20 +93,27 @@ def run(
     from cmg_mj.studies import save as runs
 
     scenario = arguments.scenario(observer)
+    wire.check(driver)
     experiment = prepare(scenario)
     note_hints(experiment.hints)
     if scenario.compare:
         note("[compare] is for cmg-mj compare; this is one run")
+    board = wire.connect(experiment)
     label = runs.file_name(scenario.observer.kind)
-    folder = arguments.folder(label, runs.files_of_run(experiment, plot=plot), experiment, driver, world)
-    live_view = live_run(experiment, live, connect, pace, driver, world)
+    files = runs.files_of_run(experiment, plot=plot, wired=board is not None)
+    settings = None if board is None else board.settings
+    folder = arguments.folder(label, files, experiment, driver, world, settings)
+    live_view = live_run(experiment, live, connect, pace, driver, world, settings)
     with CtrlC() as ctrl_c, live_view or nullcontext():
         with progress(scenario.title or arguments.name, scenario.duration_s, ctrl_c) as on_progress:
             options: SimulationOptions = (
                 {"on_progress": on_progress} if live_view is None else live_view.options(on_progress)
             )
             options["spool"] = folder.path
-            result = experiment.run(driver=driver, world=world, **options)
+            if board is None:
+                result = experiment.run(driver=driver, world=world, **options)
+            else:
+                result = experiment.run_on(board, world, **options)
         report = runs.report_run(experiment, result)
         if live_view is not None:
             live_view.ended(report)
@@ -221,15 +233,18 @@ def list_names(what: str | None) -> None:
 
 @click.command(short_help="Check a scenario file, or a model file, without running it.")
 @click.argument("file")
+@settings_option("Set a field of the scenario, as cmg-mj run does.")
 @users_code()
-def check(file: str) -> None:
+def check(file: str, settings: tuple[str, ...]) -> None:
     """Check a scenario file, or a model file (.xml), without running it, and print its main parameters."""
     from cmg_mj.scenario.description import description, rig_description
     from cmg_mj.scenario.loading import load_scenario, parse_scenario
     from cmg_mj.simulation.experiment import prepare
 
     is_model = Path(file).suffix.lower() in (".xml", ".mjb")
-    scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file)
+    if is_model and settings:
+        raise InputError(f"--set {settings[0]}: is for a scenario; {file} is a model")
+    scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file, settings)
     describe = partial(rig_description, own=_scenario_beside(Path(file))) if is_model else description
     parts = prepare(scenario).parts
     texts = [describe(file, part.scenario, part.design, part.plant.parameters, part.plant.axis.name) for part in parts]

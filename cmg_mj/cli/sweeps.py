@@ -51,7 +51,7 @@ class StudyOptions(TypedDict):
     "log:first:last:count. With --sample or --sobol also low:high. Fields joined by + take the same values. May be "
     "given again; every combination is run.",
 )
-@observers_option("the scenario's", distinct=False)
+@observers_option("the scenario's", distinct=False, baselines=True)
 @worlds_option("Worlds of each cell.  [default: 20]")
 @click.option(
     "--sample", type=click.IntRange(1), metavar="N", help="Run N points of a quasi-random design instead of a grid."
@@ -141,10 +141,12 @@ def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
 
 def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
+    from cmg_mj.inputs.bundled import find
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
     from cmg_mj.studies.sweeps.study import SweepStudy, sampling
     from cmg_mj.studies.sweeps.study_file import axes_of, design_of, scenario_of, study_file
+    from cmg_mj.studies.sweeps.varied_tracks import locate_tracks
 
     design = sampling(options["sample"], options["sobol"], prefix="--")
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in options["varied"]]
@@ -158,6 +160,8 @@ def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
             scenario = scenario.model_copy(update={"seed": arguments.seed})
         settings = fields.get("sweep", {})
         axes = axes or axes_of(arguments.name, fields)
+    beside = find("scenarios", arguments.name, ".toml", "scenario").parent
+    axes = [locate_tracks(axis, beside) for axis in axes]
     order = options["order"]
     names = options["observers"] or settings.get("observers", [scenario.observer.kind])
     expected = settings.get("order", []) if order is None else [name.strip() for name in order.split(",")]

@@ -10,6 +10,7 @@ from cmg_mj.controllers.backlash import Backlash
 from cmg_mj.controllers.integrator_trim import integrator_trim
 from cmg_mj.controllers.law_runner import LawRunner, Laws, LawTakeover
 from cmg_mj.controllers.laws.protocol import Law, feedback_state
+from cmg_mj.controllers.notch import Notch
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError
 from cmg_mj.observers.protocol import Measurement, Observer
@@ -66,6 +67,7 @@ class ControllerOptions(TypedDict, total=False):
     angle_source: AngleSource
     open_loop_observers: Mapping[str, Observer] | None
     bias_trim_s: float
+    notch_hz: float
     axis: int
 
 
@@ -90,6 +92,7 @@ class Controller:
         open_loop_observers: Observers that run open loop, by name.
         bias_trim_s: For so long from the start, the integrator is held at k_e1/k_e4 e, the value that the observer's
             bias estimate asks for, instead of finding it by integration [s].
+        notch_hz: The middle of a notch on the law's command; 0: none [Hz].
         axis: The number of the rig's axis, on which the noise depends.
 
     Attributes:
@@ -115,6 +118,7 @@ class Controller:
         angle_source: AngleSource = "measured",
         open_loop_observers: Mapping[str, Observer] | None = None,
         bias_trim_s: float = 0.0,
+        notch_hz: float = 0.0,
         axis: int = 0,
     ) -> None:
         self.observer = observer
@@ -140,6 +144,11 @@ class Controller:
         self.bias_trim_s = bias_trim_s
         self.trim_part, self.trim_gain = integrator_trim(bias_trim_s, law, self.extra_signals[0])
         self.trimmed_until = steps_until(bias_trim_s, timestep)
+        self.notch_hz = notch_hz
+        if notch_hz * law.dt >= 0.5:
+            raise InputError(
+                f"controller.notch_hz = {notch_hz:g}: must be below {0.5 / law.dt:g} Hz, half the control rate"
+            )
         self.reset()
 
     @property
@@ -156,6 +165,7 @@ class Controller:
         self._backlash = (
             None if type(self.backlash) is float and not self.backlash else Backlash(self.backlash, self.law.dt)
         )
+        self._notch = Notch(self.notch_hz, self.law.dt, self.law.rate_limit) if self.notch_hz else None
         self._true_rate: Scalar = math.nan
         self.body_rate: Scalar = math.nan
         """Rate of the frame along the tilt axis at the last update, as a perfect gyro on it shows [rad/s]."""
@@ -298,6 +308,8 @@ class Controller:
         if len(estimate) > 3:
             x.extra = estimate[3:]
         u, x_e = self._law.decide(y, x, held, step)
+        if self._notch is not None:
+            u = self._notch(u)
         if not self._single:
             read_only(u)  # observers get it at the next tick, the trajectory later
         self.tick = _new(Tick, (y1, y2, acceleration, fog, u, x_e, estimates))

@@ -56,6 +56,10 @@ class ReducedModel:
         omega_d: Flywheel's nominal speed [rad/s].
         gravity_torque: m g l/sqrt(2) [N m], the gravity torque at a tilt of 90 degrees.
         gimbals: Among how many gimbals the rig is shared; a torque on the whole rig counts 1/gimbals here.
+        pivot_arm: c [m]. A pivot that slides freely, as on a light cart, is accelerated by the rig itself:
+            a_p = -c (x2' cos(x1) - x2^2 sin(x1)). The point of the radial line so far above it stays where it is: the
+            common mass centre of rig and cart, c = m h/M. J1 is then the inertia that is left, J - m h c/gimbals. 0 for
+            a pivot at rest.
     """
 
     J1: float
@@ -64,6 +68,26 @@ class ReducedModel:
     omega_d: float
     gravity_torque: float
     gimbals: int = 1
+    pivot_arm: float = 0.0
+
+    def pivot_acceleration(self, x1: Scalar, x2: Scalar, tilt_acceleration: Scalar) -> Scalar:
+        """Acceleration of the pivot across the tilt axis, to the side that a positive tilt leans to [m/s^2]."""
+        return -self.pivot_arm * (tilt_acceleration * cos(x1) - x2 * x2 * sin(x1))
+
+    def measured_tilt(self, height: float, gravity: float) -> tuple[float, float]:
+        """The linearised y1 = c1 x1 + d u, where accelerometers take a point of the radial line to be at rest.
+
+        From y1 = x1 - a/g, a = (height - pivot_arm) x2' the acceleration of that point, and (6).
+
+        Args:
+            height: Of that point above the pivot [m]; at `pivot_arm` y1 is x1.
+            gravity: g [m/s^2].
+
+        Returns:
+            c1 and d [s].
+        """
+        delay = (self.pivot_arm - height) / gravity
+        return 1.0 + delay * self.gravity_torque / self.J1, delay * self.J_d * self.omega_d / self.J1
 
     def inertia(self, x3: Scalar) -> Scalar:
         """D = J1 + J2 sin(x3)^2, one share's tilt inertia [kg m^2]."""

@@ -17,6 +17,7 @@ OBSERVERS = {
     "luenberger": "cmg_mj.observers.luenberger:Luenberger",
     "kalman": "cmg_mj.observers.kalman:Kalman",
     "gyro_free": "cmg_mj.observers.gyro_free:GyroFree",
+    "free_pivot": "cmg_mj.observers.free_pivot:FreePivot",
     "finite_difference": "cmg_mj.observers.finite_difference:FiniteDifference",
     "super_twisting": "cmg_mj.observers.super_twisting:SuperTwisting",
     "linear_high_gain": "cmg_mj.observers.linear_high_gain:LinearHighGain",

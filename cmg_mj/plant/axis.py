@@ -16,7 +16,7 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.effective_inertia import inertia_about
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import TILT_ELEMENT, Module, element_id
-from cmg_mj.plant.tilt_line import Addressed, Line, line_at_site, line_of_joint
+from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_at_site, line_of_joint
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.tilt import RadialTilt
@@ -24,6 +24,10 @@ from cmg_mj.sensors.tilt import RadialTilt
 _new = tuple.__new__  # a named tuple's own takes twice as long
 
 QUARTER_TURN = math.pi / 2.0
+LEAST_ARM_M = 1e-4
+"""A pivot that moves by less for a tilt of 1 rad is at rest [m]."""
+TURNS_ALIKE = 1e-6
+"""A frame whose rate differs from the hinge's by less turns with the hinge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +48,7 @@ class Axis:
         gyro: Address in sensordata of the gyro along the line.
         bias: Equilibrium bias e [rad].
         initial_tilt: Tilt from the equilibrium at the start [rad].
+        misplaced: Whether an accelerometer sits elsewhere than the tilt estimate knows.
     """
 
     name: str
@@ -59,6 +64,7 @@ class Axis:
     gyro: int
     bias: float = 0.0
     initial_tilt: float = 0.0
+    misplaced: bool = False
 
     @property
     def prefix(self) -> str:
@@ -85,6 +91,10 @@ class Axis:
         return itemgetter(*self.encoders) if others else lambda sensordata: (sensordata[only],)
 
     @cached_property
+    def _spins(self) -> list[int]:
+        return [module.flywheel_dof for module in self.modules]
+
+    @cached_property
     def _gimbals(self) -> list[tuple[int, float, float]]:
         """Address, share of x3 and zero of each gimbal."""
         n = len(self.modules)
@@ -105,7 +115,8 @@ class Axis:
             forces, encoders = self._forces_of(sensordata), self._encoders_of(sensordata)
         else:
             forces, encoders = sensordata[self.forces], [sensordata[address] for address in self.encoders]
-        return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel)))
+        wheels = [qvel[dof] for dof in self._spins]
+        return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel), wheels))
 
     def gimbal_angle(self, qpos: Addressed) -> Scalar:
         """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""
@@ -220,4 +231,37 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     line.tilt(data, QUARTER_TURN)
     mujoco.mj_forward(model, data)
     gravity_torque = -(line.motion(model, data) @ data.qfrc_bias) / n
-    return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n)
+    arm = _pivot_arm(model, key, axis, upright.rates)
+    return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n, arm)
+
+
+def pivot_rows(model: mujoco.MjModel, key: int, axis: Axis) -> tuple[np.ndarray, np.ndarray]:
+    """Find how the pivot and what it belongs to move with the joints' rates, at a keyframe.
+
+    Args:
+        model: The compiled model.
+        key: The keyframe.
+        axis: The axis.
+
+    Returns:
+        The pivot's velocity across the axis, to the side a positive tilt leans to, (nv,); the frame's rate about the
+        axis, (nv,).
+    """
+    data = at_keyframe(model, key)
+    turn = data.xmat[axis.frame].reshape(3, 3)
+    slides, turns = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    mujoco.mj_jac(model, data, slides, turns, data.xpos[axis.frame] + turn @ axis.point, axis.frame)
+    line = turn @ axis.direction
+    return np.cross(line, UP) @ slides, line @ turns
+
+
+def _pivot_arm(model: mujoco.MjModel, key: int, axis: Axis, rates: np.ndarray) -> float:
+    """Find how far the pivot slides back, across the axis, for a tilt of 1 rad while the joints have these rates [m].
+
+    It is 0 where the pivot is at rest, and where what the hinge hangs on turns with it: that is no sliding pivot.
+    """
+    across, about = pivot_rows(model, key, axis)
+    if abs(float(about @ rates) - 1.0) > TURNS_ALIKE:
+        return 0.0
+    arm = -float(across @ rates)
+    return arm if arm > LEAST_ARM_M else 0.0

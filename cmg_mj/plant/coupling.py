@@ -12,8 +12,7 @@ from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.effective_inertia import wheel_momentum
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import Module
-
-UP = np.array([0.0, 0.0, 1.0])
+from cmg_mj.plant.tilt_line import UP
 
 
 def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCoupling:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from cmg_mj.plant.mujoco_state import at_keyframe
-from cmg_mj.plant.parts import ON_A_JOINT
+from cmg_mj.plant.parts import BEND_JOINT, ON_A_JOINT, element_id
 from cmg_mj.plant.tilt_line import HingeLine, Line
 
 SMALL = 1e-9
@@ -17,10 +18,17 @@ SMALL = 1e-9
 
 @dataclass(frozen=True)
 class Inertia:
-    """About a line: `coupling_row` couples a tilt with every joint, (nv,); `tilt_inertia` is the tilt's [kg m^2]."""
+    """About a line.
+
+    Attributes:
+        coupling_row: Couples a tilt with every joint, (nv,).
+        tilt_inertia: The tilt's [kg m^2].
+        rates: The joints' rates while it tilts by 1 rad/s and all that nothing holds gives way, (nv,).
+    """
 
     coupling_row: np.ndarray
     tilt_inertia: float
+    rates: np.ndarray
 
 
 def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int, float]) -> Inertia:
@@ -46,17 +54,38 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
     mujoco.mj_fullM(model, data, dense)
     motion = line.motion(model, data)
     row = motion @ dense
-    line_inertia = row @ motion
+    line_inertia, rates = row @ motion, motion
     loose = _free_dofs(model, data) if isinstance(line, HingeLine) else []
     loose = [dof for dof in loose if not motion[dof]]
     if loose:
         gives, inertia = row[loose], dense[np.ix_(loose, loose)]
         held = np.concatenate([_contacts(model, data), _weld_jacobian(model, data)])[:, loose]
+        ways = None
         if held.size:
             ways = _null_space(held)
             gives, inertia = gives @ ways, ways.T @ inertia @ ways
-        line_inertia = line_inertia - gives @ np.linalg.solve(inertia, gives)
-    return Inertia(row, float(line_inertia))
+        way = np.linalg.solve(inertia, gives)
+        line_inertia = line_inertia - gives @ way
+        rates = motion.copy()
+        rates[loose] -= way if ways is None else ways @ way
+    return Inertia(row, float(line_inertia), rates)
+
+
+def free_motions(model: mujoco.MjModel, data: mujoco.MjData, dofs: Sequence[int]) -> np.ndarray:
+    """Find the motions of some degrees of freedom and of all that neither servos, constraints nor contacts hold.
+
+    Args:
+        model: The compiled model.
+        data: Its state after a forward pass.
+        dofs: Degrees of freedom that are free, whatever holds them.
+
+    Returns:
+        A basis, (nv, n).
+    """
+    moving = sorted({*dofs, *_free_dofs(model, data)})
+    basis = np.eye(model.nv)[:, moving]
+    constraints = np.concatenate([_contacts(model, data), _weld_jacobian(model, data)]) @ basis
+    return basis @ _null_space(constraints) if constraints.size else basis
 
 
 def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, joint: int, speed: float) -> np.ndarray:
@@ -67,8 +96,8 @@ def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, joint: int, speed
 
 
 def _free_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
-    """Degrees of freedom that neither a constraint nor a servo holds, flywheels and gimbals left out."""
-    held = set()
+    """Degrees of freedom that neither a constraint, a servo nor the spring of a bend holds."""
+    held = {int(model.jnt_dofadr[joint]) for joint in [element_id(model, "joint", BEND_JOINT)] if joint >= 0}
     for constraint in np.flatnonzero((model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (data.eq_active == 1)):
         held.add(int(model.jnt_dofadr[model.eq_obj1id[constraint]]))
     for actuator in range(model.nu):

@@ -12,6 +12,7 @@ import mujoco
 
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.includes import check_files
+from cmg_mj.plant.bend import bend_frame
 from cmg_mj.plant.checks import RigChecker, invalid_numbers
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
 from cmg_mj.plant.parts import REQUIRED_PARTS, axes_of, missing_parts
@@ -99,13 +100,14 @@ class Rig(NamedTuple):
     hints: tuple[str, ...]
 
 
-def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> Rig:
+def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = (), bend: PlantSettings | None = None) -> Rig:
     """Read and compile a model, without what is only seen, and see that it is a rig.
 
     Args:
         path: The model's file.
         lock: Whether to take the yaw joint out.
         locked_axes: Axes whose hinges to take out.
+        bend: How the frame bends, if it does.
 
     Returns:
         The compiled model with its axes.
@@ -139,6 +141,9 @@ def load_rig(path: Path, *, lock: bool, locked_axes: Sequence[str] = ()) -> Rig:
     if locked_axes:
         lock_axes(spec, rig.model, locked_axes, rig.axes, path)
         rig = rig._replace(model=compile_model(spec, path))
+    if bend is not None and bend.bends:
+        bend_frame(spec, rig.model, bend, {name: rig.axes[name] for name in rig.axes if name not in locked_axes}, path)
+        rig = rig._replace(model=compile_model(spec, path))
     return rig
 
 
@@ -147,7 +152,7 @@ def parse_drawn(path: Path, settings: PlantSettings, axes: Mapping[str, Sequence
 
     Args:
         path: The model's file.
-        settings: Which hinges to take out.
+        settings: Which hinges to take out, and how the frame bends.
         axes: All axes of the rig.
 
     Returns:
@@ -161,6 +166,9 @@ def parse_drawn(path: Path, settings: PlantSettings, axes: Mapping[str, Sequence
         lock_thrust_bearing(spec, path)
     if settings.locked_axes:
         lock_axes(spec, compile_model(spec, path), settings.locked_axes, axes, path)
+    if settings.bends:
+        unlocked = {name: axes[name] for name in axes if name not in settings.locked_axes}
+        bend_frame(spec, compile_model(spec, path), settings, unlocked, path)
     return spec
 
 

@@ -13,6 +13,8 @@ from cmg_mj.errors import nearest
 EQUILIBRIUM_KEY = "equilibrium"
 TILT_ELEMENT = "tilt"
 """The hinge that a rig tilts about, or the site whose y axis lies along a line that it tilts about."""
+BEND_JOINT = "bend"
+"""Joint and body that a frame which bends gets, beside what its file has."""
 SENSORS = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
 REQUIRED_PARTS = (
     "a rig needs a joint or a site tilt, the joints MODULE/gimbal, MODULE/flywheel, the actuators MODULE/gimbal_servo, "
@@ -23,6 +25,9 @@ REQUIRED_PARTS = (
 ON_A_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 """Transmissions of an actuator that drives a joint."""
 _OF_A_MODULE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
+JOINT_KINDS = {
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name for name in ("hinge", "slide", "ball", "free")
+}
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import copy
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Unpack
@@ -27,16 +27,18 @@ from cmg_mj.inputs.messages import complaint
 from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
+from cmg_mj.plant.bend_model import bend_model
 from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse_drawn
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, element_id
+from cmg_mj.plant.parts import EQUILIBRIUM_KEY, JOINT_KINDS, element_id
+from cmg_mj.plant.sliding_model import sliding_model
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
 from cmg_mj.scenario.plant_parameters import PlantParameters
-from cmg_mj.scenario.plant_settings import FINEST_STEP_S, PlantSettings
+from cmg_mj.scenario.plant_settings import COMPILED_FIELDS, FINEST_STEP_S, PlantSettings
 from cmg_mj.scenario.schema import ObserverSettings
 from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
@@ -44,10 +46,6 @@ from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from cmg_mj.sensors.ideal import MultiAxisReading
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import RadialTilt
-
-JOINT_KINDS = {
-    int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name for name in ("hinge", "slide", "ball", "free")
-}
 
 
 class Plant:
@@ -62,7 +60,11 @@ class Plant:
         yaw: Address of q_a, or None if the thrust bearing is locked.
         largest_step: The largest physics step that is accurate enough [s].
         backlash: Between the servos' motors and the gimbals [rad].
+        above_centre_m: So much above the common mass centre lies the point that the tilt estimate of a pivot that
+            slides takes to be at rest: an error of the estimate, which settings made from this plant keep [m].
     """
+
+    above_centre_m = 0.0
 
     def __init__(
         self,
@@ -73,7 +75,7 @@ class Plant:
     ) -> None:
         self.path = path
         locked, lock = settings.locked_axes, settings.lock_thrust_bearing
-        self.model, modules, self.hints = load_rig(path, lock=lock, locked_axes=locked)
+        self.model, modules, self.hints = load_rig(path, lock=lock, locked_axes=locked, bend=settings)
         self._as_filed = self.model
         self.key = element_id(self.model, "key", EQUILIBRIUM_KEY)
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in self.joint_names else None
@@ -95,7 +97,7 @@ class Plant:
         """The same rig with other settings, without compiling its file again.
 
         Args:
-            settings: Settings with the same model file, which lock the thrust bearing and axes alike.
+            settings: Settings with the same model file, the same locks and the same bend.
             grid: The times that whole physics steps must fill.
             of_axes: The settings of axes that have their own.
 
@@ -112,9 +114,8 @@ class Plant:
         return other
 
     def is_of_same_file(self, settings: PlantSettings) -> bool:
-        """Return whether `changed` can take these settings: the same model file with the same locks."""
-        names = ("model", "lock_thrust_bearing", "locked_axes")
-        return all(getattr(self.settings, name) == getattr(settings, name) for name in names)
+        """Return whether `changed` can take these settings: the same model file, locks and bend."""
+        return all(getattr(self.settings, name) == getattr(settings, name) for name in COMPILED_FIELDS)
 
     def _apply_settings(
         self, settings: PlantSettings, grid: TimeGrid | None, of_axes: Mapping[str, PlantSettings]
@@ -130,7 +131,8 @@ class Plant:
                 axis,
                 bias=math.radians(axis_settings.equilibrium_bias_deg),
                 initial_tilt=math.radians(axis_settings.initial_tilt_deg),
-                radial_tilt=place_accelerometers(self.model, axis_settings, axis, self.path),
+                radial_tilt=place_accelerometers(self.model, axis_settings, axis, self.path, self.above_centre_m),
+                misplaced=axis_settings.has_misplaced,
             )
             if speed is not None:
                 modules = with_flywheel_speed(self.model, self.key, axis.modules, speed, self.path)
@@ -143,16 +145,15 @@ class Plant:
             set_turn_rate(self.model, self.key, settings.turn_rate_rad_s, self.path)
         vary(self.model, settings, self.path, self.axes, held)
         speeds = [abs(module.speed) for axis in self.axes for module in axis.modules]
-        shaken = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
-        self.largest_step = largest_step(self.model, self.key, float(self.model.opt.timestep), shaken)
+        shake_rate = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
+        self.largest_step = largest_step(self.model, self.key, float(self.model.opt.timestep), shake_rate)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
                 f"{FINEST_STEP_S:g} s; soften it, or set plant.timestep_s"
             )
-        self.model.opt.timestep = (
-            grid.physics_step(self.largest_step) if grid else settings.timestep_s or self.largest_step
-        )
+        step = grid.physics_step(self.largest_step) if grid else settings.timestep_s
+        self.model.opt.timestep = step or self.largest_step
         if not survives_first_steps(self.model, self.new_data()):
             raise InputError(
                 f"{self._error_source}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, "
@@ -162,8 +163,8 @@ class Plant:
     @property
     def _error_source(self) -> str:
         """Culprit if the physics fails: the settings that change it, or without such settings the file."""
-        changes = [f"plant.{name} = {value:g}" for name, value in self.settings.changes_of_physics().items()]
-        return ", ".join(changes) or str(self.path)
+        changes = self.settings.changes_of_physics()
+        return ", ".join(f"plant.{name} = {value:g}" for name, value in changes.items()) or str(self.path)
 
     @cached_property
     def drawn_model(self) -> mujoco.MjModel:
@@ -296,8 +297,7 @@ class Plant:
         """
         if len(self.axes) > 1:
             raise InputError(f"{self.path}: tilts about several axes; use multi_axis_controller")
-        law = law or StateFeedback(dt=0.005)
-        sensors = sensors or Sensors()
+        law, sensors = law or StateFeedback(dt=0.005), sensors or Sensors()
         if isinstance(observer, (str, Mapping)):
             settings = ObserverSettings(**({"kind": observer} if isinstance(observer, str) else observer))
             observer = settings.make(law.dt, self.reduced, self.parameters.noise(sensors))
@@ -336,9 +336,10 @@ class Plant:
     def parameters(self) -> PlantParameters:
         """Parameters from which a scenario's controller and observers are made."""
         names = tuple(module.name for module in self.axis.modules)
-        return PlantParameters(
-            self.path, names, self.reduced, self.radial_tilt, self.gravity, self.timestep, self.largest_step, self.hints
-        )
+        numbers = self.reduced, self.radial_tilt, self.gravity, self.timestep, self.largest_step
+        bend = bend_model(self.model, self.key, self.axis, self.settings)
+        slide = partial(sliding_model, self.model, self.key, self.axis) if self.reduced.pivot_arm else None
+        return PlantParameters(self.path, names, *numbers, self.hints, bend, slide)
 
     def initialise(self, data: mujoco.MjData) -> None:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""

@@ -17,21 +17,21 @@ OTHERS_LIMIT_S = 0.001
 """Largest step of MuJoCo's other integrators; none is as accurate at any step that costs less [s]."""
 
 
-def largest_step(model: mujoco.MjModel, key: int, own_s: float, shaken: float = 0.0) -> float:
+def largest_step(model: mujoco.MjModel, key: int, own_s: float, shake_rate: float = 0.0) -> float:
     """The largest physics step that is accurate enough for a rig [s].
 
     Args:
         model: The compiled model, with its friction and its integrator.
         key: The keyframe at which it is judged.
         own_s: The model file's own step [s], which is never exceeded: it knows about contacts, say.
-        shaken: How fast something shakes the rig, which none of its poles shows [rad/s]: an unbalanced flywheel.
+        shake_rate: Rate at which an unbalanced flywheel shakes the rig, which none of its poles shows [rad/s].
 
     Returns:
         The step [s].
     """
     if int(model.opt.integrator) != int(mujoco.mjtIntegrator.mjINT_RK4):
         return min(own_s, OTHERS_LIMIT_S)
-    return min(own_s, RK4_LIMIT / max(fastest_rate(model, key), shaken, RK4_LIMIT / own_s))
+    return min(own_s, RK4_LIMIT / max(fastest_rate(model, key), shake_rate, RK4_LIMIT / own_s))
 
 
 def fastest_rate(model: mujoco.MjModel, key: int) -> float:
@@ -44,8 +44,23 @@ def fastest_rate(model: mujoco.MjModel, key: int) -> float:
     Returns:
         The rate [1/s]; 0 where the model has no finite accelerations, which is found elsewhere.
     """
-    smooth = copy.copy(model)
-    smooth.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+    jacobian = state_matrix(model, key)
+    if not np.isfinite(jacobian).all():
+        return 0.0
+    return float(np.abs(np.linalg.eigvals(jacobian)).max())
+
+
+def state_matrix(model: mujoco.MjModel, key: int) -> np.ndarray:
+    """The matrix A of a rig without dry friction, linearised at a keyframe by central differences.
+
+    Args:
+        model: The compiled model.
+        key: The keyframe.
+
+    Returns:
+        A, (n, n), of the joints' angles from the keyframe (nv,), their rates (nv,) and the actuators' states.
+    """
+    smooth = _without_dry_friction(model)
     data = mujoco.MjData(smooth)
     nv = smooth.nv
 
@@ -66,7 +81,34 @@ def fastest_rate(model: mujoco.MjModel, key: int) -> float:
     for direction, size in zip(np.eye(len(at)), sizes, strict=True):
         h = 1e-5 * size
         columns.append((slope(at + h * direction) - slope(at - h * direction)) / (2.0 * h))
-    jacobian = np.array(columns).T
-    if not np.isfinite(jacobian).all():
-        return 0.0
-    return float(np.abs(np.linalg.eigvals(jacobian)).max())
+    return np.array(columns).T
+
+
+def input_column(model: mujoco.MjModel, key: int, command: np.ndarray) -> np.ndarray:
+    """The column of B for commands in given proportions.
+
+    Args:
+        model: The compiled model.
+        key: The keyframe.
+        command: What each actuator gets, (nu,).
+
+    Returns:
+        The slope of the state of `state_matrix` by the command, (n,).
+    """
+    smooth = _without_dry_friction(model)
+    data = mujoco.MjData(smooth)
+    h = 1e-5
+
+    def slope(size: float) -> np.ndarray:
+        mujoco.mj_resetDataKeyframe(smooth, data, key)
+        data.ctrl[:] += size * command
+        mujoco.mj_forward(smooth, data)
+        return np.concatenate([data.qvel, data.qacc, data.act_dot])
+
+    return (slope(h) - slope(-h)) / (2.0 * h)
+
+
+def _without_dry_friction(model: mujoco.MjModel) -> mujoco.MjModel:
+    smooth = copy.copy(model)
+    smooth.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+    return smooth

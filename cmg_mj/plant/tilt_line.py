@@ -12,6 +12,8 @@ import numpy as np
 
 from cmg_mj.elementwise import Scalar, atan2
 
+UP = np.array([0.0, 0.0, 1.0])
+
 
 class Addressed(Protocol):
     """Numbers of MuJoCo's, by address: of one world floats, of many arrays (n_worlds,)."""

@@ -12,8 +12,9 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import Axis
+from cmg_mj.plant.bend import step_for_bend
 from cmg_mj.plant.mujoco_state import at_keyframe
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, Module, element_id
+from cmg_mj.plant.parts import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.sensors.tilt import RadialTilt
@@ -43,7 +44,7 @@ def vary(
 
     Raises:
         InputError: The body that tilts has no mass of its own to move or no joint for friction, or a servo is none that
-            has what is to differ.
+            has what is to differ; or a bend does not go together with the rest.
     """
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
@@ -68,11 +69,13 @@ def vary(
     _vary_servos(model, settings, path, modules)
     shifts = [bias_shift(model, axis, axis.bias, path) for axis in axes if axis.bias]
     for axis, shift in zip([axis for axis in axes if axis.bias], shifts, strict=True):
-        model.body_ipos[axis.frame] += shift
+        model.body_ipos[frame_bodies(model, axis)] += shift
     if settings.flywheel_imbalance_kg_m:
         for module in modules:
             body = int(model.dof_bodyid[module.flywheel_dof])
             model.body_ipos[body, 0] += settings.flywheel_imbalance_kg_m / model.body_mass[body]
+    if settings.bends:
+        model.opt.timestep = step_for_bend(settings, model.opt.timestep, path)
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
 
 
@@ -130,42 +133,64 @@ def set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> N
     model.key_qvel[key, model.jnt_dofadr[joint]] = model.key_ctrl[key, servo] = rate
 
 
-def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path) -> RadialTilt:
+def place_accelerometers(
+    model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path, above_centre: float = 0.0
+) -> RadialTilt:
     """Move the accelerometers of an axis along the radial line.
 
     Args:
         model: The model, as its file has it.
-        settings: Their distances from the tilt axis; what is left out stays.
+        settings: Their distances from the tilt axis, what is left out stays; and how far off these they sit.
         axis: The axis, as its file has it.
         path: The model's file, for messages.
+        above_centre: Height above the common mass centre of the point that the tilt estimate of a pivot that slides
+            takes to be at rest [m].
 
     Returns:
-        The tilt estimate for their new places.
+        The tilt estimate for their new places, as far as it knows them.
 
     Raises:
         InputError: The outer one is no farther out than the inner one.
     """
     as_filed = axis.radial_tilt
+    height = _still_height(settings, axis, path, above_centre)
     distances = {
         "accelerometer_inner": (settings.accelerometer_inner_m, as_filed.r_inner),
         "accelerometer_outer": (settings.accelerometer_outer_m, as_filed.r_outer),
     }
-    if all(to is None for to, _ in distances.values()):
-        return as_filed
-    inner, outer = (was if to is None else to for to, was in distances.values())
-    if not inner < outer:
-        changed = ", ".join(f"plant.{name}_m = {to:g}" for name, (to, _) in distances.items() if to is not None)
+    if all(to is None for to, _ in distances.values()) and not settings.has_misplaced:
+        return as_filed.about(height)
+    known = [was if to is None else to for to, was in distances.values()]
+    off = {
+        "accelerometer_inner": settings.accelerometer_inner_misplaced_mm,
+        "accelerometer_outer": settings.accelerometer_outer_misplaced_mm,
+    }
+    inner, outer = (at + 1e-3 * error for at, error in zip(known, off.values(), strict=True))
+    if not (known[0] < known[1] and 0.0 < inner < outer):
+        changes = {f"plant.{name}_m": to for name, (to, _) in distances.items() if to is not None}
+        changes |= {f"plant.{name}_misplaced_mm": error for name, error in off.items() if error}
+        changed = ", ".join(f"{name} = {value:g}" for name, value in changes.items())
         raise InputError(
             f"{changed}: the inner accelerometer must lie nearer to the tilt axis than the outer one, and they are "
             f"{inner:g} and {outer:g} m away ({path})"
         )
-    for name, (to, was) in distances.items():
-        if to is not None:
+    for (name, (set_to, was)), to in zip(distances.items(), (inner, outer), strict=True):
+        if set_to is not None or off[name]:
             site = int(model.sensor_objid[element_id(model, "sensor", axis.prefix + name)])
             arm = model.site_pos[site] - axis.point
             model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (to / was - 1.0)
             model.site_sameframe[site] = 0  # should it have stood where the body's frame does
-    return RadialTilt(inner, outer)
+    return RadialTilt(*known).about(height)
+
+
+def _still_height(settings: PlantSettings, axis: Axis, path: Path, above_centre: float) -> float:
+    """Height above the pivot of the point that the tilt estimate takes to be at rest [m]."""
+    if not settings.pivot_slides:
+        return 0.0
+    if not axis.reduced.pivot_arm:
+        about = f" of axis {axis.name!r}" if axis.name else ""
+        raise InputError(f"plant.pivot_slides = true: {path}: the pivot{about} does not slide freely; leave it out")
+    return axis.reduced.pivot_arm + above_centre
 
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:
@@ -229,7 +254,14 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
     centre = to_frame @ (data.subtree_com[all_that_tilts] - data.xpos[frame]) - axis.point
     radial = centre - (centre @ axis.direction) * axis.direction
     turned = math.cos(bias) * radial + math.sin(bias) * np.cross(axis.direction, radial)
-    return model.body_subtreemass[all_that_tilts] / model.body_mass[frame] * (turned - radial)
+    own = sum(float(model.body_mass[body]) for body in frame_bodies(model, axis))
+    return model.body_subtreemass[all_that_tilts] / own * (turned - radial)
+
+
+def frame_bodies(model: mujoco.MjModel, axis: Axis) -> list[int]:
+    """The frame, and the part of it beyond a bend if there is one."""
+    part = element_id(model, "body", BEND_JOINT)
+    return [axis.frame, *([part] if part >= 0 else [])]
 
 
 def _hinge(axis: Axis, path: Path) -> int:

@@ -19,6 +19,10 @@ FLOORS = (FLOOR_Y1, FLOOR_ACCELERATION)
 """Names of the floors, in the order of every table."""
 NOISE_ALONE = "Floors are for the sensors' noise alone: no other error of theirs, and a pivot at rest."
 """Said wherever they are printed."""
+NO_ACCELERATION_FLOOR = (
+    "No floor_accel: it is for the sensors' noise alone and a pivot at rest.\nfloor_y1 has all errors of y1 in it."
+)
+"""Said where a pivot moves, or accelerometers vibrate or are off their radii."""
 
 MEMORY_S = 0.5
 """Memory of the filters of y1 that are tried for its floor [s]."""
@@ -153,17 +157,22 @@ class Floors:
     Args:
         noises: Noise of one sample of y1 and its acceleration, a world each.
         dt: Sample period [s].
+        has_acceleration: Which worlds have a floor of y1 with its acceleration, (n_worlds,); None: all. It is no floor
+            where a pivot moves, or where accelerometers vibrate or are off their radii.
     """
 
-    def __init__(self, noises: Sequence[TiltNoise], dt: float) -> None:
+    def __init__(self, noises: Sequence[TiltNoise], dt: float, has_acceleration: Sequence[bool] | None = None) -> None:
         self._y1 = TiltFloor(dt, len(noises))
         self._acceleration = [acceleration_floor(noise, dt) for noise in noises]
+        self._has_acceleration = has_acceleration or [True] * len(noises)
         self.add = self._y1.add
 
     def errors(self, world: int) -> dict[str, tuple[float | None, float | None]]:
         """Compute each floor's RMS error in the whole run and in the push windows of one world [rad/s]."""
-        error = self._acceleration[world]
-        return {FLOOR_Y1: self._y1.errors(world), FLOOR_ACCELERATION: (error, error)}
+        floors = {FLOOR_Y1: self._y1.errors(world)}
+        if self._has_acceleration[world]:
+            floors[FLOOR_ACCELERATION] = self._acceleration[world], self._acceleration[world]
+        return floors
 
 
 def _edges(memory: int) -> list[int]:

@@ -14,6 +14,7 @@ from cmg_mj.errors import InputError, nearest
 from cmg_mj.results.per_world_table import as_table
 from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, open_loop_figures
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.results.wire import WireReport
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -57,6 +58,7 @@ class Result:
         seed: Seed of the sensors' noise.
         worlds: The worlds' numbers, (n_worlds,).
         driver: Who called the controller, or was it.
+        wire: Exchange with a real board, if one decided.
     """
 
     outcomes: list[Outcome]
@@ -67,6 +69,7 @@ class Result:
     seed: int = 0
     worlds: Sequence[int] = ()
     driver: Driver = "native"
+    wire: WireReport | None = None
 
     @property
     def stood(self) -> np.ndarray:
@@ -93,13 +96,14 @@ class Result:
         """
         summaries: Sequence[Mapping[str, SummaryValue]] = self.summaries
         if estimator is not None:
-            others = open_loop_figures(self.summaries[0])
+            others = self._open_loop_names
             if estimator not in others:
                 raise InputError(f"{estimator!r}: no open-loop observer of this run; {nearest(estimator, others)}")
-            summaries = [open_loop_figures(summary)[estimator] for summary in summaries]
-        if key not in summaries[0]:
-            raise InputError(f"{key!r}: not in the summary; {nearest(key, summaries[0])}")
-        figures = [summary[key] for summary in summaries]
+            summaries = [open_loop_figures(summary).get(estimator, {}) for summary in summaries]
+        known = dict.fromkeys(name for summary in summaries for name in summary)
+        if key not in known:
+            raise InputError(f"{key!r}: not in the summary; {nearest(key, known)}")
+        figures = [summary.get(key) for summary in summaries]
         numbers = np.array([math.nan if figure is None else figure for figure in figures], dtype=float)
         return np.where(self.stood, numbers, math.nan)
 
@@ -108,6 +112,11 @@ class Result:
         values = self.values(key, estimator)
         known = values[np.isfinite(values)]
         return statistics.fmean(known) if len(known) else None
+
+    @property
+    def _open_loop_names(self) -> list[str]:
+        """Names of the open-loop observers, then of the baselines; a world may lack a floor."""
+        return list(dict.fromkeys(name for summary in self.summaries for name in open_loop_figures(summary)))
 
     def rows(self, estimator: str | None = None) -> list[Summary]:
         """Make the rows of `table` of one estimator.
@@ -133,7 +142,7 @@ class Result:
                 **{key: value for key, value in figures.items() if key not in NESTED},
             }
             for world, outcome, summary in zip(worlds, self.outcomes, self.summaries, strict=True)
-            for figures in [open_loop_figures(summary)[estimator] if estimator else summary]
+            for figures in [open_loop_figures(summary).get(estimator, {}) if estimator else summary]
         ]
 
     def table(self) -> pa.Table:
@@ -143,7 +152,7 @@ class Result:
             Columns `observer`, `in_loop_of`, `world`, `seed`, `outcome`, `stood`, `end_time_s`, `reason`, then
             every figure of the summary, null where there is none. Where `stood` is false they are those until the end.
         """
-        estimators = [None, *open_loop_figures(self.summaries[0])]
+        estimators = [None, *self._open_loop_names]
         return as_table(row for estimator in estimators for row in self.rows(estimator))
 
     def split(self, count: int) -> list[Result]:

@@ -14,7 +14,7 @@ from rich.text import Text
 from cmg_mj.inputs.bundled import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.results import markdown
-from cmg_mj.results.error_bounds import FLOORS, NOISE_ALONE
+from cmg_mj.results.error_bounds import FLOOR_ACCELERATION, FLOORS, NO_ACCELERATION_FLOOR, NOISE_ALONE
 from cmg_mj.results.intervals import Interval, format_interval, in_line
 from cmg_mj.results.summary_keys import (
     AXES,
@@ -28,6 +28,7 @@ from cmg_mj.results.summary_keys import (
     open_loop_figures,
     section,
 )
+from cmg_mj.results.wire import wire_line
 from cmg_mj.scenario.description import assignments
 from cmg_mj.scenario.differences import describe_differences
 from cmg_mj.scenario.loading import load_scenario
@@ -127,13 +128,18 @@ def comparison_note(summaries: Comparison) -> str:
     ]
     loop = next((summary["in_loop_of"] for summary in summaries if "in_loop_of" in summary), None)
     if loop:
+        has_acceleration = any(summary["observer"] == FLOOR_ACCELERATION for summary in summaries)
+        acceleration = (
+            "; floor_accel, the least error that y1 with its acceleration allow for whatever\nmotion"
+            if has_acceleration
+            else ""
+        )
         lines.append(
             f"Open loop, on the motion of {loop}, the best:\n"
             "zero, an estimate of zero; mems_as_bought, a two-dollar gyro with its offset; mems_gyro, the same\n"
             "after a second at rest, at constant temperature; mems_fused, as bought, in a Kalman filter with y1;\n"
             "floor_y1, the best time-invariant filter of y1 alone (its last 0.5 s, 16 taps) for this very world,\n"
-            "found afterwards; floor_accel, the least error that y1 with its acceleration allow for whatever\n"
-            f"motion. {NOISE_ALONE}"
+            f"found afterwards{acceleration}.{' ' if has_acceleration else chr(10)}{_about_floors(has_acceleration)}"
         )
     return "\n".join(lines)
 
@@ -141,6 +147,7 @@ def comparison_note(summaries: Comparison) -> str:
 def run_title(summary: Mapping[str, SummaryValue]) -> str:
     """Name a run in a line: scenario, observer, seed, world, what differs from the bundled scenario."""
     place = " on the board" if summary.get("driver") == "board" else ""
+    place += f" at {summary['port']}" if "port" in summary else ""
     world = f", world {summary['world']}" if "world" in summary else ""
     changes = summary["differs"]
     differs = describe_differences(changes) if isinstance(changes, Mapping) else ""
@@ -164,8 +171,14 @@ def summary_table(summary: Mapping[str, SummaryValue]) -> Group:
             figures = (format_figure(key, axis_summary.get(key)) for axis_summary in axes.values())
             table.add_row(capitalised(heading(key)), *figures)
     open_loop = [_open_loop_table(name, axis_summary) for name, axis_summary in axes.items()]
-    has_floors = any(name in open_loop_figures(axis_summary) for axis_summary in axes.values() for name in FLOORS)
-    return Group(table, *(rows for rows in open_loop if rows.row_count), *([NOISE_ALONE] if has_floors else []))
+    floors = {name for axis_summary in axes.values() for name in FLOORS if name in open_loop_figures(axis_summary)}
+    about = [_about_floors(FLOOR_ACCELERATION in floors)] if floors else []
+    wire = [line] if (line := wire_line(summary)) else []
+    return Group(table, *(rows for rows in open_loop if rows.row_count), *about, *wire)
+
+
+def _about_floors(has_acceleration: bool) -> str:
+    return NOISE_ALONE if has_acceleration else NO_ACCELERATION_FLOOR
 
 
 def _open_loop_table(axis: str, summary: Mapping[str, SummaryValue]) -> Table:

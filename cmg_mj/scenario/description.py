@@ -8,12 +8,24 @@ from collections.abc import Iterable, Iterator, Mapping
 from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.errors import TomlValue
+from cmg_mj.scenario.bend_cures import NEAR, Trial, cure_among, trials, try_loop
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
+from cmg_mj.scenario.linear_plant import rk4_energy_loss
+from cmg_mj.scenario.omissions import omissions
+from cmg_mj.scenario.pivot_track import read_track
 from cmg_mj.scenario.plant_parameters import PlantParameters
+from cmg_mj.scenario.plant_settings import BendBeyond
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
-from cmg_mj.scenario.stability_check import closed_loop, hints
+from cmg_mj.scenario.sliding_pivot import IN_THE_MODEL, NOT_IN_THE_MODEL, sliding_words
+from cmg_mj.scenario.stability_check import bend_hint, closed_loop, hints, plant_hints
+
+BEYOND: dict[BendBeyond, str] = {
+    "sensors": "with the sensors; the modules, whose tilt and rate count as true, are before it",
+    "modules": "with the modules, whose tilt and rate count as true; the sensors are before it",
+    "both": "with the modules, whose tilt and rate count as true, and the sensors",
+}
 
 
 def description(name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "") -> str:
@@ -57,14 +69,69 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
         *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
     rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
+    for pivot in scenario.pivot:
+        rows.append(("pivot", pivot.words))
+        if pivot.file is not None:
+            rows.append(("", read_track(pivot.file, pivot.column).words))
+    rows += _pivot_rows(rig)
+    missing = list(omissions(scenario).values())
+    if missing:
+        rows.append(("omitted", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
+    trial = try_loop(scenario, rig)
+    rows += _bend_rows(scenario, rig, trial)
+    clauses = [*plant_hints(scenario, design, rig), *bend_hint(rig, trial)]
     return lines(
         f"{name}{f', axis {axis}' if axis else ''}: valid",
-        [*rows, *(("hint", hint) for hint in hints(scenario, design, rig))],
+        [*rows, *(("hint", hint) for hint in clauses)],
     )
 
 
 def _about(torque: Push | Swing) -> str:
     return "" if torque.axis is None else f" about {torque.axis}"
+
+
+def _pivot_rows(rig: PlantParameters) -> Iterator[tuple[str, str]]:
+    """Where a pivot slides: what the tilt is taken about, and what of the sliding is in the reduced model."""
+    if rig.reduced.pivot_arm:
+        yield "pivot", sliding_words(rig)
+        yield "", f"in the reduced model: {IN_THE_MODEL}"
+        yield "", f"not in it: {NOT_IN_THE_MODEL}"
+
+
+def _bend_rows(scenario: Scenario, rig: PlantParameters, trial: Trial | None) -> Iterator[tuple[str, str]]:
+    """The mode of a frame that bends, the loop around it, and a cure for that if it needs one."""
+    if rig.bend is None:
+        return
+    plant, bend = scenario.plant, rig.bend
+    loss, numerical = bend.energy_loss, rk4_energy_loss(bend.frequency_hz, rig.timestep)
+    mode = f"{bend.frequency_hz:g} Hz, damping ratio {bend.damping_ratio:g}"
+    yield "bend", f"{mode}, beyond it {plant.bend_share:g} of the inertia"
+    yield "", BEYOND[plant.bend_beyond]
+    yield "", f"loses {100.0 * loss:.3g} % of its energy a second, and {100.0 * numerical:.2g} % to the physics steps"
+    if trial is None:
+        yield "", "its loop is not computed for code of your own"
+        return
+    yield "", f"the loop with it, feedback from the {scenario.controller.feedback}: {trial.words}"
+    if not trial.is_stable_rigid:
+        yield "cure", "none is tried: law, observer and notch have to hold a rigid frame first"
+    if not trial.is_near:
+        return
+    others = trials(scenario, rig)
+    for other in others:
+        yield "tried", f"{' '.join(other.settings)}: {other.words}"
+    cure = cure_among(others)
+    if cure is None or (trial.is_stable and cure.distance <= trial.distance):
+        yield (
+            "cure",
+            "none of these: the mode is too near the loop's bandwidth; a stiffer frame or another observer may",
+        )
+        return
+    little = "" if cure.distance >= NEAR else ", with little margin"
+    yield "cure", f"{' '.join(f'--set {_quoted(setting)}' for setting in cure.settings)}{little}"
+
+
+def _quoted(setting: str) -> str:
+    return f"'{setting}'" if " " in setting else setting
 
 
 def _law_rows(
@@ -74,10 +141,14 @@ def _law_rows(
     controller, law = scenario.controller, design.law
     limits = f"at {controller.rate_hz:g} Hz, at most {controller.rate_limit_rad_s:g} rad/s"
     inputs = f"tilt rate from the {controller.feedback}, {controller.angle_source} angles"
+    notch = f"notch at {controller.notch_hz:g} Hz on the command" if controller.notch_hz else ""
     if isinstance(law, StateFeedback):
         loop = closed_loop(scenario, law, rig.reduced)
         yield "law", f"K_e = {number(law.gains)} {limits}"
         yield "", inputs
+        if notch:
+            fast = f", not in the next lines: beyond {0.5 / loop.period:g} Hz the sensors show nothing"
+            yield "", notch if loop.notch_hz else f"{notch}{fast}"
         yield "", f"{loop.words} with the reduced model and its true state, slowest pole {loop.slowest:.3g} 1/s,"
         yield "", f"least damping ratio {loop.damping:.2g}, nearest to -1 {loop.distance:.2g}"
         return
@@ -86,6 +157,8 @@ def _law_rows(
     if parameters:
         yield "", assignments(parameters)
     yield "", inputs if needs(law) else "takes nothing of the observer, which is judged only"
+    if notch:
+        yield "", notch
     if controller.kind not in LAWS:
         yield "", "your own code, which was imported and tried on two samples"
 
@@ -117,6 +190,7 @@ def rig_description(
         ("modules", ", ".join(rig.modules)),
         ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
         ("", f"omega_d = {reduced.omega_d:.6g} rad/s, m g l/sqrt(2) = {reduced.gravity_torque:.6g} N m"),
+        *_pivot_rows(rig),
         ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),
         ("law", law),
         *(("hint", hint) for hint in clauses),

@@ -100,6 +100,7 @@ class Design:
             feedback=settings.feedback,
             angle_source=settings.angle_source,
             bias_trim_s=settings.bias_trim_s,
+            notch_hz=settings.notch_hz,
             open_loop_observers=self.open_loop_observers(),
             axis=axis,
         )

@@ -48,12 +48,11 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
     for setting in overrides:
         changes.append(f"--set {setting}")
         override(fields, setting)
-    if _kind_of(fields, "controller") != law:
-        _drop_gains(fields, overrides)
+    _drop_gains(fields, overrides, _kind_of(fields, "controller") != law)
     scenario = parse_scenario(fields, " ".join([name, *(["with"] if changes else []), *changes]))
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in overrides):
         scenario = find_model(scenario, path.parent)
-    return scenario
+    return find_tracks(scenario, path.parent)
 
 
 def _take_observer(fields: dict[str, Any], observer: str) -> None:
@@ -68,11 +67,16 @@ def _take_observer(fields: dict[str, Any], observer: str) -> None:
         fields["observer"] = {"kind": observer}
 
 
-def _drop_gains(fields: dict[str, Any], overrides: Iterable[str]) -> None:
-    """The file's gains are its law's: another law, which --set names, does without unless --set gives it some."""
+def _drop_gains(fields: dict[str, Any], overrides: Iterable[str], has_law_changed: bool) -> None:
+    """Take the file's gains out where --set names another law; of gains and lqr, the one that --set does not give."""
     set_fields = [setting.partition("=")[0].strip() for setting in overrides]
-    for name in ("gains", "lqr"):
-        if not any(f"{field}.".startswith(f"controller.{name}.") for field in set_fields):
+    unset = [
+        name
+        for name in ("gains", "lqr")
+        if not any(f"{field}.".startswith(f"controller.{name}.") for field in set_fields)
+    ]
+    if has_law_changed or len(unset) == 1:
+        for name in unset:
             fields["controller"].pop(name, None)
 
 
@@ -112,3 +116,26 @@ def find_model(scenario: Scenario, beside: Path) -> Scenario:
     with scenario.named_in_errors():
         model = find("models", scenario.plant.model, ".xml", "plant.model =", beside)
     return scenario.model_copy(update={"plant": dataclasses.replace(scenario.plant, model=str(model))})
+
+
+def find_tracks(scenario: Scenario, beside: Path) -> Scenario:
+    """Return the scenario with the whole paths of its tracks, which a scenario file names relative to itself."""
+    pivots = []
+    for pivot in scenario.pivot:
+        if pivot.file is not None:
+            pivot = dataclasses.replace(pivot, file=find_track(pivot.file, beside))
+        pivots.append(pivot)
+    return scenario.model_copy(update={"pivot": pivots}) if pivots else scenario
+
+
+def find_track(file: str, beside: Path) -> str:
+    """Return the whole path of a track, which may start from a folder; a file that is nowhere keeps its name."""
+    paths = [path for path in (beside / file, Path(file)) if _is_file(path)]
+    return str(paths[0].resolve()) if paths else file
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that is too long
+        return False

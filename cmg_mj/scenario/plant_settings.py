@@ -13,6 +13,12 @@ from cmg_mj.inputs.field_types import STRICT, Batched, NonNegative, PerAxis, Pos
 FINEST_STEP_S = 1e-6
 """The smallest physics step [s]."""
 Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
+COMPILED_FIELDS = (
+    *("model", "lock_thrust_bearing", "locked_axes"),
+    *("bend_frequency_hz", "bend_damping_ratio", "bend_share", "bend_beyond"),
+)
+"""Settings on which it depends what is compiled; the others change the compiled model."""
+BendBeyond = Literal["sensors", "modules", "both"]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -38,10 +44,22 @@ class PlantSettings:
         accelerometer_inner_m: The inner accelerometer's distance from the tilt axis on the radial line [m]. The tilt
             estimate knows it.
         accelerometer_outer_m: The outer accelerometer's [m].
+        accelerometer_inner_misplaced_mm: So much farther out the inner accelerometer sits than the tilt estimate
+            knows [mm].
+        accelerometer_outer_misplaced_mm: The outer accelerometer likewise [mm].
+        pivot_slides: What the tilt joint hangs on slides freely, as a light cart does, and the tilt estimate knows it:
+            it counts the accelerometers' distances from the common mass centre, which stays where it is. Otherwise
+            from the pivot.
         tilt_friction_n_m: Dry friction of the tilt joint [N m].
         tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
         flywheel_speed_rad_s: At which all flywheels turn, each in its own direction [rad/s]. The controller knows it.
         flywheel_imbalance_kg_m: Static imbalance of each flywheel, mass times offset [kg m].
+        bend_frequency_hz: The frame bends: the undamped frequency of its torsional mode about the tilt axis with the
+            hinge free, all else at rest and no gravity; 0 of a rigid frame [Hz].
+        bend_damping_ratio: Damping ratio of that mode.
+        bend_share: Share of the inertia about the tilt axis that lies beyond the bend, seen from the pivot.
+        bend_beyond: Beyond the bend are the `sensors` (on a mast; the modules are before it), the `modules` (the
+            sensors are before it, on the base) or `both` (on the base there is neither).
     """
 
     model: str = "scissored_pair.xml"
@@ -60,18 +78,46 @@ class PlantSettings:
     servo_damping_n_m_s_rad: Annotated[NonNegative | None, Batched()] = None
     accelerometer_inner_m: Annotated[Positive | None, Batched(), PerAxis()] = None
     accelerometer_outer_m: Annotated[Positive | None, Batched(), PerAxis()] = None
+    accelerometer_inner_misplaced_mm: Annotated[float, Batched(), PerAxis()] = 0.0
+    accelerometer_outer_misplaced_mm: Annotated[float, Batched(), PerAxis()] = 0.0
+    pivot_slides: Annotated[bool, PerAxis()] = False
     tilt_friction_n_m: Annotated[NonNegative | None, Batched()] = None
     tilt_damping_n_m_s: Annotated[NonNegative | None, Batched()] = None
     flywheel_speed_rad_s: Positive | None = None
     flywheel_imbalance_kg_m: Annotated[float, Batched()] = 0.0
+    bend_frequency_hz: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
+    bend_damping_ratio: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.01
+    bend_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
+    bend_beyond: BendBeyond = "sensors"
+
+    @property
+    def bends(self) -> bool:
+        """True if the frame bends."""
+        return self.bend_frequency_hz > 0.0
+
+    @property
+    def unused_bend_fields(self) -> list[str]:
+        """Fields of the bend that were set while the frame is rigid."""
+        if self.bends:
+            return []
+        fields = [field for field in dataclasses.fields(self) if field.name.startswith("bend_")]
+        return [field.name for field in fields if getattr(self, field.name) != field.default]
 
     def changes(self) -> dict[str, float]:
-        """Return the changed settings of gimbals, servos, accelerometers, tilt and flywheels: field -> value."""
+        """Return the changed numbers of gimbals, servos, accelerometers, tilt and flywheels: field -> value."""
         prefixes = ("gimbal", "servo", "accelerometer", "tilt", "flywheel")
         fields = [field for field in dataclasses.fields(self) if field.name.startswith(prefixes)]
         return {field.name: value for field in fields if (value := getattr(self, field.name)) != field.default}
 
     def changes_of_physics(self) -> dict[str, float]:
         """Return those of the `changes` that move masses or make torques."""
-        others = ("accelerometer_inner_m", "accelerometer_outer_m", "gimbal_backlash_arcmin")
-        return {name: value for name, value in self.changes().items() if name not in others}
+        return {
+            name: value
+            for name, value in self.changes().items()
+            if not name.startswith("accelerometer") and name != "gimbal_backlash_arcmin"
+        }
+
+    @property
+    def has_misplaced(self) -> bool:
+        """True if an accelerometer sits elsewhere than the tilt estimate knows."""
+        return bool(self.accelerometer_inner_misplaced_mm or self.accelerometer_outer_misplaced_mm)

@@ -37,6 +37,7 @@ from cmg_mj.inputs.user_classes import as_json
 from cmg_mj.observers import OBSERVERS, Observer, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.scenario.disturbances import Push, Swing
+from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.sensors.tilt import TiltNoise
@@ -81,11 +82,19 @@ class ControllerSettings(BaseModel):
     """Several axes: whether the gimbals also turn against what a turn about the vertical couples."""
     bias_trim_s: Instant = 0.0
     """For so long from the start the integrator is held where the observer's bias estimate asks for it."""
+    notch_hz: Annotated[NonNegative, WhateverTheLaw()] = 0.0
+    """The middle of a notch on the law's command, for a frame that bends; 0: none."""
 
     @model_validator(mode="after")
     def _one_source_of_gains(self) -> ControllerSettings:
         if self.gains is not None and self.lqr is not None:
             raise ValueError("give either gains or lqr, not both")
+        return self
+
+    @model_validator(mode="after")
+    def _notch_below_half_the_rate(self) -> ControllerSettings:
+        if self.notch_hz >= 0.5 * self.rate_hz:
+            raise ValueError(f"notch_hz = {self.notch_hz:g}: must be below {0.5 * self.rate_hz:g} Hz, half of rate_hz")
         return self
 
     @property
@@ -203,6 +212,7 @@ class Scenario(BaseModel):
     """Settings of single axes, by name."""
     push: list[Push] = Field(default_factory=list)
     swing: list[Swing] = Field(default_factory=list)
+    pivot: list[Pivot] = Field(default_factory=list)
     metrics: MetricsSettings = Field(default_factory=MetricsSettings)
     compare: Annotated[CompareSettings | None, NoEffect()] = None
     """Written by `cmg-mj compare`, so that its scenario runs to the same comparison."""

@@ -16,7 +16,7 @@ from cmg_mj.sensors.timing import whole_steps
 FINEST_S = 1e-4
 """A scenario whose rates and times leave only a smaller step than this must name the step itself [s]."""
 SWING_SHARE = 10.0
-"""A swinging torque has at least so many samples a period."""
+"""A swinging torque or pivot has at least so many samples a period."""
 MOST_TICKS = 2_000_000
 """Most ticks of a run; a tick takes about 1.5 kB of memory until the recording is written."""
 MOST_STEPS = 1_000_000_000
@@ -119,11 +119,19 @@ def time_grid(scenario: Scenario) -> TimeGrid:
                 f"swing.{i}.frequency_hz = {swing.frequency_hz:g}: the torque is held from sample to sample; at most "
                 f"{control / SWING_SHARE:g} Hz at controller.rate_hz = {control:g}"
             )
-    for name, torques in (("push", scenario.push), ("swing", scenario.swing)):
-        for i, torque in enumerate(torques):
-            if torque.start_s >= duration:
+    for i, pivot in enumerate(scenario.pivot):
+        for field in ("frequency_hz", "corner_hz"):
+            frequency = getattr(pivot, field)
+            if frequency and frequency > control / SWING_SHARE:
                 raise InputError(
-                    f"{name}.{i}.start_s = {torque.start_s:g}: must be less than duration_s = {duration:g}, "
+                    f"pivot.{i}.{field} = {frequency:g}: the acceleration is held from sample to sample; at most "
+                    f"{control / SWING_SHARE:g} Hz at controller.rate_hz = {control:g}"
+                )
+    for name, events in (("push", scenario.push), ("swing", scenario.swing), ("pivot", scenario.pivot)):
+        for i, event in enumerate(events):
+            if event.start_s >= duration:
+                raise InputError(
+                    f"{name}.{i}.start_s = {event.start_s:g}: must be less than duration_s = {duration:g}, "
                     "where the run ends"
                 )
     return grid

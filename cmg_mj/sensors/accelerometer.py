@@ -24,7 +24,13 @@ NARROWEST_HZ = 1.0
 CROSSWISE = [1, 0, 3, 2]
 """Each channel's other axis of the same part."""
 
+MOST_HARMONICS = 20
+"""No flywheel's tones beyond this multiple of its speed."""
+
 Share = Annotated[float, Field(gt=-1.0, lt=1.0)]
+NoiseSize = Annotated[float, Field(ge=0.0, le=1e6)]
+"""No part is noisier than 1 g/rtHz [ug/rtHz], or shaken by more than 1000 g [mg]."""
+VibrationFrequency = Annotated[float, Field(ge=0.1, le=1e5)]
 Angle = Annotated[float, Field(gt=-45.0, lt=45.0)]
 
 
@@ -36,8 +42,8 @@ class Accelerometer:
     on the tangential axes acts like the equilibrium bias e. What else a part and its mounting do is off by default; the
     datasheet allows a scale error of 3 % and a cross-axis sensitivity of 2 % before calibration.
 
-    What happens to a reading, in this order: misalignment, cross-axis, scale, offset, noise (white, then 1/f), range,
-    low-pass, resolution. What the low-pass overshoots is cut off at the range once more.
+    What happens to a reading, in this order: vibration, misalignment, cross-axis, scale, offset, noise (white, then
+    1/f), range, low-pass, resolution. What the low-pass overshoots is cut off at the range once more.
 
     Attributes:
         rate_hz: Samples a second.
@@ -54,10 +60,13 @@ class Accelerometer:
         bias_instability_ug: Floor of the Allan deviation that each axis' 1/f noise has [ug].
         bandwidth_hz: Of the part's second-order low-pass, which works at 1 kHz [Hz]; 0 for none. (The MPU-6050 can be
             set to 5, 10, 21, 44, 94 or 184 Hz.)
+        vibration_mg: RMS of the broadband vibration of each axis, independent of the others' [mg].
+        vibration_band_hz: Its half-power frequencies [Hz].
+        wheel_harmonics_mg: Amplitudes of the tones at 1, 2, 3, ... times the speed of each flywheel, in each axis [mg].
     """
 
     rate_hz: Rate = 200.0
-    noise_density_ug_rthz: Annotated[NonNegative, Batched()] = 400.0
+    noise_density_ug_rthz: Annotated[NoiseSize, Batched()] = 400.0
     bias_mg: Annotated[tuple[float, float], Batched()] = (0.0, 0.0)
     range_g: Positive = 2.0
     counts_per_g: NonNegative = 16384.0
@@ -66,8 +75,11 @@ class Accelerometer:
     misalignment_deg: tuple[Angle, Angle] = (0.0, 0.0)
     cross_axis: tuple[Share, Share] = (0.0, 0.0)
     skew_s: Annotated[NonNegative, OnGrid("s")] = 0.0
-    bias_instability_ug: NonNegative = 0.0
+    bias_instability_ug: NoiseSize = 0.0
     bandwidth_hz: Annotated[float, Field(ge=0.0, lt=INSIDE_HZ / 2.0)] = 0.0
+    vibration_mg: Annotated[NoiseSize, Batched()] = 0.0
+    vibration_band_hz: tuple[VibrationFrequency, VibrationFrequency] = (20.0, 500.0)
+    wheel_harmonics_mg: tuple[NonNegative, ...] = ()
 
     channels = 4
 
@@ -90,6 +102,26 @@ class Accelerometer:
                 f"a part with a low-pass samples at {INSIDE_HZ:g} Hz, which rate_hz = {rate:g} must divide"
             )
         return bandwidth_hz
+
+    @field_validator("vibration_band_hz")
+    @classmethod
+    def _rising(cls, band_hz: tuple[float, float]) -> tuple[float, float]:
+        low, high = band_hz
+        if not low < high:
+            raise ValueError(f"{low:g} Hz to {high:g} Hz: the lower end comes first")
+        return band_hz
+
+    @field_validator("wheel_harmonics_mg")
+    @classmethod
+    def _not_too_many(cls, amplitudes: tuple[float, ...]) -> tuple[float, ...]:
+        if len(amplitudes) > MOST_HARMONICS:
+            raise ValueError(f"{len(amplitudes)} amplitudes: at most {MOST_HARMONICS} harmonics")
+        return amplitudes
+
+    @property
+    def vibrates(self) -> bool:
+        """True if the accelerometers of one world vibrate."""
+        return bool(self.vibration_mg) or any(self.wheel_harmonics_mg)
 
     @property
     def raw_rate_hz(self) -> float:
@@ -126,11 +158,13 @@ class Accelerometer:
         return self.bias_instability_ug * 1e-6 * STANDARD_GRAVITY
 
     @property
-    def imperfections(self) -> dict[str, float | tuple[float, float]]:
+    def imperfections(self) -> dict[str, float | tuple[float, ...]]:
         """Imperfections that are switched on beyond noise, range and resolution: field -> its value."""
         names = [field.name for field in dataclasses.fields(self)]
         optional = ["bias_mg", *names[names.index("scale_error") :]]
-        return {name: value for name in optional if (value := getattr(self, name)) not in (0.0, (0.0, 0.0))}
+        if not self.vibration_mg:
+            optional.remove("vibration_band_hz")
+        return {name: value for name in optional if (value := getattr(self, name)) not in (0.0, (0.0, 0.0), ())}
 
     def constant_errors(self) -> Callable[[Forces], Forces]:
         """A function: true specific forces (inner x, z, outer x, z) -> what parts without noise show [m/s^2].
@@ -169,12 +203,15 @@ class Accelerometer:
         return distorted
 
     def make_reading_function(
-        self, drift: Callable[[], Forces] | None = None
+        self,
+        drift: Callable[[], Forces] | None = None,
+        vibration: Callable[[IdealReading], Forces] | None = None,
     ) -> Callable[[IdealReading, Sequence[Scalar]], Forces]:
         """The parts at work: to be called once for every sample that they take (`raw_rate_hz`).
 
         Args:
             drift: What the 1/f noise adds to the next sample, four numbers or an array (4, n_worlds) [m/s^2].
+            vibration: The true forces with those of the vibration at the next sample [m/s^2].
 
         Returns:
             A function (ideal reading, standard normals) -> reading: inner x, z, outer x, z [m/s^2]. It remembers its
@@ -193,7 +230,7 @@ class Accelerometer:
             return filters[number](x)
 
         def measure(ideal: IdealReading, normal: Sequence[Scalar]) -> Forces:
-            forces = erring(ideal.accelerations)
+            forces = erring(vibration(ideal) if vibration else ideal.accelerations)
             wander = drift() if drift else None
             if isinstance(forces, np.ndarray):
                 raw = forces + sigma * np.asarray(normal)

@@ -23,6 +23,8 @@ class IdealReading(NamedTuple):
     """Rate of the frame along the tilt axis, as a gyro on it measures [rad/s]."""
     rate: Scalar
     """The true tilt rate, q_b' [rad/s]: no sensor's, but what `feedback = "truth"` uses."""
+    wheels: Sequence[Scalar] = ()
+    """Rates of the flywheels, one a module [rad/s]: no sensor's, but what makes accelerometers vibrate."""
 
 
 class MultiAxisReading(NamedTuple):

@@ -26,6 +26,12 @@ class NoiseStream(IntEnum):
     """The gyro about the vertical, which a plant of several axes has once."""
     MEMS_PART = 6
     """The signs of the cheap gyro's offset and drift: which part was bought."""
+    PIVOT = 7
+    """The acceleration of the pivot; its motions have the streams that axes would have."""
+    VIBRATION = 8
+    """The accelerometers' broadband vibration."""
+    WHEEL_TONES = 9
+    """The phases of the tones that flywheels make in the accelerometers."""
 
     def on_axis(self, axis: int) -> int:
         """Return the number of the stream of one axis of several."""

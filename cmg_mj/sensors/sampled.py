@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.field_types import STRICT
-from cmg_mj.sensors.accelerometer import INSIDE_HZ, Accelerometer
+from cmg_mj.sensors.accelerometer import INSIDE_HZ, STANDARD_GRAVITY, Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker
 from cmg_mj.sensors.fog import Fog
@@ -23,6 +23,7 @@ from cmg_mj.sensors.ideal import Forces, IdealReading
 from cmg_mj.sensors.mems_gyro import MemsGyro
 from cmg_mj.sensors.noise_streams import NoiseStream, normals
 from cmg_mj.sensors.timing import steps_until, whole_steps
+from cmg_mj.sensors.vibration import BroadbandVibration, WheelTones, vibration
 
 Reading = TypeVar("Reading")
 """A sensor's reading: a number, a number for each gimbal, or the forces of the accelerometers."""
@@ -167,6 +168,21 @@ def _flicker_source(sensor: Accelerometer, noise: Iterator) -> Callable[[], Forc
     return drift
 
 
+def _vibration_source(
+    sensor: Accelerometer, noise: Callable[[NoiseStream, int], Iterator[Sequence[Scalar]]]
+) -> Callable[[IdealReading], Forces] | None:
+    """Make what shakes the accelerometers; None if nothing does."""
+    dt, milli_g = 1.0 / sensor.raw_rate_hz, 1e-3 * STANDARD_GRAVITY
+    broadband = tones = None
+    if np.any(sensor.vibration_mg):
+        numbers = noise(NoiseStream.VIBRATION, BroadbandVibration.channels)
+        broadband = BroadbandVibration(sensor.vibration_band_hz, dt, numbers)
+    if any(sensor.wheel_harmonics_mg):
+        amplitudes = [milli_g * amplitude for amplitude in sensor.wheel_harmonics_mg]
+        tones = WheelTones(amplitudes, dt, noise(NoiseStream.WHEEL_TONES, 2))
+    return vibration(broadband, milli_g * sensor.vibration_mg, tones)
+
+
 def sampled_sensors(
     sensors: Sensors, timestep: float, seed: int, worlds: int | Sequence[int], axis: int = 0
 ) -> tuple[SampledSensor[Forces], SampledSensor[Sequence[Scalar]], SampledSensor[Scalar]]:
@@ -192,12 +208,13 @@ def sampled_sensors(
     pair = sensors.accelerometer
     flicker_noise = noise(NoiseStream.FLICKER, len(CORNERS_HZ) * pair.channels)
     drift = _flicker_source(pair, flicker_noise) if pair.bias_instability_ug else None
+    vibration = _vibration_source(pair, noise)
     kind = UnevenPair if pair.skew_s or pair.bandwidth_hz else SampledSensor[Forces]
     encoder, fog = sensors.encoder, sensors.fog
     pair_noise = noise(NoiseStream.ACCELEROMETER, pair.channels)
     encoder_noise, fog_noise = noise(NoiseStream.ENCODER, encoder.channels), noise(NoiseStream.FOG, fog.channels)
     return (
-        kind(pair, timestep, pair_noise, "sensors.accelerometer", pair.make_reading_function(drift)),
+        kind(pair, timestep, pair_noise, "sensors.accelerometer", pair.make_reading_function(drift, vibration)),
         SampledSensor(encoder, timestep, encoder_noise, "sensors.encoder", encoder.make_reading_function()),
         SampledSensor(fog, timestep, fog_noise, "sensors.fog", fog.make_reading_function()),
     )

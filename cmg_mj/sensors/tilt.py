@@ -43,10 +43,24 @@ class RadialTilt:
     Attributes:
         r_inner: Distance of the inner accelerometer from the pivot, of many worlds an array (n_worlds,) [m].
         r_outer: Distance of the outer accelerometer from the pivot, likewise [m].
+        height: How far above the pivot the point lies that both distances are from, and that is at rest [m]. An
+            accelerometer below it has a negative distance.
     """
 
     r_inner: Scalar
     r_outer: Scalar
+    height: float = 0.0
+
+    def about(self, height: float) -> RadialTilt:
+        """Return the estimate with distances from a point of the ray above the pivot [m]."""
+        if not height:
+            return self
+        return RadialTilt(self.r_inner - height, self.r_outer - height, height)
+
+    @property
+    def radii(self) -> tuple[Scalar, Scalar]:
+        """Distances of both from the pivot [m]."""
+        return self.r_inner + self.height, self.r_outer + self.height
 
     @cached_property
     def _weights(self) -> tuple[Scalar, Scalar]:

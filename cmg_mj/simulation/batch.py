@@ -6,7 +6,7 @@ import copy
 import dataclasses
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -19,10 +19,12 @@ from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push
+from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.simulation.batch_values import batch_values
 
+T = TypeVar("T")
 BATCHED_FIELDS = marked_fields(Scenario, Batched)
 """Fields that worlds of one batch may differ in. Every other decides what is computed, or when."""
 UNUSED = frozenset(marked_fields(Scenario, NoEffect))
@@ -176,10 +178,22 @@ def require_same_structure(plants: Sequence[Plant], worlds: int, scenario_plant:
         )
 
 
-def batched(worlds: Sequence[tuple[Law, Sensors, tuple[Push, ...]]]) -> tuple[Law, Sensors, tuple[Push, ...]]:
-    """Law, sensors and pushes of many worlds as one, with arrays (n_worlds,) where they differ."""
-    laws, sensors, pushes = zip(*worlds, strict=True)
-    return _batched_law(laws), batch_values(sensors), tuple(batch_values(push) for push in zip(*pushes, strict=True))
+def batched(worlds: Sequence[tuple[Law, Scenario]]) -> tuple[Law, Sensors, tuple[Push, ...], tuple[Pivot, ...]]:
+    """Law, sensors, pushes and motions of the pivot of many worlds as one, with arrays (n_worlds,) where they differ.
+
+    Args:
+        worlds: The law and the scenario of each.
+    """
+    laws, scenarios = zip(*worlds, strict=True)
+    pushes = [tuple(scenario.push) for scenario in scenarios]
+    pivots = [tuple(scenario.pivot) for scenario in scenarios]
+    sensors = batch_values([scenario.sensors for scenario in scenarios])
+    return _batched_law(laws), sensors, batch_values(pushes), batch_values(pivots)
+
+
+def once(items: Sequence[T]) -> list[T]:
+    """Each of some things once."""
+    return list({id(item): item for item in items}.values())
 
 
 def _batched_law(laws: Sequence[Law]) -> Law:

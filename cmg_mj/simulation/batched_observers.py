@@ -15,8 +15,8 @@ from cmg_mj.observers import Estimate, Measurement, Observer
 from cmg_mj.observers.protocol import State, extra_signals
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.batch import BatchKey, PlantStructure, plant_structure
-from cmg_mj.simulation.experiment import Experiment, batch_inputs, once, run_batch
+from cmg_mj.simulation.batch import BatchKey, PlantStructure, once, plant_structure
+from cmg_mj.simulation.experiment import Experiment, batch_inputs, run_batch
 from cmg_mj.simulation.simulate import SimulationOptions
 
 MOST_WORLDS = 1024
@@ -146,8 +146,8 @@ def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[
         parts.append((alike[0].experiments[0].design.observer(), sum(len(job.worlds) for job in alike)))
     experiments = [experiment for job in jobs for experiment in job.experiments]
     numbers = [int(number) for job in jobs for number in job.worlds]
-    plants, controller, pushes = batch_inputs(experiments, numbers, observer=BatchedObservers(parts))
-    whole = experiments[0].simulate(plants, controller, pushes, **options)
+    inputs = batch_inputs(experiments, numbers, observer=BatchedObservers(parts))
+    whole = experiments[0].simulate(*inputs, **options)
     ends = np.cumsum([len(job.worlds) for job in jobs]).tolist()
     return [
         _renamed(whole.select(slice(end - len(job.worlds), end)), job.experiments[0].scenario.observer.kind)

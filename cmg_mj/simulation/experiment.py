@@ -21,10 +21,13 @@ from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
+from cmg_mj.results.rerun_head import rerun_head
 from cmg_mj.results.result import Driver, Result
+from cmg_mj.results.wire import WireSettings
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import base_of
+from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.stability_check import hints
@@ -36,10 +39,11 @@ from cmg_mj.simulation.batch import (
     batched,
     batched_interface,
     hashable,
+    once,
     require_same_structure,
     varied_settings,
 )
-from cmg_mj.simulation.prepare import check_axes, plant_on_grid
+from cmg_mj.simulation.prepare import check_scenario, plant_on_grid
 from cmg_mj.simulation.simulate import SimulationOptions, simulate
 
 
@@ -131,10 +135,9 @@ class Experiment:
 
     def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
-        from cmg_mj.codegen.board import Board
+        from cmg_mj.codegen.board import result_of
 
-        result = self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
-        return dataclasses.replace(result, driver="board") if isinstance(processor, Board) else result
+        return result_of(processor, self.simulate(self.plant, self.axis_controller(int(world), processor), **options))
 
     def run_many(
         self,
@@ -222,6 +225,7 @@ class Experiment:
         plant: Plant | Sequence[Plant],
         controller: AnyController,
         pushes: Sequence[Push] | None = None,
+        pivots: Sequence[Pivot] | None = None,
         driver: Driver = "native",
         **options: Unpack[SimulationOptions],
     ) -> Result:
@@ -231,6 +235,7 @@ class Experiment:
             plant: The rig, or one a world.
             controller: A fresh one.
             pushes: Instead of the scenario's.
+            pivots: Likewise.
             driver: What calls the controller.
             **options: Those of `simulate`.
 
@@ -245,6 +250,7 @@ class Experiment:
             observers={name: part.observer_names for name, part in zip(self.plant.axis_names, self.parts, strict=True)},
             pushes=scenario.push if pushes is None else pushes,
             swings=scenario.swing,
+            pivots=scenario.pivot if pivots is None else pivots,
             settings=scenario.metrics,
             driver=driver,
             **options,
@@ -303,17 +309,9 @@ class Experiment:
             bundled = prepare(base)
         return law_change | differences(bundled.resolved(), self.resolved())
 
-    def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
+    def as_toml(self, driver: Driver = "native", world: int = 0, wire: WireSettings | None = None) -> str:
         """The resolved scenario: running it again gives the same run; its head says if that needs options."""
-        why, command = "", "cmg-mj run scenario.toml"
-        if driver == "board":
-            why += "Run on the emulated board (docs/board.md), whose numbers are not quite the host's. "
-            command += " --driver board"
-        if world:
-            why += f"World {world}: its noise is not that of world 0. "
-            command += f" --world {world}"
-        head = f"# {why}To the same numbers it runs with\n#     {command}\n\n" if why else ""
-        return head + tomli_w.dumps(self.resolved())
+        return rerun_head(driver, world, wire) + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path) -> None:
         """Write it as TOML."""
@@ -338,7 +336,7 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
     with scenario.named_in_errors():
         grid = time_grid(scenario)
         plant = plant or plant_on_grid(scenario, grid, like)
-        check_axes(scenario, plant)
+        check_scenario(scenario, plant)
     if len(plant.axes) == 1 and not scenario.axes:
         return Experiment(scenario, plant, design(scenario, plant.parameters))
     parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
@@ -367,14 +365,13 @@ def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **option
         part = key.first_difference(other.batch_key)
         if part:
             raise InputError(f"run_many: {part} differs, which worlds of one batch must have in common")
-    plants, controller, pushes = batch_inputs(experiments, worlds)
-    return first.simulate(plants, controller, pushes, **options)
+    return first.simulate(*batch_inputs(experiments, worlds), **options)
 
 
 def batch_inputs(
     experiments: Sequence[Experiment], worlds: Sequence[int], observer: Observer | None = None
-) -> tuple[list[Plant], AnyController, Sequence[Push]]:
-    """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, the pushes of all worlds.
+) -> tuple[list[Plant], AnyController, Sequence[Push], Sequence[Pivot]]:
+    """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, what moves all worlds.
 
     Args:
         experiments: One a world.
@@ -382,19 +379,12 @@ def batch_inputs(
         observer: The observer of all worlds instead of the first experiment's.
     """
     first, plants = experiments[0], [experiment.plant for experiment in experiments]
-    controllers, pushes = [], ()
+    controllers, pushes, pivots = [], (), ()
     for i, part in enumerate(first.parts):
         parts = [experiment.parts[i] for experiment in experiments]
-        law, sensors, pushes = batched(
-            [(one.design.fresh_law(), one.scenario.sensors, tuple(one.scenario.push)) for one in parts]
-        )
+        law, sensors, pushes, pivots = batched([(one.design.fresh_law(), one.scenario) for one in parts])
         interface = batched_interface(part.plant, plants, i)
         controllers.append(
             part.design.controller(interface, worlds=worlds, axis=i, observer=observer, law=law, sensors=sensors)
         )
-    return plants, first.of_axes(controllers), pushes
-
-
-def once(experiments: Sequence[Experiment]) -> list[Experiment]:
-    """Each of some experiments once."""
-    return list({id(experiment): experiment for experiment in experiments}.values())
+    return plants, first.of_axes(controllers), pushes, pivots

@@ -14,9 +14,11 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.plant.moving_pivot import pivot_directions, with_own_model
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.baselines import MEMS_GYRO
 from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.pivot_signals import PivotSignals
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.noise_streams import NoiseStream, normals
@@ -24,7 +26,7 @@ from cmg_mj.sensors.timing import whole_steps
 from cmg_mj.simulation.control_loop import ControlLoop
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.physics import OneWorld
-from cmg_mj.simulation.schedule import sampling_instants, with_swing_torques
+from cmg_mj.simulation.schedule import sampling_instants, with_moving_pivot, with_swing_torques
 
 try:
     import gymnasium
@@ -149,6 +151,8 @@ class ScissoredPairEnv(gymnasium.Env):
         self.experiment, part = experiment, experiment.require_single_axis("an environment")
         scenario = part.scenario.model_copy(update={"seed": seed, "open_loop_observers": []})
         plant, timestep = experiment.plant, experiment.plant.timestep
+        if scenario.pivot:
+            plant = with_own_model(plant)
         self._physics = OneWorld(plant)
         self._controller = dataclasses.replace(part.design, scenario=scenario).controller(
             part.plant.interface, worlds=self._world
@@ -163,6 +167,9 @@ class ScissoredPairEnv(gymnasium.Env):
         )
         if scenario.swing:
             instants = with_swing_torques(instants, scenario.swing, timestep, plant.axis_names)
+        if scenario.pivot:
+            pivot = PivotSignals(scenario.pivot, pivot_directions(plant, scenario.pivot), seed, self._world)
+            instants = with_moving_pivot(instants, pivot, self._physics.accelerate, timestep)
         self._loop = ControlLoop(self._physics, self._controller, instants, self._fall)
         self._ticks = self._loop.ticks()
         self._running = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Protocol
@@ -20,6 +21,8 @@ Joints = Sequence[Scalar] | np.ndarray
 """Joint angles or rates: a list of floats, or an array (n, n_worlds)."""
 State = tuple[Joints, Joints]
 """Joint angles, joint rates."""
+Acceleration = Sequence[Scalar]
+"""Acceleration of the pivot: x, y, z [m/s^2]."""
 Reading = IdealReading | MultiAxisReading
 
 
@@ -88,6 +91,7 @@ class OneWorld:
         self._ctrl, self._applied = self.data.ctrl, self.data.qfrc_applied
         self._forward = partial(mujoco.mj_forward, self.model, self.data)
         self.advance = partial(mujoco.mj_step, self.model, self.data)  # no method: a call less in every tick
+        self._still: list[float] = self.model.opt.gravity.tolist()
         self._servos = [list(zip(axis.servos, axis.directions, strict=True)) for axis in plant.axes]
         self._lines = [axis.line for axis in plant.axes]
         self.axis_names = plant.axis_names
@@ -116,6 +120,12 @@ class OneWorld:
         apply_torques(self._applied, self._lines, torques)
         return torques
 
+    def accelerate(self, acceleration: Acceleration) -> None:
+        """Set the pivot's acceleration, x, y, z [m/s^2]: gravity of the plant's model, which is its own."""
+        x, y, z = acceleration
+        gx, gy, gz = self._still
+        self.model.opt.gravity[:] = gx - x, gy - y, gz - z
+
     def stop_fallen(self, tilt: Scalar, limit: float) -> Sequence[tuple[int, float]]:
         """Stop the world if its tilt is beyond a limit, or no number."""
         if abs(tilt) <= limit:
@@ -140,6 +150,9 @@ class ManyWorlds:
         self.batch = Batch(first.model, len(plants), threads)
         if any(plant is not first for plant in plants):
             self.batch.set_models([plant.model for plant in plants])
+        self._plants = plants
+        self._gravity = self._still = np.zeros((0, 3))
+        self._own_models: list[mujoco.MjModel] = []
         b = self.batch
         self._qpos, self._qvel, self._ctrl = b.bind("qpos"), b.bind("qvel"), b.bind("ctrl")
         self._applied, self._sensordata = b.bind("qfrc_applied"), b.bind("sensordata")
@@ -183,6 +196,25 @@ class ManyWorlds:
         for (dofs, shares), torque in zip(self._pushes, torques, strict=True):
             self._applied[:, dofs] += np.multiply.outer(torque, shares)
         return [np.broadcast_to(torque, len(self.running)) for torque in torques]
+
+    def accelerate(self, acceleration: Acceleration) -> None:
+        """Set the pivot's acceleration, x, y, z, one for all or (n_worlds,) each [m/s^2]."""
+        if not len(self._still):
+            self._gravity = self._own_gravity()
+            self._still = self._gravity.copy()
+        for i, part in enumerate(acceleration):
+            self._gravity[:, i] = self._still[:, i] - part
+        if self._own_models:
+            for model, gravity in zip(self._own_models, self._gravity, strict=True):
+                model.opt.gravity[:] = gravity
+            self.batch.set_models(self._own_models)
+
+    def _own_gravity(self) -> np.ndarray:
+        """Give every world gravity of its own, (n_worlds, 3)."""
+        if self.batch.models is None:
+            return self.batch.expand("opt.gravity")
+        self._own_models = [copy.copy(plant.model) for plant in self._plants]
+        return np.array([model.opt.gravity for model in self._own_models])
 
     def advance(self, steps: int) -> None:
         """Take physics steps. A world in which MuJoCo raises is given joints that are NaN: it has diverged."""

@@ -26,6 +26,7 @@ from cmg_mj.plant.plugin_model import plugin_mjcf
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.run_folder.folder import claimed, write_text
 from cmg_mj.scenario.design import Design
+from cmg_mj.scenario.omissions import IN_THE_MODEL, omissions
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.stability_check import require_stable_period
 
@@ -90,6 +91,10 @@ class PluginTexts(NamedTuple):
 
 def describe_rig(experiment: PluginSource, name: str, world: int = 0) -> PluginRig:
     """Describe an experiment's rig and its controllers."""
+    for part in experiment.parts:
+        for field, clause in omissions(part.scenario).items():
+            if field not in IN_THE_MODEL:
+                raise InputError(f"{field}: {clause}: a plugin has no such thing")
     axes = []
     for i, part in enumerate(experiment.parts):
         axis = part.plant.axis

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.bundled import folder
+from cmg_mj.plant.moving_pivot import pivot_directions
 from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.scenario.pivot_track import MOST_RECORDED_M_S2, read_track
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import TimeGrid, time_grid
 
@@ -34,6 +36,33 @@ def plant_on_grid(scenario: Scenario, grid: TimeGrid, like: Plant | None = None)
     return plant
 
 
+def check_scenario(scenario: Scenario, plant: Plant) -> None:
+    """Refuse what a scenario asks of a plant that it is not, or cannot do.
+
+    Raises:
+        InputError: An axis is none of the plant's, the pivot cannot be moved, or its track cannot be read.
+    """
+    check_axes(scenario, plant)
+    for i, pivot in enumerate(scenario.pivot):
+        if pivot.axis in plant.settings.locked_axes:
+            raise InputError(
+                f"pivot.{i}.axis = {pivot.axis!r}: is locked, and gives no direction; name one of "
+                f"{', '.join(plant.axis_names)}"
+            )
+        if pivot.file is not None:
+            try:
+                track = read_track(pivot.file, pivot.column)
+            except InputError as error:
+                raise InputError(f"pivot.{i}.file: {error}") from error
+            largest = abs(pivot.scale) * float(abs(track.accelerations).max())
+            if largest > MOST_RECORDED_M_S2:
+                raise InputError(
+                    f"pivot.{i}.scale = {pivot.scale:g}: {pivot.file} times this reaches {largest:.3g} m/s2; at most "
+                    f"{MOST_RECORDED_M_S2:g}"
+                )
+    pivot_directions(plant, scenario.pivot)
+
+
 def check_axes(scenario: Scenario, plant: Plant) -> None:
     """Refuse the name of an axis that the plant does not have, and on a plant of several axes a push without one.
 
@@ -48,6 +77,9 @@ def check_axes(scenario: Scenario, plant: Plant) -> None:
             raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
     torques = [(f"push.{i}.axis", push.axis) for i, push in enumerate(scenario.push)]
     torques += [(f"swing.{i}.axis", swing.axis) for i, swing in enumerate(scenario.swing)]
+    for i, pivot in enumerate(scenario.pivot):
+        if pivot.direction != "vertical" or pivot.axis is not None:
+            torques.append((f"pivot.{i}.axis", pivot.axis))
     for field, axis in torques:
         if axis is None and len(known) > 1:
             raise InputError(f"{field}: the rig has several axes: which of {', '.join(known)}?")

@@ -1,12 +1,13 @@
-"""The instants of a run at which something is due, and the torques from outside between them."""
+"""The instants of a run at which something is due, and the torques and the pivot's acceleration between them."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from cmg_mj.elementwise import Scalar, where
 from cmg_mj.scenario.disturbances import Push, Swing, add_swing_torques
+from cmg_mj.scenario.pivot_signals import PivotSignals
 from cmg_mj.sensors.timing import whole_steps
 
 Instant = tuple[int, int, Sequence[Scalar]]
@@ -51,3 +52,19 @@ def with_swing_torques(
     """Add the swings' torques, at their value in the middle between two instants."""
     for step, steps, torques in instants:
         yield step, steps, add_swing_torques(torques, swings, axes, (step + 0.5 * steps) * timestep)
+
+
+def with_moving_pivot(
+    instants: Iterable[Instant], pivot: PivotSignals, accelerate: Callable[[Sequence[Scalar]], None], timestep: float
+) -> Iterator[Instant]:
+    """Set the pivot's acceleration before each instant, at its mean until the next one.
+
+    Args:
+        instants: The instants.
+        pivot: The acceleration in time.
+        accelerate: Sets x, y, z of the acceleration in the physics [m/s^2].
+        timestep: Physics step [s].
+    """
+    for step, steps, torques in instants:
+        accelerate(pivot.mean(step * timestep, (step + steps) * timestep))
+        yield step, steps, torques

@@ -14,6 +14,7 @@ from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.make_controller import AnyController
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers.protocol import BIAS
+from cmg_mj.plant.moving_pivot import pivot_directions, refuse_other_forces, with_own_model
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import RATES, References
@@ -22,15 +23,17 @@ from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.result import Driver, Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
 from cmg_mj.scenario.disturbances import Push, Swing
+from cmg_mj.scenario.pivot import Pivot
+from cmg_mj.scenario.pivot_signals import PivotSignals
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.sensors.timing import whole_steps
 from cmg_mj.simulation.batch_values import split_values
 from cmg_mj.simulation.callback import CallbackLoop, control_callback
 from cmg_mj.simulation.control_loop import ControlLoop, Ending
-from cmg_mj.simulation.physics import ManyWorlds, OneWorld, Physics
+from cmg_mj.simulation.physics import ManyWorlds, OneWorld
 from cmg_mj.simulation.plugin_loop import PluginLoop
 from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
-from cmg_mj.simulation.schedule import sampling_instants, with_swing_torques
+from cmg_mj.simulation.schedule import sampling_instants, with_moving_pivot, with_swing_torques
 
 DIVERGED_TILT = 2.0 * math.pi
 """No plant that stood at one instant lies a whole turn farther at the next one: it has diverged [rad]."""
@@ -62,6 +65,7 @@ def simulate(
     observers: Sequence[str] | Mapping[str, Sequence[str]],
     pushes: Sequence[Push] = (),
     swings: Sequence[Swing] = (),
+    pivots: Sequence[Pivot] = (),
     settings: MetricsSettings | None = None,
     driver: Driver = "native",
     **options: Unpack[SimulationOptions],
@@ -75,6 +79,7 @@ def simulate(
         observers: Names of the controller's observer and open-loop observers; or of each axis' if they differ.
         pushes: Torques from outside; of many worlds a torque may be an array (n_worlds,).
         swings: Others that swing.
+        pivots: Motions of the pivot; of many worlds a size may be an array (n_worlds,).
         settings: What counts as settled and fallen.
         driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only). `plugin`: the model
             has a plugin that decides (likewise): see `plant_with_plugin`.
@@ -92,7 +97,11 @@ def simulate(
         raise InputError(f"driver = {driver!r}: drives one world, not a batch")
     names = plants[0].axis_names
     of_axis = observers if isinstance(observers, Mapping) else dict.fromkeys(names, observers)
-    run = _Simulation(plants, controller, duration_s, of_axis, pushes, swings, settings or MetricsSettings(), options)
+    if pivots and single:
+        plants = [with_own_model(plants[0])]
+    run = _Simulation(
+        plants, controller, duration_s, of_axis, pushes, swings, pivots, settings or MetricsSettings(), options
+    )
     physics = OneWorld(plants[0]) if single else ManyWorlds(plants, options.get("threads", 0))
     run.advance(physics, driver)
     return run.result(driver)
@@ -109,11 +118,12 @@ class _Simulation:
         observers: Mapping[str, Sequence[str]],
         pushes: Sequence[Push],
         swings: Sequence[Swing],
+        pivots: Sequence[Pivot],
         settings: MetricsSettings,
         options: SimulationOptions,
     ) -> None:
         self.plants, self.controller, self.duration_s, self.observers = plants, controller, duration_s, observers
-        self.pushes, self.settings = pushes, settings
+        self.pushes, self.pivots, self.settings = pushes, pivots, settings
         self.axis_names = names = plants[0].axis_names
         self.timestep = timestep = plants[0].timestep
         steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
@@ -136,7 +146,13 @@ class _Simulation:
         dt, limit, sensors = controller.law.dt, controller.law.rate_limit, controller.sensors
         noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
         y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
-        floors = Floors(noises, y1_period)
+        moves = any(np.any(pivot.size) for pivot in self.pivots)
+        has_acceleration = [
+            not (moves or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.settings.bends)
+            and plant.radial_tilt.height == plant.reduced.pivot_arm
+            for plant, sensor in pairs
+        ]
+        floors = Floors(noises, y1_period, has_acceleration)
         # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
         tilt_sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
         references = References(
@@ -147,8 +163,14 @@ class _Simulation:
         spool = options.get("spool")
         return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first, spool=spool)
 
-    def advance(self, physics: Physics, driver: Driver) -> None:
+    def advance(self, physics: OneWorld | ManyWorlds, driver: Driver) -> None:
         """Run to the end, whatever that is."""
+        if self.pivots:
+            for plant in dict.fromkeys(self.plants):
+                refuse_other_forces(plant)
+            directions = pivot_directions(self.plants[0], self.pivots)
+            pivot = PivotSignals(self.pivots, directions, self.controller.seed, self.controller.worlds)
+            self.instants = with_moving_pivot(self.instants, pivot, physics.accelerate, self.timestep)
         called_back = driver == "callback"
         loop_class = CallbackLoop if called_back else PluginLoop if driver == "plugin" else ControlLoop
         loop = loop_class(physics, self.controller, self.instants, self.fall_angle)

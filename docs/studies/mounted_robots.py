@@ -3,12 +3,13 @@
 python docs/studies/mounted_robots.py [ROBOT ...] (about six minutes on a quiet core)
 python docs/studies/mounted_robots.py --commands (with what each is mounted)
 python docs/studies/mounted_robots.py --homogeneous [ROBOT ...] (`homogeneous` in the loop, beside `gyro_free`)
+python docs/studies/mounted_robots.py --public FOLDER [ROBOT ...] (robots whose repositories are cloned into FOLDER)
 
 The robots are those of tests/plant/mounting/robots.py; ROBOT is a part of a name. The sensors of the datasheets,
 `gyro_free`. The push that a robot stands is what `cmg-mj mount` prints, without the limit of a minute. It, and 1.8
 times it, is tried on ten worlds of another seed, to both sides, at 2 s from upright; and 30 s from the tilt that the
 scenario starts with, alone, are tried on that seed too. With --homogeneous both observers are pushed with the E
-that the reduced model has with `homogeneous`, and with 1.2 times it.
+that the reduced model has with `homogeneous` and the papers' parameters, and with 1.2 times it.
 """
 
 import math
@@ -20,7 +21,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj import mount
 from cmg_mj.results.markdown import table
-from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.scenario.schema import ObserverSettings
+from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.push_limits.largest_push import PUSH_S
 from cmg_mj.studies.push_limits.mount_files import write_scenario
 from cmg_mj.studies.push_limits.prospects import prospects
@@ -29,6 +31,27 @@ from tests.plant.mounting.robots import ROBOTS, Robot
 
 WORLDS = 10
 SEED = 1
+PUBLIC = {
+    "dm_control's cart-pole, its cart free": Robot(
+        Path("dm_control/dm_control/suite/cartpole.xml"), {"body": "pole_1", "axis": "hinge_1", "release": ["slider"]}
+    ),
+    "dm_control's hopper, freed": Robot(
+        Path("dm_control/dm_control/suite/hopper.xml"),
+        {"body": "torso", "axis": "x", "base": "free", "scale": 1.6},
+        True,
+    ),
+    "LimX TRON 1 on point feet": Robot(
+        Path("robot-description/pointfoot/PF_TRON1A/xml/robot.xml"),
+        {"body": "base_Link", "axis": "y", "scale": 1.6},
+        True,
+    ),
+    "LimX TRON 1 on wheels": Robot(
+        Path("robot-description/pointfoot/WF_TRON1A/xml/robot.xml"),
+        {"body": "base_Link", "axis": "y", "scale": 1.6},
+        True,
+    ),
+}
+"""Robots of github.com/google-deepmind/dm_control (985d094) and github.com/limxdynamics/robot-description (469df8d)."""
 
 
 def stood(experiment: Experiment, torques: list[float]) -> int:
@@ -67,7 +90,9 @@ def row(name: str, robot: Robot, folder: Path) -> list[str]:
 def beside_homogeneous(name: str, robot: Robot, folder: Path) -> list[str]:
     """E with either observer, and the worlds that stand that of `homogeneous`, and 1.2 times it, to both sides."""
     model = mount(robot.path, **robot.options).save(folder / "balanced.xml")
-    loops = [write_scenario(model, robot.path, observer) for observer in ("homogeneous", "gyro_free")]
+    mounted = write_scenario(model, robot.path, "gyro_free")
+    kinds = [ObserverSettings(kind=kind) for kind in ("homogeneous", "gyro_free")]  # with the papers' parameters
+    loops = [prepare(mounted.scenario.model_copy(update={"observer": kind}), mounted.plant) for kind in kinds]
     limits = [prospects(loop) for loop in loops]
     push = limits[0].push_margin.median_impulse / PUSH_S
     upright = {"seed": SEED, "duration_s": 14.0, "plant.initial_tilt_deg": 0.0}
@@ -82,7 +107,11 @@ def beside_homogeneous(name: str, robot: Robot, folder: Path) -> list[str]:
 def main() -> None:
     """Print the table."""
     parts = [word for word in sys.argv[1:] if not word.startswith("--")]
-    wanted = [name for name in ROBOTS if not parts or any(part in name for part in parts)]
+    robots = ROBOTS
+    if "--public" in sys.argv:
+        clones = Path(parts.pop(0))
+        robots = {name: robot._replace(path=clones / robot.path) for name, robot in PUBLIC.items()}
+    wanted = [name for name in robots if not parts or any(part in name for part in parts)]
     if "--homogeneous" in sys.argv:
         with tempfile.TemporaryDirectory() as folder:
             rows = [beside_homogeneous(name, ROBOTS[name], Path(folder)) for name in wanted]
@@ -93,7 +122,7 @@ def main() -> None:
         print("\n".join(robot.command for robot in ROBOTS.values()))
         return
     with tempfile.TemporaryDirectory() as folder:
-        rows = [row(name, ROBOTS[name], Path(folder)) for name in wanted]
+        rows = [row(name, robots[name], Path(folder)) for name in wanted]
     names = ["robot", "tilts about", "scale", "inertia [kg m^2]", "pole: reduced, simulated [1/s]", "ceiling [deg]"]
     names += ["ceiling [N m s]", "E [N m s] (of the ceiling)", "stands [N m s] (of E)"]
     names += ["another seed: alone; pushed so, and 1.8 times so"]

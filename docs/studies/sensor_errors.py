@@ -33,6 +33,8 @@ from cmg_mj.results.markdown import table
 
 SEED = 90_000
 OURS = "gyro_free"
+RELATIVE = "free_pivot"
+"""It has a study of its own, and no place among the others that ours is compared with."""
 ERROR, PUSH = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
 WHEEL_KG, WHEEL_RAD_S = 0.61, 314.0
 G_6_3_KG_M = WHEEL_KG * 6.3e-3 / WHEEL_RAD_S
@@ -207,7 +209,9 @@ def main() -> None:
     )
     parser.add_argument("--only", default="", help="cases whose names contain this")
     options = parser.parse_args()
-    names = list(OBSERVERS) if options.observers == "all" else options.observers.split(",")
+    names = (
+        [name for name in OBSERVERS if name != RELATIVE] if options.observers == "all" else options.observers.split(",")
+    )
     names = [*dict.fromkeys([OURS, *names]), "true rate"]
     lines = alone() if options.lines == "alone" else together(options.parts)
     chosen = [case._replace(settings=(*case.settings, *options.set)) for case in lines if options.only in case.name]

@@ -14,6 +14,7 @@ from cmg_mj.simulation.experiment import prepare
 STANDING = {
     # observer -> settings in which it stands: the headline push at 0.5 degrees of bias, unless it cannot
     "gyro_free": (),
+    "free_pivot": (),
     "homogeneous": (),
     "ltv": (),
     "linear": (),

@@ -132,6 +132,6 @@ def test_what_a_message_shows_has_an_end() -> None:
 
 def test_an_error_of_the_benchs_own_is_none_of_the_users(monkeypatch: pytest.MonkeyPatch) -> None:
     """It stays a traceback, which is what a report of it needs."""
-    monkeypatch.setattr("cmg_mj.scenario.loading.load_scenario", len)  # a number is no scenario
-    with pytest.raises(AttributeError):
+    monkeypatch.setattr("cmg_mj.scenario.loading.load_scenario", divmod)  # refuses texts
+    with pytest.raises(TypeError):
         cmg_mj("check", "push_recovery")

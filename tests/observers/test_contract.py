@@ -106,7 +106,7 @@ def test_estimate_uses_the_sample_it_is_given(kind: str) -> None:
 
 
 MODELS = ("ltv", "homogeneous", "luenberger", "kalman", "high_gain", "adaptive", "homogeneous_adaptive")
-DIFFERENTIATORS = ("linear", "linear_high_gain", "finite_difference", "super_twisting", "gyro_free")
+DIFFERENTIATORS = ("linear", "linear_high_gain", "finite_difference", "super_twisting", "gyro_free", "free_pivot")
 
 
 def test_every_observer_is_a_model_or_a_differentiator() -> None:
@@ -169,6 +169,8 @@ def positive_gains() -> list[tuple[str, str]]:
             (kind, name) for name in names if isinstance(value := getattr(estimator, name), float) and value > 0.0
         ]
     may_be_zero = {("high_gain", "d_inf"), ("gyro_free", "bias_walk"), ("gyro_free", "jerk")}
+    may_be_zero |= {("free_pivot", name) for name in ("bias_walk", "jerk", "pivot_start", "pivot_floor")}
+    may_be_zero |= {("free_pivot", name) for name in ("surprise", "hurry", "doubt", "inflation")}
     return [gain for gain in result if gain not in may_be_zero]
 
 

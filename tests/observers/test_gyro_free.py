@@ -15,6 +15,7 @@ from cmg_mj.observers import Measurement
 from cmg_mj.observers.gyro_free import GyroFree, State
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.sensors.tilt import TiltNoise
+from tests.observers.double_integrator import integrator_rows
 from tests.observers.reference import DT, NOISE, PAPER
 
 C = NOISE.correlation * NOISE.tilt / NOISE.acceleration  # v = C n + what is independent of n
@@ -50,23 +51,12 @@ def least_squares(estimator: GyroFree, y1: np.ndarray, a: np.ndarray) -> tuple[f
     """
     n = len(y1)
     unknown = 3 + n
-    alpha = np.zeros((n, unknown + 1))  # the last column is what is known
-    alpha[:, 2], alpha[:, -1] = -1.0, a
-    alpha[np.arange(n), 3 + np.arange(n)] = -1.0
-    x1, x2 = np.zeros((n, unknown + 1)), np.zeros((n, unknown + 1))
-    x1[0, 0] = x2[0, 1] = 1.0
-    for k in range(1, n):
-        x2[k] = x2[k - 1] + 0.5 * DT * (alpha[k - 1] + alpha[k])
-        x1[k] = x1[k - 1] + DT * x2[k - 1] + DT**2 * (alpha[k - 1] / 3.0 + alpha[k] / 6.0)
+    x1, x2, start = integrator_rows(y1, a, unknown, DT, estimator.rate_start, estimator.bias_start)
     n_rows = np.eye(n, unknown + 1, 3)
     reading = x1 + C * n_rows
     reading[:, -1] -= y1
     reading /= NOISE.tilt * math.sqrt(1.0 - NOISE.correlation**2)
-    start_p = x1[:1] - DT**2 / 6.0 * alpha[:1]
-    start_p[:, -1] -= y1[0] - DT**2 / 6.0 * a[0]
-    start_z = (x2[:1] - 0.5 * DT * alpha[:1]) / estimator.rate_start
-    start_b = np.eye(1, unknown + 1, 2) / estimator.bias_start
-    rows = np.vstack([reading, n_rows / NOISE.acceleration, start_p, start_z, start_b])
+    rows = np.vstack([reading, n_rows / NOISE.acceleration, start])
     solution = np.linalg.lstsq(rows[:, :-1], -rows[:, -1], rcond=None)[0]
     coefficients = np.append(solution, 1.0)
     return float(x1[-1] @ coefficients), float(x2[-1] @ coefficients)

@@ -218,6 +218,34 @@ def test_what_they_feel_of_a_turn_grows_with_the_distance() -> None:
     assert plant.radial_tilt.acceleration(ix, ox) == pytest.approx(alpha, rel=1e-12)
 
 
+def test_misplaced_they_feel_what_is_there_and_the_estimate_knows_the_old_places() -> None:
+    """At rest nothing shows; a turn shows in y1, and its acceleration by the wrong distance."""
+    off = PlantSettings(accelerometer_inner_misplaced_mm=3.0, accelerometer_outer_misplaced_mm=-5.0)
+    assert load_plant(off).radial_tilt == load_plant().radial_tilt
+    places = {"accelerometer_inner_m": INNER, "accelerometer_outer_m": OUTER}
+    plant = load_plant(replace(off, **places, lock_thrust_bearing=True))
+    assert plant.radial_tilt == RadialTilt(INNER, OUTER)
+    data = plant.new_data()
+    span, rate = OUTER - INNER - 0.008, 3.0
+    data.qpos[plant.tilt], data.qvel[plant.tilt] = plant.tilt_zero + 0.2, rate
+    mujoco.mj_forward(plant.model, data)
+    alpha = float(data.qacc[plant.tilt])
+    ix, iz, ox, oz = plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist()).accelerations
+    assert ox - ix == pytest.approx(span * alpha, rel=1e-12)
+    assert oz - iz == pytest.approx(-span * rate**2, rel=1e-12)
+    assert ix == pytest.approx((INNER + 0.003) * alpha - 9.81 * math.sin(0.2), rel=1e-12)
+    assert plant.radial_tilt.acceleration(ix, ox) == pytest.approx(alpha * span / (OUTER - INNER), rel=1e-12)
+    assert abs(plant.radial_tilt(ix, iz, ox, oz) - 0.2) > 1e-3
+    drawn = {name: plant.drawn_model.site(name).pos for name in ("accelerometer_inner", "accelerometer_outer")}
+    assert math.dist(*drawn.values()) == pytest.approx(span, rel=1e-12)
+
+
+def test_there_is_no_floor_of_misplaced_accelerometers_with_their_acceleration() -> None:
+    rig = prepare(load_scenario("push_recovery", ["duration_s=0.1", "push=[]"]))
+    result = rig.run_many(2, vary={"accelerometer_inner_misplaced_mm": [0.0, 2.0]})
+    assert np.isnan(result.values("velocity_rms_error_rad_s", "floor_accel")).tolist() == [False, True]
+
+
 def test_one_of_them_alone() -> None:
     radial_tilt = load_plant().radial_tilt
     assert load_plant(accelerometer_outer_m=OUTER).radial_tilt == RadialTilt(radial_tilt.r_inner, OUTER)
@@ -233,12 +261,16 @@ def test_one_of_them_alone() -> None:
         ((0.2, 0.1), r"inner_m = 0\.2, plant\.accelerometer_outer_m = 0\.1: the inner .* 0\.2 and 0\.1 m away"),
         ((0.2, 0.2), "must lie nearer"),
         ((0.3, None), r"plant\.accelerometer_inner_m = 0\.3: .* 0\.3 and 0\.201525 m away"),
+        ((None, None, 200.0), r"inner_misplaced_mm = 200: the inner .* 0\.267175 and 0\.201525 m away"),
+        ((None, None, -70.0), r"inner_misplaced_mm = -70: .* -0\.00282486 and 0\.201525 m away"),
         ((None, 0.05), r"plant\.accelerometer_outer_m = 0\.05: .* 0\.0671751 and 0\.05 m away"),
     ],
 )
 def test_the_inner_one_is_the_inner_one(arguments: tuple, complaint: str) -> None:
+    fields = "accelerometer_inner_m", "accelerometer_outer_m", "accelerometer_inner_misplaced_mm"
+    values = dict(zip(fields, arguments, strict=False))
     with pytest.raises(InputError, match=complaint):
-        load_plant(accelerometer_inner_m=arguments[0], accelerometer_outer_m=arguments[1])
+        load_plant(**values)
 
 
 # --- all of them ----------------------------------------------------------------------------------------------
@@ -250,6 +282,7 @@ SETTINGS: dict[str, Any] = {
     "gimbal_backlash_arcmin": 20.0,
     "accelerometer_inner_m": INNER,
     "accelerometer_outer_m": OUTER,
+    "accelerometer_outer_misplaced_mm": 5.0,
 }
 
 

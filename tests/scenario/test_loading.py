@@ -248,3 +248,15 @@ def test_preparing_again_gives_a_fresh_controller() -> None:
     experiment = prepare(parse_scenario({"duration_s": 0.1}))
     first, second = experiment.run(), experiment.run()
     assert first.summaries == second.summaries
+
+
+def test_of_gains_and_weights_the_one_set_replaces_the_files(tmp_path: Path) -> None:
+    """So that a scenario that `mount` wrote, which has gains, takes the weights that `check` proposes."""
+    path = tmp_path / "with_gains.toml"
+    path.write_text('[controller]\ngains = "scaled"\n', encoding="utf-8")
+    weights = "controller.lqr={state_cost=[1.0, 1.0, 1.0, 1.0], input_cost=10}"
+    controller = load_scenario(str(path), [weights]).controller
+    assert controller.gains is None
+    assert controller.lqr is not None
+    with pytest.raises(InputError, match="give either gains or lqr, not both"):
+        load_scenario(str(path), [weights, "controller.gains=scaled"])

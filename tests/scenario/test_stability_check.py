@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -10,8 +11,9 @@ import pytest
 
 from cmg_mj import load_plant, load_scenario, prepare
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
+from cmg_mj.controllers.notch import Notch
 from cmg_mj.inputs.bundled import bundled, folder
-from cmg_mj.scenario.stability_check import Loop, closed_loop
+from cmg_mj.scenario.stability_check import Loop, _hold, closed_loop
 from tests.command import cmg_mj
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -127,3 +129,23 @@ def test_half_the_flywheel_is_solved_for(half: str) -> None:
 def test_compare_says_it_once(half: str) -> None:
     options = ["--observers", "linear,ltv", "--worlds", 2, "--set", half, "--set", "duration_s=2.2", "--json"]
     assert cmg_mj("compare", "push_recovery", *options).err.count("hint") == 1
+
+
+def test_a_notch_is_in_the_rigid_loop() -> None:
+    """The loop, sample after sample, obeys the polynomial of its poles."""
+    plain, notched = loop(), loop("controller.notch_hz=8")
+    assert (len(plain.poles), plain.notch_hz, len(notched.poles), notched.notch_hz) == (5, 0.0, 7, 8.0)
+    model, K, notch = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3]), Notch(8.0, 0.005, math.inf)
+    A, B = _hold(model, 0.005)
+    x, tilts = np.array([0.01, 0.0, 0.0, 0.0]), []
+    for _ in range(40):
+        tilts.append(float(x[0]))
+        x = A @ x + B[:, 0] * notch(float(-K @ x))
+    for poles, is_whole in ((notched.poles, True), (plain.poles, False)):
+        remainder = np.convolve(tilts, np.poly(np.exp(0.005 * poles)).real, "valid")
+        assert (np.abs(remainder).max() < 1e-9) == is_whole
+    assert notched.distance < 0.7 < plain.distance
+    assert loop("controller.notch_hz=2").words == "UNSTABLE"
+    assert "or a notch above 8 Hz is needed" in (notched.hint or "")
+    out = cmg_mj("check", "push_recovery", "--set=controller.notch_hz=8").out
+    assert "              notch at 8 Hz on the command\n" in out

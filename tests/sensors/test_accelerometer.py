@@ -274,7 +274,7 @@ def test_the_drift_is_the_same_for_a_part_that_filters() -> None:
 
 def test_every_sensor_of_every_axis_has_a_stream_of_its_own() -> None:
     numbers = [stream.on_axis(axis) for axis in range(3) for stream in NoiseStream]
-    assert sorted(numbers)[: len(NoiseStream)] == list(range(7))
+    assert sorted(numbers)[: len(NoiseStream)] == list(range(10))
     assert len(set(numbers)) == len(numbers)
 
 

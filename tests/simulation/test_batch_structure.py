@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,11 @@ from cmg_mj.simulation.batch_values import batch_values, value_of_world
 from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 
 N = 6
+TRACK = Path(__file__).with_name("track.csv")
+MOVING = (
+    'pivot=[{kind="noise", acceleration_m_s2=0.1, corner_hz=5.0},'
+    f" {{kind='track', file='{TRACK}', direction='vertical'}}]"
+)
 
 
 def experiment(observer: str, *more: str) -> Experiment:
@@ -38,6 +45,8 @@ def values(seed: int = 3) -> dict[str, Any]:
         "plant.servo_damping_n_m_s_rad": 0.6 + 0.2 * small[6],
         "plant.accelerometer_inner_m": 0.05 + 0.03 * small[0],
         "plant.accelerometer_outer_m": 0.15 + 0.05 * small[2],
+        "plant.accelerometer_inner_misplaced_mm": 5.0 * small[1],
+        "plant.accelerometer_outer_misplaced_mm": 5.0 * small[3],
         "plant.tilt_friction_n_m": 0.005 * small[3],
         "plant.tilt_damping_n_m_s": 0.01 * small[4],
         "plant.flywheel_imbalance_kg_m": 1e-5 * small[5],
@@ -46,13 +55,16 @@ def values(seed: int = 3) -> dict[str, Any]:
         "controller.rate_limit_rad_s": 2.0 + small[6],
         "sensors.accelerometer.noise_density_ug_rthz": 100.0 + 500.0 * small[7],
         "sensors.accelerometer.bias_mg": [[float(i), -2.0 * i] for i in range(N)],
+        "sensors.accelerometer.vibration_mg": 4.0 * small[0],
         "sensors.fog.angle_random_walk_deg_rth": 0.01 + 0.01 * small[0],
         "push.0.torque_n_m": rng.uniform(-1.5, 1.5, N),
+        "pivot.0.acceleration_m_s2": 0.2 * small[4],
+        "pivot.1.scale": [0.5, 1.0, 1.0, 2.0, -1.0, 0.0],
     }
 
 
 def test_these_are_all_fields_that_may_differ() -> None:
-    fields = {name.replace(".0.", ".") for name in values()} - {"plant.timestep_s"}
+    fields = {re.sub(r"\.\d\.", ".", name) for name in values()} - {"plant.timestep_s"}
     assert fields | {"controller.lqr"} == BATCHED_FIELDS.keys()
 
 
@@ -66,7 +78,7 @@ def test_these_are_all_fields_that_may_differ() -> None:
     ],
 )
 def test_each_world_is_its_own_experiments(observer: str, more: tuple[str, ...]) -> None:
-    setup = experiment(observer, *more)
+    setup = experiment(observer, MOVING, *more)
     worlds = [5, 5, 0, 1, 2, 9]
     pool = setup.run_many(worlds, vary=values())
     assert pool.trajectory is not None

@@ -449,5 +449,5 @@ def test_an_option_that_no_controller_has_is_named_with_those_it_has() -> None:
         load_plant().controller("linear", **wrong)
     assert str(caught.value) == (
         "controller: 'feedbck': no such option; did you mean 'feedback'? "
-        "allowed: angle_source, axis, bias_trim_s, feedback, open_loop_observers, seed, worlds"
+        "allowed: angle_source, axis, bias_trim_s, feedback, notch_hz, open_loop_observers, seed, worlds"
     )

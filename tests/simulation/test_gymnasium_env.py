@@ -21,6 +21,12 @@ from cmg_mj.simulation.gymnasium_env import ID, READINGS, STATE_COST, ScissoredP
 from tests.command import ROOT, environment
 
 SHORT = ["duration_s=3.0", "push.0.start_s=0.5"]
+REAL = [
+    'pivot=[{kind="noise", acceleration_m_s2=0.3, corner_hz=5.0}]',
+    "sensors.accelerometer.vibration_mg=4",
+    "sensors.accelerometer.wheel_harmonics_mg=[5, 2]",
+    "plant.accelerometer_inner_misplaced_mm=-3",
+]
 UNEVEN = [
     *SHORT,
     "plant.gimbal_backlash_arcmin=20.0",
@@ -54,8 +60,9 @@ def act(env: ScissoredPairEnv, seed: int, **options: Any) -> tuple[list[Tick], l
         ("push_recovery", UNEVEN, 1, 0),
         ("push_recovery", [*SHORT, "push.0.torque_n_m=40.0"], 0, 0),
         ("bias_estimation", ["duration_s=2.0"], 0, 0),
+        ("push_recovery", [*SHORT, *REAL], 1, 2),
     ],
-    ids=["push", "another world", "uneven", "fall", "bias"],
+    ids=["push", "another world", "uneven", "fall", "bias", "a real rig"],
 )
 def test_our_controller_gives_the_runners_trajectory(scenario: str, settings: list[str], seed: int, world: int) -> None:
     """Bit for bit: what is measured, estimated, commanded, and where the rig is."""

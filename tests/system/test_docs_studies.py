@@ -10,9 +10,15 @@ from pathlib import Path
 
 import pytest
 
+from cmg_mj.results.error_bounds import acceleration_floor
+from cmg_mj.sensors.tilt import TiltNoise
+from cmg_mj.studies.sweeps.study import SweepStudy
+from cmg_mj.studies.sweeps.study_file import axes_of, design_of, scenario_of, study_file
 from tests.command import cmg_mj
 
 STUDIES = Path(__file__).resolve().parents[2] / "docs/studies"
+REAL_RIGS = ("real_bend", "real_pivot", "real_rigs", "real_vibration")
+"""Study files of many observers, which `--dry-run` would try for minutes."""
 STEPS = STUDIES / "steps.py"
 
 
@@ -42,6 +48,15 @@ def test_the_tables_of_the_baselines() -> None:
     process = subprocess.run(command, capture_output=True, text=True, check=True)
     assert re.search(r"\| fused, told nothing, offset 20 deg/s +\| +0\.\d+ \| +0\.00\d+ \| +0\.001", process.stdout)
     assert re.search(r"\| 0\.1, 0\.15 +\| +0\.83 \| +1\.11 \| +0\.0366 \|", process.stdout)
+
+
+@pytest.mark.slow
+def test_the_table_of_the_numbers_of_free_pivot() -> None:
+    study = STEPS.with_name("free_pivot_tuning.py")
+    arguments = "--worlds 2 --falls 2 --jobs 1"
+    process = subprocess.run([sys.executable, study, *arguments.split()], capture_output=True, text=True, check=True)
+    assert re.search(r"\| as it is +(\| +\d\.\d\d ){6}\| +\d \|", process.stdout)
+    assert process.stdout.count("\n") == 12
 
 
 @pytest.mark.slow
@@ -80,11 +95,37 @@ def test_the_tables_of_two_axes() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("study", sorted(path.name for path in STUDIES.glob("*.toml")))
+@pytest.mark.parametrize(
+    "study", sorted({path.name for path in STUDIES.glob("*.toml")} - {f"{name}.toml" for name in REAL_RIGS})
+)
 def test_a_study_file_can_be_run(study: str) -> None:
     outcome = cmg_mj("sweep", STUDIES / study, "--dry-run")
     assert outcome.status == 0, outcome.err
     assert " trials in " in outcome.out
+
+
+@pytest.mark.parametrize("study", REAL_RIGS)
+def test_a_study_of_real_rigs_has_the_baselines(study: str) -> None:
+    name = str(STUDIES / f"{study}.toml")
+    fields = study_file(name)
+    assert fields is not None
+    settings = fields.get("sweep", {})
+    design = design_of(name, settings)
+    scenario, axes = scenario_of(name, fields), tuple(axes_of(name, fields))
+    parsed = SweepStudy(scenario, axes, tuple(settings.get("observers", [])), settings.get("worlds", 0), *design)
+    assert {"zero", "mems_as_bought", "mems_fused"} <= set(parsed.references)
+    assert {"gyro_free", "free_pivot"} <= set(parsed.observers)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("study", REAL_RIGS)
+def test_a_study_of_real_rigs_runs(study: str, tmp_path: Path) -> None:
+    size = "--sample 2 --worlds 1 --observers free_pivot,gyro_free,zero --set duration_s=0.1 --set push.0.start_s=0"
+    outcome = cmg_mj("sweep", STUDIES / f"{study}.toml", *size.split(), "--out", tmp_path)
+    assert outcome.status == 0, outcome.err
+    report = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "| zero (baseline)" in report
+    assert "## Refused and stopped" not in report
 
 
 @pytest.mark.slow
@@ -95,3 +136,50 @@ def test_the_table_of_gymnasium() -> None:
     row = r"\| InvertedPendulum-v5, cart held \| +0.001 \| +10 of 10 \| +10 of 10 \| +0 of 10 \(\d+ to \d+ steps\) \|"
     assert re.search(row, process.stdout)
     assert re.search(row, (STUDIES.parent / "plugin.md").read_text(encoding="utf-8"))
+
+
+@pytest.mark.slow
+def test_a_cell_of_the_bending_frames_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(STUDIES)
+    study = importlib.import_module("bending_frame")
+    settings = [*study.bend(10.0, "mast"), *study.RATES["gyro_free"]]
+    assert study.cell((settings, 2)) == "2 fall"
+    assert float(study.cell(([*settings, "controller.notch_hz=10"], 2))) < 0.6
+    heads = [head for head, _ in study.rows(1)]
+    page = (STUDIES.parent / "real_rigs.md").read_text(encoding="utf-8")
+    assert all(f"| {head} |" in page for head in heads if "off by" not in head)
+
+
+@pytest.mark.slow
+def test_the_grid_of_free_pivot(tmp_path: Path) -> None:
+    """Two worlds of two cells; the second call computes nothing."""
+    arguments = ["--worlds", "2", "--jobs", "1", "--only", "0.5 m/s2 to 5 Hz", "--keep", tmp_path]
+    command = [sys.executable, STUDIES / "free_pivot_grid.py", *map(str, arguments)]
+    tables = [subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2)]
+    assert tables[0] == tables[1]
+    assert len(list(tmp_path.iterdir())) == 2
+    assert tables[0].count("| pivot 0.5 m/s2 to 5 Hz") == 3
+
+
+@pytest.mark.slow
+def test_the_bound_of_a_pivot_at_rest_is_that_of_the_acceleration(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(STUDIES)
+    bound = importlib.import_module("free_pivot_grid").matched_bound
+    noise, start = TiltNoise(0.0063, 0.41, 0.89), {"offset": 0.35, "rate": 0.02}
+    at_rest, weak, strong, sine = (
+        bound(noise, 0.005, motion, 9.81, **start)
+        for motion in (None, ("noise", 0.05, 5.0), ("noise", 0.5, 5.0), ("sine", 0.5, 5.0))
+    )
+    assert at_rest.error == pytest.approx(acceleration_floor(noise, 0.005), rel=1e-9)
+    assert at_rest.error == sine.error < weak.error < strong.error
+    assert at_rest.early < weak.early < strong.early
+
+
+@pytest.mark.slow
+def test_the_tables_of_the_light_cart() -> None:
+    """The cart of 1 kg: unstable about the pivot, stable about the mass centre."""
+    command = [sys.executable, STUDIES / "light_cart.py", "--carts", "1", "--worlds", "1"]
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert re.search(r"5.51 x1 \+ 0.12 u \| +274 \| +-0.279 \|", process.stdout)
+    for about, stands in (("about the pivot", 0), ("about the mass centre", 1)):
+        assert re.search(rf"\n\| gyro_free, {about} +\| +{stands} \|", process.stdout)

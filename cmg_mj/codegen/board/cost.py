@@ -9,7 +9,7 @@ from typing import Protocol, TypedDict
 from rich import box
 from rich.table import Table
 
-from cmg_mj.codegen.board.deploy import exported
+from cmg_mj.codegen.board.deploy import temporary_export
 from cmg_mj.codegen.board.image import build, flash_of
 from cmg_mj.codegen.board.qemu import Board, Cost
 from cmg_mj.codegen.board.tools import require
@@ -127,7 +127,7 @@ def cost_of(run: ProcessorExperiment, controller: Controller) -> UpdateCost:
     Returns:
         The cost.
     """
-    with exported(controller) as files:
+    with temporary_export(controller) as files:
         flash = flash_of(files.observer, files.folder)
         board = Board(build(files.observer, files.folder).path, counting=True)
     with board:

@@ -8,13 +8,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from cmg_mj.codegen.board.identity import identity_of, require_own_estimate
 from cmg_mj.codegen.board.image import build
 from cmg_mj.codegen.board.qemu import Board
 from cmg_mj.codegen.board.tools import require
 from cmg_mj.codegen.export import export
 from cmg_mj.codegen.export.names import name_of
 from cmg_mj.controllers.controller import Controller
-from cmg_mj.errors import InputError, shown
+from cmg_mj.errors import InputError
 
 
 class ExportedFiles(NamedTuple):
@@ -23,14 +24,16 @@ class ExportedFiles(NamedTuple):
     Attributes:
         observer: The observer's name in C.
         folder: Folder of the files.
+        identity: The text with which a board that runs it introduces itself.
     """
 
     observer: str
     folder: Path
+    identity: str
 
 
 @contextmanager
-def exported(controller: Controller) -> Iterator[ExportedFiles]:
+def temporary_export(controller: Controller) -> Iterator[ExportedFiles]:
     """Export a controller to a temporary folder.
 
     Args:
@@ -42,14 +45,11 @@ def exported(controller: Controller) -> Iterator[ExportedFiles]:
     Raises:
         InputError: The controller cannot be exported.
     """
-    if controller.feedback != "observer":
-        raise InputError(
-            f"controller.feedback = {shown(controller.feedback)}: a board has no such sensor; it closes the loop "
-            "on its own estimate, 'observer'"
-        )
+    require_own_estimate(controller)
     with TemporaryDirectory(prefix="cmg_mj-board-") as folder:
-        header = export(controller, Path(folder), precision="single", name=_name_of(controller))[0]
-        yield ExportedFiles(header.stem, Path(folder))
+        header, source, *_ = export(controller, Path(folder), precision="single", name=_name_of(controller))
+        identity = identity_of(controller, header.stem, source.read_text(encoding="utf-8")).text()
+        yield ExportedFiles(header.stem, Path(folder), identity)
 
 
 def _name_of(controller: Controller) -> str:
@@ -76,7 +76,7 @@ def on_a_board(controller: Controller, *, counting: bool = False) -> Iterator[Bo
         RunStopped: The board does not start.
     """
     require()
-    with exported(controller) as files:
+    with temporary_export(controller) as files:
         board = Board(build(files.observer, files.folder).path, counting=counting)
     with board:  # it has loaded its image: the files may go
         yield board

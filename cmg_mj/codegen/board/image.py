@@ -32,6 +32,32 @@ FLAGS = (
 )
 
 
+class Machine(NamedTuple):
+    """A board that the firmware has a port layer for.
+
+    Attributes:
+        title: The board's name for people.
+        sources: The port layer, a file in the firmware's folder.
+        script: The linker script there.
+        macros: Definitions for the compiler.
+    """
+
+    title: str
+    sources: str
+    script: str
+    macros: tuple[str, ...] = ()
+
+
+MACHINES = {
+    "mps2": Machine("QEMU's mps2-an500", "mps2.c", "mps2.ld", ("QUIET_US=180000000u", "GAP_US=1000000u")),
+    "stm32f746": Machine("ST's 32F746GDISCOVERY", "stm32f746.c", "stm32f746.ld"),
+}
+"""Machine -> its board. The emulated one ends when nobody talks to it for about three minutes.
+
+Its line loses nothing, and its host may be busy: it waits a second for the rest of a message before it drops it.
+"""
+
+
 class Image(NamedTuple):
     """A program for the board.
 
@@ -44,13 +70,17 @@ class Image(NamedTuple):
     flash: int
 
 
-def build(observer: str, folder: Path, controller: Path | None = None) -> Image:
+def build(
+    observer: str, folder: Path, controller: Path | None = None, machine: str = "mps2", identity: str = ""
+) -> Image:
     """Build an exported controller for the board.
 
     Args:
         observer: The observer's name in C.
         folder: Folder of the .h and .c files, to which the image is written.
         controller: Another file in place of the .c file, such as `EMPTY`.
+        machine: The board, one of `MACHINES`.
+        identity: The text with which it introduces itself: see `Identity`.
 
     Returns:
         The image.
@@ -59,15 +89,21 @@ def build(observer: str, folder: Path, controller: Path | None = None) -> Image:
         InputError: The compiler reports errors.
     """
     source = controller or folder / f"{observer}.c"
-    path = folder / f"{observer}-{source.stem}.elf"
-    firmware = [FIRMWARE / name for name in ("startup.c", "mps2.c", "board.c")]
-    macros = [f"-DOBSERVER={observer}"]
-    macros += [f"-D{size}={observer.upper()}_{size}" for size in ("ESTIMATES", "ENCODERS")]
+    board = MACHINES[machine]
+    path = folder / f"{observer}-{source.stem}-{machine}.elf"
+    firmware = [FIRMWARE / name for name in ("startup.c", board.sources, "board.c")]
+    macros = [f"-D{macro}" for macro in macros_of(observer, machine, identity)]
     command: list[str | Path] = [COMPILER, *FLAGS, *macros, "-I", folder, "-I", FIRMWARE]
-    command += ["-T", FIRMWARE / "mps2.ld", *firmware, source, "-lm", "-o", path]
+    command += ["-T", FIRMWARE / board.script, *firmware, source, "-lm", "-o", path]
     _run(command, observer)
     text, data, *_ = _run([SIZE, path], observer).splitlines()[1].split()
     return Image(path, int(text) + int(data))
+
+
+def macros_of(observer: str, machine: str, identity: str) -> list[str]:
+    """List the definitions that the firmware is compiled with; `identity` has no character that C quotes."""
+    sizes = [f"{size}={observer.upper()}_{size}" for size in ("ESTIMATES", "ENCODERS")]
+    return [f"OBSERVER={observer}", *sizes, f'IDENTITY="{identity}"', *MACHINES[machine].macros]
 
 
 EMPTY = FIRMWARE / "empty.c"

@@ -30,7 +30,7 @@ STATUSES = {
     101: "its processor met a fault",
     102: "its stack is full",
 }
-"""Exit status -> the reason, as firmware/machine.h numbers them."""
+"""Exit status -> the reason, as firmware/port.h numbers them."""
 
 NOT_FINITE = {1: "a reading was not finite", 2: "its state, estimate or command was not finite"}
 """Status of an update -> the reason why the controller has stopped, as the exported header numbers them."""
@@ -78,17 +78,7 @@ class Board:
 
     def __init__(self, image: Path, *, counting: bool = False, patience_s: float = PATIENCE_S) -> None:
         host, board = socket.socketpair()
-        command = [
-            *_parent_death_prefix(),
-            EMULATOR,
-            "-M",
-            "mps2-an500",
-            "-nodefaults",
-            "-nographic",
-            "-monitor",
-            "none",
-        ]
-        command += ["-semihosting-config", "enable=on,target=native", "-serial", "stdio", "-kernel", str(image)]
+        command = [*_parent_death_prefix(), *emulator_command(image)]
         if counting:
             command += ["-icount", f"shift={NANOSECONDS_AN_INSTRUCTION.bit_length() - 1}"]
         with board:
@@ -108,6 +98,7 @@ class Board:
             self.sizes = Sizes(*self._ask("i", b"", "<4I"))
             self._reals = "f" if self.sizes.real == 4 else "d"
             self._per_instruction, self._empty = self._calibrated() if counting else (0.0, {})
+            self.start()
         except BaseException:
             self.close()
             raise
@@ -145,9 +136,7 @@ class Board:
         payload = self._packed(*accelerations, *encoders)
         counts, stack, status, u, x_e, *estimate = self._ask("u", payload, f"<3I{numbers}{self._reals}")
         self.costs.append(self._cost("u", counts, stack))
-        if status:
-            raise RunStopped(f"the controller on the board has stopped: {NOT_FINITE.get(status, f'status {status}')}")
-        return Decision(u, x_e, tuple(estimate))
+        return decision_of(status, u, x_e, estimate)
 
     def init(self, y1: float, y2: float, acceleration: float) -> Cost:
         """Start the separate observer, which is not the controller's."""
@@ -201,6 +190,23 @@ class Board:
                 return f"{EMULATOR} was ended by signal {-status}"
             return STATUSES.get(status, f"{EMULATOR} has ended with status {status}")
         return "it has closed the line"
+
+
+def decision_of(status: int, u: float, x_e: float, estimate: Sequence[float]) -> Decision:
+    """Return the decision of an update's answer.
+
+    Raises:
+        RunStopped: Its status says that a number was not finite.
+    """
+    if status:
+        raise RunStopped(f"the controller on the board has stopped: {NOT_FINITE.get(status, f'status {status}')}")
+    return Decision(u, x_e, tuple(estimate))
+
+
+def emulator_command(image: Path) -> list[str]:
+    """Return the command that runs an image with its serial line on standard input and output."""
+    options = "-M mps2-an500 -nodefaults -nographic -monitor none -semihosting-config enable=on,target=native"
+    return [EMULATOR, *options.split(), "-serial", "stdio", "-kernel", str(image)]
 
 
 def _parent_death_prefix() -> list[str]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import binascii
 import socket
 import struct
 
+from cmg_mj.codegen.board.frames import Frame, FrameReader
 from cmg_mj.errors import RunStopped
-
-START_BYTE = b"\xa5"
 
 
 class Silent(RunStopped):
@@ -17,12 +15,6 @@ class Silent(RunStopped):
 
 class Closed(RunStopped):
     """The board has closed the line."""
-
-
-def frame(kind: str, number: int, payload: bytes) -> bytes:
-    """Encode a message for the line."""
-    body = bytes((ord(kind), number, len(payload))) + payload
-    return START_BYTE + body + struct.pack("<H", _crc(body))
 
 
 class SerialLine:
@@ -36,6 +28,7 @@ class SerialLine:
     def __init__(self, line: socket.socket, patience_s: float) -> None:
         self._line = line
         self._line.settimeout(patience_s)
+        self._reader, self._waiting = FrameReader(), list[Frame]()
         self._number = 0
         self.patience_s = patience_s
 
@@ -55,7 +48,7 @@ class SerialLine:
         """
         self._number = (self._number + 1) % 256
         try:
-            self._line.sendall(frame(kind, self._number, payload))
+            self._line.sendall(Frame(kind, self._number, payload).encode())
         except OSError as error:
             raise Closed("the board is gone") from error
         answer_kind, number, answer = self._message()
@@ -74,31 +67,18 @@ class SerialLine:
         if self._message() != ("!", 0, b""):
             raise RunStopped("the board says something else than that it is ready")
 
-    def _message(self) -> tuple[str, int, bytes]:
-        """Receive the next message: kind, number and payload."""
+    def _message(self) -> Frame:
+        """Receive the next message."""
         try:
-            head = self._receive(4)
-            if head[:1] != START_BYTE:
-                raise RunStopped(f"the board sent the byte {head[0]:#04x} where a message should begin")
-            rest = self._receive(head[3] + 2)
+            while not self._waiting:
+                data = self._line.recv(4096)
+                if not data:
+                    raise Closed("the board is gone")
+                self._waiting += self._reader.feed(data)
+                if self._reader.damaged:
+                    raise RunStopped("the board sent a message that was damaged on the line, or bytes that are none")
         except TimeoutError as error:
             raise Silent(f"the board has not answered for {self.patience_s:g} s") from error
         except OSError as error:
             raise Closed("the board is gone") from error
-        if struct.pack("<H", _crc(head[1:] + rest[:-2])) != rest[-2:]:
-            raise RunStopped("the board sent a message that was damaged on the line")
-        return chr(head[1]), head[2], rest[:-2]
-
-    def _receive(self, count: int) -> bytes:
-        received = b""
-        while len(received) < count:
-            more = self._line.recv(count - len(received))
-            if not more:
-                raise Closed("the board is gone")
-            received += more
-        return received
-
-
-def _crc(body: bytes) -> int:
-    """Compute the CRC-16/CCITT."""
-    return binascii.crc_hqx(body, 0xFFFF)
+        return self._waiting.pop(0)

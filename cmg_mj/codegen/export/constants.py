@@ -44,11 +44,12 @@ class Constants(NamedTuple):
 def constants_of(controller: Controller) -> Constants:
     """Collect the constants of a controller."""
     tilt, gimbals = controller.tilt, controller.gimbal_angle
+    centre = "the common mass centre of rig and cart" if tilt.height else "the tilt axis"
     numbered = list(enumerate(zip(gimbals.directions, gimbals.zeros, strict=True), 1))
     return Constants(
         of_measure=[
-            Constant("r_inner", tilt.r_inner, "inner accelerometer from the tilt axis [m]"),
-            Constant("r_outer", tilt.r_outer, "outer accelerometer from the tilt axis [m]"),
+            Constant("r_inner", tilt.r_inner, f"inner accelerometer from {centre} [m]"),
+            Constant("r_outer", tilt.r_outer, f"outer accelerometer from {centre} [m]"),
             *(Constant(f"direction_{i}", sign, f"sign of u that gimbal {i} is given") for i, (sign, _) in numbered),
             *(Constant(f"zero_{i}", zero, f"encoder {i} at a gimbal angle of 0 [rad]") for i, (_, zero) in numbered),
         ],

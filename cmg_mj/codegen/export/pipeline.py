@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
-import inspect
 import shlex
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple, TypedDict, TypeVar
-
-import numpy as np
 
 from cmg_mj.codegen.export import check
 from cmg_mj.codegen.export.c_code import Precision, operations
@@ -20,25 +15,17 @@ from cmg_mj.codegen.export.constants import constants_of
 from cmg_mj.codegen.export.example import format_example, format_test_vector
 from cmg_mj.codegen.export.law_code import LawPrinter
 from cmg_mj.codegen.export.names import export_files, name_of
+from cmg_mj.codegen.export.refusals import refuse_unexported
 from cmg_mj.codegen.export.source_location import LawNotExportable
 from cmg_mj.codegen.export.trace import trace
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.dry_run import dry_run_law, dry_run_observer
-from cmg_mj.controllers.laws import Law, StateFeedback
-from cmg_mj.errors import InputError, TomlValue, raised, shown
+from cmg_mj.controllers.laws import Law
+from cmg_mj.errors import InputError, raised
 from cmg_mj.observers.protocol import Observer
 from cmg_mj.results.run_folder.folder import write_text
 
 Part = TypeVar("Part", Observer, Law)
-
-EXPORTED_OPTIONS = ("angle_source", "bias_trim_s")
-"""Options of a `Controller` that its C has."""
-SIMULATION_OPTIONS = ("seed", "worlds", "axis", "open_loop_observers")
-"""Options that concern the simulation around a controller alone."""
-EXPORTED_LAW_FIELDS = ("dt", "gains", "rate_limit")
-"""Fields of the law (8) that its C has; another law is traced whole."""
-REASONS = {"feedback": "what is exported has the observer's rate alone"}
-"""Option of a `Controller` -> why its C has none, where that is known."""
 
 
 class Figures(TypedDict):
@@ -71,7 +58,7 @@ class Code(NamedTuple):
 
 def generate_code(controller: Controller, precision: Precision, name: str | None = None, suffix: str = "") -> Code:
     """Generate a controller's C, whose name has a suffix, and compare it with Python; see `export`."""
-    _refuse_unexported(controller)
+    refuse_unexported(controller)
     cls = type(controller.observer)
     try:
         return _generate(controller, precision, name_of(controller.observer, name) + suffix)
@@ -79,48 +66,6 @@ def generate_code(controller: Controller, precision: Precision, name: str | None
         raise InputError(f"law {type(controller.law).__name__}: cannot be exported: {error}") from error
     except InputError as error:
         raise InputError(f"{cls.__module__}:{cls.__qualname__} cannot be exported: {error}") from error
-
-
-def _refuse_unexported(controller: Controller) -> None:
-    """Refuse every option of the controller, and every field of (8), that C does not have and that is in use."""
-    law = controller.law
-    option_defaults = {
-        option.name: None if option.default is option.empty else option.default
-        for cls in type(controller).__mro__
-        for option in inspect.signature(cls.__init__).parameters.values()
-        if option.kind is option.KEYWORD_ONLY and option.name not in EXPORTED_OPTIONS + SIMULATION_OPTIONS
-    }
-    _refuse_in_use(controller, option_defaults)
-    if type(law) is StateFeedback:
-        fields = [field for field in dataclasses.fields(law) if field.name not in EXPORTED_LAW_FIELDS]
-        _refuse_in_use(law, {field.name: _default_of(field) for field in fields})
-
-
-def _default_of(field: dataclasses.Field[TomlValue]) -> TomlValue:
-    """Return a field's default; None without one."""
-    if field.default_factory is not dataclasses.MISSING:
-        return field.default_factory()
-    return None if field.default is dataclasses.MISSING else field.default
-
-
-def _refuse_in_use(part: Controller | Law, defaults: Mapping[str, TomlValue]) -> None:
-    """Refuse a name whose value is not its default, and one that is no attribute: its value is not known.
-
-    Args:
-        part: The controller or its law.
-        defaults: Name of an attribute -> its default; None is no default.
-    """
-    for name, default in defaults.items():
-        setting = f"controller.{name}"
-        if not hasattr(part, name):
-            raise InputError(f"{setting}: cannot be exported: {type(part).__qualname__} has no attribute {name!r}")
-        value = getattr(part, name)
-        if not np.any(value != default):
-            continue
-        reason = REASONS.get(name, "C has no such option")
-        if default is not None:
-            reason += f"; set {setting}={default if isinstance(default, str) else shown(default)}"
-        raise InputError(f"{setting} = {shown(value)}: cannot be exported: {reason}")
 
 
 def _copied(part: Part, refusal: type[InputError]) -> Part:

@@ -14,13 +14,12 @@ from cmg_mj.elementwise import Scalar, clip, where
 from cmg_mj.errors import InputError
 from cmg_mj.observers.protocol import Measurement
 from cmg_mj.observers.reduced_model import ReducedModel, is_hurwitz
+from cmg_mj.observers.scaling import PAPERS_GRAVITY
 
 TABLE_2_GAINS = (35.0, 4.0, -1.0, 0.3)
 """K_e of aranovskiy2020 Table 2, on [x1, x2, x3, x_e]."""
 PAPERS_AUTHORITY = 0.3454 / 0.061841
 """b0 = J_d omega_d/J1 of the rig that Table 2's gains were chosen for (aranovskiy2020 Table 1) [1/s]."""
-PAPERS_GRAVITY = 3.4531 / 0.061841
-"""g0 = (m g l/sqrt(2))/J1 of that rig [1/s^2]."""
 
 
 def lqr_gains(model: ReducedModel, state_cost: Sequence[float], input_cost: float) -> tuple[float, ...]:

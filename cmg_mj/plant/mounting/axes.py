@@ -10,12 +10,12 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
+from cmg_mj.plant.tilt_line import UP
 
 NAMED = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 LEVEL_DEG = 5.0
 """An axis steeper than this is not horizontal [deg]."""
 PARALLEL = math.cos(math.radians(5.0))
-UP = np.array([0.0, 0.0, 1.0])
 
 AxisLike = str | Sequence[float]
 

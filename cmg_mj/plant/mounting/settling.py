@@ -11,6 +11,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mounting.servos import rest_controls
+from cmg_mj.plant.tilt_line import UP
 
 LONGEST_S = 10.0
 """Longest time for a robot to come to rest [s]."""
@@ -26,7 +27,6 @@ STANDS_DEG = 2.0
 """A robot that must lean so far before it falls stands by itself [deg]."""
 LONG_M = 0.02
 """Contacts farther apart along the axis say how it lies [m]."""
-UP = np.array([0.0, 0.0, 1.0])
 
 
 class Support(NamedTuple):

@@ -17,8 +17,9 @@ from cmg_mj.plant.mounting.attach import place_modules
 from cmg_mj.plant.mounting.axes import hinge_or_direction
 from cmg_mj.plant.mounting.keyframes import as_qpos
 from cmg_mj.plant.mounting.request import MountRequest
-from cmg_mj.plant.mounting.settling import UP, Support, stand
+from cmg_mj.plant.mounting.settling import Support, stand
 from cmg_mj.plant.mujoco_state import posed
+from cmg_mj.plant.tilt_line import UP
 
 SMALLEST_HEIGHT_M = 1e-3
 """Smallest height of a robot's mass above the line [m]."""

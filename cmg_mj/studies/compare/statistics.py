@@ -11,7 +11,7 @@ import numpy as np
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.intervals import finite_mean, finite_values, known_interval
 from cmg_mj.results.per_world_table import as_table
-from cmg_mj.results.summary_keys import KEYS, Summary, finite, open_loop_figures
+from cmg_mj.results.summary_keys import KEYS, Summary, finite, open_loop_figures, section
 from cmg_mj.studies.compare.comparison import ComparedObserver, standard_deviation
 
 if TYPE_CHECKING:
@@ -84,7 +84,9 @@ def comparison_rows(compared: Sequence[ComparedObserver]) -> list[ComparisonRow]
     The best observer is the one with the least error in the push window, or over the whole run if there is no push.
     """
     leader = best_observer(compared, PUSH_ERROR) or best_observer(compared, ERROR)
-    return [*map(ComparisonRow, compared), *(ComparisonRow(leader, name) for name in REFERENCES if leader)]
+    known = section(leader.result.summaries[0], "references") if leader else {}
+    references = [ComparisonRow(leader, name) for name in REFERENCES if name in known] if leader else []
+    return [*map(ComparisonRow, compared), *references]
 
 
 def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Collection, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 
 import mujoco
 import tomli_w
@@ -14,6 +17,7 @@ import tomli_w
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.paths import expanded
 from cmg_mj.observers import OBSERVER_CLASSES
+from cmg_mj.observers.scaling import Number, scaled_names, scaled_parameters
 from cmg_mj.plant.mounting import MountedRobot
 from cmg_mj.plant.mounting.mount import mount_on_request
 from cmg_mj.plant.mounting.mounted import check_target, with_scenario
@@ -24,6 +28,7 @@ from cmg_mj.results.files import whole_file
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.signed_text import signed
 from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.plugin_files import Plugin, find_tools
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
@@ -49,6 +54,27 @@ PUSH_SHARE = 0.6
 PUSHED_AT_S, DURATION_S = 10.0, 20.0
 """The gimbals come back from the first tilt before the push: both limits are those of upright gimbals. On a slow robot,
 whose pole is 3 1/s, that takes so long."""
+DIGITS = 4
+"""Significant digits of the observer's parameters."""
+SCALED_COMMENT = (
+    "# The observer's parameters, carried over from the papers' rig by this robot's time scale (docs/mount.md)."
+)
+AxesParameters = Mapping[str, Mapping[str, Number]]
+"""Axis -> parameter of its observer -> value."""
+SUITS_EVERY_RIG = "finite_difference"
+"""An observer with which the plant is prepared before another's parameters are known."""
+
+
+class RigSettings(NamedTuple):
+    """The robot that carries the pair, as a scenario has it besides its model.
+
+    Attributes:
+        sliding: Axes whose pivot slides freely.
+        parameters: Parameters of the observers.
+    """
+
+    sliding: Collection[str] = ()
+    parameters: AxesParameters = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -177,7 +203,8 @@ def _mount_and_write(
                 trial = model.with_suffix(".trial.xml")
                 sufficient = _sufficient_scale(robot, request, trial, observer, time_limit)
         pushed = write_scenario(model, mounted.path, observer, limits, request.name, simulated) if folder else None
-        text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated)
+        rig = RigSettings(sliding_axes(experiment.plant), observer_parameters(observer, experiment))
+        text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated, rig)
         model.with_suffix(".toml").write_bytes(signed(text, ".toml"))
         check_replaceable(file, overwrite=overwrite)  # also what has come meanwhile
         if folder and pushed:
@@ -242,9 +269,26 @@ def write_scenario(
         The prepared experiment.
     """
     path = model.with_suffix(".toml")
-    with whole_file(path) as temporary:
-        temporary.write_bytes(signed(scenario_text(model.name, robot, observer, limits, axis, simulated), ".toml"))
-    return prepare(load_scenario(str(path)))
+
+    def written(kind: str, settings: RigSettings) -> Scenario:
+        text = scenario_text(model.name, robot, kind, limits, axis, simulated, settings)
+        with whole_file(path) as temporary:
+            temporary.write_bytes(signed(text, ".toml"))
+        return load_scenario(str(path))
+
+    kind = SUITS_EVERY_RIG if scaled_names(observer) else observer
+    rig = prepare(written(kind, RigSettings()))
+    sliding = sliding_axes(rig.plant)
+    if sliding:
+        rig = prepare(written(kind, RigSettings(sliding)))
+    if kind == observer:
+        return rig
+    return prepare(written(observer, RigSettings(sliding, observer_parameters(observer, rig))), rig.plant)
+
+
+def sliding_axes(plant: Plant) -> list[str]:
+    """Return the names of the axes whose pivot slides freely."""
+    return [axis.name for axis in plant.axes if axis.reduced.pivot_arm]
 
 
 def scenario_text(
@@ -254,24 +298,57 @@ def scenario_text(
     limits: Prospects | None,
     axis: str,
     simulated: SimulatedPush | None = None,
+    rig: RigSettings | None = None,
 ) -> str:
     """Return the scenario that `write_scenario` writes, as TOML."""
+    sliding, parameters = rig or RigSettings()
     start = {"initial_tilt_deg": limits.start_tilt_deg if limits else 0.0}
     plant = {"model": model, "equilibrium_bias_deg": 0.0, **({"initial_tilt_deg": 0.0} if axis else start)}
+    slides = {"pivot_slides": True}
+    plant |= slides if "" in sliding else {}
+    axes: dict[str, dict[str, Mapping[str, Number]]] = {axis: {"plant": start}} if axis else {}
+    for name in filter(None, sliding):
+        axes[name] = {"plant": {**axes.get(name, {}).get("plant", {}), **slides}}
     pushes: list[dict[str, str | float]] = []
     largest = simulated.impulse if simulated else limits.push_margin.median_impulse if limits else 0.0
     if largest:
         torque = float(f"{PUSH_SHARE * largest / PUSH_S:.3g}")
         pushed_axis = {"axis": axis} if axis else {}
         pushes = [{**pushed_axis, "start_s": PUSHED_AT_S, "duration_s": PUSH_S, "torque_n_m": torque}]
-    return tomli_w.dumps(
+    observers = {name: its for name, its in parameters.items() if its}
+    if len(observers) > 1:
+        axes |= {name: {**axes.get(name, {}), "observer": its} for name, its in observers.items()}
+    text = tomli_w.dumps(
         {
             "title": f"{robot.stem}, balanced",
             "duration_s": DURATION_S,
             "plant": plant,
             "controller": {"gains": "scaled"},
-            "observer": {"kind": observer},
-            **({"axes": {axis: {"plant": start}}} if axis else {}),
+            "observer": {"kind": observer, **(next(iter(observers.values())) if len(observers) == 1 else {})},
+            **({"axes": axes} if axes else {}),
             **({"push": pushes} if pushes else {}),
         }
     )
+    if not observers:
+        return text
+    return with_comment(text, SCALED_COMMENT, "[axes" if len(observers) > 1 else "[observer]")
+
+
+def with_comment(text: str, comment: str, header: str) -> str:
+    """Put a comment above the first header in a TOML text that begins so."""
+    return text.replace(f"\n{header}", f"\n{comment}\n{header}", 1)
+
+
+def observer_parameters(kind: str, experiment: Experiment) -> AxesParameters:
+    """Carry an observer's parameters to a robot, axis by axis, in the digits that its scenario shows."""
+    parts = experiment.parts
+    return {
+        part.plant.axis.name: {
+            name: _round(value) for name, value in scaled_parameters(kind, part.plant.reduced).items()
+        }
+        for part in parts
+    }
+
+
+def _round(value: Number) -> Number:
+    return tuple(map(_round, value)) if isinstance(value, tuple) else float(f"{value:.{DIGITS}g}")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from cmg_mj.plant.tilt_line import HingeLine
+from cmg_mj.scenario.sliding_pivot import IN_THE_MODEL, NOT_IN_THE_MODEL, loop_words, measured_words, sliding_words
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
 from cmg_mj.studies.push_limits.mount_files import MountResult
 from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG
@@ -44,6 +45,7 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
         f"  any controller, from upright gimbals (linear model): recovers from at most {figures['limit_tilt_deg']:.3g} "
         f"deg, or a push of {figures['limit_push_torque_n_m']:.3g} N m for {PUSH_S:g} s"
     )
+    yield from _pivot(result)
     margin = result.prospects.push_margin.median_impulse
     reduced = (
         f"by its reduced model E = {margin:.3g} N m s, a push of {margin / PUSH_S:.3g} N m, "
@@ -52,6 +54,22 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
     yield f"  {result.observer}: {_simulated(result.simulated)}{reduced}"
     yield from _scale(result)
     yield from _demands(result)
+
+
+def _pivot(result: MountResult) -> Iterator[str]:
+    """Say what a pivot that slides freely does to the tilt, and what the loop would be if the tilt did not know it."""
+    rig = result.plant.parameters
+    if rig.reduced.pivot_arm:
+        yield f"  its pivot {sliding_words(rig)}"
+        poles = result.prospects.sliding_poles
+        if poles:
+            yield (
+                f"    so the loop with the true rate is {loop_words(poles.about_centre)}; about the pivot, where "
+                f"{measured_words(rig)}, it is {loop_words(poles.about_pivot)}"
+            )
+        if result.observer != "free_pivot":
+            yield "    if what it slides on rubs, --observer free_pivot stands more of that"
+        yield f"    in the reduced model: {IN_THE_MODEL}; not: {NOT_IN_THE_MODEL}"
 
 
 def _plugin_step(file: float, runner: float) -> Iterator[str]:

@@ -11,6 +11,7 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.mounting.fall_check import overlap, simulated_pole
 from cmg_mj.plant.mounting.request import SCALES
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
+from cmg_mj.scenario.sliding_pivot import SlidingPoles, sliding_poles
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, PushMargin, push_margin
 from cmg_mj.studies.push_limits.recoverable_states import RecoverableLimit, ceiling
@@ -39,6 +40,7 @@ class Prospects:
         push_margin: Pushes that the scenario's law, observer and sensors recover from.
         pole: Unstable pole of the simulated robot, uncontrolled and with its flywheels at rest [1/s].
         overlap: Clause on geoms that overlap where it stands; "" if there are none.
+        sliding_poles: Slowest poles of the loop of a rig whose pivot slides freely; None for a pivot at rest.
     """
 
     reduced: ReducedModel
@@ -46,6 +48,7 @@ class Prospects:
     push_margin: PushMargin
     pole: float
     overlap: str = ""
+    sliding_poles: SlidingPoles | None = None
 
     @property
     def limit_push_impulse(self) -> float:
@@ -93,7 +96,7 @@ class Prospects:
     def figures(self) -> dict[str, float]:
         """Return the figures by name, as `cmg-mj mount --json` prints them."""
         model = self.reduced
-        n = model.gimbals
+        n, poles = model.gimbals, self.sliding_poles
         return {
             "inertia_kg_m2": n * model.J1,
             "gravity_torque_n_m": n * model.gravity_torque,
@@ -107,6 +110,8 @@ class Prospects:
             "push_margin_impulse_n_m_s": self.push_margin.median_impulse,
             "push_margin_worst_impulse_n_m_s": self.push_margin.worst_impulse,
             "push_margin_torque_n_m": self.push_margin.median_impulse / PUSH_S,
+            **({"pivot_arm_m": model.pivot_arm} if model.pivot_arm else {}),
+            **({f"pole_tilt_{name}_1_s": pole for name, pole in poles._asdict().items()} if poles else {}),
         }
 
 
@@ -129,7 +134,8 @@ def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = Tru
         pole = simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias)
         touching = overlap(plant.model, plant.key, plant.axis.line, pole)
     margin = push_margin(experiment.scenario, experiment.design) if with_margin else PushMargin(0.0, 0.0)
-    return Prospects(plant.reduced, limit, margin, pole, touching)
+    poles = sliding_poles(experiment.law, plant.parameters)
+    return Prospects(plant.reduced, limit, margin, pole, touching, poles)
 
 
 def smallest_sufficient_scale(suffices: Callable[[float], bool], scale: float) -> float | None:

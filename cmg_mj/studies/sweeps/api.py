@@ -58,7 +58,8 @@ def sweep(
     Args:
         scenario: The scenario, or its name.
         vary: Field, named as with `--set` -> a list of values, or one, or text as `--vary` takes it, such as "-1:1:5".
-        observers: The observers in the loop; by default the scenario's own.
+        observers: The observers in the loop; by default the scenario's own. Baselines too, such as `zero`, whose trials
+            are those of a loop with the true rate.
         worlds: Trials a cell: world i has the same noise in every cell.
         sample: Number of points of a quasi-random design of the ranges and lists, instead of every combination.
         sobol: Rows of a design for Sobol indices instead, a power of two.

@@ -92,13 +92,13 @@ def cells_of(trials: Trials) -> Iterator[Summary]:
     """Make a row a cell, point by point: counts of falls, every figure's mean, and its difference to the best.
 
     The best observer of a point has the smallest (or largest, where more is better) mean among those that stood in
-    every world; differences are taken world by world. The share of falls is among the trials that fell or stood; a
-    cell of which all trials were refused or stopped has none.
+    every world, baselines apart; differences are taken world by world. The share of falls is among the trials that
+    fell or stood; a cell of which all trials were refused or stopped has none.
     """
     fallen = trials.fell
     figures = {key: trials.figure(key) for key in COMPARED}
     for number, point in enumerate(trials.study.points):
-        best = {key: _best(values[number], key) for key, values in figures.items()}
+        best = {key: _best(values[number], key, trials.study.contenders) for key, values in figures.items()}
         for place, observer in enumerate(trials.study.observers):
             n = trials.study.worlds
             fell, stood = int(fallen[number, place].sum()), int(trials.stood[number, place].sum())
@@ -116,12 +116,12 @@ def cells_of(trials: Trials) -> Iterator[Summary]:
             yield row
 
 
-def _best(values: np.ndarray, key: str) -> int | None:
-    """Find the observer with the best mean among those that stood in every world, (n_observers, n_worlds)."""
-    means = values.mean(axis=1)
+def _best(values: np.ndarray, key: str, places: list[int]) -> int | None:
+    """Find the best mean among some observers that stood in every world, (n_observers, n_worlds)."""
+    means = values[places].mean(axis=1)
     if not np.isfinite(means).any():
         return None
-    return int(np.nanargmin(means if KEYS[key].better == "less" else -means))
+    return places[int(np.nanargmin(means if KEYS[key].better == "less" else -means))]
 
 
 def _with_ends(key: str, values: np.ndarray, positive: bool = False) -> Figures:

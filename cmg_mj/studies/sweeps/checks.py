@@ -10,6 +10,7 @@ import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
 from cmg_mj.observers import OBSERVERS
+from cmg_mj.results.baselines import RATES
 from cmg_mj.simulation.batch import UNUSED
 from cmg_mj.studies.sweeps.axes import VariedField
 
@@ -85,8 +86,8 @@ def check_observers(observers: Sequence[str]) -> None:
     for i, name in enumerate(observers):
         if not isinstance(name, str):
             raise InputError(f"observers: {shown(name)}: must be an observer's name")
-        if ":" not in name and name not in OBSERVERS:
-            known = nearest(name, OBSERVERS)
+        if ":" not in name and name not in (*OBSERVERS, *RATES):
+            known = nearest(name, [*OBSERVERS, *RATES])
             raise InputError(f"observers: {name!r}: no such observer; {known}, or your own as package.module:Class")
         if name in observers[:i]:
             raise InputError(f"observers: {name!r} is there twice")

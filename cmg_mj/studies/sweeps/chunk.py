@@ -46,7 +46,8 @@ def compute(
         A row a trial, in the chunk's order: the point's number, the varied values, and the figures of the run.
     """
     points = study.points if points is None else points
-    base = prepare(study.scenario.with_observer(chunk.observer).model_copy(update={"open_loop_observers": []}))
+    base = prepare(study.scenario_with(chunk.observer))
+    baseline = chunk.observer if chunk.observer in study.baselines else None
     results: dict[tuple[int, int], Summary] = {}
     batches: dict[BatchId, list[tuple[int, int]]] = {}
     experiments: dict[int, Experiment] = {}
@@ -67,7 +68,7 @@ def compute(
     for trials in batches.values():
         done, share = len(results) / len(chunk.trials), len(trials) / len(chunk.trials) / study.scenario.duration_s
         tick = part_of_progress(on_progress, done, share)
-        rows = _run([experiments[number] for number, _ in trials], trials, tick, threads)
+        rows = _run([experiments[number] for number, _ in trials], trials, tick, threads, baseline)
         results |= zip(trials, rows, strict=True)
     for trial in chunk.trials:
         if trial[0] in refused:
@@ -103,6 +104,7 @@ def _run(
     trials: Sequence[tuple[int, int]],
     tick: Callable[[float], None] | None,
     threads: int,
+    baseline: str | None,
 ) -> list[Summary]:
     """Run trials in one batch. Where one raises, those that it stopped run again, without it at last.
 
@@ -113,7 +115,7 @@ def _run(
     parts = [list(range(len(trials)))]
     while parts:
         part = parts.pop()
-        part_rows = _run_once([experiments[i] for i in part], [trials[i][1] for i in part], onward, threads)
+        part_rows = _run_once([experiments[i] for i in part], [trials[i][1] for i in part], onward, threads, baseline)
         rows |= {i: row for i, row in zip(part, part_rows, strict=True) if row is not None}
         again = [i for i in part if i not in rows]
         half = (len(again) + 1) // 2
@@ -126,6 +128,7 @@ def _run_once(
     worlds: Sequence[int],
     tick: Callable[[float], None] | None,
     threads: int,
+    baseline: str | None,
 ) -> list[Summary | None]:
     """Run one batch once; None for a trial that may have been stopped by another one."""
     try:
@@ -138,7 +141,7 @@ def _run_once(
     identity = {"observer", "in_loop_of", "world", "seed"}
     return [
         None if outcome.with_others else {key: value for key, value in row.items() if key not in identity}
-        for outcome, row in zip(result.outcomes, result.rows(), strict=True)
+        for outcome, row in zip(result.outcomes, result.rows(baseline), strict=True)
     ]
 
 

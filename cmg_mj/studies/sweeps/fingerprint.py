@@ -7,6 +7,7 @@ import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 import tomli_w
@@ -17,6 +18,7 @@ from cmg_mj.inputs.includes import check_files
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.sweeps.axes import FieldValue
 from cmg_mj.studies.sweeps.study import SweepStudy
+from cmg_mj.studies.sweeps.varied_tracks import varied_tracks
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -82,7 +84,7 @@ def not_ours(there: ChunkFingerprint | None, ours: ChunkFingerprint) -> str | No
     if there is None or there.study != ours.study:
         return "holds no trials of this study"
     if there.model != ours.model:
-        return "was computed with a model file that has changed since"
+        return "was computed with a model file or a track that has changed since"
     return None if there.chunk == ours.chunk else f"is chunk {there.chunk}, in the place of {ours.chunk}"
 
 
@@ -100,7 +102,7 @@ def hash_of_study(fields: StudyFields) -> str:
 
 
 def hash_of_models(study: SweepStudy) -> str:
-    """Hash the files of the study's model, or of those that it varies, with all that they include.
+    """Hash the files of the study's model, or of those that it varies, with all that they include, and its tracks.
 
     Raises:
         InputError: A file cannot be read.
@@ -116,6 +118,13 @@ def hash_of_models(study: SweepStudy) -> str:
                     f"plant.model = {model!r}: {path} cannot be read: {error.strerror or error}"
                 ) from error
             digest.update(f"{path.name} {len(content)}\n".encode() + content)
+    tracks = [(f"pivot.{i}.file", pivot.file) for i, pivot in enumerate(study.scenario.pivot) if pivot.file is not None]
+    for field, file in [*tracks, *(track for axis in study.axes for track in varied_tracks(axis))]:
+        try:
+            content = Path(file).read_bytes()
+        except OSError as error:
+            raise InputError(f"{field} = {file!r}: cannot be read: {error.strerror or error}") from error
+        digest.update(f"track {field} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 

@@ -15,6 +15,7 @@ from cmg_mj.results.intervals import Interval, finite_mean, known_interval
 from cmg_mj.results.summary_keys import heading
 from cmg_mj.studies.sweeps.axes import is_number
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
+from cmg_mj.studies.sweeps.leads import baselines_ahead, least_error, smallest
 from cmg_mj.studies.sweeps.study import counted
 from cmg_mj.visualization.plots.figure_spec import Line, Map, Panel, Picture
 
@@ -26,6 +27,8 @@ LOGARITHMIC = 10.0
 """Errors that differ by more than this factor are drawn on a logarithmic axis."""
 ASIDE = 0.3
 """Share of the smallest step between values over which the observers' shares of falls are spread."""
+TRUE_RATE = "true"
+"""Name of the true rate in the loop, as baselines' trials have it, in a map."""
 UNKNOWN = Interval(math.nan, math.nan, math.nan)
 MAPS = {ERRORS[0]: "map_velocity_error", ERRORS[1]: "map_push_error", "fell": "map_falls"}
 """Figure -> its picture."""
@@ -138,22 +141,28 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
 
     fell, known = (gridded(counts) for counts in fall_counts(trials))
     shares = fall_shares(fell, known)
-    halves = {name: shares[:, :, i] for i, name in enumerate(study.observers)}
+    places = study.contenders
+    halves = {study.observers[place]: shares[:, :, place] for place in places}
+    if study.references:
+        halves[TRUE_RATE] = shares[:, :, study.observers.index(study.references[0])]
     boundaries = {name: half for name, half in halves.items() if (half < 0.5).any() and (half > 0.5).any()}
     pictures = []
     for key, name in MAPS.items():
         if key == "fell":
             if not trials.fell.any():
                 continue
-            best, sure, least = _least_falls(fell, known)
+            best, sure, least = _least_falls(fell, known, places)
+            ahead = {}
             label, value, levels, nobody = "share of falls", "share", (0.1, 0.9), "several alike"
         else:
             figure = gridded(trials.figure(key))
             if not np.isfinite(figure).any():
                 continue
-            best, sure, least = _least_error(figure)
+            best, sure, least = least_error(figure, places)
+            ahead = baselines_ahead(study, figure, least)
             label, value, levels, nobody = heading(key), "mean", round_values(least), "none stood in every world"
-        cells = Map(x, y, study.observers, best, sure, least, levels, boundaries, nobody, "half of the worlds fall")
+        half = "half of the worlds fall"
+        cells = Map(x, y, study.observers, best, sure, least, levels, boundaries, nobody, half, ahead)
         panel = Panel(
             up,
             (),
@@ -169,42 +178,22 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
     return pictures
 
 
-def _least_error(figure: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the best mean among those that stood in every world, (n_y, n_x, n_observers, n_worlds) -> (n_y, n_x) each.
-
-    The best is sure if its mean difference to every other, world by world, is beyond its 95 % interval.
-    """
-    means = figure.mean(axis=3)
-    best, least = _smallest(means)
-    sure = np.zeros(best.shape, dtype=bool)
-    for at in zip(*np.nonzero(best >= 0), strict=True):
-        others = [i for i in np.nonzero(np.isfinite(means[at]))[0] if i != best[at]]
-        behind = [known_interval(figure[at][i] - figure[at][best[at]]) for i in others]
-        sure[at] = all(interval is not None and interval.low > 0.0 for interval in behind)
-    return best, sure, least
-
-
-def _least_falls(fell: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find who falls the least, unless several do, (n_y, n_x, n_observers) -> (n_y, n_x) each.
+def _least_falls(fell: np.ndarray, known: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find who of some falls the least, unless several do, (n_y, n_x, n_observers) -> (n_y, n_x) each.
 
     The best is sure if its Wilson interval is below those of all others.
     """
-    shares = fall_shares(fell, known)
-    best, least = _smallest(shares)
+    shares = np.full(fell.shape, math.nan)
+    shares[:, :, places] = fall_shares(fell, known)[:, :, places]
+    best, least = smallest(shares)
     best[(shares == least[:, :, None]).sum(axis=2) > 1] = -1
     sure = np.zeros(best.shape, dtype=bool)
     for at in zip(*np.nonzero(best >= 0), strict=True):
-        intervals = [fell_interval(n, trials) for n, trials in zip(fell[at], known[at], strict=True) if trials]
+        pairs = zip(fell[at][places], known[at][places], strict=True)
+        intervals = [fell_interval(n, trials) for n, trials in pairs if trials]
         low = sorted(intervals, key=lambda interval: interval.mean)
         sure[at] = all(low[0].high < other.low for other in low[1:])
     return best, sure, least
-
-
-def _smallest(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the place of the smallest along the last axis, -1 where there is none, and its value."""
-    filled = np.where(np.isfinite(values), values, np.inf)
-    least = filled.min(axis=-1)
-    return np.where(np.isfinite(least), filled.argmin(axis=-1), -1), np.where(np.isfinite(least), least, math.nan)
 
 
 def is_logarithmic(values: Sequence[float] | np.ndarray) -> bool:

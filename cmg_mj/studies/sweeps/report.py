@@ -85,6 +85,7 @@ def report(tables: SweepTables, pictures: Sequence[Picture]) -> str:
     parts = [f"# {study.scenario.title or 'Sweep'}", f"{counts}: {counted(study.trials, 'trial')}."]
     parts += sections.varied(study)
     parts += sections.pictures(trials, pictures)
+    parts += sections.leads(trials)
     if study.order:
         parts += sections.order(trials, tables.order)
     if study.design == "sobol":

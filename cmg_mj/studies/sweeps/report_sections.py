@@ -12,6 +12,7 @@ from cmg_mj.results.intervals import Interval
 from cmg_mj.results.summary_keys import KEYS, Summary, SummaryValue, capitalised, format_figure, heading
 from cmg_mj.studies.sweeps.axes import VariedField
 from cmg_mj.studies.sweeps.cells import Trials, cells_of
+from cmg_mj.studies.sweeps.leads import CLOSE, lead_rows
 from cmg_mj.studies.sweeps.order import (
     ORDER_FIGURES,
     OrderCount,
@@ -36,6 +37,16 @@ ABOUT_MAPS = (
     "A cell's colour is the observer of the smallest mean error among those that stood in every world, the contours "
     "are its error. A dot: another one's mean difference to it, world by world, is within its 95 % interval. A line in "
     "an observer's colour: half of its worlds fall beyond it. For falls, a dot says that Wilson's intervals overlap."
+)
+ABOUT_AHEAD = (
+    "Baselines close no loop: their errors are those on the motion of a loop with the true rate, and its falls are "
+    "shown as theirs. A dotted line in a baseline's colour: its error is less than the best observer's beyond it."
+)
+ABOUT_LEADS = (
+    f"At how many points each observer has the least mean {heading(ERROR)} of those that stood in every world; "
+    "surely: by its difference to every other, world by world, beyond 95 % intervals; close: stood in every world, "
+    f"with at most {CLOSE:g} times the least error. Of a baseline: at how many its error is less than the best "
+    "observer's, or no observer stood in every world."
 )
 ABOUT_CURVES = (
     "Bands are 95 % intervals. A cross: some worlds did not stand to the end, and the mean is that of the others, "
@@ -172,7 +183,24 @@ def pictures(trials: Trials, drawings: Sequence[Picture]) -> list[str]:
     is_map = any(panel.map is not None for picture in drawings for panel in picture.panels)
     links = [f"![{picture.title}]({picture.name}.png)" for picture in drawings]
     falls = [] if trials.fell.any() else ["No world fell."]
-    return [*links, ABOUT_MAPS if is_map else ABOUT_CURVES, *falls]
+    about = [ABOUT_MAPS if is_map else ABOUT_CURVES, *([ABOUT_AHEAD] if trials.study.references else [])]
+    return [*links, *about, *falls]
+
+
+def leads(trials: Trials) -> list[str]:
+    """Say who leads at how many points, of a study that compares observers with baselines; else nothing."""
+    study = trials.study
+    if not study.references:
+        return []
+    table = []
+    for row in lead_rows(trials, ERROR):
+        share = [] if study.design == "grid" else _share(row.leads.share)[1:]
+        name = f"{row.name} (baseline)" if row.is_baseline else row.name
+        table.append([name, row.leads.words, *share, row.surely.words, row.close.words])
+    interval = [] if study.design == "grid" else SHARE_HEADINGS[1:]
+    head = ["observer", "leads", *interval, "surely", "close"]
+    independent = " Of a design for indices, its independent points count." if study.design == "sobol" else ""
+    return ["## Who leads", ABOUT_LEADS + independent, markdown.table(head, table)]
 
 
 def order(trials: Trials, counts: Mapping[str, Sequence[OrderCount]]) -> list[str]:

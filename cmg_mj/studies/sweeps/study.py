@@ -11,9 +11,12 @@ from typing import Literal
 
 import numpy as np
 
+from cmg_mj.controllers.laws import LAW_CLASSES
+from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.bundled import find
 from cmg_mj.inputs.overrides import assign
+from cmg_mj.results.baselines import RATES
 from cmg_mj.scenario.schema import ObserverSettings, Scenario, parse_scenario
 from cmg_mj.simulation.batch import can_vary_in_batch
 from cmg_mj.simulation.experiment import prepare
@@ -27,6 +30,10 @@ MOST_TRIALS = 1_000_000
 """Beyond it a sweep must be asked for twice (`--yes`)."""
 CHUNK = 1024
 """Trials of a chunk: so many fill a batch, and take minutes at most."""
+BASELINE_LOOP = "linear"
+"""Observer that runs where a baseline's trials have the true rate in the loop; nothing depends on it."""
+BASELINE_SETTINGS = {"feedback": "truth", "angle_source": "measured", "bias_trim_s": 0.0}
+"""Fields of [controller] of a baseline's loop: with others the loop would depend on `BASELINE_LOOP`."""
 MOST_ALONE = 200
 """Values of a field that is varied alone that are tried before the sweep, at 5 ms each; the last one is, too."""
 
@@ -115,7 +122,8 @@ class SweepStudy:
     Attributes:
         scenario: The scenario that every trial starts from.
         axes: The varied fields.
-        observers: The observers in the loop.
+        observers: The observers in the loop, and baselines: `zero`, `mems_gyro` and the like close no loop, so that
+            their trials are those of a loop with the true rate.
         worlds: Trials a point and observer: world i has the same noise at every point, for every observer.
         design: `grid`: every combination of values. `sample`: a quasi-random design of the ranges and lists.
             `sobol`: one for Sobol indices.
@@ -185,6 +193,42 @@ class SweepStudy:
         return np.array(sorted(range(len(self.points)), key=unpooled))
 
     @property
+    def baselines(self) -> tuple[str, ...]:
+        """Names in `observers` that close no loop."""
+        return tuple(name for name in self.observers if name in RATES)
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """Baselines that observers are compared with; none where no observer is."""
+        return self.baselines if len(self.baselines) < len(self.observers) else ()
+
+    @property
+    def contenders(self) -> list[int]:
+        """Places in `observers` of those that are compared to find the best: baselines only among themselves."""
+        closing = [place for place, name in enumerate(self.observers) if name not in RATES]
+        return closing or list(range(len(self.observers)))
+
+    def scenario_with(self, observer: str) -> Scenario:
+        """Return the scenario with an observer in the loop; for a baseline with the true rate and measured angles.
+
+        Raises:
+            InputError: The law takes no rate, so that a baseline has no loop.
+        """
+        alone = self.scenario.model_copy(update={"open_loop_observers": []})
+        if observer not in RATES:
+            return alone.with_observer(observer)
+        law = alone.controller.kind
+        if not needs(LAW_CLASSES.find(law)):
+            raise InputError(
+                f"{observer}: a baseline's trials have the true rate in the loop, and controller.kind = {law!r} takes "
+                f"none; leave {observer} out, or take another law"
+            )
+        by_truth = alone.with_observer(BASELINE_LOOP).as_fields()
+        for name, value in BASELINE_SETTINGS.items():
+            assign(by_truth, f"controller.{name}", value, observer)
+        return parse_scenario(by_truth, f"the baseline {observer}")
+
+    @property
     def chunks(self) -> Chunks:
         """All trials; those that can run in one batch are next to each other."""
         return Chunks(self)
@@ -219,10 +263,12 @@ def check_values(study: SweepStudy) -> None:
     plant = load_scenario_plant(study.scenario)
     base = study.scenario.model_copy(update={"open_loop_observers": []})
     for observer in study.observers:
-        prepare(base.with_observer(observer), plant)
+        prepare(study.scenario_with(observer), plant)
     fields = base.as_fields()
     for axis in study.axes:
         parameters = {field.partition(".")[2] for field in axis.fields if field.startswith("observer.")}
+        if parameters and study.baselines:
+            raise InputError(f"--vary {axis.option}: a baseline has no parameters; leave {study.baselines[0]} out")
         values = axis.values or (axis.low, axis.high)
         for i, value in enumerate(values):
             changed = copy.deepcopy(fields)
@@ -235,8 +281,9 @@ def check_values(study: SweepStudy) -> None:
             changed_plant = load_scenario_plant(scenario, plant) if alone else plant
             for observer in study.observers if parameters else study.observers[: int(alone)]:
                 settings = scenario.observer
-                if observer != base.observer.kind:
-                    settings = ObserverSettings.model_validate({"kind": observer, **dict.fromkeys(parameters, value)})
+                kind = BASELINE_LOOP if observer in RATES else observer
+                if kind != base.observer.kind:
+                    settings = ObserverSettings.model_validate({"kind": kind, **dict.fromkeys(parameters, value)})
                 prepare(scenario.model_copy(update={"observer": settings}), changed_plant)
 
 

@@ -10,7 +10,7 @@ from typing import TypedDict, get_args
 from cmg_mj.errors import InputError, TomlValue, nearest
 from cmg_mj.inputs.bundled import bundled, find
 from cmg_mj.inputs.overrides import override
-from cmg_mj.scenario.loading import find_model, load_scenario, parse_scenario
+from cmg_mj.scenario.loading import find_model, find_tracks, load_scenario, parse_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.studies.sweeps.axes import FieldValue, VariedField, parse_axis
 from cmg_mj.studies.sweeps.study import SamplingDesign
@@ -79,9 +79,10 @@ def scenario_of(name: str, fields: StudyFile, settings: Sequence[str] = ()) -> S
         override(changed, setting)
     where = " ".join([name, *(["with"] if settings else []), *(f"--set {setting}" for setting in settings)])
     scenario = parse_scenario(changed, where)
-    if any(setting.partition("=")[0].strip() == "plant.model" for setting in settings):
-        return scenario
-    return find_model(scenario, find("scenarios", name, ".toml", "scenario").parent)
+    beside = find("scenarios", name, ".toml", "scenario").parent
+    if not any(setting.partition("=")[0].strip() == "plant.model" for setting in settings):
+        scenario = find_model(scenario, beside)
+    return find_tracks(scenario, beside)
 
 
 def axes_of(name: str, fields: StudyFile) -> list[VariedField]:

@@ -13,7 +13,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.replay.parameter_options import ParameterValue
 from cmg_mj.results.intervals import Interval, PairedVerdict, paired_verdict, ratio_interval
 from cmg_mj.studies.tuning.parameters import ParameterValues, TunedScalar, replaced
-from cmg_mj.studies.tuning.search import insensitive_numbers, search
+from cmg_mj.studies.tuning.search import StopSearch, insensitive_numbers, search
 
 DIGITS = 4
 """Significant digits of the tuned parameters: what is written is what was scored."""
@@ -21,6 +21,8 @@ AT_A_LIMIT = 1.02
 """A number this close to a limit of its range is at the limit."""
 
 OnShare = Callable[[float], None]
+Stop = Callable[[], bool]
+"""Asked before every evaluation: from the first yes on none is made, and the best so far counts."""
 M = TypeVar("M")
 M_contra = TypeVar("M_contra", contravariant=True)
 
@@ -121,8 +123,10 @@ class ParameterFit(Generic[M]):
         start_parameters: The given parameters.
         data: The fitted worlds, or stretches of logs.
         on_share: Called with the completed share of the evaluations.
+        stop: Whether to end the search early.
 
     Attributes:
+        stopped: Whether it was ended early.
         expected: Expected number of evaluations.
         given_loss: Loss of the given parameters [rad/s].
     """
@@ -134,9 +138,10 @@ class ParameterFit(Generic[M]):
         start_parameters: ParameterValues,
         data: ScoringData[M],
         on_share: OnShare,
+        stop: Stop = lambda: False,
     ) -> None:
         self.kind, self.make, self.start_parameters, self.data = kind, make, start_parameters, data
-        self.on_share = on_share
+        self.on_share, self._stop, self.stopped = on_share, stop, False
         self.expected = 1
         self.count = 0
         self.given_loss = self.mean_error(start_parameters)
@@ -156,7 +161,14 @@ class ParameterFit(Generic[M]):
         return float(errors.mean()) if np.isfinite(errors).all() else math.inf
 
     def loss(self, numbers: Sequence[TunedScalar], sizes: Sequence[float]) -> float:
-        """Return the mean error of parameters with some sizes [rad/s], and report the progress."""
+        """Return the mean error of parameters with some sizes [rad/s], and report the progress.
+
+        Raises:
+            StopSearch: The search is to end.
+        """
+        self.stopped = self.stopped or self._stop()
+        if self.stopped:
+            raise StopSearch
         self.count += 1
         self.on_share(self.count / self.expected)
         return self.mean_error(replaced(self.start_parameters, numbers, sizes))
@@ -167,7 +179,10 @@ class ParameterFit(Generic[M]):
         Raises:
             InputError: The rate depends on none of them.
         """
-        insensitive = insensitive_numbers(lambda sizes: self.loss(numbers, sizes), numbers, self.given_loss)
+        try:
+            insensitive = insensitive_numbers(lambda sizes: self.loss(numbers, sizes), numbers, self.given_loss)
+        except StopSearch:
+            return list(numbers), []
         if len(insensitive) == len(numbers):
             names = ", ".join(number.name for number in numbers)
             raise InputError(f"the rate that {self.kind} estimates does not depend on {names}")
@@ -194,7 +209,7 @@ def level_of(
     """
     fitter.count = 0
     sizes, loss = search(lambda sizes: fitter.loss(numbers, sizes), numbers, starts=starts)
-    if not math.isfinite(loss):
+    if not math.isfinite(loss) and not fitter.stopped:
         raise InputError(f"{fitter.kind}: no parameters give an estimate that stays finite")
     given_sizes = [abs(_get(fitter.start_parameters[number.parameter], number.place)) for number in numbers]
     inside = all(number.low <= size <= number.high for number, size in zip(numbers, given_sizes, strict=True))
@@ -202,7 +217,7 @@ def level_of(
         sizes = given_sizes
     else:
         rounded = [float(f"{size:.{DIGITS}g}") for size in sizes]
-        if math.isfinite(fitter.loss(numbers, rounded)):  # not beyond an open limit
+        if math.isfinite(fitter.mean_error(replaced(fitter.start_parameters, numbers, rounded))):  # no open limit
             sizes = rounded
     tuned = replaced(fitter.start_parameters, numbers, sizes)
     return NoiseLevelResult(

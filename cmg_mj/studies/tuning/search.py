@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +23,11 @@ TOLERANCE = 5e-3
 """Relative accuracy of the sizes."""
 FIRST_STEP = 0.4
 """First step of a search in several dimensions, in the logarithm."""
+
+
+class StopSearch(Exception):
+    """Raised by a loss to end the search."""
+
 
 Loss = Callable[[Sequence[float]], float]
 """Sizes -> a positive loss; infinite where there is none."""
@@ -67,7 +73,7 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
     More: Nelder and Mead's simplex from the given sizes, and from the best of points scattered around them.
 
     Args:
-        loss: The loss.
+        loss: The loss. It may raise `StopSearch`: then the best so far is returned.
         numbers: The tuned numbers.
         starts: Number of starts in several dimensions; one is the given sizes alone.
 
@@ -86,10 +92,11 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
             best = (value, np.array(point))
         return value
 
-    if len(numbers) == 1:
-        _search_line(height, float(low[0]), float(high[0]))
-    else:
-        _search_simplex(height, low, high, start, starts)
+    with suppress(StopSearch):
+        if len(numbers) == 1:
+            _search_line(height, float(low[0]), float(high[0]))
+        else:
+            _search_simplex(height, low, high, start, starts)
     return [float(size) for size in np.exp(np.clip(best[1], low, high))], math.exp(best[0])
 
 

@@ -14,7 +14,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.observers import make_observer
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.studies.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, level_of
+from cmg_mj.studies.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, Stop, level_of
 from cmg_mj.studies.tuning.on_simulations import WARM_UP_S, Recorded, Window, halves, recorder
 from cmg_mj.studies.tuning.parameters import (
     MakeObserver,
@@ -63,6 +63,7 @@ def tune(
     starts: int = 2,
     recorded: Callable[..., Recorded] | None = None,
     on_share: OnShare | None = None,
+    stop: Stop = lambda: False,
 ) -> TuningResult:
     """Fit the parameters of the scenario's observer to the gyro.
 
@@ -78,6 +79,7 @@ def tune(
         starts: Starts of a search in several dimensions.
         recorded: Returns recordings made before; by default they are made here, all at once.
         on_share: Called now and then with the completed share.
+        stop: Whether to end the search early, with the best parameters so far.
 
     Returns:
         The result. After an interrupt, it has the noise densities done until then.
@@ -110,7 +112,7 @@ def tune(
                 on_share((i + min(done, 1.0)) / len(densities))
 
         fit, held_out = (recorded(scenario, span, noise_ug_rthz=density, warm_up_s=warm_up_s) for span in spans)
-        fitter = ParameterFit(kind, _maker(experiment, density), start_parameters, fit, share)
+        fitter = ParameterFit(kind, _maker(experiment, density), start_parameters, fit, share, stop)
         if not levels:
             window = fit.window
             numbers, insensitive = fitter.sensitive_parameters(numbers)

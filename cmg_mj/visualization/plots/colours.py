@@ -13,18 +13,19 @@ from collections.abc import Iterable
 Colour = tuple[int, int, int]
 
 COLOURS: dict[str, Colour] = {
-    "linear": (49, 171, 105),
-    "ltv": (69, 148, 253),
-    "homogeneous": (251, 96, 0),
-    "luenberger": (255, 134, 181),
-    "kalman": (110, 83, 99),
-    "gyro_free": (66, 132, 146),
-    "finite_difference": (179, 45, 0),
-    "super_twisting": (44, 61, 254),
-    "linear_high_gain": (177, 179, 252),
-    "high_gain": (148, 42, 178),
-    "adaptive": (243, 54, 196),
-    "homogeneous_adaptive": (231, 180, 33),
+    "linear": (70, 178, 124),
+    "ltv": (69, 144, 254),
+    "homogeneous": (252, 95, 0),
+    "luenberger": (255, 138, 186),
+    "kalman": (129, 68, 110),
+    "gyro_free": (69, 131, 155),
+    "free_pivot": (172, 99, 90),
+    "finite_difference": (176, 25, 9),
+    "super_twisting": (43, 60, 254),
+    "linear_high_gain": (177, 178, 253),
+    "high_gain": (148, 41, 182),
+    "adaptive": (243, 50, 197),
+    "homogeneous_adaptive": (230, 178, 32),
 }
 """The bundled observers. Observers that are often among the best are no shades of one colour."""
 
@@ -40,7 +41,7 @@ BASELINE_COLOURS: dict[str, Colour] = {
 }
 """The signals that observers are compared with."""
 
-USER_COLOURS: tuple[Colour, ...] = ((96, 84, 120), (51, 213, 119), (219, 6, 76), (216, 77, 151))
+USER_COLOURS: tuple[Colour, ...] = ((91, 85, 128), (47, 157, 113), (236, 15, 72), (212, 88, 142))
 """Observers of users: the name decides which."""
 
 

@@ -50,6 +50,8 @@ class Map:
         boundaries: Name -> a share, (n_y, n_x); a boundary is drawn where the share crosses one half.
         nobody: Name of a cell without a best in the legend.
         boundary: Name of the boundaries in the legend.
+        ahead: Name -> a share, (n_y, n_x), above one half where something that is no candidate is better than the
+            best; a dotted line is drawn where it crosses one half. NaN where that is unknown.
     """
 
     x: np.ndarray
@@ -62,6 +64,7 @@ class Map:
     boundaries: Mapping[str, np.ndarray] = field(default_factory=dict)
     nobody: str = "none"
     boundary: str = "half"
+    ahead: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -18,21 +18,24 @@ EMPTY = (232, 232, 232)
 """Colour of a cell without a best."""
 BOUNDARY, DASH = 2.4, 2.5
 """Width of a boundary [points], and of its dashes [line widths]."""
+AHEAD = 3.2
+"""Width of the dotted line within which something that is no candidate is ahead [points]."""
 CASING = "white"
 """Colour under every line, so that the line is seen on every other colour."""
 
 
 def draw_map(axes: Axes, spec: Map) -> None:
     """Draw a map on axes whose scales are set."""
-    palette = colours(spec.names)
+    palette = colours([*spec.names, *spec.boundaries, *spec.ahead])
     observers = list(spec.names)
-    names = short_names(observers)
-    cells = np.array([*palette.values(), EMPTY], dtype=np.uint8)[spec.best]  # -1 is the last
+    names = short_names(list(palette))
+    cells = np.array([*(palette[name] for name in spec.names), EMPTY], dtype=np.uint8)[spec.best]  # -1 is the last
     x = edges(spec.x, log=axes.get_xscale() == "log")
     y = edges(spec.y, log=axes.get_yscale() == "log")
     axes.pcolormesh(x, y, cells)
     _contours(axes, spec, x, y)
     _boundaries(axes, spec, x, y, [hexadecimal(palette[name]) for name in spec.boundaries])
+    _dotted(axes, spec, x, y, [hexadecimal(palette[name]) for name in spec.ahead])
     unsure = (spec.best >= 0) & ~spec.sure
     across, up = np.meshgrid(spec.x, spec.y)
     axes.plot(across[unsure], up[unsure], "o", color="0.1", markeredgecolor=CASING, markeredgewidth=0.6, markersize=3.5)
@@ -49,6 +52,11 @@ def draw_map(axes: Axes, spec: Map) -> None:
         _in_legend(axes, " ", f"{spec.boundary}:")
     for name in spec.boundaries:
         _in_legend(axes, "--", names[name], color=hexadecimal(palette[name]), linewidth=BOUNDARY)
+    if spec.ahead:
+        _in_legend(axes, " ", "less error than the best:")
+    for name, share in spec.ahead.items():
+        label = f"{names[name]}, {int((share > 0.5).sum())} of {share.size} cells"
+        _in_legend(axes, ":", label, color=hexadecimal(palette[name]), linewidth=AHEAD)
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize="small", frameon=False, borderpad=0)
 
 
@@ -79,6 +87,16 @@ def _boundaries(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Se
     for i, (share, color) in enumerate(zip(shares, palette, strict=True)):
         style = (i % n * DASH, (DASH, DASH * (n - 1))) if n > 1 else "-"
         axes.contour(*share, [0.5], colors=color, linewidths=BOUNDARY, linestyles=[style])
+
+
+def _dotted(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Sequence[str]) -> None:
+    """Draw where each of what is no candidate is as good as the best; nothing where it is so in all cells or none."""
+    for share, color in zip(spec.ahead.values(), palette, strict=True):
+        known = share[np.isfinite(share)]
+        if known.min(initial=1.0) < 0.5 < known.max(initial=0.0):
+            line = _to_edges(spec, x, y, share)
+            axes.contour(*line, [0.5], colors=CASING, linewidths=AHEAD + 2.0)
+            axes.contour(*line, [0.5], colors=color, linewidths=AHEAD, linestyles=["dotted"])
 
 
 def _to_edges(spec: Map, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,8 +14,10 @@ import numpy as np
 
 from cmg_mj.controllers.make_controller import AnyController
 from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.plant.moving_pivot import pivot_directions
 from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.plant.tilt_line import apply_torques
+from cmg_mj.scenario.pivot_signals import PivotSignals
 from cmg_mj.simulation.callback import control
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.visualization.studio.drawn_plant import copy_physics_numbers, drawn_plant
@@ -62,6 +65,10 @@ class StudioSession:
         self._lines = [axis.line for axis in self.plant.axes]
         scenario = experiment.scenario
         self.pushes = Pushes(scenario.push, scenario.swing, self.plant.axis_names, self.timestep)
+        self._pivot = PivotSignals(scenario.pivot, pivot_directions(self.plant, scenario.pivot), scenario.seed, 0)
+        self._still = self.model.opt.gravity.copy()
+        self._pivot_steps: tuple[int, int] | None = None if scenario.pivot else (0, sys.maxsize)
+        """The steps between which the present acceleration of the pivot is held; for ever if it is at rest."""
         self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=PLOTTED_TICKS)
         self._begin(0)
 
@@ -122,6 +129,7 @@ class StudioSession:
         torques = self.pushes.at(step, self.controller.steps_per_sample)
         # Studio's mouse writes xfrc_applied: MuJoCo adds them up.
         apply_torques(data.qfrc_applied, self._lines, torques)
+        self._accelerate(step)
         ticked = not self.stopped and self._control(data, step, torques)
         mujoco.mj_step(self.model, data)
         self._next = step + 1
@@ -129,6 +137,14 @@ class StudioSession:
             self.diverged = True
             self._stop(data, step, f"the physics diverged at t = {data.time:g} s; reset")
         return ticked
+
+    def _accelerate(self, step: int) -> None:
+        """Set the pivot's acceleration during a physics step, which is held as long as a swinging torque."""
+        if self._pivot_steps is not None and self._pivot_steps[0] <= step < self._pivot_steps[1]:
+            return
+        self._pivot_steps = self.pushes.interval(step, self.controller.steps_per_sample)
+        start, end = self._pivot_steps
+        self.model.opt.gravity[:] = self._still - self._pivot.mean(start * self.timestep, end * self.timestep)
 
     def _control(self, data: mujoco.MjData, step: int, torques: Sequence[float]) -> bool:
         lean = self.plant.largest_tilt(data.qpos)

@@ -77,11 +77,15 @@ class Pushes:
         Returns:
             A torque for each axis [N m].
         """
-        index = bisect_right(self._edges, step)
-        pushes = self._torques[index]
+        pushes = self._torques[bisect_right(self._edges, step)]
         if not self._swings:
             return pushes
+        start, end = self.interval(step, steps_per_sample)
+        return add_swing_torques(pushes, self._swings, self._axes, (start + 0.5 * (end - start)) * self._timestep)
+
+    def interval(self, step: int, steps_per_sample: int) -> tuple[int, int]:
+        """Return the steps around a physics step between which the torques are constant: the first, and the next."""
+        index = bisect_right(self._edges, step)
         start = step // steps_per_sample * steps_per_sample
         end = start + steps_per_sample
-        start, end = max([start, *self._edges[:index][-1:]]), min([end, *self._edges[index : index + 1]])
-        return add_swing_torques(pushes, self._swings, self._axes, (start + 0.5 * (end - start)) * self._timestep)
+        return max([start, *self._edges[:index][-1:]]), min([end, *self._edges[index : index + 1]])

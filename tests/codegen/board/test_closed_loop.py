@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.codegen.board import Board, on_a_board
-from cmg_mj.codegen.board.deploy import exported
+from cmg_mj.codegen.board.deploy import temporary_export
 from cmg_mj.codegen.board.image import build
 from cmg_mj.codegen.board.tools import available
 from cmg_mj.controllers.processor import Decision
@@ -96,7 +96,7 @@ def test_lockstep_on_the_same_inputs(observer: str) -> None:
     experiment = prepare(load_scenario("push_recovery", PUSH_SETTINGS if observer in ARE_PUSHED else SHORT, observer))
     host = Recorder(experiment)
     experiment.run_on(host)
-    with exported(experiment.axis_controller()) as files:
+    with temporary_export(experiment.axis_controller()) as files:
         image = build(files.observer, files.folder).path
         assert double_precision_names(image) == []
         board = Board(image)
@@ -166,7 +166,7 @@ def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
 def test_another_law_closes_the_loop(law: str) -> None:
     """Its integrator too, which of one of them does not begin at zero, and which another one does not have."""
     experiment = short("kalman", *NO_COUNTS, f"controller.kind={law}")
-    with exported(experiment.axis_controller()) as files:
+    with temporary_export(experiment.axis_controller()) as files:
         assert double_precision_names(build(files.observer, files.folder).path) == []
     host, board = experiment.run(), experiment.run(driver="board")
     assert board.outcomes == host.outcomes

@@ -9,7 +9,7 @@ import pytest
 
 from cmg_mj.codegen.board import Board
 from cmg_mj.codegen.board.cost import CostFigures, ObserverCost, cost_markdown, cost_of, cost_table
-from cmg_mj.codegen.board.deploy import exported
+from cmg_mj.codegen.board.deploy import temporary_export
 from cmg_mj.codegen.board.tools import available
 from cmg_mj.papers.aranovskiy2020 import on_the_board
 from tests.codegen.board.toy import short, toy
@@ -37,7 +37,7 @@ def test_what_they_cost() -> None:
 @pytest.mark.slow
 def test_most_of_11_is_powers(tmp_path: Path) -> None:
     """Why (11) costs more than (10): four powers an update, which are more than half of it."""
-    with exported(short("homogeneous").axis_controller()) as files:
+    with temporary_export(short("homogeneous").axis_controller()) as files:
         powers = (files.folder / "homogeneous.c").read_text().count("powf(")
     steps = []
     for more in ("", "extern float powf(float, float); y1 = powf(y1, y2);"):

@@ -92,7 +92,7 @@ def test_no_process_is_left_behind(tmp_path: Path) -> None:
         process = board.process_id
         assert is_running(process)
     assert not is_running(process)
-    board = Board(tmp_path / "toy-toy.elf")
+    board = Board(tmp_path / "toy-toy-mps2.elf")
     process = board.process_id
     del board
     assert not is_running(process)
@@ -103,7 +103,7 @@ def test_no_process_is_left_behind(tmp_path: Path) -> None:
 def test_nor_when_this_process_is_killed(tmp_path: Path) -> None:
     toy(tmp_path)
     code = "import sys, time; from pathlib import Path; from cmg_mj.codegen.board.qemu import Board\n"
-    code += "b = Board(Path('toy-toy.elf')); print(b.process_id, flush=True); time.sleep(60)"
+    code += "b = Board(Path('toy-toy-mps2.elf')); print(b.process_id, flush=True); time.sleep(60)"
     with subprocess.Popen(
         [sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, text=True, env=environment()
     ) as user:

@@ -67,17 +67,19 @@ toy_status toy_update(toy_controller *c, const toy_real a[4], const toy_real e[2
 """
 
 
-def toy(folder: Path, update: str = "", step: str = "") -> Path:
+def toy(folder: Path, update: str = "", step: str = "", machine: str = "mps2", identity: str = "") -> Path:
     """Build it.
 
     Args:
         folder: Where.
         update: C at the beginning of an update; `e[0]` is what the first encoder shows.
         step: C at the beginning of a step of the observer.
+        machine: For which board.
+        identity: With which it introduces itself.
 
     Returns:
         The image.
     """
     (folder / "toy.h").write_text(HEADER)
     (folder / "toy.c").write_text(SOURCE % {"update": update, "step": step})
-    return build("toy", folder).path
+    return build("toy", folder, machine=machine, identity=identity).path

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import pytest
 
-from cmg_mj.codegen.export import export, pipeline
+from cmg_mj.codegen.export import export, pipeline, refusals
 from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law
 from cmg_mj.errors import InputError
@@ -166,7 +166,7 @@ class WithADeadBand:
 def test_a_field_of_the_law_that_c_does_not_have_is_refused_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "StateFeedback", WithADeadBand)
+    monkeypatch.setattr(refusals, "StateFeedback", WithADeadBand)
     exported = controller("linear")
     exported.law = cast("Law", WithADeadBand(exported.law.dt, dead_band=0.05))
     with pytest.raises(InputError, match=r"^controller\.dead_band = 0\.05: cannot be exported"):
@@ -175,4 +175,4 @@ def test_a_field_of_the_law_that_c_does_not_have_is_refused_by_name(
     with pytest.raises(InputError, match=r"^controller\.notches_hz = \[7\.0\]: .*; set controller\.notches_hz=\[\]$"):
         export(exported, tmp_path / "export")
     exported.law = cast("Law", WithADeadBand(exported.law.dt))
-    pipeline._refuse_unexported(exported)
+    refusals.refuse_unexported(exported)

@@ -85,6 +85,12 @@ LEG = """
 """
 
 
+def cart_pole(mass: float = 1.0, friction: float = 0.0, damping: float = 5e-4) -> str:
+    """A cart-pole of dm_control's sizes: mass of the cart [kg], friction [N] and damping [N s/m] of its slider."""
+    text = CART_POLE.format(rails="").replace('mass="1"', f'mass="{mass}"', 1)
+    return text.replace('damping="5e-4"', f'damping="{damping}" frictionloss="{friction}"')
+
+
 def bicycle(
     half_width: float = 0.01,
     tyre: str = "",

@@ -23,6 +23,7 @@ BIAS = "plant.equilibrium_bias_deg"
 SHORT = ["--set", "push=[]", "--set", "duration_s=0.2", "--worlds", "2"]
 SWEEP = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--observers", "linear,gyro_free", *SHORT, "--out"]
 CURE = "; delete it, and it is computed again, or name another folder"
+MOTIONS = "pivot=[{{kind='track', file='{}'}}],[{{kind='track', file='{}', scale=2.0}}]"
 VERSION_RULE = "while trials are missing they must be the same: name another folder"
 
 
@@ -80,7 +81,26 @@ def test_an_edited_model_is_another(tmp_path: Path, model_copy: Path, name: str)
     assert cmg_mj(*sweep).status == 0
     with (tmp_path / name).open("a", encoding="utf-8") as file:
         file.write("<!-- edited -->\n")
-    complaint = "was computed with a model file that has changed since"
+    complaint = "was computed with a model file or a track that has changed since"
+    assert cmg_mj(*sweep).complaint == f"{tmp_path / 'out' / 'chunks' / '000000.parquet'}: {complaint}{CURE}"
+
+
+@pytest.mark.parametrize(
+    "varied",
+    ["", "pivot.0.file={},{}", pytest.param(MOTIONS, marks=pytest.mark.slow)],
+    ids=["of the scenario", "varied", "varied motions"],
+)
+def test_an_edited_track_is_another(tmp_path: Path, varied: str) -> None:
+    """A track of the scenario, a file that is varied, or motions that are."""
+    first, track = tmp_path / "first.csv", tmp_path / "track.csv"
+    for file in (first, track):
+        file.write_text("t,a\n0,0.1\n1,0.2\n", encoding="utf-8")
+    pivot = ["--set", f"pivot=[{{kind='track', file='{first if varied else track}'}}]"]
+    vary = ["--vary", varied.format(first, track)] if varied else []
+    sweep = [*SWEEP[:-1], *pivot, *vary, "--out", tmp_path / "out"]
+    assert cmg_mj(*sweep).status == 0
+    track.write_text("t,a\n0,0.1\n1,0.3\n", encoding="utf-8")
+    complaint = "was computed with a model file or a track that has changed since"
     assert cmg_mj(*sweep).complaint == f"{tmp_path / 'out' / 'chunks' / '000000.parquet'}: {complaint}{CURE}"
 
 

@@ -23,15 +23,18 @@ VARIATIONS = {
     "servo_damping_n_m_s_rad": 1.0,
     "accelerometer_inner_m": 0.1,
     "accelerometer_outer_m": 0.5,
+    "accelerometer_inner_misplaced_mm": 3.0,
+    "accelerometer_outer_misplaced_mm": -3.0,
     "tilt_friction_n_m": 0.01,
     "tilt_damping_n_m_s": 0.01,
     "flywheel_speed_rad_s": 200.0,
     "flywheel_imbalance_kg_m": 1e-5,
     "turn_rate_rad_s": 0.1,
 }
-OUTSIDE_THE_MODEL = {"initial_tilt_deg", "gimbal_backlash_arcmin"}
+OUTSIDE_THE_MODEL = {"initial_tilt_deg", "gimbal_backlash_arcmin", "pivot_slides"}
 OPTIONS = {"timestep_s", "integrator"}
-COMPILE_OPTIONS = {"model", "lock_thrust_bearing", "locked_axes"}
+BEND = {"bend_frequency_hz", "bend_damping_ratio", "bend_share", "bend_beyond"}
+COMPILE_OPTIONS = {"model", "lock_thrust_bearing", "locked_axes"} | BEND
 VIEW_ARRAYS = ("cam_", "light_")
 
 
@@ -81,3 +84,14 @@ def test_only_visual_geoms_differ(scenario: str) -> None:
         for name, value in stepped_arrays.items()
         if not name.startswith(visual)
     )
+
+
+def test_a_frame_that_bends_is_drawn_as_it_is_stepped() -> None:
+    settings = ("plant.bend_frequency_hz=20", "plant.bend_damping_ratio=0.01", "plant.bend_share=0.2")
+    plant = prepare(load_scenario("push_recovery", (*settings, "plant.bend_beyond=sensors"))).plant
+    drawn = drawn_plant(plant)
+    one, other = plant.new_data(), drawn.new_data()
+    mujoco.mj_step(plant.model, one, 20)
+    mujoco.mj_step(drawn.model, other, 20)
+    np.testing.assert_array_equal(one.qpos, other.qpos)
+    assert drawn.model.nv == experiment("push_recovery").plant.model.nv + 1

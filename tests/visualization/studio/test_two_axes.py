@@ -21,6 +21,13 @@ SWING = (
     "swing=[{frequency_hz=1.3, amplitude_n_m=0.3, axis='pitch'},"
     " {frequency_hz=2.0, amplitude_n_m=0.2, start_s=0.2513, axis='roll'}]"
 )
+REAL = (
+    "sensors.accelerometer.vibration_mg=4",
+    "sensors.accelerometer.wheel_harmonics_mg=[5, 2]",
+    "plant.accelerometer_outer_misplaced_mm=3",
+    "pivot=[{kind='noise', acceleration_m_s2=0.3, corner_hz=5.0, axis='pitch'},"
+    " {kind='sine', acceleration_m_s2=0.2, frequency_hz=3.0, start_s=0.2513, direction='vertical'}]",
+)
 
 
 def runner(*settings: str) -> np.ndarray:
@@ -35,8 +42,9 @@ def runner(*settings: str) -> np.ndarray:
         ("duration_s=1.5", "plant.model=two_axes_free_base", "axes.roll.observer.kind=adaptive", "push=[]"),
         ("duration_s=1.0", "push.0.start_s=0.313", "push.1.start_s=0.32", "plant.timestep_s=0.001", SWING),
         ("duration_s=1.0", 'plant.locked_axes=["roll"]', "push.1.start_s=0.5", "push.0.start_s=0.253"),
+        ("duration_s=1.0", "push.0.start_s=0.313", "push.1.start_s=0.32", "plant.timestep_s=0.001", *REAL),
     ],
-    ids=["pushed", "free base", "swings", "locked"],
+    ids=["pushed", "free base", "swings", "locked", "a real rig"],
 )
 def test_untouched_it_is_the_runners_trajectory_of_each_axis(settings: tuple[str, ...]) -> None:
     expected = runner(*settings)

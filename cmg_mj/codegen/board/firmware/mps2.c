@@ -1,6 +1,6 @@
-/* The machine that QEMU calls mps2-an500: ARM's MPS2 board with a Cortex-M7. Its UART and timer are those of ARM's CMSDK
- * (Cortex-M System Design Kit). */
-#include "machine.h"
+/* The port layer of the board that QEMU calls mps2-an500: ARM's MPS2 with a Cortex-M7. Its UART and timers are those of ARM's
+ * CMSDK (Cortex-M System Design Kit). The emulated line has no baud rate. */
+#include "port.h"
 
 #define WORD(address) (*(volatile uint32_t *)(address))
 
@@ -20,10 +20,12 @@
 #define PENDING_NO_MORE WORD(0xe000e280u)
 
 enum { UART_RECEIVED = 1u << 0, WATCH = 1u << 9 }; /* numbers of the interrupts */
+enum { CLOCK_MHZ = 25 };
 
-static const uint32_t quiet_for = 4294967295u; /* of the clock's 25 MHz: about three minutes */
+const char port_name[] = "mps2-an500";
+const uint32_t port_cycles_a_second = 0; /* QEMU knows no cycles: the timer counts the host's time, or instructions */
 
-void machine_start(void)
+int port_init(void)
 {
     UART_DIVIDER = 16;
     UART_CONTROL = 0xb; /* send, receive, interrupt when something has come */
@@ -32,42 +34,65 @@ void machine_start(void)
     TIMER_CONTROL = 1;
     __asm volatile("cpsid i" ::: "memory"); /* interrupts only end a wait: nothing comes between two instructions */
     INTERRUPTS = UART_RECEIVED | WATCH;
+    return 0;
 }
 
-uint8_t machine_receive(void)
+int port_read(uint8_t *byte, uint32_t wait_us)
 {
+    const uint32_t longest = 0xffffffffu / CLOCK_MHZ;
+
     WATCH_CONTROL = 0;
-    WATCH_RELOAD = WATCH_VALUE = quiet_for;
+    WATCH_RELOAD = WATCH_VALUE = CLOCK_MHZ * (wait_us < longest ? wait_us : longest);
     WATCH_CONTROL = 0x9; /* count, interrupt */
     for (;;) {
+        uint32_t over;
+
         /* In this order: what comes after the interrupt was taken back raises it again, what came before is seen. */
         UART_STATUS = 0x2;
+        over = WATCH_STATUS & 1u;
         WATCH_STATUS = 1;
         PENDING_NO_MORE = UART_RECEIVED | WATCH;
-        if (UART_STATE & 2u)
-            return (uint8_t)UART_DATA;
+        if (UART_STATE & 2u) {
+            *byte = (uint8_t)UART_DATA;
+            return 1;
+        }
+        if (over)
+            return 0;
         __asm volatile("wfi" ::: "memory");
-        if (WATCH_STATUS & 1u)
-            machine_halt(NOBODY_TALKS);
     }
 }
 
-void machine_send(uint8_t byte)
+/* The emulated line loses nothing: a byte is not sent to the board before the last one has been taken. */
+void port_write(const uint8_t *bytes, uint32_t count)
 {
-    while (UART_STATE & 1u) {
+    while (count--) {
+        while (UART_STATE & 1u) {
+        }
+        UART_DATA = *bytes++;
     }
-    UART_DATA = byte;
 }
 
-uint32_t machine_time(void)
+uint32_t port_cycles(void)
 {
     return ~TIMER_VALUE; /* it counts down */
 }
 
-void machine_halt(int status)
+uint32_t port_time(void)
 {
-    /* Semihosting: SYS_EXIT_EXTENDED, ADP_Stopped_ApplicationExit with a status. */
-    const uint32_t block[2] = {0x20026u, (uint32_t)status};
+    static uint32_t last, rest, time; /* the timer comes round after 172 s, and somebody asks more often */
+    const uint32_t now = port_cycles();
+
+    rest += now - last;
+    last = now;
+    time += rest / CLOCK_MHZ;
+    rest %= CLOCK_MHZ;
+    return time;
+}
+
+void port_reset(int why)
+{
+    /* Ends the emulator. Semihosting: SYS_EXIT_EXTENDED, ADP_Stopped_ApplicationExit with a status. */
+    const uint32_t block[2] = {0x20026u, (uint32_t)why};
     register uint32_t operation __asm("r0") = 0x20;
     register const void *parameter __asm("r1") = block;
     __asm volatile("bkpt 0xab" ::"r"(operation), "r"(parameter) : "memory");

@@ -1,7 +1,7 @@
 /* From reset to main on a Cortex-M with a floating-point unit: memory as C expects it, and the unit switched on. */
 #include <stdint.h>
 
-#include "machine.h"
+#include "port.h"
 
 extern uint32_t image_data[], data_start[], data_end[], bss_start[], bss_end[], stack_top[];
 
@@ -10,7 +10,7 @@ void reset(void);
 
 static void fault(void)
 {
-    machine_halt(FAULT);
+    port_reset(FAULT);
 }
 
 void reset(void)
@@ -25,7 +25,7 @@ void reset(void)
     for (to = bss_start; to < bss_end;)
         *to++ = 0;
     main();
-    machine_halt(NOBODY_TALKS);
+    port_reset(NOBODY_TALKS);
 }
 
 /* Where the stack begins, where to begin, then what to do in NMI, HardFault and the other faults. No interrupt is served. */

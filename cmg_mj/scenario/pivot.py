@@ -1,0 +1,100 @@
+"""Accelerations of the pivot, and of everything that the rig stands on: a sine, a step, a recorded track, noise."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.inputs.field_types import STRICT, Batched, Duration, Instant
+
+MOST_M_S2 = 50.0
+"""No pivot is accelerated by more [m/s^2]."""
+FASTEST_HZ = 20.0
+"""Highest frequency of a sine and highest corner of the noise [Hz]."""
+FIELDS_OF = {
+    "sine": ("acceleration_m_s2", "frequency_hz", "phase_deg"),
+    "step": ("acceleration_m_s2",),
+    "track": ("file", "column", "scale"),
+    "noise": ("acceleration_m_s2", "corner_hz"),
+}
+"""Fields of each kind, beside those of all."""
+OPTIONAL = ("phase_deg", "column", "scale")
+"""Fields that a kind which has them does without."""
+
+Acceleration = Annotated[float, Field(ge=-MOST_M_S2, le=MOST_M_S2)]
+Frequency = Annotated[float, Field(gt=0.0, le=FASTEST_HZ)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Pivot:
+    """A motion of the pivot. Its acceleration is held from sample to sample, at its mean over that time.
+
+    The tilt axis at the keyframe gives the directions. They do not turn with the rig.
+
+    Attributes:
+        kind: Form of the motion.
+        direction: `across`: horizontal, at right angles to the tilt axis, to the side that a positive tilt leans to;
+            `along`: along the tilt axis; `vertical`: upwards.
+        acceleration_m_s2: Amplitude of a sine, height of a step, RMS of noise [m/s^2].
+        frequency_hz: Frequency of a sine [Hz].
+        phase_deg: Phase of a sine at its start [deg].
+        corner_hz: Half-power frequency of noise, white behind a second-order Butterworth low-pass [Hz].
+        file: CSV file of a track, by its path: a heading, times [s], accelerations [m/s^2].
+        column: Heading of the track's acceleration; left out, the only one beside the time.
+        scale: Factor on a track.
+        start_s: When it begins [s].
+        duration_s: How long it lasts; left out, to the end of the track or of the run [s].
+        axis: Name of the tilt axis that gives the direction, on a rig of several; `vertical` needs none.
+    """
+
+    kind: Literal["sine", "step", "track", "noise"]
+    direction: Literal["across", "along", "vertical"] = "across"
+    acceleration_m_s2: Annotated[Acceleration | None, Batched()] = None
+    frequency_hz: Frequency | None = None
+    phase_deg: float = 0.0
+    corner_hz: Frequency | None = None
+    file: str | None = None
+    column: str | None = None
+    scale: Annotated[float, Batched()] = 1.0
+    start_s: Instant = 0.0
+    duration_s: Duration | None = None
+    axis: str | None = None
+
+    @model_validator(mode="after")
+    def _has_the_fields_of_its_kind(self) -> Pivot:
+        noun = "noise" if self.kind == "noise" else f"a {self.kind}"
+        defaults = {field.name: field.default for field in dataclasses.fields(self)}
+        for name in dict.fromkeys(name for names in FIELDS_OF.values() for name in names):
+            value = getattr(self, name)
+            if name in FIELDS_OF[self.kind]:
+                if value is None and name not in OPTIONAL:
+                    raise ValueError(f"{noun} needs {name}")
+            elif value != defaults[name]:
+                raise ValueError(f"{noun} has no {name}; it has {', '.join(FIELDS_OF[self.kind])}")
+        if self.kind == "noise" and self.acceleration_m_s2 is not None and self.acceleration_m_s2 < 0.0:
+            raise ValueError(f"acceleration_m_s2 = {self.acceleration_m_s2:g}: an RMS is not negative")
+        return self
+
+    @property
+    def size(self) -> float:
+        """Factor on the motion of size 1 that `pivot_signals` makes."""
+        if self.kind == "track":
+            return self.scale
+        assert self.acceleration_m_s2 is not None  # as the validator has seen
+        return self.acceleration_m_s2
+
+    @property
+    def words(self) -> str:
+        """The motion in a line."""
+        end = "" if self.duration_s is None else f" to {self.start_s + self.duration_s:g} s"
+        about = "" if self.axis is None or self.direction == "vertical" else f" {self.axis}"
+        what = {
+            "sine": f"{self.size:g} m/s2 at {self.frequency_hz or 0.0:g} Hz",
+            "step": f"{self.size:g} m/s2",
+            "track": f"{self.file}{'' if self.column is None else f', {self.column}'}, times {self.size:g}",
+            "noise": f"{self.size:g} m/s2 rms up to {self.corner_hz or 0.0:g} Hz",
+        }[self.kind]
+        return f"{self.kind}, {what}, {self.direction}{about}, from {self.start_s:g} s{end}"

@@ -1,0 +1,68 @@
+"""The notch on the command, against its transfer function."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+
+from cmg_mj import InputError, load_scenario, prepare
+from cmg_mj.controllers.notch import DEPTH_DAMPING, WIDTH_DAMPING, Notch
+
+DT = 0.005
+
+
+def gain(hz: float, middle_hz: float) -> complex:
+    """The amplitude of a sine after the notch has settled."""
+    inputs = np.exp(2.0j * math.pi * hz * DT * np.arange(4000))
+    real, imaginary = (_through(Notch(middle_hz, DT, math.inf), part) for part in (np.real(inputs), np.imag(inputs)))
+    return complex(np.mean(((real + 1j * imaginary) / inputs)[2000:]))
+
+
+def _through(notch: Notch, commands: np.ndarray) -> np.ndarray:
+    return np.array([notch(float(u)) for u in commands])
+
+
+@pytest.mark.parametrize("hz", [0.5, 4.0, 9.0, 10.0, 11.0, 30.0])
+def test_its_transfer_is_that_of_its_formula(hz: float) -> None:
+    # Tustin's rule, exact at the middle: w is the middle's, s what the rule makes of the frequency.
+    w = 2.0 * math.pi * 10.0
+    s = w / math.tan(0.5 * w * DT) * cmath.tanh(1j * math.pi * hz * DT)
+    expected = (s * s + 2.0 * DEPTH_DAMPING * w * s + w * w) / (s * s + 2.0 * WIDTH_DAMPING * w * s + w * w)
+    assert gain(hz, 10.0) == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_25th_is_left_in_the_middle_and_a_constant_passes() -> None:
+    assert abs(gain(20.0, 20.0)) == pytest.approx(DEPTH_DAMPING / WIDTH_DAMPING, rel=1e-6)
+    assert gain(0.0, 20.0) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_worlds_side_by_side_are_single_worlds() -> None:
+    commands = np.random.default_rng(1).normal(size=(50, 3))
+    batch, singles = Notch(10.0, DT, 1.5), [Notch(10.0, DT, 1.5) for _ in range(3)]
+    for row in commands:
+        assert batch(row).tolist() == [one(float(u)) for one, u in zip(singles, row, strict=True)]
+
+
+def test_its_result_is_within_the_limit() -> None:
+    notch = Notch(30.0, DT, 1.0)
+    assert max(abs(notch(3.0 * (-1.0) ** (k // 50))) for k in range(100)) == 1.0
+
+
+def test_the_command_that_is_recorded_and_observed_is_behind_it() -> None:
+    settings = ["duration_s=0.3", "push=[]"]
+    plain, behind = (
+        prepare(load_scenario("push_recovery", [*settings, *more])).run().trajectory
+        for more in ([], ["controller.notch_hz=20"])
+    )
+    assert plain is not None
+    assert behind is not None
+    first = Notch(20.0, DT, math.inf)(float(plain["u_rad_s"][0]))
+    assert behind["u_rad_s"][0] == first != plain["u_rad_s"][0]
+
+
+def test_it_lies_below_half_the_rate() -> None:
+    with pytest.raises(InputError, match="notch_hz = 100: must be below 100 Hz, half of rate_hz"):
+        load_scenario("push_recovery", ["controller.notch_hz=100"])

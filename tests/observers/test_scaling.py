@@ -1,0 +1,112 @@
+"""Observers carried to another rig: with time, inertia and noise scaled they do the same in their own units."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmg_mj.controllers.laws import scaled_gains
+from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
+from cmg_mj.observers.protocol import extra_signals
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.observers.scaling import PURE, TORQUE, UNITS, Owner, Scales, Unit, scale_value, scaled_parameters, scales_of
+from tests.observers.reference import DT, HEAVY, NOISE, PAPER, rough_signals
+
+EXTRA = {"bias_rad": PURE}
+"""Units of estimates beyond x; the others are torques."""
+SLOW_AND_HEAVY = Scales(time=2.7, inertia=900.0)
+OTHER: dict[str, dict[str, Any]] = {
+    "homogeneous": {"friction_n_m": 0.02, "damping_n_m_s": 0.01},
+    "luenberger": {"L": ((20.0, 0.3), (150.0, -2.0), (0.7, 20.0))},
+    # The exponent b, beside which L counts as a unit of tilt too, has no effect but for that while L does not move.
+    "high_gain": {"b": 1e-13, "phi3": 0.3},
+    "adaptive": {"bias": False, "torque": True, "sinusoid_hz": 1.1, "known_bias_deg": 0.4},
+}
+"""Parameters that are not zero, so that their units matter."""
+
+
+def other_rig(model: ReducedModel, s: Scales) -> ReducedModel:
+    """The rig whose equation (4) is the same in its own units."""
+    return replace(
+        model,
+        J1=model.J1 * s.inertia,
+        J2=model.J2 * s.inertia,
+        J_d=model.J_d * s.inertia,
+        omega_d=model.omega_d / s.time,
+        gravity_torque=model.gravity_torque * s.inertia / s.time**2,
+    )
+
+
+def of_all(kind: str, values: dict[str, Any], scales: Scales) -> dict[str, Any]:
+    """Every parameter in the other rig's units, whatever it describes."""
+    units = UNITS[kind]
+    return {name: scale_value(value, units[name], scales) if name in units else value for name, value in values.items()}
+
+
+def estimates(kind: str, scales: Scales, model: ReducedModel) -> np.ndarray:
+    """Estimate the same trajectory by an observer on the other rig, in the papers' rig's units."""
+    signature = OBSERVER_CLASSES.takes(kind)
+    names = [name for name in signature if name not in OBSERVER_CLASSES.bench_parameters]
+    values = {name: signature[name].default for name in names} | OTHER.get(kind, {})
+    rate, acceleration = 1.0 / scales.time, 1.0 / scales.time**2
+    noise = replace(
+        NOISE,
+        tilt=0.05 * NOISE.tilt,  # less than y1 has: free_pivot learns that
+        acceleration=NOISE.acceleration * acceleration,
+    )
+    of_rig = (DT * scales.time, other_rig(model, scales), noise)
+    observer = make_observer(kind, *of_rig, **of_all(kind, values, scales))
+    y1, y2, u = rough_signals(150)
+    a = np.random.default_rng(0).normal(0.0, 5.0, 150) * acceleration
+    u = u / scales.time
+    state, rows = observer.init(Measurement(y1[0], y2[0], a[0])), []
+    for k in range(1, 150):
+        state, estimate = observer.step(state, Measurement(y1[k], y2[k], a[k]), u[k - 1])
+        rows.append(estimate)
+    extra = [EXTRA.get(name, TORQUE).factor(scales) for name in extra_signals(observer)]
+    return np.array(rows) / [1.0, rate, 1.0, *extra]
+
+
+@pytest.mark.parametrize("kind", sorted(OBSERVERS))
+def test_the_same_in_the_rigs_own_units(kind: str) -> None:
+    expected, scaled = (estimates(kind, scales, HEAVY) for scales in (Scales(1.0), SLOW_AND_HEAVY))
+    size = np.abs(expected).max(axis=0)
+    np.testing.assert_allclose(scaled / size, expected / size, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", sorted(OBSERVERS))
+def test_every_number_has_a_unit(kind: str) -> None:
+    parameters = OBSERVER_CLASSES.takes(kind).values()
+    numbers = {p.name for p in parameters if p.name not in OBSERVER_CLASSES.bench_parameters}
+    assert set(UNITS[kind]) == numbers - {"bias", "torque"}
+
+
+def test_the_scale_of_time_is_that_of_the_law() -> None:
+    model = ReducedModel(J1=40.0, J2=0.01, J_d=0.04, omega_d=300.0, gravity_torque=350.0, gimbals=2)
+    np.testing.assert_allclose(scaled_gains(model)[2], TABLE_2_GAINS[2] / scales_of(model).time, rtol=1e-12)
+
+
+def test_nothing_changes_on_the_papers_rig() -> None:
+    for kind in OBSERVERS:
+        for name, value in scaled_parameters(kind, replace(PAPER, gimbals=2)).items():
+            default = OBSERVER_CLASSES.takes(kind)[name].default
+            np.testing.assert_allclose(value, default, rtol=2e-3)
+
+
+def test_a_slow_robot_gets_slow_gains() -> None:
+    humanoid = ReducedModel(J1=68.79, J2=-0.0098, J_d=0.0567, omega_d=314.0, gravity_torque=536.6, gimbals=2)
+    time, inertia = scales_of(humanoid)
+    assert (time, inertia) == pytest.approx((2.675, 1112.0), rel=2e-3)
+    assert scaled_parameters("homogeneous", humanoid) == pytest.approx({"k1": 20.0 / time, "k2": 150.0 / time**2})
+    assert scaled_parameters("linear", humanoid) == {"tau": pytest.approx(0.02 * time)}
+    assert scaled_parameters("kalman", humanoid)["torque_start"] == pytest.approx(0.2 * inertia / time**2)
+
+
+def test_the_sensors_observers_and_a_users_own_stay_as_they_are() -> None:
+    for kind in ("gyro_free", "free_pivot", "finite_difference", "tests.studies.tuning.user_observer:UserObserver"):
+        assert scaled_parameters(kind, HEAVY) == {}
+    assert {unit.owner for unit in UNITS["gyro_free"].values() if isinstance(unit, Unit)} == {Owner.SENSORS}

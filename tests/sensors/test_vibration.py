@@ -1,0 +1,220 @@
+"""Vibration of accelerometers: of the RMS and in the band that it is told, and tones that follow the flywheels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from cmg_mj.errors import InputError
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY, Accelerometer
+from cmg_mj.sensors.ideal import IdealReading
+from cmg_mj.sensors.noise_streams import NoiseStream, normals
+from cmg_mj.sensors.sampled import Sensors, sampled_sensors
+from cmg_mj.sensors.vibration import BroadbandVibration, WheelTones
+from cmg_mj.simulation.experiment import Experiment, prepare
+
+MG = 1e-3 * STANDARD_GRAVITY
+SILENT = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
+
+
+def broadband(band_hz: tuple[float, float], dt: float, n: int, worlds: int | Sequence[int] = 0) -> np.ndarray:
+    """n samples of the four axes: (n, 4[, n_worlds])."""
+    source = BroadbandVibration(band_hz, dt, normals(0, worlds, NoiseStream.VIBRATION, BroadbandVibration.channels))
+    return np.array([source.advance() for _ in range(n)])
+
+
+def readings(
+    n: int, worlds: int | Sequence[int] = 0, rates: Sequence[float] = (), h: float = 0.005, **fields: object
+) -> np.ndarray:
+    """n samples of accelerometers at rest, weightless and otherwise perfect."""
+    pair, _, _ = sampled_sensors(Sensors(Accelerometer(**{**SILENT, **fields})), h, 0, worlds)
+    forces = (0.0,) * 4 if isinstance(worlds, int) else np.zeros((4, len(worlds)))
+    wheels = [rate if isinstance(worlds, int) else np.full(len(worlds), rate) for rate in rates]
+    taken = []
+    for k in range(n):
+        pair.sample(k, IdealReading(forces, [0.0], 0.0, 0.0, wheels))
+        taken.append(pair.read(k))
+    return np.array(taken)
+
+
+# --- broadband -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("band_hz", "dt"), [((20.0, 500.0), 0.005), ((20.0, 500.0), 1e-4), ((90.0, 110.0), 1e-3)])
+def test_the_rms_is_the_same_at_any_sample_rate(band_hz: tuple[float, float], dt: float) -> None:
+    """From the first sample on; and the covariance of two samples is the band-pass'."""
+    samples = broadband(band_hz, dt, 20, range(4000))
+    assert float(samples[0].std()) == pytest.approx(1.0, rel=0.02)
+    assert float(samples[-1].std()) == pytest.approx(1.0, rel=0.02)
+    f = np.arange(0.005, 2e5, 0.25) if dt < 0.005 else np.arange(0.005, 1e5, 0.1)
+    low, high = band_hz
+    power = (f * (high - low)) ** 2 / ((low * high - f * f) ** 2 + (f * (high - low)) ** 2)
+    expected = float((power * np.cos(2.0 * np.pi * f * dt)).sum() / power.sum())
+    together = float((samples[10] * samples[11]).mean())
+    print(f"{band_hz} Hz, {dt:g} s: covariance {together:.3f}, {expected:.3f} expected")
+    assert together == pytest.approx(expected, abs=0.02)
+
+
+def test_axes_vibrate_each_by_itself() -> None:
+    samples = broadband((20.0, 500.0), 0.005, 1, range(4000))[0]
+    np.testing.assert_allclose(np.corrcoef(samples), np.eye(4), atol=0.06)
+
+
+def test_a_band_is_where_it_is_told() -> None:
+    """Half of the peak's power density at both ends, by a spectrum of its own."""
+    dt, n = 2.5e-4, 2048
+    samples = broadband((100.0, 400.0), dt, n, range(100)).reshape(n, -1)
+    density = (np.abs(np.fft.rfft(samples * np.hanning(n)[:, None], axis=0)) ** 2).mean(axis=1)
+    f = np.fft.rfftfreq(n, dt)
+
+    def at(frequency: float) -> float:
+        return float(density[np.abs(f - frequency) < 0.05 * frequency].mean())
+
+    assert at(100.0) / at(200.0) == pytest.approx(0.5, rel=0.12)
+    assert at(400.0) / at(200.0) == pytest.approx(0.5, rel=0.12)
+
+
+def test_poles_that_coincide_are_no_division_by_zero() -> None:
+    """A band whose width is twice its middle has one pole twice."""
+    low = 100.0 * (math.sqrt(2.0) - 1.0)
+    double, near = (broadband((low, 100.0**2 / low + shift), 0.001, 50) for shift in (0.0, 1e-9))
+    assert np.isfinite(double).all()
+    np.testing.assert_allclose(double, near, atol=1e-6)
+
+
+def test_accelerometers_show_it_in_mg() -> None:
+    samples = readings(20, range(2000), vibration_mg=4.0)
+    assert float(samples.std()) == pytest.approx(4.0 * MG, rel=0.02)
+
+
+def test_a_low_pass_takes_off_what_lies_beyond_it() -> None:
+    """The low-pass works on the part's samples of 1 kHz, with what they alias: 44 Hz leave so much of 100 to 450 Hz."""
+    fields = {"vibration_mg": 10.0, "vibration_band_hz": (100.0, 450.0)}
+    filtered = readings(600, range(100), h=0.001, bandwidth_hz=44.0, **fields)[::5]
+    bare = readings(100, range(100), **fields)
+    share = float(filtered.std() / bare.std())
+    f, fold = np.arange(0.0, 500.0, 0.5), range(-40, 41)
+
+    def power(f: np.ndarray) -> np.ndarray:
+        return (f * 350.0) ** 2 / ((45000.0 - f * f) ** 2 + (f * 350.0) ** 2)
+
+    aliased = np.sum([power(np.abs(f + 1000.0 * k)) for k in fold], axis=0)
+    t = math.tan(math.pi * 44.0 / 1000.0)
+    passed = 1.0 / (1.0 + (np.tan(math.pi * f / 1000.0) / t) ** 4)
+    expected = math.sqrt(float((aliased * passed).sum() / aliased.sum()))
+    print(f"{share:.3f} of the RMS passes, {expected:.3f} expected")
+    assert share == pytest.approx(expected, rel=0.06)
+    assert expected < 0.4
+
+
+def test_one_world_of_many_vibrates_as_alone() -> None:
+    fields = {"vibration_mg": 4.0, "wheel_harmonics_mg": (5.0, 0.0, 2.0)}
+    alone = readings(40, 3, (314.0, -313.0), **fields)
+    many = readings(40, [1, 3, 2], (314.0, -313.0), **fields)
+    np.testing.assert_array_equal(many[:, :, 1], alone)
+
+
+# --- tones -----------------------------------------------------------------------------------------------------
+
+
+def tone(rates: np.ndarray, dt: float, harmonics: Sequence[float] = (1.0,)) -> np.ndarray:
+    """The first axis' samples with one wheel at these rates."""
+    source = WheelTones(harmonics, dt, normals(0, 0, NoiseStream.WHEEL_TONES, 2))
+    return np.array([source.advance([rate])[0] for rate in rates.tolist()])
+
+
+def strongest(samples: np.ndarray, dt: float) -> float:
+    """The frequency of the largest peak above 10 Hz [Hz]."""
+    f = np.fft.rfftfreq(len(samples), dt)
+    spectrum = np.where(f > 10.0, np.abs(np.fft.rfft(samples * np.hanning(len(samples)))), 0.0)
+    return float(f[int(np.argmax(spectrum))])
+
+
+def test_a_tone_has_its_amplitude_and_its_multiple() -> None:
+    rates = np.full(4000, 2.0 * np.pi * 50.0)
+    samples = tone(rates, 0.001, (0.0, 0.0, 3.0))
+    assert strongest(samples, 0.001) == pytest.approx(150.0, abs=0.3)
+    assert float(samples.std()) == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
+
+
+def test_a_tone_shifts_with_the_wheel() -> None:
+    """A wheel that runs up from 40 to 60 Hz: the phase is the integral of its rate, to the first order of the step."""
+    dt, t = 0.001, np.arange(2000) * 0.001
+    rates = 2.0 * np.pi * (40.0 + 10.0 * t)
+    samples = tone(rates, dt)
+    angle = 2.0 * np.pi * (40.0 * t + 5.0 * t * t)
+    basis = np.array([np.sin(angle), np.cos(angle)]).T
+    rest = samples - basis @ np.linalg.lstsq(basis, samples, rcond=None)[0]
+    assert np.abs(rest).max() < 1e-9
+    assert strongest(samples[:400], dt) == pytest.approx(42.0, abs=2.6)
+    assert strongest(samples[-400:], dt) == pytest.approx(58.0, abs=2.6)
+
+
+def experiment(*settings: str) -> Experiment:
+    return prepare(load_scenario("push_recovery", ["duration_s=2.0", "push=[]", *settings], "gyro_free"))
+
+
+@pytest.mark.parametrize("speed", [314.0, 220.0])
+def test_the_rigs_own_wheels_make_the_tone(speed: float) -> None:
+    """In the angular acceleration that the accelerometers show; the frequency moves with the wheels' speed."""
+    quiet = [f"sensors.accelerometer.{name}={value:g}" for name, value in SILENT.items()]
+    rig = experiment(*quiet, "sensors.accelerometer.wheel_harmonics_mg=[20.0]", f"plant.flywheel_speed_rad_s={speed:g}")
+    trajectory = rig.run().trajectory
+    assert trajectory is not None
+    assert strongest(trajectory["acceleration_rad_s2"][40:], 0.005) == pytest.approx(speed / (2.0 * math.pi), abs=0.6)
+
+
+# --- in a run --------------------------------------------------------------------------------------------------
+
+
+def test_a_world_without_vibration_has_the_floor_and_the_others_do_not() -> None:
+    """In one batch; each world's summary is its own, as if it had run alone."""
+    rig = experiment("duration_s=0.3")
+    vary = {"sensors.accelerometer.vibration_mg": [0.0, 4.0]}
+    result = rig.run_many([1, 1], vary=vary)
+    for summary, one in zip(result.summaries, rig.with_varied(vary), strict=True):
+        assert summary == one.run(world=1).summaries[0]
+    floors = result.values("velocity_rms_error_rad_s", "floor_accel")
+    assert np.isnan(floors).tolist() == [False, True]
+    table = result.table().to_pylist()
+    assert [row["velocity_rms_error_rad_s"] is None for row in table if row["observer"] == "floor_accel"] == [0, 1]
+
+
+@pytest.mark.slow
+def test_four_mg_cost_gyro_free_what_as_much_noise_costs() -> None:
+    """4 mg behind no low-pass are to samples at 200 Hz as white as 400 ug/rtHz are: the error grows by root two."""
+    still, vibrating = (
+        experiment("duration_s=6.0", f"sensors.accelerometer.vibration_mg={rms}").run_many(4) for rms in (0, 4)
+    )
+    errors = [result.values("velocity_rms_error_rad_s").mean() for result in (still, vibrating)]
+    assert errors[1] / errors[0] == pytest.approx(math.sqrt(2.0), rel=0.12)
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("vibration_mg=-1", "vibration_mg = -1: must be a number greater than or equal to 0"),
+        ("vibration_band_hz=[500, 20]", "vibration_band_hz: 500 Hz to 20 Hz: the lower end comes first"),
+        ("vibration_band_hz=[0, 20]", "vibration_band_hz"),
+        ("wheel_harmonics_mg=[1, -1]", "wheel_harmonics_mg"),
+        (f"wheel_harmonics_mg={[1.0] * 21}", "wheel_harmonics_mg: 21 amplitudes: at most 20 harmonics"),
+        ("wheel_harmonics_mg=3", "wheel_harmonics_mg = 3: must be a list of numbers greater than or equal to 0"),
+    ],
+)
+def test_what_does_not_vibrate_is_refused(setting: str, message: str) -> None:
+    with pytest.raises(InputError) as refused:
+        load_scenario("push_recovery", [f"sensors.accelerometer.{setting}"])
+    print(refused.value)
+    assert message in str(refused.value).replace("sensors.accelerometer.", "")
+
+
+def test_the_plugin_refuses_it_by_name() -> None:
+    from cmg_mj.simulation.plugin_files import describe_rig
+
+    for field in ("vibration_mg=4.0", "wheel_harmonics_mg=[2.0]"):
+        with pytest.raises(InputError, match=rf"sensors\.accelerometer\.{field.partition('=')[0]}: the "):
+            describe_rig(experiment(f"sensors.accelerometer.{field}"), "plugin")
