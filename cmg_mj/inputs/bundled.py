@@ -11,7 +11,7 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def folder(name: str) -> Path:
-    """The bundled folder `models` or `scenarios`: inside the wheel, or beside the package in a checkout."""
+    """Return the bundled folder `models`, `scenarios` or `examples`: in the wheel, or beside the package in a clone."""
     inside = _PACKAGE / name
     return inside if inside.is_dir() else _PACKAGE.parent / name
 
