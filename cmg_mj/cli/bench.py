@@ -82,7 +82,7 @@ def plugin(observers: list[str], worlds: int, as_json: bool) -> None:
     from cmg_mj.studies.plugin_benchmark import measure, plugin_table
 
     find_tools()
-    experiments = [prepare(load_scenario("push_recovery", observer=name)) for name in observers]
+    experiments = [prepare(load_scenario("push_recovery", ["open_loop_observers=[]"], name)) for name in observers]
     with progress("Bench of plugins", 1.0 * len(observers)) as on_progress:
         figures = [
             measure(experiment, worlds, os.cpu_count() or 1, lambda share, i=i: on_progress(i + share))

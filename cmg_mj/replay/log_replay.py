@@ -7,8 +7,9 @@ import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,10 +30,14 @@ from cmg_mj.replay.scores import Figures, noise_gain, scores
 from cmg_mj.replay.user_noise import noise_of
 from cmg_mj.replay.zero_phase import ZeroPhase, zero_phase
 from cmg_mj.results.baselines import ZERO
+from cmg_mj.results.frames import NamedColumns
 from cmg_mj.results.memory import release_free_memory
 from cmg_mj.results.stored_columns import LONG, ColumnStore, StoredColumns, shelved, stored
-from cmg_mj.results.trajectory import ESTIMATES
+from cmg_mj.results.trajectory import ESTIMATES, Trajectory
 from cmg_mj.sensors.tilt import TiltNoise
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SETTLE_S = 1.0
 """Default time at the start of each part that is not scored [s]."""
@@ -50,8 +55,10 @@ OnShare = Callable[[float], None]
 
 
 @dataclass(frozen=True)
-class ReplayResult:
+class ReplayResult(NamedColumns):
     """Estimates and scores of observers on one log.
+
+    It has the log's signals and the estimates as columns: `replayed["estimate/linear/x2_rad_s"]`, `dict(replayed)`.
 
     Attributes:
         log: The log.
@@ -76,6 +83,24 @@ class ReplayResult:
     parameters: Parameters = field(default_factory=dict)
     zero_phase: ZeroPhase | None = None
     misfit: float | None = None
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The log's signals and all estimates, evenly sampled, in SI units and radians."""
+        from cmg_mj.replay.save import signals
+
+        return signals(self)
+
+    def _columns(self) -> Mapping[str, np.ndarray]:
+        return self.trajectory.columns
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Make a pandas frame of the log's signals and the estimates, a row a sample.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return self.trajectory.to_pandas()
 
 
 def replay_log(

@@ -6,17 +6,20 @@ import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
+from cmg_mj.results.frames import NamedColumns, columns_of, frame_of
 from cmg_mj.results.per_world_table import as_table
 from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, open_loop_figures
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.results.wire import WireReport
 
 if TYPE_CHECKING:
+    import pandas as pd
     import pyarrow as pa
 
 Driver = Literal["native", "callback", "board", "plugin"]
@@ -46,8 +49,10 @@ class Outcome:
 
 
 @dataclass
-class Result:
+class Result(NamedColumns):
     """The outcome, the numbers and perhaps the trajectory of a run's worlds.
+
+    It has the columns of `table()`, a row per observer and world: `result["stood"]`, `dict(result)`.
 
     Attributes:
         outcomes: How each world ended, (n_worlds,).
@@ -154,6 +159,21 @@ class Result:
         """
         estimators = [None, *self._open_loop_names]
         return as_table(row for estimator in estimators for row in self.rows(estimator))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Make a pandas frame of `table`.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return frame_of(self.table())
+
+    @cached_property
+    def _table_columns(self) -> Mapping[str, np.ndarray]:
+        return columns_of(self.table())
+
+    def _columns(self) -> Mapping[str, np.ndarray]:
+        return self._table_columns
 
     def split(self, count: int) -> list[Result]:
         """Split the worlds into groups of equal size, in the order in which `run_many` was given them."""

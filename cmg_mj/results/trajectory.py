@@ -6,14 +6,18 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import TypeAdapter
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.results.files import METADATA_KEY, write_row_groups
+from cmg_mj.results.frames import NamedColumns, require_pandas
 from cmg_mj.results.stored_columns import STRETCH, StoredColumns, number_of_rows, select_rows
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SIGNALS = (
     "x1_rad",
@@ -102,8 +106,11 @@ class Layout:
 
 
 @dataclass(frozen=True)
-class Trajectory:
-    """One row a control tick.
+class Trajectory(NamedColumns):
+    """One row a control tick, by column: `trajectory["x1_rad"]`.
+
+    As with a pandas frame, iteration and `keys()` give the columns' names and `len` counts the rows.
+    `dict(trajectory)` has all columns as arrays.
 
     Attributes:
         columns: Name -> values, (n_ticks,) for one world, (n_ticks, n_worlds) for many; the unit ends the name.
@@ -116,8 +123,8 @@ class Trajectory:
     metadata: Mapping[str, Any] = field(default_factory=dict)
     layout: Layout = Layout((), (), ())
 
-    def __getitem__(self, name: str) -> np.ndarray:
-        return self.columns[name]
+    def _columns(self) -> Mapping[str, np.ndarray]:
+        return self.columns
 
     def __len__(self) -> int:
         return number_of_rows(self.columns)
@@ -183,7 +190,7 @@ class Trajectory:
     def world(self, index: int) -> Trajectory:
         """Select one world of many, up to its end."""
         columns = {name: values if name == "time_s" else values[:, index] for name, values in self.columns.items()}
-        running = np.isfinite(columns[self.layout.columns()[0] if self.layout.axes else SIGNALS[0]])
+        running = np.isfinite(columns[self._first_signal])
         return replace(self, columns={name: values[running] for name, values in columns.items()})
 
     def of_worlds(self, worlds: np.ndarray | slice) -> Trajectory:
@@ -209,6 +216,33 @@ class Trajectory:
         """Select the rows from one time to another, both included."""
         rows = (self["time_s"] >= start_s - 1e-9) & (self["time_s"] <= end_s + 1e-9)
         return replace(self, columns={name: values[rows] for name, values in self.columns.items()})
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Make a pandas frame with a row a control tick.
+
+        Returns:
+            The columns of the trajectory, units in their names. Of many worlds, the rows of one world after the other,
+            each up to its end, with the world's position in the batch as the column `world`.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        pandas = require_pandas()
+        columns = dict(self.columns)
+        time = columns.pop("time_s")
+        worlds = next((values.shape[1] for values in columns.values() if values.ndim == 2), None)
+        if worlds is None:
+            return pandas.DataFrame({"time_s": time, **columns})
+        running = np.isfinite(columns[self._first_signal]).T  # (n_worlds, n_ticks)
+        world = np.broadcast_to(np.arange(worlds)[:, None], running.shape)
+        times = np.broadcast_to(time, running.shape)
+        rows = {name: values.T[running] for name, values in columns.items()}
+        return pandas.DataFrame({"world": world[running], "time_s": times[running], **rows})
+
+    @property
+    def _first_signal(self) -> str:
+        """The column that is NaN after a world's end, whatever the plant."""
+        return self.layout.columns()[0] if self.layout.axes else SIGNALS[0]
 
     def save(self, path: Path) -> None:
         """Write one world's trajectory as Parquet, a row group a stretch, whole or not at all."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +68,7 @@ class Design:
         axis: int = 0,
         processor: Processor | None = None,
         observer: Observer | None = None,
+        open_loop_observers: Mapping[str, Observer] | None = None,
         law: Law | None = None,
         sensors: Sensors | None = None,
     ) -> Controller:
@@ -78,7 +79,8 @@ class Design:
             worlds: The number of one world, or the numbers of many.
             axis: The number of the plant's axis.
             processor: Takes the decisions in the host's place.
-            observer: Instead of the scenario's, as are the next two.
+            observer: Instead of the scenario's, as are the next three.
+            open_loop_observers: The open-loop observers, by name.
             law: The control law.
             sensors: The sensors.
 
@@ -101,7 +103,7 @@ class Design:
             angle_source=settings.angle_source,
             bias_trim_s=settings.bias_trim_s,
             notch_hz=settings.notch_hz,
-            open_loop_observers=self.open_loop_observers(),
+            open_loop_observers=self.open_loop_observers() if open_loop_observers is None else open_loop_observers,
             axis=axis,
         )
 

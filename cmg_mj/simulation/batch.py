@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+from collections import namedtuple
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from cmg_mj.controllers.controller import PlantInterface
 from cmg_mj.controllers.laws import LAW_CLASSES, Law
+from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.inputs.field_types import Batched, NoEffect
 from cmg_mj.inputs.marks import marked_fields
-from cmg_mj.observers import OBSERVER_CLASSES
+from cmg_mj.observers import OBSERVER_CLASSES, Estimate, Measurement, Observer
+from cmg_mj.observers.protocol import State, extra_signals
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push
@@ -94,9 +98,9 @@ def _key_parts(scenario: Scenario, design: Design, axis: str) -> Iterator[tuple[
             yield KeyPart(field, axis, field.partition(".")[0] == "observer"), hashable(value)
     _, model, noise = design.constructor_arguments
     yield KeyPart("the reduced model", axis), model
-    for observer in (scenario.observer.kind, *scenario.open_loop_names()):
-        if "noise" in OBSERVER_CLASSES.takes(observer):
-            yield KeyPart(f"the sensors' noise, which {observer} is told,", axis, is_of_observer=True), noise
+    observer = scenario.observer.kind
+    if "noise" in OBSERVER_CLASSES.takes(observer):
+        yield KeyPart(f"the sensors' noise, which {observer} is told,", axis, is_of_observer=True), noise
     if "noise" in LAW_CLASSES.takes(law):
         yield KeyPart("the noise that the law is told", axis), noise
 
@@ -189,6 +193,67 @@ def batched(worlds: Sequence[tuple[Law, Scenario]]) -> tuple[Law, Sensors, tuple
     pivots = [tuple(scenario.pivot) for scenario in scenarios]
     sensors = batch_values([scenario.sensors for scenario in scenarios])
     return _batched_law(laws), sensors, batch_values(pushes), batch_values(pivots)
+
+
+class BatchedObservers:
+    """Observers that stand beside each other in one batch, each in worlds of its own.
+
+    Args:
+        parts: An observer, and how many worlds it has, in the batch's order. All name the same extra signals.
+    """
+
+    def __init__(self, parts: Sequence[tuple[Observer, int]]) -> None:
+        self.extra_signals = extra_signals(parts[0][0])
+        self._estimate: Any = namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
+        ends = np.cumsum([worlds for _, worlds in parts]).tolist()
+        self._parts = [
+            (observer, slice(end - worlds, end)) for (observer, worlds), end in zip(parts, ends, strict=True)
+        ]
+        self._shapes = [(worlds,) for _, worlds in parts]
+
+    def init(self, y: Measurement) -> list[State]:
+        """Return each observer's state at the first sample."""
+        return [observer.init(_measurement(y, worlds)) for observer, worlds in self._parts]
+
+    def step(self, state: list[State], y: Measurement, u: Scalar) -> tuple[list[State], Estimate]:
+        """Advance each by one sample period; estimates are arrays (n_worlds,)."""
+        steps = [
+            observer.step(observer_state, _measurement(y, worlds), u[worlds])
+            for observer_state, (observer, worlds) in zip(state, self._parts, strict=True)
+        ]
+        estimates = [
+            [np.broadcast_to(part, shape) for part in estimate]
+            for (_, estimate), shape in zip(steps, self._shapes, strict=True)
+        ]
+        whole = self._estimate(*(np.concatenate(parts) for parts in zip(*estimates, strict=True)))
+        return [observer_state for observer_state, _ in steps], whole
+
+
+def _measurement(y: Measurement, worlds: slice) -> Measurement:
+    """Take the measurement of some of the worlds."""
+    y1, y2 = y
+    return Measurement(y1[worlds], y2[worlds], y.acceleration[worlds])  # type: ignore[index]
+
+
+def batched_open_loop_observers(designs: Sequence[Design]) -> dict[str, Observer]:
+    """Make the open-loop observers of many worlds, each for the noise of its own world's sensors.
+
+    Args:
+        designs: The design of each world; all name the same open-loop observers.
+
+    Returns:
+        The observers by name: one for all worlds, or one for each neighbouring group of worlds with equal noise.
+    """
+    groups = [list(group) for _, group in groupby(designs, key=lambda design: design.constructor_arguments)]
+    if len(groups) == 1:
+        return designs[0].open_loop_observers()
+    observers = [group[0].open_loop_observers() for group in groups]
+    return {
+        name: BatchedObservers([(made[name], len(group)) for made, group in zip(observers, groups, strict=True)])
+        if "noise" in OBSERVER_CLASSES.takes(name)
+        else observer
+        for name, observer in observers[0].items()
+    }
 
 
 def once(items: Sequence[T]) -> list[T]:

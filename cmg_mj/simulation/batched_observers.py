@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections import namedtuple
 from collections.abc import Iterator, Sequence
 from itertools import groupby
-from typing import Any, NamedTuple, Unpack
+from typing import NamedTuple, Unpack
 
 import numpy as np
 
-from cmg_mj.elementwise import Scalar
-from cmg_mj.observers import Estimate, Measurement, Observer
-from cmg_mj.observers.protocol import State, extra_signals
+from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.batch import BatchKey, PlantStructure, once, plant_structure
+from cmg_mj.simulation.batch import BatchedObservers, BatchKey, PlantStructure, once, plant_structure
 from cmg_mj.simulation.experiment import Experiment, batch_inputs, run_batch
 from cmg_mj.simulation.simulate import SimulationOptions
 
@@ -38,46 +35,6 @@ class BatchJob(NamedTuple):
 def run_of(experiment: Experiment, worlds: int) -> BatchJob:
     """Worlds 0 to n - 1 of one experiment."""
     return BatchJob([experiment] * worlds, range(worlds))
-
-
-class BatchedObservers:
-    """Observers that stand beside each other in one batch, each in worlds of its own.
-
-    Args:
-        parts: An observer, and how many worlds it has, in the batch's order. All name the same extra signals.
-    """
-
-    def __init__(self, parts: Sequence[tuple[Observer, int]]) -> None:
-        self.extra_signals = extra_signals(parts[0][0])
-        self._estimate: Any = namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
-        ends = np.cumsum([worlds for _, worlds in parts]).tolist()
-        self._parts = [
-            (observer, slice(end - worlds, end)) for (observer, worlds), end in zip(parts, ends, strict=True)
-        ]
-        self._shapes = [(worlds,) for _, worlds in parts]
-
-    def init(self, y: Measurement) -> list[State]:
-        """Return each observer's state at the first sample."""
-        return [observer.init(_measurement(y, worlds)) for observer, worlds in self._parts]
-
-    def step(self, state: list[State], y: Measurement, u: Scalar) -> tuple[list[State], Estimate]:
-        """Advance each by one sample period; estimates are arrays (n_worlds,)."""
-        steps = [
-            observer.step(observer_state, _measurement(y, worlds), u[worlds])
-            for observer_state, (observer, worlds) in zip(state, self._parts, strict=True)
-        ]
-        estimates = [
-            [np.broadcast_to(part, shape) for part in estimate]
-            for (_, estimate), shape in zip(steps, self._shapes, strict=True)
-        ]
-        whole = self._estimate(*(np.concatenate(parts) for parts in zip(*estimates, strict=True)))
-        return [observer_state for observer_state, _ in steps], whole
-
-
-def _measurement(y: Measurement, worlds: slice) -> Measurement:
-    """Take the measurement of some of the worlds."""
-    y1, y2 = y
-    return Measurement(y1[worlds], y2[worlds], y.acceleration[worlds])  # type: ignore[index]
 
 
 def run_side_by_side(runs: Sequence[BatchJob], **options: Unpack[SimulationOptions]) -> list[Result]:
@@ -126,15 +83,17 @@ class SharedKey(NamedTuple):
     key: BatchKey
     plant: PlantStructure
     extra_signals: tuple[str, ...]
+    open_loop: tuple[str, ...]
 
 
 def _shared_key(job: BatchJob) -> SharedKey | None:
     """Return the key that jobs of one batch share; None for a job that cannot share a batch."""
     first = job.experiments[0]
-    if first.axes or first.scenario.open_loop_names() or len({one.batch_key for one in once(job.experiments)}) > 1:
+    if first.axes or len({one.batch_key for one in once(job.experiments)}) > 1:
         return None
     key = first.batch_key.without_observer()
-    return SharedKey(key, plant_structure(first.plant), extra_signals(first.design.observer()))
+    names = extra_signals(first.design.observer())
+    return SharedKey(key, plant_structure(first.plant), names, tuple(first.scenario.open_loop_names()))
 
 
 def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[Result]:
@@ -157,7 +116,7 @@ def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[
 
 def _renamed(result: Result, observer: str) -> Result:
     """The same with the name of the observer that these worlds had."""
-    (before,) = result.observers
+    before, *open_loop = result.observers
     trajectory = result.trajectory
     if trajectory is not None and before != observer:
         old, new = f"estimate/{before}/", f"estimate/{observer}/"
@@ -165,6 +124,6 @@ def _renamed(result: Result, observer: str) -> Result:
             new + name.removeprefix(old) if name.startswith(old) else name: values
             for name, values in trajectory.columns.items()
         }
-        layout = dataclasses.replace(trajectory.layout, observers=(observer,))
+        layout = dataclasses.replace(trajectory.layout, observers=(observer, *open_loop))
         trajectory = Trajectory(columns, trajectory.metadata, layout)
-    return dataclasses.replace(result, observers=(observer,), trajectory=trajectory)
+    return dataclasses.replace(result, observers=(observer, *open_loop), trajectory=trajectory)

@@ -38,6 +38,7 @@ from cmg_mj.simulation.batch import (
     batch_key,
     batched,
     batched_interface,
+    batched_open_loop_observers,
     hashable,
     once,
     require_same_structure,
@@ -364,7 +365,10 @@ def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **option
     for other in others:
         part = key.first_difference(other.batch_key)
         if part:
-            raise InputError(f"run_many: {part} differs, which worlds of one batch must have in common")
+            raise InputError(
+                f"run_many: {part} differs, which worlds of one batch must have in common; call run_many once for "
+                "each value"
+            )
     return first.simulate(*batch_inputs(experiments, worlds), **options)
 
 
@@ -383,8 +387,16 @@ def batch_inputs(
     for i, part in enumerate(first.parts):
         parts = [experiment.parts[i] for experiment in experiments]
         law, sensors, pushes, pivots = batched([(one.design.fresh_law(), one.scenario) for one in parts])
-        interface = batched_interface(part.plant, plants, i)
+        open_loop = batched_open_loop_observers([one.design for one in parts])
         controllers.append(
-            part.design.controller(interface, worlds=worlds, axis=i, observer=observer, law=law, sensors=sensors)
+            part.design.controller(
+                batched_interface(part.plant, plants, i),
+                worlds=worlds,
+                axis=i,
+                observer=observer,
+                open_loop_observers=open_loop,
+                law=law,
+                sensors=sensors,
+            )
         )
     return plants, first.of_axes(controllers), pushes, pivots

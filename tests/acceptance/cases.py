@@ -39,7 +39,8 @@ BAND = "metrics.settle_band_deg=2.0"
 @cache
 def closed_loop(observer: str, settings: tuple[str, ...], seed: int, worlds: int) -> Result:
     """Push recovery with an observer in the loop."""
-    scenario = load_scenario("push_recovery", [f"observer.kind={observer}", BAND, *settings, f"seed={seed}"])
+    common = [f"observer.kind={observer}", "open_loop_observers=[]", BAND]
+    scenario = load_scenario("push_recovery", [*common, *settings, f"seed={seed}"])
     return prepare(scenario).run_many(worlds, keep_trajectory=False)
 
 

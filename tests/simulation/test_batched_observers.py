@@ -7,6 +7,7 @@ import pytest
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Result
+from cmg_mj.results.summary_keys import open_loop_figures
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation import batched_observers as side_by_side
 from cmg_mj.simulation.batched_observers import BatchJob, run_of, run_side_by_side
@@ -14,7 +15,7 @@ from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 
 
 def experiment(observer: str, *more: str) -> Experiment:
-    return prepare(load_scenario("push_recovery", ["duration_s=2.4", *more], observer))
+    return prepare(load_scenario("push_recovery", ["duration_s=2.4", "open_loop_observers=[]", *more], observer))
 
 
 def same(a: Result, b: Result) -> None:
@@ -89,6 +90,56 @@ def test_a_batch_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
     batches = Batches(monkeypatch)
     run_side_by_side([run_of(experiment(name, "duration_s=0.1", "push=[]"), 2) for name in ("linear", "ltv", "kalman")])
     assert batches.sizes == [4, 2]
+
+
+def test_the_same_open_loop_observers_share_a_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    short = ("duration_s=0.2", "push=[]", 'open_loop_observers=["gyro_free"]')
+    quiet = "sensors.accelerometer.noise_density_ug_rthz=100"
+    runs = [
+        run_of(experiment("linear", *short), 2),
+        run_of(experiment("ltv", *short), 1),
+        run_of(experiment("ltv", *short, quiet), 2),
+        run_of(experiment("gyro_free", *short), 1),  # in the loop it is not in open loop as well
+    ]
+    alone = [run_batch(*run) for run in runs]
+    batches = Batches(monkeypatch)
+    for a, b in zip(run_side_by_side(runs), alone, strict=True):
+        same(a, b)
+    assert sorted(batches.sizes) == [1, 5]
+
+
+def test_an_open_loop_observer_knows_the_noise_of_its_own_world() -> None:
+    settings = ["duration_s=0.3", "push=[]"]
+    noises = [100.0, 400.0, 400.0, 100.0]
+    field = "sensors.accelerometer.noise_density_ug_rthz"
+    homogeneous = prepare(load_scenario("push_recovery", settings))
+    together = homogeneous.run_many(4, vary={field: noises})
+    assert list(together.observers) == ["homogeneous", "gyro_free"]
+    assert together.trajectory is not None
+    for world, noise in enumerate(noises):
+        alone = homogeneous.with_settings({field: noise}).run(world=world)
+        assert alone.trajectory is not None
+        assert together.summaries[world] == alone.summaries[0]
+        for name, values in alone.trajectory.columns.items():
+            np.testing.assert_array_equal(together.trajectory.world(world)[name], values, name)
+
+
+def test_push_recovery_shows_gyro_free_beside_what_the_loop_does() -> None:
+    """The open-loop observer adds its own columns and figures, and changes no bit of the others."""
+    settings = ["duration_s=0.3", "push=[]"]
+    beside = prepare(load_scenario("push_recovery", settings)).run()
+    alone = prepare(load_scenario("push_recovery", [*settings, "open_loop_observers=[]"])).run()
+    assert beside.trajectory is not None
+    assert alone.trajectory is not None
+    (shown,), (expected,) = beside.summaries, alone.summaries
+    assert shown["references"] == expected["references"]
+    assert list(open_loop_figures({**shown, "references": {}})) == ["gyro_free"]
+    assert {key: value for key, value in shown.items() if key != "open_loop_observers"} == expected
+    assert set(beside.trajectory.columns) - set(alone.trajectory.columns) == {
+        f"estimate/gyro_free/{name}" for name in ("x1_rad", "x2_rad_s", "x3_rad")
+    }
+    for name, values in alone.trajectory.columns.items():
+        np.testing.assert_array_equal(beside.trajectory[name], values, name)
 
 
 class Raises:

@@ -88,7 +88,7 @@ class ProcessorExperiment(Protocol):
 
 def cost_scenario(observer: str) -> Scenario:
     """Load the scenario on which an observer's cost is measured."""
-    return load_scenario("push_recovery", [f"duration_s={SECONDS}"], observer)
+    return load_scenario("push_recovery", [f"duration_s={SECONDS}", "open_loop_observers=[]"], observer)
 
 
 def measure(runs: Sequence[ProcessorExperiment], on_progress: Callable[[float], None]) -> CostFigures:

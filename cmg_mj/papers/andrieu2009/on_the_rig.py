@@ -44,7 +44,7 @@ def claims(on_share: OnShare) -> list[Claim]:
 def experiment(label: str, seed: int) -> Experiment:
     """Prepare one of `KINDS` in the loop of push_recovery, e = 0.5 degrees."""
     kind, settings = KINDS[label]
-    return prepare(load_scenario("push_recovery", [f"seed={seed}", *settings], kind))
+    return prepare(load_scenario("push_recovery", [f"seed={seed}", "open_loop_observers=[]", *settings], kind))
 
 
 def run_kinds(labels: Sequence[str], worlds: int, seed: int) -> dict[str, Result]:

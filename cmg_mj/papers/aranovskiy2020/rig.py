@@ -36,7 +36,7 @@ def push_recovery(observer: str, seed: int, settings: Sequence[str] = (), durati
     Returns:
         The experiment, ready to run.
     """
-    common = [f"seed={seed}", f"duration_s={duration_s}"]
+    common = [f"seed={seed}", f"duration_s={duration_s}", "open_loop_observers=[]"]
     return prepare(load_scenario("push_recovery", [*common, *settings], observer))
 
 

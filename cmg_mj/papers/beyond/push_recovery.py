@@ -17,7 +17,7 @@ ERROR = "velocity_rms_error_rad_s"
 
 def push_recovery(kind: str, seed: int, settings: Sequence[str] = ()) -> Experiment:
     """Prepare the scenario with an observer, and with other settings."""
-    return prepare(load_scenario("push_recovery", [f"seed={seed}", *settings], kind))
+    return prepare(load_scenario("push_recovery", [f"seed={seed}", "open_loop_observers=[]", *settings], kind))
 
 
 def on_rigs(experiment: Experiment, worlds: int, field: str, values: Sequence[float]) -> list[Result]:

@@ -22,7 +22,8 @@ DURATION_S, LATE_S = 10.0, 5.0
 
 def without_push(seed: int, *settings: str, pushes: Sequence[Push] = ()) -> Scenario:
     """Build the scenario push_recovery for ten seconds, without its push, or with others."""
-    scenario = load_scenario("push_recovery", [f"seed={seed}", f"duration_s={DURATION_S}", *settings])
+    common = [f"seed={seed}", f"duration_s={DURATION_S}", "open_loop_observers=[]"]
+    scenario = load_scenario("push_recovery", [*common, *settings])
     return scenario.model_copy(update={"push": list(pushes)})
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from cmg_mj.errors import InputError, nearest
+from cmg_mj.results.frames import NoArray, frame_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.studies.sweeps.axes import Variation, parse_axis
@@ -18,15 +20,17 @@ from cmg_mj.studies.sweeps.study import SweepStudy, check_values, sampling
 from cmg_mj.studies.sweeps.trials import table_of
 
 if TYPE_CHECKING:
+    import pandas as pd
     import pyarrow as pa
 
+TABLES = ("trials", "cells", "order", "indices")
 WORLDS = 20
 """Worlds a cell by default."""
 
 
 @dataclass(frozen=True)
-class SweepResult:
-    """The tables of a sweep.
+class SweepResult(NoArray):
+    """The tables of a sweep, by name: `result["cells"]`, `dict(result)`.
 
     Attributes:
         study: The sweep.
@@ -42,6 +46,37 @@ class SweepResult:
     cells: pa.Table
     order: pa.Table | None = None
     indices: pa.Table | None = None
+
+    def keys(self) -> list[str]:
+        """List the names of the tables that there are: `trials`, `cells`, perhaps `order` and `indices`."""
+        return [name for name in TABLES if getattr(self, name) is not None]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def __len__(self) -> int:
+        return len(self.keys())
+
+    def __getitem__(self, name: str) -> pa.Table:
+        if name not in self.keys():
+            raise KeyError(name)
+        return getattr(self, name)
+
+    def to_pandas(self, table: str = "cells") -> pd.DataFrame:
+        """Make a pandas frame of one table.
+
+        Args:
+            table: The table's name: `cells`, `trials`, `order` or `indices`.
+
+        Returns:
+            The frame.
+
+        Raises:
+            InputError: pandas is not installed, or the sweep has no such table.
+        """
+        if table not in self.keys():
+            raise InputError(f"to_pandas: {table!r} is no table of this sweep; {nearest(table, self.keys())}")
+        return frame_of(self[table])
 
 
 def sweep(

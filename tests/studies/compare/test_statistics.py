@@ -186,7 +186,7 @@ def test_the_table_has_every_world_of_every_row() -> None:
     assert set(table["seed"].to_pylist()) == {3}
     assert table["outcome"].to_pylist() == ["done"] * 3 + ["fell"] * 3 + ["done"] * 3 * len(REFERENCES)
     assert table["in_loop_of"].to_pylist() == [None] * 6 + ["ltv"] * 3 * len(REFERENCES)
-    assert set(compare_two()[0].result.summaries[0]) - {"references"} <= set(table.column_names)
+    assert set(compare_two()[0].result.summaries[0]) - {"references", "open_loop_observers"} <= set(table.column_names)
 
 
 def test_what_stood_averages_to_what_is_printed() -> None:

@@ -1,0 +1,182 @@
+"""Trajectories and results as mappings and as pandas frames."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cmg_mj
+from cmg_mj.errors import InputError
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.studies.compare.api import Comparison, compare
+
+SHORT = ["duration_s=0.4", "push=[]"]
+BIASES = [0.5, 40.0]  # one stands, one falls
+
+
+@cache
+def experiment() -> cmg_mj.Experiment:
+    return cmg_mj.prepare(cmg_mj.load_scenario("push_recovery", SHORT))
+
+
+@cache
+def many() -> cmg_mj.Result:
+    return experiment().run_many(2, vary={"equilibrium_bias_deg": BIASES})
+
+
+@cache
+def one() -> cmg_mj.Result:
+    return experiment().run()
+
+
+def trajectory(result: cmg_mj.Result) -> Trajectory:
+    assert result.trajectory is not None
+    return result.trajectory
+
+
+@cache
+def replayed() -> cmg_mj.ReplayResult:
+    log = Path(__file__).parents[2] / "examples/data/stepper_encoder_gyro.csv"
+    columns = {"time": "time_s", "tilt": "encoder_rad", "rate": "gyr_y_rad_s"}
+    return cmg_mj.replay_log(cmg_mj.read_log(log, cmg_mj.ReadOptions(columns)), ["linear", "finite_difference"])
+
+
+@cache
+def swept() -> cmg_mj.SweepResult:
+    return cmg_mj.sweep(
+        experiment().scenario, {"plant.equilibrium_bias_deg": [0.0, 0.5]}, ["linear", "gyro_free"], worlds=2
+    )
+
+
+@cache
+def compared() -> Comparison:
+    return compare(experiment().scenario, ["linear", "gyro_free"], 2)
+
+
+EVERY: dict[str, Callable[[], Any]] = {
+    "trajectory": lambda: trajectory(one()),
+    "trajectory of many worlds": lambda: trajectory(many()),
+    "result": many,
+    "replay": replayed,
+    "sweep": swept,
+    "comparison": compared,
+}
+every = pytest.mark.parametrize("make", [pytest.param(make, id=name) for name, make in EVERY.items()])
+
+
+@every
+def test_keys_iteration_and_look_up_agree(make: Callable[[], Any]) -> None:
+    table = make()
+    assert list(table) == list(table.keys())
+    assert list(dict(table)) == list(table)
+    assert all(name in table for name in table)
+    assert "no such column" not in table
+    with pytest.raises(KeyError, match="no such column"):
+        table["no such column"]
+
+
+def test_as_with_a_frame_the_length_counts_rows() -> None:
+    assert len(trajectory(one())) == len(trajectory(one())["time_s"]) == 80
+    assert len(many()) == len(many()["observer"]) == many().table().num_rows
+    assert len(compared()) == 2
+
+
+def test_the_columns_of_a_result() -> None:
+    stood, error = many()["stood"], many()["velocity_rms_error_rad_s"]
+    assert stood[:2].tolist() == [True, False]
+    assert error[0] == many().summaries[0]["velocity_rms_error_rad_s"]
+    assert many()["in_loop_of"][0] is None
+
+
+@every
+def test_no_frame_is_made_in_silence(make: Callable[[], Any]) -> None:
+    pandas = pytest.importorskip("pandas")
+    name = type(make()).__name__
+    for convert in (pandas.DataFrame, np.asarray):
+        with pytest.raises(InputError, match=rf"^{name}: is no array and no pandas.DataFrame. Call its to_pandas\(\)"):
+            convert(make())
+
+
+def test_a_trajectory_as_a_frame() -> None:
+    pandas = pytest.importorskip("pandas")
+    one_world = trajectory(one())
+    frame = one_world.to_pandas()
+    assert list(frame.columns) == one_world.keys()
+    np.testing.assert_array_equal(frame["x1_rad"], one_world["x1_rad"])
+    pandas.testing.assert_frame_equal(frame, pandas.DataFrame(dict(one_world)))
+
+
+def test_many_worlds_as_a_frame_have_a_row_a_world_and_tick() -> None:
+    pytest.importorskip("pandas")
+    worlds = trajectory(many())
+    frame = worlds.to_pandas()
+    assert list(frame.columns) == ["world", *worlds.keys()]
+    for world in (0, 1):
+        alone, rows = worlds.world(world), frame[frame["world"] == world]
+        assert len(rows) == len(alone)
+        for name in alone:
+            np.testing.assert_array_equal(rows[name], alone[name], name)
+    assert len(worlds.world(1)) < len(worlds.world(0))  # it fell
+
+
+def test_two_axes_as_a_frame() -> None:
+    pytest.importorskip("pandas")
+    two = trajectory(cmg_mj.prepare(cmg_mj.load_scenario("two_axes", ["duration_s=0.05", "push=[]"])).run_many(2))
+    frame = two.to_pandas()
+    np.testing.assert_array_equal(frame[frame["world"] == 1]["pitch/x1_rad"], two["pitch/x1_rad"][:, 1])
+
+
+def test_results_as_frames() -> None:
+    pytest.importorskip("pandas")
+    frame: Any = many().to_pandas()
+    assert len(frame) == len(many())
+    assert frame["velocity_rms_error_rad_s"].tolist()[0] == many().summaries[0]["velocity_rms_error_rad_s"]
+    assert math.isnan(frame[frame["observer"] == "zero"]["settle_time_s"].tolist()[0])
+    np.testing.assert_array_equal(
+        replayed().to_pandas()["estimate/linear/x2_rad_s"], replayed()["estimate/linear/x2_rad_s"]
+    )
+    frame = compared().to_pandas()
+    means = frame.groupby("observer")["velocity_rms_error_rad_s"].mean()
+    for summary in compared().summaries[:2]:
+        assert means[summary["observer"]] == pytest.approx(summary["velocity_rms_error_rad_s"], rel=1e-12)
+
+
+def test_the_tables_of_a_sweep_as_frames() -> None:
+    pytest.importorskip("pandas")
+    assert swept().keys() == ["trials", "cells"]
+    assert len(swept().to_pandas("trials")) == 2 * 2 * 2
+    cells = swept().to_pandas()
+    assert cells["observer"].tolist() == swept().cells["observer"].to_pylist()
+    with pytest.raises(InputError, match="to_pandas: 'order' is no table of this sweep; allowed: cells, trials"):
+        swept().to_pandas("order")
+
+
+@every
+def test_without_pandas_the_message_names_the_cure(make: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    table = make()
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(InputError, match=r"pandas is not installed. Install it with `python -m pip install pandas`"):
+        table.to_pandas()
+    assert dict(table)
+
+
+@pytest.mark.parametrize(
+    ("observers", "worlds", "message"),
+    [
+        (["linear", "linear"], 2, "must be a list of different names"),
+        ("linear", 2, "must be a list of different names"),
+        ([], 2, "must be a list of different names"),
+        (["linear"], 0, "worlds = 0: must be at least 1"),
+        (["liner"], 1, "did you mean 'linear'"),
+    ],
+)
+def test_a_comparison_that_cannot_be_is_refused(observers: Any, worlds: int, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        compare(experiment().scenario, observers, worlds)
