@@ -1,7 +1,8 @@
 """A bench for gyroscopic stabilisation: a six-body MuJoCo scissored pair, real sensors, velocity observers.
 
 Names are imported when they are first used, so that the packages without physics (observers, sensors, the law) can be
-used without MuJoCo. Type checkers read the imports instead; a test holds both lists to the same names.
+used without MuJoCo. The imports below list them once: type checkers follow the imports, and this module reads their
+lines.
 """
 
 from __future__ import annotations
@@ -10,13 +11,16 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cmg_mj.codegen.export import export as export
     from cmg_mj.controllers.controller import Controller as Controller
+    from cmg_mj.controllers.controller import Tick as Tick
     from cmg_mj.controllers.laws import LAWS as LAWS
     from cmg_mj.controllers.laws import FeedbackState as FeedbackState
     from cmg_mj.controllers.laws import Law as Law
     from cmg_mj.controllers.laws import StateFeedback as StateFeedback
     from cmg_mj.controllers.laws import lqr_gains as lqr_gains
     from cmg_mj.controllers.laws import make_law as make_law
+    from cmg_mj.controllers.multi_axis import MultiAxisController as MultiAxisController
     from cmg_mj.errors import InputError as InputError
     from cmg_mj.errors import RunStopped as RunStopped
     from cmg_mj.observers import OBSERVERS as OBSERVERS
@@ -34,55 +38,54 @@ if TYPE_CHECKING:
     from cmg_mj.replay.logs import Log as Log
     from cmg_mj.replay.logs import ReadOptions as ReadOptions
     from cmg_mj.replay.logs import read_log as read_log
+    from cmg_mj.results.metrics import MetricsSettings as MetricsSettings
     from cmg_mj.results.result import Outcome as Outcome
     from cmg_mj.results.result import Result as Result
     from cmg_mj.results.trajectory import Trajectory as Trajectory
     from cmg_mj.scenario.disturbances import Push as Push
+    from cmg_mj.scenario.disturbances import Swing as Swing
     from cmg_mj.scenario.loading import load_scenario as load_scenario
     from cmg_mj.scenario.loading import parse_scenario as parse_scenario
+    from cmg_mj.scenario.pivot import Pivot as Pivot
     from cmg_mj.scenario.plant_settings import PlantSettings as PlantSettings
+    from cmg_mj.scenario.schema import AxisSettings as AxisSettings
+    from cmg_mj.scenario.schema import ControllerSettings as ControllerSettings
+    from cmg_mj.scenario.schema import LqrSettings as LqrSettings
+    from cmg_mj.scenario.schema import ObserverSettings as ObserverSettings
     from cmg_mj.scenario.schema import Scenario as Scenario
     from cmg_mj.sensors.accelerometer import Accelerometer as Accelerometer
     from cmg_mj.sensors.encoder import Encoder as Encoder
     from cmg_mj.sensors.fog import Fog as Fog
+    from cmg_mj.sensors.mems_gyro import MemsGyro as MemsGyro
     from cmg_mj.sensors.sampled import Sensors as Sensors
     from cmg_mj.sensors.tilt import RadialTilt as RadialTilt
+    from cmg_mj.sensors.tilt import TiltNoise as TiltNoise
     from cmg_mj.simulation.callback import control as control
     from cmg_mj.simulation.callback import control_callback as control_callback
     from cmg_mj.simulation.experiment import Experiment as Experiment
     from cmg_mj.simulation.experiment import prepare as prepare
     from cmg_mj.simulation.plugin import plugin as plugin
+    from cmg_mj.studies.compare.api import Comparison as Comparison
+    from cmg_mj.studies.compare.api import compare as compare
+    from cmg_mj.studies.compare.comparison import ComparedObserver as ComparedObserver
+    from cmg_mj.studies.live_run import LiveRun as LiveRun
+    from cmg_mj.studies.save import RunReport as RunReport
+    from cmg_mj.studies.save import report_run as report_run
+    from cmg_mj.studies.save import save_run as save_run
     from cmg_mj.studies.sweeps.api import SweepResult as SweepResult
     from cmg_mj.studies.sweeps.api import sweep as sweep
+    from cmg_mj.studies.tuning import TuningResult as TuningResult
+    from cmg_mj.studies.tuning import tune as tune
 
-NAMES_OF_MODULES = {
-    "controllers.controller": ("Controller",),
-    "controllers.laws": ("LAWS", "FeedbackState", "Law", "StateFeedback", "lqr_gains", "make_law"),
-    "errors": ("InputError", "RunStopped"),
-    "observers": ("OBSERVERS", "Estimate", "Measurement", "Observer", "make_observer"),
-    "observers.reduced_model": ("ReducedModel",),
-    "plant.mounting": ("MountedRobot", "mount"),
-    "plant.plant": ("Plant", "load_plant"),
-    "replay.log_replay": ("ReplayResult", "replay_log"),
-    "replay.logs": ("Log", "ReadOptions", "read_log"),
-    "results.result": ("Outcome", "Result"),
-    "results.trajectory": ("Trajectory",),
-    "scenario.disturbances": ("Push",),
-    "scenario.loading": ("load_scenario", "parse_scenario"),
-    "scenario.plant_settings": ("PlantSettings",),
-    "scenario.schema": ("Scenario",),
-    "sensors.accelerometer": ("Accelerometer",),
-    "sensors.encoder": ("Encoder",),
-    "sensors.fog": ("Fog",),
-    "sensors.sampled": ("Sensors",),
-    "sensors.tilt": ("RadialTilt",),
-    "simulation.callback": ("control", "control_callback"),
-    "simulation.experiment": ("Experiment", "prepare"),
-    "simulation.plugin": ("plugin",),
-    "studies.sweeps.api": ("SweepResult", "sweep"),
-}
-"""The public names, by the module that defines them."""
-_MODULE_OF_NAME = {name: module for module, names in NAMES_OF_MODULES.items() for name in names}
+
+def _listed_names() -> dict[str, str]:
+    """Read the imports above: public name -> the module that it is imported from."""
+    with open(f"{__path__[0]}/__init__.py", encoding="utf-8") as source:
+        imports = [line.split() for line in source if line.startswith("    from cmg_mj.")]  # from A import B as B
+    return {name: module for _, module, _, name, *_ in imports}
+
+
+_MODULE_OF_NAME = _listed_names()
 
 # pyright: reportUnsupportedDunderAll=false
 __all__ = sorted(_MODULE_OF_NAME)
@@ -91,4 +94,8 @@ __all__ = sorted(_MODULE_OF_NAME)
 def __getattr__(name: str) -> Any:
     if name not in _MODULE_OF_NAME:
         raise AttributeError(f"module 'cmg_mj' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"cmg_mj.{_MODULE_OF_NAME[name]}"), name)
+    return getattr(importlib.import_module(_MODULE_OF_NAME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
