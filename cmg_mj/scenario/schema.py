@@ -200,8 +200,11 @@ class Scenario(BaseModel):
 
     model_config = FORBID
     title: Annotated[Line, NoEffect()] = ""
+    """Name shown in tables, plots and recordings."""
     duration_s: GridDuration = 15.0
+    """Simulated time [s]."""
     seed: Annotated[int, Field(ge=0)] = 0
+    """Seed of the sensors' noise."""
     plant: PlantSettings = Field(default_factory=PlantSettings)
     controller: ControllerSettings = Field(default_factory=ControllerSettings)
     observer: ObserverSettings = Field(default_factory=ObserverSettings)

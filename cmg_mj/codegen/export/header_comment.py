@@ -89,7 +89,7 @@ def describe_parameters(instance: Observer | Law | DataclassInstance, names: lis
         Lines, one or more for each parameter.
     """
     values = {name: getattr(instance, name) for name in names if hasattr(instance, name)}
-    words = _attributes(type(instance).__doc__ or "")
+    words = attribute_descriptions(type(instance).__doc__ or "")
     width = max((len(f"{name} = {value!r}") for name, value in values.items()), default=0)
     lines = []
     for name, value in values.items():
@@ -98,7 +98,7 @@ def describe_parameters(instance: Observer | Law | DataclassInstance, names: lis
     return lines
 
 
-def _attributes(docstring: str) -> dict[str, str]:
+def attribute_descriptions(docstring: str) -> dict[str, str]:
     """Read the section "Attributes:" of a docstring: name -> description."""
     _, _, part = inspect.cleandoc(docstring).partition("Attributes:\n")
     block = re.split(r"\n(?=\S)", part)[0]
