@@ -1,4 +1,4 @@
-"""Prints the tables of docs/real_rigs.md about a frame that bends: who stands, as is and with each cure.
+"""Prints the tables of docs/real_rigs_evidence.md about a frame that bends: who stands, and with which cure.
 
 python docs/studies/bending_frame.py [WORLDS]
 python docs/studies/bending_frame.py --border    # check's verdicts beside the simulation, near the border of stability

@@ -1,4 +1,4 @@
-"""Observers that stand on a cart that slides freely, and how light that may be: the tables of docs/mount.md.
+"""Observers that stand on a cart that slides freely, and how light that may be: the tables of docs/mount_evidence.md.
 
 python docs/studies/light_cart.py (about five minutes on a quiet core)
 python docs/studies/light_cart.py --rubbing (what the cart slides on is not free of friction; about three minutes)

@@ -1,4 +1,4 @@
-"""Every observer on the seven robots of docs/mount.md: with the papers' parameters, scaled by `mount`, and tuned there.
+"""Every observer on the robots of docs/mount_evidence.md: as in the papers, scaled by `mount`, and tuned there.
 
 python docs/studies/observers_on_robots.py [ROBOT ...] [--keep FILE] [--minutes M] [--rows loop,fit,tuned,E]
 

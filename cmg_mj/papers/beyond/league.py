@@ -19,7 +19,7 @@ from cmg_mj.results.result import Result
 NOISES_UG = (200.0, 400.0, 800.0)
 BIASES_DEG = (0.0, 0.5, 1.0)
 ON_A_PIVOT_AT_REST = tuple(name for name in OBSERVERS if name != "free_pivot")
-"""free_pivot is a second gyro_free while the pivot rests: docs/real_rigs.md has its own table."""
+"""free_pivot is a second gyro_free while the pivot rests: docs/real_rigs_evidence.md has its own table."""
 MEANS = (ERROR, "settle_time_s", "tilt_rms_deg", "command_rms_rad_s")
 """The keys of a run's summary that are shown."""
 
