@@ -9,10 +9,10 @@ from cmg_mj.errors import InputError
 
 
 class TextFormat(NamedTuple):
-    """What a text file must be to be read."""
+    """Conditions that a text file must meet to be read."""
 
     noun: str
-    """What the file is, for messages: `scenario`."""
+    """Noun for the file in messages: `scenario`."""
     largest: int
     """Its largest size [bytes]."""
     encoding: str

@@ -1,4 +1,4 @@
-"""Names what of a real rig is in a scenario, and in neither the reduced model nor anything computed from it."""
+"""Names the traits of a real rig that a scenario has and the reduced model has not."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ IN_THE_MODEL = (
     "plant.accelerometer_outer_misplaced_mm",
     "plant.bend_frequency_hz",
 )
-"""Those of them that the plant's MuJoCo model itself has, whoever steps it."""
+"""Fields among these that the plant's MuJoCo model itself has, whoever steps it."""
 
 
 def omissions(scenario: Scenario) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""What a cheap gyro is worth in the first seconds and whatever its offset, and the floor over accelerometers' places.
+"""The worth of a cheap gyro, in the first seconds and whatever its offset; the floor over accelerometers' places.
 
     python docs/studies/baselines.py [--worlds 20]
 

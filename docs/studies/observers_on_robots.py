@@ -49,7 +49,7 @@ TUNED = {
     "homogeneous": ("k1", "k2"),
     "kalman": ("torque_walk", "torque_white"),
 }
-"""Those of the model's floor, which bounds the others too, need no tuning to show that none of them is positive."""
+"""Parameters to tune, by observer. Observers above the model's floor need none to show that no gap is positive."""
 IN_THE_LOOP = ("gyro_free", "linear", "super_twisting", "homogeneous", "luenberger", "kalman", "adaptive")
 
 

@@ -47,7 +47,7 @@ class Beside:
         self._tick = 0
 
     def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
-        """What the board decides."""
+        """Let the board decide."""
         decision = self.board.update(accelerations, encoders)
         step = self._tick * self.controller.period
         tick = self.controller.decide(step, accelerations, encoders, math.nan, math.nan)

@@ -18,7 +18,7 @@ SAYS = (
     "machine."
 )
 WIDTH, COLOURS = 820, 40
-"""Of the small pictures: [px], and so many of a palette."""
+"""Width of the small pictures [px], and colours of their palette."""
 
 
 def small(source: Path, target: Path) -> None:
