@@ -49,6 +49,7 @@ CODE_FOLDERS = ("cmg_mj", "examples", "docs/studies")
 
 _SENTENCE_END = re.compile(r"(?<=[.!?])[\"')\]*]*\s+(?=[\"'(\[*`]*[A-Z0-9`])")
 _ABBREVIATION = re.compile(r"\b(e\.g|i\.e|vs|cf|Fig|Figs|Eq|Sec|No|approx|resp)\.$")
+_DEFAULT = re.compile(r"\s*\[default: .*\]$")
 _CODE = re.compile(r"`[^`]*`")
 _SECTION = re.compile(r"^(Args|Attributes|Returns|Yields|Raises|Note|Notes|Example|Examples):$")
 _ENTRY = re.compile(r"^(\*{0,2}[\w.]+)( \([^)]*\))?: ")
@@ -195,7 +196,8 @@ def code_texts(root: Path, folder: str) -> dict[str, list[Text]]:
             ):
                 found["docstrings"] += _docstring(f"{place}:{node.lineno}", node.value.value)
             elif isinstance(node, ast.keyword) and node.arg in ("help", "short_help", "epilog"):
-                found["help"] += [Text(f"{place}:{node.value.lineno}", text) for text in _literals(node.value)]
+                texts = [_DEFAULT.sub("", text) for text in _literals(node.value)]
+                found["help"] += [Text(f"{place}:{node.value.lineno}", text) for text in texts]
             elif isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
                 texts = [text for argument in node.exc.args for text in _literals(argument)]
                 found["messages"] += [Text(f"{place}:{node.lineno}", text) for text in texts]

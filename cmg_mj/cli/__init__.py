@@ -23,7 +23,7 @@ ExitStatus = str | int | None
 """Exit status in the forms that `sys.exit` takes."""
 HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, realistic sensors, velocity observers.
 
-A scenario is a bundled one's name (cmg-mj list scenarios) or the path of a TOML file.
+A scenario is the name of a bundled scenario (cmg-mj list scenarios) or the path of a TOML file.
 
 \b
   cmg-mj run push_recovery
