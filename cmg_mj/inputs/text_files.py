@@ -9,10 +9,10 @@ from cmg_mj.errors import InputError
 
 
 class TextFormat(NamedTuple):
-    """Conditions that a text file must meet to be read."""
+    """What a text file must be to be read."""
 
     noun: str
-    """Noun for the file in messages: `scenario`."""
+    """What the file is, for messages: `scenario`."""
     largest: int
     """Its largest size [bytes]."""
     encoding: str

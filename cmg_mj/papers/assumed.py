@@ -1,4 +1,4 @@
-"""Assumptions where the papers are silent on the six-body rig's experiments; push_recovery makes them."""
+"""What the papers do not give of the experiments on the six-body rig, and the scenario push_recovery has."""
 
 from __future__ import annotations
 

@@ -78,12 +78,12 @@ class Result(NamedColumns):
 
     @property
     def stood(self) -> np.ndarray:
-        """True for worlds that stood to the end, (n_worlds,)."""
+        """Which worlds stood to the end, (n_worlds,)."""
         return np.array([outcome.kind == "done" for outcome in self.outcomes])
 
     @property
     def fell(self) -> np.ndarray:
-        """True for worlds that fell, (n_worlds,)."""
+        """Which worlds fell, (n_worlds,)."""
         return np.array([outcome.fell for outcome in self.outcomes])
 
     def values(self, key: str, estimator: str | None = None) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Results that a run over a wire leaves beside its figures."""
+"""What a run over a wire leaves beside its figures."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def push_windows(pushes: Iterable[Push]) -> list[Window]:
 
 
 def inside(time: np.ndarray, windows: Sequence[Window]) -> np.ndarray:
-    """Mark the times [s] that lie in any of the windows; the mask has their shape."""
+    """Which of these times [s] lie in any of the windows; the same shape."""
     mask = np.zeros(np.shape(time), dtype=bool)
     for start, end in windows:
         mask |= (time > start - 1e-9) & (time < end - 1e-9)

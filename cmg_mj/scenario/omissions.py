@@ -1,4 +1,4 @@
-"""Names the traits of a real rig that a scenario has and the reduced model has not."""
+"""Names what of a real rig is in a scenario, and in neither the reduced model nor anything computed from it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ IN_THE_MODEL = (
     "plant.accelerometer_outer_misplaced_mm",
     "plant.bend_frequency_hz",
 )
-"""Fields among these that the plant's MuJoCo model itself has, whoever steps it."""
+"""Those of them that the plant's MuJoCo model itself has, whoever steps it."""
 
 
 def omissions(scenario: Scenario) -> dict[str, str]:

@@ -37,7 +37,7 @@ class Physics(Protocol):
 
     @property
     def running(self) -> np.ndarray | None:
-        """True for worlds that are still stepped, (n_worlds,); None for one world."""
+        """Which worlds are still stepped, (n_worlds,); None for one world."""
         ...
 
     @property

@@ -1,4 +1,4 @@
-"""An observer for each robot: README's table.
+"""Which observer for which robot: README's table.
 
 python docs/studies/for_a_builder.py [--worlds 20] (about two minutes on two quiet cores)
 
@@ -44,7 +44,7 @@ def bears(limit: np.ndarray) -> str:
 
 
 def instructions() -> dict[str, str]:
-    """Count the instructions of a whole update on the board, by observer."""
+    """Of a whole update on the board, by observer."""
     try:
         figures = measure([prepare(cost_scenario(name)) for name in OBSERVERS], lambda share: None)["figures"]
     except InputError as error:

@@ -18,7 +18,7 @@ SAYS = (
     "machine."
 )
 WIDTH, COLOURS = 820, 40
-"""Width of the small pictures [px], and colours of their palette."""
+"""Of the small pictures: [px], and so many of a palette."""
 
 
 def small(source: Path, target: Path) -> None:

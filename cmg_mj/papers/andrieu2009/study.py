@@ -46,7 +46,7 @@ ASSUMED: Mapping[Assumption, str] = {
     "initial values": "drawn from M_eta for each seed",
     "noise": "a new value every 10 ms, straight in between",
 }
-"""Assumptions where the paper is silent on Figs 1 and 2."""
+"""What the paper does not give of Figs 1 and 2."""
 
 
 def study(seeds: int, seed: int = 0, dt: float = 0.01) -> Study:

@@ -62,7 +62,7 @@ class Prospects:
 
     @property
     def noisy(self) -> bool:
-        """True if, by the reduced model, the sensors' noise alone may fell the robot."""
+        """Whether the sensors' noise alone may fell the robot, by its reduced model."""
         return self.push_margin.worst_impulse < NOISY * self.push_margin.median_impulse
 
     @property
