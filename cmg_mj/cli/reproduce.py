@@ -23,7 +23,7 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
 
     \b
       reproduced                           the claim holds; the paper gives all that it depends on
-      reproduced within stated conditions  the claim holds with assumptions: a push, a bias, noise, a drive
+      reproduced within stated conditions  the claim holds with assumed values, such as the noise
       illustrated                          the claim is general and was tried on some systems
       cannot be tested                     the claim is about data that the paper does not give
       not reproduced                       the claim does not hold; the report says why
