@@ -118,8 +118,8 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     "--tune",
     "with_tuning",
     is_flag=True,
-    help="Then tune the observer's parameters on the robot in MuJoCo (up to two minutes). Write them if they are "
-    "better in other worlds, and if the robot stands in as many of these.",
+    help="Then tune the observer's parameters on the robot in MuJoCo (up to two minutes), and write them if they are "
+    "better on other worlds and withstand no smaller push.",
 )
 @json_option()
 @click.option(
@@ -137,11 +137,11 @@ def mount(
     overwrite: bool,
     **options: Unpack[MountOptions],
 ) -> None:
-    """Mount control moment gyroscopes on a robot, and print the largest push that the robot recovers from.
+    """Mount control moment gyroscopes on a robot, and print the largest push it withstands.
 
     Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario has the
-    gains of the papers' Table 2, scaled to the robot. Its push is 0.6 times the largest that the robot recovers from in
-    MuJoCo.
+    gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest that the robot withstands
+    in MuJoCo.
     """
     from cmg_mj.plant.mounting.request import MountRequest
     from cmg_mj.studies.push_limits.mount_files import mount_and_write

@@ -44,9 +44,9 @@ _NOT_CALLED = (
     type=click.Choice(["keyframe", "spinning"]),
     default="keyframe",
     show_default=True,
-    help="Let the program start the flywheels, with the model's keyframe, or let the plugin start them.",
+    help="Spin the flywheels up in the program, with the model's keyframe, or in the plugin.",
 )
-@click.option("--no-sensors", is_flag=True, help="Write the model without the plugin's own sensors.")
+@click.option("--no-sensors", is_flag=True, help="Omit the plugin's own sensors from the model.")
 @click.option(
     "--install",
     metavar="PATH",
