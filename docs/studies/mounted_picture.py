@@ -53,7 +53,7 @@ def robot(spec: mujoco.MjSpec, qpos: np.ndarray) -> np.ndarray:
 
 
 def no_sites() -> mujoco.MjvOption:
-    """The sensors' marks are left out."""
+    """Return options that hide the sensors' marks."""
     option = mujoco.MjvOption()
     option.sitegroup[:] = 0
     return option

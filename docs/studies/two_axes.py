@@ -1,9 +1,9 @@
-"""The two-axis rig in numbers: what it is, what couples its axes, and what wheels and gimbals that are not alike do.
+"""The two-axis rig in numbers: its measures, the coupling of its axes, and the effect of unlike wheels and gimbals.
 
     python docs/studies/two_axes.py [--parts rig,turning,unlike,loop] [--worlds 8] [--observer homogeneous]
 
-Torques are the full model's: what the joints are asked for at given rates, without accelerations, with the wheels
-turning less the same with the wheels at rest.
+Torques are those of the full model's joints at given rates, without accelerations. The torques with the wheels at
+rest are subtracted. docs/two_axes_evidence.md has the tables.
 """
 
 from __future__ import annotations
