@@ -19,14 +19,14 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     PAPER may also be beyond: a table of every observer over 100 seeds, which is in no paper and takes some minutes.
 
     Writes a folder: report.md, its plots, and figures.json. The report compares every claim of the paper with the
-    figures obtained here. A claim's verdict is one of these:
+    figures obtained here. One rule decides the verdict of a claim:
 
     \b
-      reproduced                           the claim holds; the paper gives all that it depends on
-      reproduced within stated conditions  the claim holds with assumed values, such as the noise
-      illustrated                          the claim is general and was tried on some systems
-      cannot be tested                     the claim is about data that the paper does not give
-      not reproduced                       the claim does not hold; the report says why
+      reproduced                it holds; the paper prints all it depends on
+      within stated conditions  it holds, with an assumption of ours (push, noise)
+      illustrated               a general statement, tried on some systems
+      cannot be tested          the paper does not give its data
+      not reproduced            otherwise, with the reason
 
     The exit status is 0 whatever the verdicts are.
     """  # noqa: D301  (click wants the character itself)
