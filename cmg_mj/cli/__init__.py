@@ -20,10 +20,10 @@ OBJECTS_A_COLLECTION = 50_000
 """New objects after which Python looks for cycles. Imports make many objects and few cycles: Python's default of 700
 makes a short run slower."""
 ExitStatus = str | int | None
-"""As `sys.exit` takes it."""
+"""Exit status in the forms that `sys.exit` takes."""
 HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, realistic sensors, velocity observers.
 
-A scenario is a bundled one's name (cmg-mj list scenarios) or the path of a TOML file.
+A scenario is the name of a bundled scenario (cmg-mj list scenarios) or the path of a TOML file.
 
 \b
   cmg-mj run push_recovery

@@ -22,7 +22,7 @@ from cmg_mj.errors import InputError
 @click.option(
     "--firmware",
     type=click.Choice(["mps2", "stm32f746"]),
-    help="Write a project around it to build and flash: for QEMU's mps2-an500, or ST's 32F746GDISCOVERY.",
+    help="Also write a firmware to build and flash: for QEMU's mps2-an500, or for ST's 32F746GDISCOVERY.",
 )
 @click.option("--name", metavar="NAME", help="Prefix of files, types and functions.  [default: OBSERVER's name]")
 @click.option(
@@ -45,14 +45,16 @@ def export(
     settings: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Write OBSERVER, a name or your own as package.module:Class, and the control law as C without malloc.
+    """Write an observer and the control law around it as C without dynamic memory.
+
+    OBSERVER is a name, or your own as package.module:Class.
 
     \b
     Writes a folder:
       NAME.h, NAME.c      init, step: the observer; update: the controller, sensors to gimbal rate
       NAME_example.c      program that compares the C code with the test vector
       NAME_test_vector.h  test vector
-      Makefile, ...       with --firmware: the firmware around it (docs/board.md)
+      Makefile, ...       with --firmware: the firmware around these (docs/board.md)
 
     The C code is compared with Python on random signals before it is written.
     """  # noqa: D301  (click wants the character itself)
@@ -98,7 +100,7 @@ def export(
         )
     for part in figures["beyond_rounding"]:
         off = (figures["c_off_by"] or {})[part]
-        note(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer makes so much of a last digit")
+        note(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer amplifies last digits")
     at = files[0].parent
     if firmware is not None:
         if firmware in NEVER_RUN:

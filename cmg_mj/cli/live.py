@@ -23,13 +23,13 @@ DEFAULT_ADDRESS = "127.0.0.1:9876"
 
 
 live_options = all_of(
-    click.option("--live", is_flag=True, help="Show the run in a rerun viewer while it goes on."),
+    click.option("--live", is_flag=True, help="Show the run in a rerun viewer as it happens."),
     click.option(
         "--connect",
         metavar="[ADDRESS]",
         is_flag=False,
         flag_value=DEFAULT_ADDRESS,
-        help=f"Show the run in a viewer that runs already, at PORT or HOST:PORT.  [default: {DEFAULT_ADDRESS}]",
+        help=f"Show the run in a running viewer, at PORT or HOST:PORT.  [default: {DEFAULT_ADDRESS}]",
     ),
     click.option(
         "--pace",
@@ -74,7 +74,7 @@ def live_run(
             raise InputError("--pace: goes with --live or --connect; without a viewer a run goes as fast as it can")
         return None
     if live and connect is not None:
-        raise InputError("--live starts a viewer, --connect takes one that runs already: give one of them")
+        raise InputError("--live starts a viewer, --connect uses a running one: give one of them")
     factor = factor_of(pace)
     # Rerun reads it when it is imported. The command itself reports a lost viewer at the end.
     os.environ.setdefault("RUST_LOG", "off")

@@ -51,7 +51,12 @@ _LOG_OPTIONS = all_of(
     ),
     click.option("--scale", multiple=True, metavar="ROLE=FACTOR,...", help="Factors, such as rate=-1 or rate=1.015."),
     click.option("--offset", multiple=True, metavar="ROLE=VALUE,...", help="Addends after the scale, in column units."),
-    click.option("--rate", type=float, metavar="HZ", help="Rate of rows without a time; else the rate to resample to."),
+    click.option(
+        "--rate",
+        type=float,
+        metavar="HZ",
+        help="Rate of the rows of a log without times; otherwise the rate to resample to.",
+    ),
     click.option("--max-gap", type=float, metavar="SECONDS", help="Divide the log at longer gaps.  [default: 5 rows]"),
     click.option("--delay", type=float, default=0.0, metavar="SECONDS", help="Lag of the reference behind the tilt."),
     click.option("--radii", metavar="INNER,OUTER", help="Distances of two accelerometers from the pivot [m]."),
@@ -76,7 +81,7 @@ def noise_option() -> Decorator:
         default="",
         metavar="NAME=VALUE,...",
         help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of "
-        "one sample.  [default: by the log; if it cannot tell, accelerometer=400, or tilt=0.1,acceleration=1]",
+        "one sample.  [default: from the log, or else accelerometer=400, or tilt=0.1,acceleration=1]",
     )
 
 
@@ -186,9 +191,9 @@ def replay(
       cmg-mj replay runs/push_recovery-homogeneous-0
 
     Prints a table, and writes plots, a rerun recording and all signals as Parquet. Without a reference the table has
-    the roughness and the reconstruction error: the measured tilt less the tilt integrated from the estimated rate.
-    Observers that need a model take part only with --model. A run's recording, whose columns are known, replays to the
-    figures of the run. docs/replay.md has the details.
+    the roughness and the reconstruction error, which is the measured tilt less the integral of the estimated rate.
+    Observers that need a model take part only with --model. A run's recording replays to the figures of the run.
+    docs/replay.md has the details.
     """  # noqa: D301  (click wants the character itself)
     from dataclasses import replace
 

@@ -109,16 +109,22 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     is_flag=True,
     help="Write a plugin of MuJoCo too, into FILE_plugin: the controller as a library, and the model that names it.",
 )
-@click.option("--quick", is_flag=True, help="Print E of the reduced model, and try nothing in MuJoCo (up to a minute).")
+@click.option(
+    "--quick",
+    is_flag=True,
+    help="Print only the reduced model's limits, without the trials in MuJoCo (up to a minute).",
+)
 @click.option(
     "--tune",
     "with_tuning",
     is_flag=True,
     help="Then tune the observer's parameters on the robot in MuJoCo (up to two minutes), and write them if they are "
-    "better on other worlds and stand no less.",
+    "better on other worlds and withstand no smaller push.",
 )
 @json_option()
-@click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount; not what has changed since.")
+@click.option(
+    "--overwrite", is_flag=True, help="Replace the files of an earlier mount, except files that have changed since."
+)
 @users_code()
 def mount(
     robot: str,
@@ -131,11 +137,11 @@ def mount(
     overwrite: bool,
     **options: Unpack[MountOptions],
 ) -> None:
-    """Mount control moment gyroscopes on a robot, and print the largest push it stands.
+    """Mount control moment gyroscopes on a robot, and print the largest push it withstands.
 
     Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario has the
-    gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest that the robot stands in
-    MuJoCo.
+    gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest that the robot withstands
+    in MuJoCo.
     """
     from cmg_mj.plant.mounting.request import MountRequest
     from cmg_mj.studies.push_limits.mount_files import mount_and_write
@@ -143,7 +149,7 @@ def mount(
     from cmg_mj.studies.push_limits.simulated_push import LONGEST_S, TimeLimit
 
     if with_tuning and with_plugin:
-        raise InputError("--tune: not with --plugin, which would keep the parameters from before; then cmg-mj plugin")
+        raise InputError("--tune: not with --plugin, which would keep the old parameters; use cmg-mj plugin afterwards")
     with CtrlC() as ctrl_c, nullcontext() if quick else progress("no push", LONGEST_S, ctrl_c) as on_progress:
         time_limit = None if quick else TimeLimit(on_progress=on_progress)
         result = mount_and_write(

@@ -28,7 +28,9 @@ _NOT_CALLED = (
     callback=lambda context, parameter, name: None if name is None else check_observer("OBSERVER", name),
 )
 @out_option()
-@click.option("--name", metavar="NAME", help="The plugin's name behind cmg_mj.  [default: OBSERVER's name]")
+@click.option(
+    "--name", metavar="NAME", help="Name of the plugin, behind the prefix cmg_mj.  [default: OBSERVER's name]"
+)
 @click.option(
     "--scenario",
     default="push_recovery",
@@ -42,15 +44,15 @@ _NOT_CALLED = (
     type=click.Choice(["keyframe", "spinning"]),
     default="keyframe",
     show_default=True,
-    help="What sets the flywheels going: the program, with the model's keyframe, or the plugin.",
+    help="Spin the flywheels up in the program, with the model's keyframe, or in the plugin.",
 )
-@click.option("--no-sensors", is_flag=True, help="Leave the plugin's own sensors out of the model.")
+@click.option("--no-sensors", is_flag=True, help="Omit the plugin's own sensors from the model.")
 @click.option(
     "--install",
     metavar="PATH",
-    help="Have `import mujoco` load a plugin made before: its folder or library, or its name in runs/.",
+    help="Let `import mujoco` load a plugin that this command has made: its folder, library, or name in runs/.",
 )
-@click.option("--uninstall", metavar="NAME", help="Take an installed plugin back.")
+@click.option("--uninstall", metavar="NAME", help="Remove an installed plugin.")
 @click.option("--list", "lists", is_flag=True, help="List the installed plugins, and those that do not load.")
 @json_option()
 @users_code()
@@ -72,10 +74,10 @@ def plugin(
     \b
     Writes a folder:
       libcmg_mj_NAME.so   the library
-      NAME.xml            the scenario's model, which names it; its keyframe is "start"
+      NAME.xml            the scenario's model, which names the library; its keyframe is "start"
       NAME_example.py, NAME_example.c, Makefile, and the C of the library
 
-    Nothing loads the library by itself until --install copies it into a folder of yours.
+    No program loads the library by itself until --install copies the library into a folder of yours.
     """  # noqa: D301  (click wants the character itself)
     if install is not None or uninstall is not None or lists:
         _check_alone()
@@ -130,7 +132,7 @@ def _check_alone() -> None:
     first = next(option for option in options if option in ("--install", "--uninstall", "--list"))
     others = [option for option in options if option not in (first, "--json")]
     if others:
-        raise InputError(f"plugin: {first} goes without {', '.join(others)}")
+        raise InputError(f"plugin: {first} does not go with {', '.join(others)}")
 
 
 def _install(target: str, as_json: bool) -> None:
@@ -144,9 +146,9 @@ def _install(target: str, as_json: bool) -> None:
         name = result.plugin.removeprefix("cmg_mj.")
         for other in manifests:
             if other is not None and other.plugin == result.plugin and other.sha256 != result.sha256:
-                note(f"it takes the place of the library from {other.source}, whose models no longer load")
+                note(f"the library replaces the one from {other.source}, whose models no longer load")
         loads = "`import mujoco` loads it from now on" if is_called() else _NOT_CALLED
-        note(f"installed: {loads}. Take it back: cmg-mj plugin --uninstall {name}")
+        note(f"installed: {loads}. Remove it: cmg-mj plugin --uninstall {name}")
 
 
 def _uninstall(name: str, as_json: bool) -> None:

@@ -52,8 +52,8 @@ if TYPE_CHECKING:
     type=click.Choice(["native", "callback", "board", "plugin"]),
     default="native",
     show_default=True,
-    help="Run the controller in the simulation loop (native), in MuJoCo's control callback, as C on an emulated "
-    "Cortex-M7 (board; see docs/board.md), or as C inside MuJoCo (plugin; see docs/plugin.md).",
+    help="Run the controller in the simulation loop (native), in MuJoCo's control callback, or as C. The C runs on an "
+    "emulated Cortex-M7 (board, see docs/board.md) or inside MuJoCo (plugin, see docs/plugin.md).",
 )
 @number_option(
     "--world",
@@ -83,7 +83,7 @@ def run(
       trajectory.parquet  all signals, a row for each control tick
       recording.rrd       rerun recording
       scenario.toml       scenario with all defaults, which reruns to the same numbers
-      board.frames        with --port: what went over the wire, which cmg-mj replay takes
+      board.frames        with --port: the traffic of the wire, as a log for cmg-mj replay
 
     A rerun needs the same --driver board and --world, if they were given.
     """  # noqa: D301  (click wants the character itself)

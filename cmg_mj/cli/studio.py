@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 VIEWERS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_software")
 
 
-@click.command(short_help="Open a scenario in MuJoCo Studio, its controller running.")
+@click.command(short_help="Open a scenario in MuJoCo Studio with its controller running.")
 @click.argument("scenario")
 @observer_option()
 @settings_option()
@@ -27,7 +27,7 @@ VIEWERS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_softw
     type=click.Choice(VIEWERS),
     default="web",
     show_default=True,
-    help="web opens in a browser, on this machine only; the others open a window and need Python 3.12 or newer.",
+    help="web serves a browser on this machine only; the others open a window and need Python 3.12 or newer.",
 )
 @click.option(
     "--port",
@@ -47,7 +47,7 @@ def studio(
     port: int,
     browser: bool,
 ) -> None:
-    """Open SCENARIO in MuJoCo Studio, its controller running, until the viewer is closed or Ctrl-C.
+    """Open SCENARIO in MuJoCo Studio with its controller running. Close the viewer or press Ctrl-C to end.
 
     Without user actions the trajectory equals that of cmg-mj run. A panel pushes the plant, switches the observer, the
     gains and the feedback, and sets the bias and the accelerometers' noise. Studio pauses, steps, resets, and goes

@@ -49,7 +49,7 @@ class StudyOptions(TypedDict):
     metavar="FIELD=VALUES",
     help="Field and its values: a list (0,0.5,1 or RK4,implicit), a range first:last:count, or a logarithmic range "
     "log:first:last:count. With --sample or --sobol also low:high. Fields joined by + take the same values. May be "
-    "given again; every combination is run.",
+    "given again: the sweep runs every combination.",
 )
 @observers_option("the scenario's", distinct=False, baselines=True)
 @worlds_option("Worlds of each cell.  [default: 20]")
@@ -102,23 +102,23 @@ def sweep(
         return
     if study.trials > MOST_TRIALS and not yes:
         raise InputError(
-            f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; beyond {MOST_TRIALS} say "
-            "--yes (--dry-run prints the time and memory)"
+            f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; for more than "
+            f"{MOST_TRIALS} give --yes (--dry-run prints the time and memory)"
         )
     with _runner(cluster) as run:
         folder = claim_output(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}", FILES)
         store = Store(folder.path, study)
         before = store.open(on_damage=note)
         if before:
-            note(f"{before} of {study.trials} trials are there from before")
+            note(f"resuming: {before} of {study.trials} trials are done")
         with CtrlC() as ctrl_c:
             try:
                 pace = ProgressRate("trials", study.trials, before)
                 with progress(f"sweep {arguments.name}", study.trials, ctrl_c, pace) as on_progress:
                     run(store, on_progress)
             except KeyboardInterrupt:
-                kept = f"what is finished is kept in {folder.path}"
-                end_interrupted(f"interrupted; {kept}, and the same command goes on from there")
+                kept = f"finished trials are kept in {folder.path}"
+                end_interrupted(f"interrupted; {kept}, and the same command resumes the sweep")
             tables = tables_of(Trials(study, store.tables(COLUMNS)))
             written = save(folder, store, tables)
     show(_as_json(tables) if arguments.as_json else None, summary(tables), arguments.as_json)

@@ -79,9 +79,9 @@ def tune(
 
     The bundled scenario observer_tuning is the experiment of that paper. The loop is closed on the gyro, whatever the
     scenario says, and its recording is replayed through the observer. The score is the RMS of the estimated rate less
-    the gyro's, from each push to one second after it, on held-out worlds. It is compared with the score of the
-    observer's parameters as given (by default, the paper's). With several noise levels the command reports at which
-    one the given parameters are best.
+    the gyro's, from each push to one second after it, on held-out worlds. The command compares this score with that of
+    the given parameters (by default, the paper's). With several noise levels it also prints the level at which the
+    given parameters are best.
 
     Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
     """
@@ -167,9 +167,9 @@ def tune_log(
     \b
       cmg-mj tune-log LOG.csv --columns tilt=pitch_deg,rate=gyro_dps --observer linear
 
-    The score is the RMS of the estimated rate less the reference, compared with that of the parameters as given: better
-    is better by more than 1 % and beyond chance. Sixteen short worlds show what both do in a closed loop. Logs are read
-    as in replay. Writes a folder with tuned.json.
+    The score is the RMS of the estimated rate less the reference, compared with that of the parameters as given. Tuned
+    parameters count as better by more than 1 % and beyond chance. Sixteen short worlds compare both in a closed loop.
+    Logs are read as in replay. Writes a folder with tuned.json.
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.replay.logs import read_log
     from cmg_mj.replay.logs.checks import check_distinct_logs

@@ -32,7 +32,7 @@ _OPTIONS = all_of(
         "--deadline-ms",
         type=float,
         metavar="MS",
-        help="Time for the board to answer; later its last command is held.  [default: the control period]",
+        help="Time for the board to answer; without an answer its last command is held.  [default: the control period]",
     ),
     click.option(
         "--max-lost", type=int, metavar="N", help="End the run when N ticks in a row are lost.  [default: 20]"
@@ -100,7 +100,7 @@ class WireOptions:
         )
         board = click.get_current_context().with_resource(connection)
         if not board.checksum_compared:
-            note("casadi is not installed: whether the board has the scenario's numbers was not compared")
+            note("casadi is not installed: the board's numbers were not compared with the scenario's")
         return board
 
 

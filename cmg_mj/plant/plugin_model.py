@@ -32,7 +32,7 @@ INSTANCE = "balance"
 START_KEY = "start"
 """Keyframe of the scenario's initial state."""
 QUANTITIES = ("estimate", "command", "tilt", "gimbal_angle", "acceleration", "integrator", "sample")
-"""What the plugin shows as sensors, of each axis."""
+"""Quantities of each axis that the plugin shows as sensors."""
 EXACT_DIGITS = 17
 PHYSICS = ("body_", "jnt_", "dof_", "site_pos", "site_quat", "actuator_", "eq_", "tendon_", "pair_", "exclude_")
 """Beginnings of the names of what the written model must have in common with the plant."""

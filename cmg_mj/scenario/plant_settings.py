@@ -1,4 +1,4 @@
-"""Which rig, and how it differs from its model file: what a scenario says of the plant, checked without MuJoCo."""
+"""Settings of the plant in a scenario: the rig, and its differences from its model file. Checked without MuJoCo."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def run(checkout: Path, python: str, code: str, *arguments: object) -> str:
 
 
 def recorded(path: Path) -> None:
-    """What 256 worlds of `push_recovery` measured and commanded."""
+    """Write the measurements and commands of 256 worlds of `push_recovery`."""
     trajectory = prepare(load_scenario("push_recovery")).run_many(256).trajectory
     assert trajectory is not None
     np.savez(path, y1=trajectory["y1_rad"], y2=trajectory["y2_rad"], u=trajectory["u_rad_s"])

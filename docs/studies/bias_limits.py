@@ -21,7 +21,7 @@ SEED, WORLDS, LARGEST_DEG, CUTS, PARTS = 30_000, 5, 4.0, 2, 8
 
 
 class Case(NamedTuple):
-    """What the loop is closed on."""
+    """An observer and the settings with which it closes the loop."""
 
     observer: str
     overrides: Sequence[str] = ()

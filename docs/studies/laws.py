@@ -3,8 +3,8 @@
 python docs/studies/laws.py [--worlds 20] [--e 0.5,1.5] (about a minute and a half on two quiet cores)
 
 push_recovery, the same worlds and noise for every loop. A figure is the mean over the worlds that stood, with its 95 %
-interval; the second table has the differences to the LQG law, world by world. How much bias a loop bears, and how
-hard a push, is found in steps over worlds of another seed: the median of what a world bears, and the range.
+interval. The second table has the differences to the LQG law, world by world. The largest bias and push that a loop
+tolerates are found in steps, over worlds of another seed: their median over the worlds, and their range.
 """
 
 import argparse

@@ -5,9 +5,9 @@ python docs/studies/light_cart.py --rubbing (what the cart slides on is not free
 python docs/studies/light_cart.py --height (the tilt is taken about another point than the mass centre; a minute)
 
 --carts 1,3 --worlds 2 make it shorter. The cart-pole has the sizes of dm_control's: a pole of 1 m and 0.1 kg; the cart
-there has 1 kg. A pair of the papers' size is mounted on the pole with `--release slider`. Ten worlds a cell, for 20 s
-from the tilt that `mount` starts with, sensors with their noise, seed 7, which no limit was tuned on. A cell is how
-many stand.
+there has 1 kg. A pair of the papers' size is mounted on the pole with `--release slider`. Each cell has ten worlds of
+20 s, from the tilt that `mount` starts with, sensors with their noise. No limit was tuned on the seed, 7. A cell is
+the number of worlds that stand.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""How far a right model misses, and wrong ones: `model_misfit` of runs whose model is known, over seeds.
+"""Misfits of right and wrong models: `model_misfit` of runs whose model is known, over seeds.
 
     python docs/studies/model_misfit.py [SEEDS]
 

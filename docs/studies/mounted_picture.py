@@ -23,7 +23,7 @@ from cmg_mj.visualization.plots.colours import colour, hexadecimal
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "torso.xml"
 SIZE = 1200
-"""Of the robot, drawn [pixels]."""
+"""Side of the robot's drawing [pixels]."""
 SHOWN_S = 8.0, 14.0
 GREY = "#404040"
 
@@ -53,7 +53,7 @@ def robot(spec: mujoco.MjSpec, qpos: np.ndarray) -> np.ndarray:
 
 
 def no_sites() -> mujoco.MjvOption:
-    """The sensors' marks are left out."""
+    """Return options that hide the sensors' marks."""
     option = mujoco.MjvOption()
     option.sitegroup[:] = 0
     return option

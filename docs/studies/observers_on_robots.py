@@ -2,12 +2,12 @@
 
 python docs/studies/observers_on_robots.py [ROBOT ...] [--keep FILE] [--minutes M] [--rows loop,fit,tuned,E]
 
-ROBOT is a part of a name. Each row is written to FILE as soon as it is there, and not computed again; after M minutes
-no other row is begun, and what there is is printed. All takes about twenty minutes on a quiet core. The scenario is
-that of `cmg-mj mount --quick`. First every observer is in its own loop. Then the loop is closed on the gyro, so that
-one recording serves all observers (`cmg-mj tune`): the fit is 1 - error/motion from the push to one second after it,
-on six worlds that no parameter was tuned on. Tuning starts at the scaled parameters, takes those in `TUNED`, and ends
-after five seconds of CPU. E is the push margin of the reduced model with the observer in the loop.
+ROBOT is a part of a name. Each row is written to FILE as soon as the row is there, and is not computed again. After M
+minutes no other row begins, and the finished rows are printed. All rows take about twenty minutes on a quiet core. The
+scenario is that of `cmg-mj mount --quick`. First every observer is in its own loop. Then the loop is closed on the
+gyro, so that one recording serves all observers (`cmg-mj tune`). The fit is 1 - error/motion from the push to one
+second after it, on six worlds that no parameter was tuned on. Tuning starts at the scaled parameters, takes those in
+`TUNED`, and ends after five seconds of CPU. E is the push margin of the reduced model with the observer in the loop.
 """
 
 import json
@@ -49,7 +49,7 @@ TUNED = {
     "homogeneous": ("k1", "k2"),
     "kalman": ("torque_walk", "torque_white"),
 }
-"""Those of the model's floor, which bounds the others too, need no tuning to show that none of them is positive."""
+"""Parameters to tune, by observer. Observers that `floor_model` bounds need none to show that no fit is positive."""
 IN_THE_LOOP = ("gyro_free", "linear", "super_twisting", "homogeneous", "luenberger", "kalman", "adaptive")
 
 

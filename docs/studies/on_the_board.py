@@ -2,10 +2,10 @@
 
     python docs/studies/on_the_board.py [--observers NAMES] [--worlds 20] [--scenario push_recovery]
 
-In lockstep: the board closes the loop, and the host's controller is shown the same readings; RMS difference of both
-estimated rates over all worlds and ticks. Closed loop: means of velocity RMS error and settle time over the worlds on
-the host with their 95 % intervals, then with the board in the loop, and whether these lie within. About a minute an
-observer.
+In lockstep the board closes the loop, and the host's controller gets the same readings. The column has the RMS
+difference of both estimated rates over all worlds and ticks. In closed loop there are means of velocity RMS error and
+settle time over the worlds. Those on the host have their 95 % intervals; for those with the board the table says
+whether they lie within. docs/board_evidence.md has the table. About a minute an observer.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ FIGURES = {"velocity_rms_error_rad_s": "{:.5f}", "settle_time_s": "{:.3f}"}
 
 
 class Beside:
-    """The board, and a controller on the host that is shown what the board is shown.
+    """The board, and a controller on the host that gets the same readings.
 
     Attributes:
-        differences: Of the estimated rates, a number a tick [rad/s].
+        differences: Differences of the estimated rates, a number a tick [rad/s].
     """
 
     def __init__(self, board: Board, controller: Controller) -> None:
@@ -47,7 +47,7 @@ class Beside:
         self._tick = 0
 
     def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
-        """What the board decides."""
+        """Let the board decide."""
         decision = self.board.update(accelerations, encoders)
         step = self._tick * self.controller.period
         tick = self.controller.decide(step, accelerations, encoders, math.nan, math.nan)

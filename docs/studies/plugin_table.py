@@ -2,10 +2,10 @@
 
     python docs/studies/plugin_table.py [--parts rig,axes,worlds,robots] [--observers gyro_free,kalman] [--duration 15]
 
-A program that calls nothing but mj_step stands beside a run of the native driver at every control tick: positions and
-rates of all joints, the estimate, y1, y2, the measured acceleration, the command, the integrator, and the decision's
-number. Numbers are compared as their 64 bits: -0 is not 0. One library serves the three integrators. About ten
-minutes on a quiet core; the last line says how many numbers were compared, and how many differ.
+A program that calls nothing but mj_step stands beside a run of the native driver at every control tick. Compared are
+positions and rates of all joints, the estimate, y1, y2, the measured acceleration, the command, the integrator, and the
+decision's number. Numbers are compared as their 64 bits: -0 is not 0. One library serves the three integrators. About
+ten minutes on a quiet core; the last line says how many numbers were compared, and how many differ.
 """
 
 from __future__ import annotations

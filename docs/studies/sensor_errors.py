@@ -1,4 +1,4 @@
-"""What the accelerometers' imperfections do to every observer, in its own loop: each alone, and all together.
+"""The effect of the accelerometers' imperfections on every observer, in its own loop: each alone, and all together.
 
     python docs/studies/sensor_errors.py alone [--worlds 20] [--observers all] [--jobs 2] [--only skew]
     python docs/studies/sensor_errors.py together [--worlds 10] [--parts 4] [--observers gyro_free,kalman,adaptive]
@@ -52,11 +52,11 @@ class Case(NamedTuple):
     pairs: list[dict[str, Any]]
     """Fields of the accelerometers."""
     settings: tuple[str, ...] = ()
-    """What else differs from the scenario."""
+    """Further differences from the scenario."""
 
 
 def tilt_off(fields: dict[str, Any]) -> float:
-    """How far y1 is off at rest [deg]."""
+    """Return the error of y1 at rest [deg]."""
     plant = load_plant()
     return math.degrees(plant.bias - plant.apparent_bias(Accelerometer(**fields)))
 
@@ -69,10 +69,10 @@ def levelled(fields: dict[str, Any]) -> dict[str, Any]:
 
 
 def skew_gain() -> tuple[float, float]:
-    """What an outer sample that is a period old does.
+    """Return the effect of an outer sample that is a period old.
 
     Returns:
-        What y1 changes by if the angular acceleration changes from one sample to the next, r_i r_o/((r_o - r_i) g)
+        Change of y1 if the angular acceleration changes from one sample to the next, r_i r_o/((r_o - r_i) g)
         [s^2]; the gain of the loop that this closes: y1 -> u by K_e, u -> acceleration.
     """
     plant = load_plant()
@@ -173,7 +173,7 @@ def mean(values: np.ndarray) -> str:
 
 
 def share(fell: np.ndarray) -> str:
-    """Of the worlds that fell."""
+    """Share of the worlds that fell."""
     return f"{fell.mean():.0%}"
 
 
@@ -188,7 +188,7 @@ def short(of: dict[str, np.ndarray]) -> str:
 
 
 def ratio(ours: np.ndarray, theirs: np.ndarray) -> tuple[str, float, float]:
-    """Of the worlds in which both stood, with its interval."""
+    """Ratio over the worlds in which both stood, with its interval."""
     both = np.isfinite(ours) & np.isfinite(theirs)
     if both.sum() < 2:
         return "-", math.nan, math.nan

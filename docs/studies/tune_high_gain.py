@@ -1,10 +1,11 @@
 """Fit `high_gain` to the gyro, as section V of aranovskiy2020 fits its observers, and say which d_inf is best.
 
-The loop is closed on the gyro (scenario observer_tuning), the observer is replayed on what was recorded, and the RMS
-of (estimate - gyro) over all worlds, from the start of the push to one second after it, is minimised over the
-logarithms of l1 and l2, for each d_inf of a grid (0 is the linear correction). The rest is not tuned: phi1, phi2, phi3
-are those of andrieu2009 section 3.1 (phi2 = 1 is the least that its proof allows), and b is half of what (21) allows.
-Seeds are used nowhere else. After that the winner and the best linear one are put into the loop on other worlds.
+The loop is closed on the gyro (scenario observer_tuning), and the observer is replayed on the recordings. The RMS of
+(estimate - gyro) is taken over all worlds, from the start of the push to one second after it. It is minimised over
+the logarithms of l1 and l2, for each d_inf of a grid (0 is the linear correction). The other parameters are not
+tuned. phi1, phi2, phi3 are those of andrieu2009 section 3.1 (phi2 = 1 is the least that its proof allows). b is half
+of the value that (21) allows. Seeds are used nowhere else. After that the winner and the best linear correction are
+put into the loop on other worlds.
 
 Run it (about two minutes): python docs/studies/tune_high_gain.py
 """

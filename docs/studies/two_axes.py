@@ -1,9 +1,9 @@
-"""The two-axis rig in numbers: what it is, what couples its axes, and what wheels and gimbals that are not alike do.
+"""The two-axis rig in numbers: its measures, the coupling of its axes, and the effect of unlike wheels and gimbals.
 
     python docs/studies/two_axes.py [--parts rig,turning,unlike,loop] [--worlds 8] [--observer homogeneous]
 
-Torques are the full model's: what the joints are asked for at given rates, without accelerations, with the wheels
-turning less the same with the wheels at rest.
+Torques are those of the full model's joints at given rates, without accelerations. The torques with the wheels at
+rest are subtracted. docs/two_axes_evidence.md has the tables.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def asked(
 
 
 def the_rig() -> str:
-    """What it is, by axis."""
+    """Describe the rig, by axis."""
     rows = []
     for name in ("two_axes.xml", "two_axes_free_base.xml"):
         plant = load_plant(model=name, equilibrium_bias_deg=0.0)
@@ -88,7 +88,7 @@ def the_rig() -> str:
 
 
 def turning() -> str:
-    """What a turn at 1 rad/s asks of the tilts at x3 = 40 and 10 degrees, under several rates of the gimbals."""
+    """Torques that a turn at 1 rad/s asks of the tilts at x3 = 40 and 10 degrees, at several gimbal rates."""
     plant = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0)
     c = plant.turning.flywheels
     print("c =", ", ".join(f"[{', '.join(f'{value:+.0f}' for value in row + 0.0)}]" for row in np.round(c, 9)), "\n")
@@ -111,7 +111,7 @@ def turning() -> str:
 
 
 def unlike() -> str:
-    """What couples where a wheel is 10 % slow, or a gimbal 5 degrees ahead of its partner."""
+    """Coupling by a wheel that is 10 % slow, or a gimbal 5 degrees ahead of its partner."""
     rows = []
     with tempfile.TemporaryDirectory() as place:
         alike = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0)

@@ -2,7 +2,7 @@
 
     python docs/studies/two_axes_loop.py [--worlds 20]   (three minutes)
 
-Prints the tables of docs/two_axes.md.
+Prints the tables of docs/two_axes_evidence.md.
 """
 
 from __future__ import annotations
@@ -106,11 +106,11 @@ def gait(worlds: int) -> str:
         ):
             given = ("push=[]", "duration_s=30", f"swing=[{swings}]", f"observer.kind={name}", *own)
             result = two_axes(*given).run_many(worlds, keep_trajectory=False)
-            told = ", told the frequency" if own else ""
+            known = ", with the frequency" if own else ""
             figures = [f"{of_axis(result, axis, key):.3f}" for key in (ERROR, "tilt_rms_deg") for axis in AXES]
             stood = int(result.stood.sum())
             rows.append(
-                [f"{amplitude:g} N m, {frequency:g} Hz", name + told, f"{stood} of {worlds}"]
+                [f"{amplitude:g} N m, {frequency:g} Hz", name + known, f"{stood} of {worlds}"]
                 + (figures if stood == worlds else ["-"] * 4)
             )
     headings = [f"{what} {axis} [{unit}]" for what, unit in (("error", "rad/s"), ("tilt RMS", "deg")) for axis in AXES]

@@ -309,7 +309,7 @@ def test_a_viewer_that_finds_no_screen_is_not_taken_for_one(monkeypatch: pytest.
         (["--connect=localhost:99999"], "--connect 'localhost:99999': no address of a viewer; "),
         (
             ["--connect={free_port}", "--live"],
-            "--live starts a viewer, --connect takes one that runs already: give one",
+            "--live starts a viewer, --connect uses a running one: give one",
         ),
         (["--live", "--pace=fast"], "--pace 'fast': must be a number such as 0.5 or 4, or max for no limit"),
         (["--live", "--pace=-1"], "--pace '-1': must be "),

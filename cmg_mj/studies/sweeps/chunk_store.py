@@ -43,7 +43,7 @@ from cmg_mj.studies.sweeps.trials import schema_of, table_of, write_tables
 STUDY, CHUNKS = "study.toml", "chunks"
 TRIALS = "trials.parquet"
 """Files of a sweep's folder."""
-GOES_ON = "what is finished is kept, and the same command goes on from there"
+GOES_ON = "finished trials are kept, and the same command resumes the sweep"
 AGAIN = "delete it, and it is computed again"
 
 

@@ -115,11 +115,11 @@ def test_command(folder: Path, tmp_path: Path) -> None:
     library = make_library(tmp_path)
     outcome = cmg_mj("plugin", "--install", library)
     assert (outcome.status, outcome.out.split()[:2]) == (0, ["plugin", "cmg_mj.balance"])
-    assert outcome.err.endswith("Take it back: cmg-mj plugin --uninstall balance\n")
+    assert outcome.err.endswith("Remove it: cmg-mj plugin --uninstall balance\n")
     assert len(outcome.err.splitlines()) == 1
     (tmp_path / "other").mkdir()
     other = make_library(tmp_path / "other", content="another robot")
-    expected = f"cmg-mj: it takes the place of the library from {library}, whose models no longer load"
+    expected = f"cmg-mj: the library replaces the one from {library}, whose models no longer load"
     assert cmg_mj("plugin", "--install", other).err.splitlines()[0] == expected
     assert json.loads(cmg_mj("plugin", "--install", library, "--json").out)["mujoco"] == MUJOCO
     assert cmg_mj("plugin", "--list").out == f"balance  from {library}\n{folder}\n"
@@ -156,11 +156,11 @@ def test_a_package_that_mujoco_does_not_call(
     ("arguments", "complaint"),
     [
         ((), "name an OBSERVER to make a plugin, or give --install, --uninstall or --list"),
-        (("gyro_free", "--list"), "--list goes without OBSERVER"),
-        (("--install", "x", "--uninstall", "y"), "--install goes without --uninstall"),
-        (("--uninstall", "x", "--list"), "--uninstall goes without --list"),
-        (("--install", "x", "--out", "y", "--set", "a=1", "--json"), "--install goes without --out, --set"),
-        (("--list", "--start", "spinning", "--no-sensors"), "--list goes without --start, --no-sensors"),
+        (("gyro_free", "--list"), "--list does not go with OBSERVER"),
+        (("--install", "x", "--uninstall", "y"), "--install does not go with --uninstall"),
+        (("--uninstall", "x", "--list"), "--uninstall does not go with --list"),
+        (("--install", "x", "--out", "y", "--set", "a=1", "--json"), "--install does not go with --out, --set"),
+        (("--list", "--start", "spinning", "--no-sensors"), "--list does not go with --start, --no-sensors"),
     ],
 )
 def test_what_does_not_go_together(arguments: tuple[str, ...], complaint: str) -> None:

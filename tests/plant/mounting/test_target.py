@@ -216,4 +216,4 @@ def test_a_folder_that_cannot_be_written() -> None:
 
 
 def test_the_help_says_so() -> None:
-    assert "not what has changed since" in " ".join(cmg_mj("mount", "--help").out.split())
+    assert "except files that have changed since" in " ".join(cmg_mj("mount", "--help").out.split())

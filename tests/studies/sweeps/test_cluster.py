@@ -137,7 +137,7 @@ def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> 
     _, err = process.communicate(timeout=HANGS_AFTER_S)
     assert process.returncode == 130, err
     (line,) = told(err)
-    assert line == "cmg-mj: interrupted; what is finished is kept in out, and the same command goes on from there"
+    assert line == "cmg-mj: interrupted; finished trials are kept in out, and the same command resumes the sweep"
     kept = [path.name for path in chunks.iterdir()]
     assert kept
     assert all(name.endswith(".parquet") for name in kept)

@@ -49,7 +49,7 @@ def test_the_files_of_a_sweep(tmp_path: Path) -> None:
     rerun_trials = pq.read_table(tmp_path / "again" / "trials.parquet")
     assert rerun_trials.equals(pq.read_table(tmp_path / "out" / "trials.parquet"))
     second_outcome = cmg_mj(*SMALL, *SHORT, "--out", str(tmp_path / "out"))
-    assert "12 of 12 trials are there from before" in second_outcome.err
+    assert "resuming: 12 of 12 trials are done" in second_outcome.err
 
 
 WEIGHTS = "controller.lqr.state_cost"
@@ -121,7 +121,7 @@ def test_the_report_of_a_map_with_an_order(tmp_path: Path) -> None:
     assert [row["worlds"] for row in pq.read_table(out / "order.parquet").to_pylist()] == [3] * 8
     assert 'order = [\n    "gyro_free",' in (out / "study.toml").read_text(encoding="utf-8")
     rerun = cmg_mj(*SMALL, *rates, *SHORT, "--out", str(out))
-    assert "24 of 24 trials are there from before" in rerun.err
+    assert "resuming: 24 of 24 trials are done" in rerun.err
     assert not (out / "order.parquet").exists()
     assert "order" not in (out / "study.toml").read_text(encoding="utf-8")
 
@@ -202,7 +202,10 @@ def test_a_plan_runs_nothing(tmp_path: Path) -> None:
         ([], "nothing is varied"),
         (["--vary", "observer.k1=10,20", "--observers", "homogeneous,linear"], "observer.k1"),
         (["--vary", "observer.k1=10,-20"], "observer.k1"),
-        (["--vary", f"{BIAS}=0:1:11", *NOISES, "--worlds", "10000"], "1100000 trials; beyond 1000000 say --yes"),
+        (
+            ["--vary", f"{BIAS}=0:1:11", *NOISES, "--worlds", "10000"],
+            "1100000 trials; for more than 1000000 give --yes",
+        ),
         (["--vary", f"{BIAS}=0:1", "--sobol", "200"], "--sobol 200: must be a power of two, such as 256"),
         (["--vary", f"{BIAS}=0:1", "--sobol", "2", "--sample", "3"], "--sample and --sobol: one of them"),
         (["--vary", f"{BIAS}=0,1", "--order", "linear,ltv"], "--order linear,ltv: linear does not run here"),

@@ -24,7 +24,7 @@ SWEEP = ["sweep", "push_recovery", "--vary", "plant.equilibrium_bias_deg=0,1", "
 SWEEP += ["--set", "duration_s=0.2", "--observers", "linear,gyro_free,high_gain", "--out"]
 FULL = OSError(28, "No space left on device")
 CONTINUATION = (
-    "cannot be written: No space left on device; what is finished is kept, and the same command goes on from there"
+    "cannot be written: No space left on device; finished trials are kept, and the same command resumes the sweep"
 )
 
 
@@ -67,7 +67,7 @@ def test_a_disk_that_is_full_in_the_middle(
     monkeypatch.undo()
     rerun = cmg_mj(*SWEEP, tmp_path)
     assert rerun.status == 0
-    assert "4 of 12 trials are there from before" in rerun.err
+    assert "resuming: 4 of 12 trials are done" in rerun.err
     assert chunk_times.items() <= times(tmp_path / "chunks").items()
     assert (tmp_path / "trials.parquet").read_bytes() == trials_bytes
 
@@ -151,7 +151,7 @@ def test_a_damaged_chunk_is_computed_again(finished: Path, trials_bytes: bytes, 
         f"cmg-mj: {chunk}: ({message}); it is computed again, and kept as 000002.damaged, which may be deleted\n",
         rerun.err,
     )
-    assert "8 of 12 trials are there from before" in rerun.err
+    assert "resuming: 8 of 12 trials are done" in rerun.err
     assert (finished / "trials.parquet").read_bytes() == trials_bytes
     unharmed = ("000000.parquet", "000001.parquet")
     assert {name: times(finished / "chunks")[name] for name in unharmed} == {name: before[name] for name in unharmed}

@@ -48,7 +48,7 @@ def test_chunks_whose_study_is_lost_serve_no_other(out: Path) -> None:
     )
     assert contents(out) == before
     rerun = cmg_mj(*SWEEP, out)
-    assert "8 of 8 trials are there from before" in rerun.err
+    assert "resuming: 8 of 8 trials are done" in rerun.err
     assert contents(out) | {"study.toml": b""} == before | {"study.toml": b""}
 
 
@@ -123,7 +123,7 @@ def test_other_versions_go_on_with_nothing_and_may_finish_what_is_whole(out: Pat
     study.write_text(
         study.read_text(encoding="utf-8").replace(f'mujoco = "{version}"', 'mujoco = "2.0"'), encoding="utf-8"
     )
-    assert "8 of 8 trials are there from before" in cmg_mj(*SWEEP, out).err
+    assert "resuming: 8 of 8 trials are done" in cmg_mj(*SWEEP, out).err
     assert contents(out) == before  # the study says what the chunks do
     study.write_text(
         study.read_text(encoding="utf-8").replace(f'mujoco = "{version}"', 'mujoco = "2.0"'), encoding="utf-8"
