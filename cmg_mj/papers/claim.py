@@ -13,13 +13,13 @@ Verdict = Literal[
 ]
 
 MEANINGS: dict[Verdict, str] = {
-    "reproduced": "it holds, and all that it depends on is printed in the paper",
-    "reproduced within stated conditions": "it holds with something assumed by us (a push, a bias e, noise, a drive), "
-    "with a misprint mended, or for a part of what is said; that stands below the claim",
-    "illustrated": "it is a general statement, and holds for the systems on which it was tried; that is no proof",
-    "cannot be tested": "whether it holds depends on something that the paper does not give, such as a recording, a "
-    "gain or a threshold; so what came out with ours speaks neither for it nor against it",
-    "not reproduced": "it does not hold, and the reason stands below the claim",
+    "reproduced": "the claim holds, and the paper prints all that the claim depends on",
+    "reproduced within stated conditions": "the claim holds with an assumption of ours (a push, a bias e, noise, a "
+    "drive), with a misprint mended, or in part. These conditions stand below the claim",
+    "illustrated": "the claim is a general statement and holds for the systems on which it was tried. This is no proof",
+    "cannot be tested": "the outcome depends on something that the paper does not give, such as a recording, a gain or "
+    "a threshold. A result with our choice speaks neither for the claim nor against it",
+    "not reproduced": "the claim does not hold, and the reason stands below it",
 }
 """The rule by which `Claim.verdict` decides, in words."""
 

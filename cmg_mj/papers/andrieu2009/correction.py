@@ -37,8 +37,8 @@ def correction(run: Run, nominal: Replay) -> Claim:
         f"With b = {b_inside:.4f}, inside (21) and (22), it is {rms_inside:.5f}.",
         assumes=ASSUMED,
         holds=difference < 0.01 * rms,
-        conditions="With the parameters of section 3.1. What homogeneity gives is the right to use Omega_2; where the "
-        "correction matters is large errors, as in Theorem 1 on system (1).",
+        conditions="With the parameters of section 3.1. Homogeneity gives the right to use Omega_2. The correction "
+        "matters for large errors, as in Theorem 1 on system (1).",
         otherwise="The correction has its part in it.",
         is_ours=True,
         figures={

@@ -210,9 +210,9 @@ def axes_claim(couplings: dict[float, Coupling]) -> Claim:
         },
         conditions=(
             f"Up to pushes of {max(separate_pushes, default=0.0):g} N m for {PUSH_S:g} s, under which the other axis "
-            f"changes less than {SMALL:.0%} of the tilt, on a body that does not turn about the vertical. What a pair "
-            "holds along its own axis makes a torque about the vertical as soon as the other axis moves; the ground "
-            "must bear it."
+            f"changes less than {SMALL:.0%} of the tilt, on a body that does not turn about the vertical. The momentum "
+            "that a pair holds along its own axis makes a torque about the vertical when the other axis moves. The "
+            "ground must take this torque."
         ),
         otherwise="The axes are felt in each other.",
         figures={

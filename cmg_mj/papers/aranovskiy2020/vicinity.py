@@ -118,8 +118,8 @@ def vicinity_claim(seed: int = SEED) -> Claim:
             f"{_list_by_alpha({a: values[2] for a, values in measures.by_bias.items()}, '.4f')} rad/s. With noise in "
             "y1 and e = 0 its RMS rises with the noise to the power "
             f"{_list_by_alpha(slopes, '.2f')}: the vicinity shrinks to the origin "
-            f"with either. Of {len(gains)} random pairs of gains, of any sign, the two polynomials are Hurwitz "
-            f"together in {'all' if is_equivalent else 'some'}."
+            f"with either. For {len(gains)} random pairs of gains, of any sign, the two polynomials are "
+            f"{'always' if is_equivalent else 'not always'} Hurwitz together."
         ),
         is_general=True,
         assumes={
