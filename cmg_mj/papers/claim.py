@@ -56,7 +56,7 @@ class Claim:
         place: Place in the paper: `Fig. 2`, `Remark 1`, `Section V`.
         statement: Statement of the paper there, in our words.
         result: Result obtained, with its figures, in words.
-        table: More figures than a sentence bears, as a Markdown table below the words.
+        table: A Markdown table of further figures, below the words.
         holds: Whether what was obtained bears the paper out, computed from the figures; or that by each of several
             measures, all of which must hold.
         assumes: Assumptions of ours that the claim depends on, each with its size in a few words.
@@ -79,7 +79,7 @@ class Claim:
     is_general: bool = False
     missing_data: str = ""
     conditions: str = ""
-    otherwise: str = "The figures above do not bear it out."
+    otherwise: str = "The figures above contradict the claim."
     figures: Mapping[str, Any] = field(default_factory=dict)
     pictures: Sequence[Picture] = ()
     is_ours: bool = False

@@ -79,8 +79,8 @@ def simple_copy(study: Study) -> Claim:
         "to choose.",
         result="A copy of (14) with hbar = 0.8 does not use the measurement; the noise changes the observers' "
         f"estimates by {least:.4f} RMS and more. From t = 10 to 20, at u = 0.02, the copy's error of eta1 + eta2 keeps "
-        f"{share_left:.3f} of its size, as exp(-0.02 * 10) = {expected_share:.3f} demands, whatever one would like. In "
-        f"this example it does no harm: after t = 5 the copy's RMS error is {error:.3f}, the best observer's "
+        f"{share_left:.3f} of its size, as exp(-0.02 * 10) = {expected_share:.3f} demands. No parameter changes this. "
+        f"In this example it does no harm: after t = 5 the copy's RMS error is {error:.3f}, the best observer's "
         f"{best_rms:.3f}.",
         holds=abs(share_left - expected_share) < 0.01 and least > SEEN_NOISE * best_rms,
         otherwise="The copy is not as the footnote says.",
