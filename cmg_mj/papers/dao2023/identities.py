@@ -38,8 +38,8 @@ def separated_errors(on_share: OnShare) -> Claim:
         is_general=True,
         assumes={"initial values": "one motion", "control rate": "200 Hz"},
         holds=largest < 1e-8,
-        conditions="On the pendulum robot. The paper has (7) to (9) for any system, and does not say that they decouple "
-        "the errors.",
+        conditions="On the pendulum robot. The paper has (7) to (9) for any system, and does not say that they "
+        "decouple the errors.",
         is_ours=True,
         figures={"identity_error": errors, "largest_z": max(*sizes, size)},
     )
