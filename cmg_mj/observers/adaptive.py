@@ -152,7 +152,7 @@ class Adaptive:
 
     @cached_property
     def _shown(self) -> list[int]:
-        """Which states of the exosystem are the extra signals: a constant, and the second part of a sinusoid."""
+        """Indices of the exosystem's states that are extra signals: a constant, and the second part of a sinusoid."""
         return [-1 if name == SINUSOID else 0 for name in self.extra_signals]
 
     @cached_property

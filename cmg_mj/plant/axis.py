@@ -78,7 +78,7 @@ class Axis:
 
     @cached_property
     def directions(self) -> list[float]:
-        """For each gimbal the sign of u that it is given."""
+        """Sign of u for each gimbal."""
         return [module.direction for module in self.modules]
 
     @cached_property

@@ -24,7 +24,7 @@ STEP_SHARE = 0.25
 RK4 is then 3.3e-5 slow (z^4/120) and takes z^5/72 = 1.4e-5 of the mode's energy a radian.
 """
 RIGID_SHARE = 0.999
-"""So much of the frame's own inertia may lie on one side of the bend: a part without mass does not move."""
+"""Largest share of the frame's own inertia on one side of the bend: a part without mass does not move."""
 
 
 def bend_frame(

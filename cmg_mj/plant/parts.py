@@ -60,7 +60,7 @@ class Module:
 
     @property
     def of_axis(self) -> str:
-        """Its name without the axis': `cube1` of `roll/cube1`."""
+        """The module's name without that of its axis: `cube1` of `roll/cube1`."""
         return self.name.rpartition("/")[2]
 
 

@@ -94,7 +94,7 @@ class Plant:
         grid: TimeGrid | None = None,
         of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
     ) -> Plant:
-        """The same rig with other settings, without compiling its file again.
+        """Return the rig with other settings, without compiling its file again.
 
         Args:
             settings: Settings with the same model file, the same locks and the same bend.

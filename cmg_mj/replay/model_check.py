@@ -1,4 +1,4 @@
-"""Whether a pendulum's model can be that of a log: the acceleration that it predicts, beside the tilt's own."""
+"""Checks a pendulum's model against a log: the acceleration that it predicts, beside the tilt's own."""
 
 from __future__ import annotations
 

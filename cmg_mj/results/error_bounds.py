@@ -27,14 +27,14 @@ NO_ACCELERATION_FLOOR = (
 MEMORY_S = 0.5
 """Memory of the filters of y1 that are tried for its floor [s]."""
 SINGLE, WIDER = 4, 1.3
-"""Their newest samples have a tap each; older ones share one, and every share is so much wider than the one before.
-A tap a sample takes 0.3 to 0.8 % off the floor of a whole run of 15 s, 200 taps over a second 2 to 4 %. About 3 % are
-due to their number alone: so much of a world's noise do 200 taps learn of its 3,000 samples
+"""Number of newest samples with a tap each, and the factor by which the taps of older samples widen.
+A tap a sample lowers the floor of a whole run of 15 s by 0.3 to 0.8 %, 200 taps over a second by 2 to 4 %. About 3 %
+are due to their number alone: 200 taps fit this share of the noise in a world's 3,000 samples
 (docs/studies/gyro_free.py --parts taps)."""
 PIECE = 16
 """Worlds whose sums are taken together: so many stay in a processor's cache."""
 ROWS_A_TAP = 10
-"""So many samples a tap, or there is no fit."""
+"""Fewest samples for each tap of a fit."""
 
 
 @lru_cache(maxsize=256)

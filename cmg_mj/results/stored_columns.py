@@ -142,7 +142,7 @@ class ColumnStore:
 
     @property
     def in_memory(self) -> bool:
-        """Whether no row is in a file."""
+        """True if no row is in a file."""
         return self._file is None
 
     def append(self, columns: Sequence[np.ndarray]) -> None:

@@ -91,7 +91,7 @@ def _about(torque: Push | Swing) -> str:
 
 
 def _pivot_rows(rig: PlantParameters) -> Iterator[tuple[str, str]]:
-    """Where a pivot slides: what the tilt is taken about, and what of the sliding is in the reduced model."""
+    """Describe a sliding pivot: the point that the tilt is taken about, and the model's share of the sliding."""
     if rig.reduced.pivot_arm:
         yield "pivot", sliding_words(rig)
         yield "", f"in the reduced model: {IN_THE_MODEL}"

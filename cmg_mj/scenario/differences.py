@@ -11,7 +11,7 @@ from cmg_mj.errors import TomlValue
 LONGEST_NAME = 60
 """Longest text of the differences in a folder's name [characters]."""
 SHOWN = 3
-"""So many differences are shown in one line."""
+"""Most differences in one line."""
 
 
 def describe_differences(differing: Mapping[str, TomlValue | None]) -> str:

@@ -112,7 +112,7 @@ def base_of(scenario: Scenario) -> Scenario | None:
 
 
 def find_model(scenario: Scenario, beside: Path) -> Scenario:
-    """The same with the path of its model, which a scenario file names relative to itself."""
+    """Return a scenario with the path of its model, which a scenario file names relative to itself."""
     with scenario.named_in_errors():
         model = find("models", scenario.plant.model, ".xml", "plant.model =", beside)
     return scenario.model_copy(update={"plant": dataclasses.replace(scenario.plant, model=str(model))})

@@ -16,7 +16,7 @@ from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
 from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker
 
 PIECE = 1000
-"""So many samples before the run are made together, whatever the rate."""
+"""Samples before the run that are made together, whatever the rate."""
 
 
 @dataclass(frozen=True, config=STRICT)

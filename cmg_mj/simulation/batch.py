@@ -83,7 +83,7 @@ class AxisPart(NamedTuple):
     scenario: Scenario
     design: Design
     axis: str
-    """Its name; empty on a plant of one axis."""
+    """Name of the axis; empty on a plant of one axis."""
 
 
 def batch_key(parts: Sequence[AxisPart]) -> BatchKey:

@@ -115,7 +115,7 @@ def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[
 
 
 def _renamed(result: Result, observer: str) -> Result:
-    """The same with the name of the observer that these worlds had."""
+    """Return a result with the name of the observer that these worlds had."""
     before, *open_loop = result.observers
     trajectory = result.trajectory
     if trajectory is not None and before != observer:

@@ -204,7 +204,7 @@ class Experiment:
         return [experiments[key] for key, _ in keyed]
 
     def with_settings(self, values: Mapping[str, Any]) -> Experiment:
-        """The same with other values of some fields.
+        """Return the experiment with other values of some fields.
 
         Args:
             values: By field, named as with `--set`.

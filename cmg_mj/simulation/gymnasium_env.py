@@ -43,7 +43,7 @@ MOST = 1e6
 SIZE = (480, 640)
 """Height and width of a picture [pixels]."""
 VIEW = (132.0, -18.0)
-"""From where it is taken: azimuth and elevation [deg]."""
+"""Camera of a picture: azimuth and elevation [deg]."""
 
 
 class ScissoredPairEnv(gymnasium.Env):

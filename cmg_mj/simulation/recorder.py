@@ -19,7 +19,7 @@ from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.simulation.physics import Joints
 
 TICKS_A_PIECE = 256
-"""So many ticks wait until they are made into columns together, which is much cheaper than one by one."""
+"""Ticks that are made into columns together, which is much cheaper than one by one."""
 
 
 class TickRecorder:

@@ -45,7 +45,7 @@ _COST = struct.Struct("<3I")
 
 @dataclass
 class WireCounts:
-    """What has gone over a wire during a run.
+    """The traffic over a wire during a run.
 
     Attributes:
         sent_again: Number of samples that were sent again.

@@ -24,11 +24,11 @@ class PluginModule(NamedTuple):
     """A module of an axis."""
 
     name: str
-    """What its elements' names begin with, such as `cube1` or `roll/cube1`."""
+    """Prefix of its elements' names, such as `cube1` or `roll/cube1`."""
     direction: float
     """Sign of u that its gimbal is given."""
     speed: float
-    """Of its flywheel [rad/s]."""
+    """Speed of its flywheel [rad/s]."""
     zero: float
     """Angle of its gimbal at which the flywheel's axis is upright [rad]."""
 
@@ -68,7 +68,7 @@ class PluginRig:
 
     @property
     def clock(self) -> Clock:
-        """Its clock."""
+        """The clock of the plugin."""
         controller = self.axes[0].controller
         return Clock(controller.timestep, self.instant_steps, controller.period)
 

@@ -54,7 +54,7 @@ class TracedLaw(NamedTuple):
 
     @property
     def is_state_feedback(self) -> bool:
-        """Whether it is (8), which keeps u within its limit by itself, and whose numbers have names in C."""
+        """True for (8), which keeps u within its limit by itself, and whose numbers have names in C."""
         return self.init is None
 
     @property

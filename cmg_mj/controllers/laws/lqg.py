@@ -144,7 +144,7 @@ class Lqg:
         return self.innovation_gain.tolist(), np.hstack([F, G]).tolist(), per_torque
 
     def init(self, y: Measurement) -> LqgState:
-        """At rest at the measured angles, with no torque."""
+        """Start at rest at the measured angles, with no torque."""
         zero = 0.0 * y.y1
         return LqgState(y.y1, zero, y.y2, zero, zero)
 

@@ -34,7 +34,7 @@ class Escape(NamedTuple):
     error: np.ndarray
     """|x2_hat - x2|/x2, (n,)."""
     end_time: float
-    """When the solution ends."""
+    """Time at which the solution ends."""
     moved: float
     """Distance that y has moved until then; infinite if without bound."""
 

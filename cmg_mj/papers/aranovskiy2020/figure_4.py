@@ -31,7 +31,7 @@ class OpenLoopRuns(NamedTuple):
     whole: dict[str, np.ndarray]
     """RMS of the estimated rate less the gyro's over the whole run, (n_worlds,) [rad/s]; `zero`: of zero."""
     after_push: dict[str, np.ndarray]
-    """The same from the push to one second after its end."""
+    """Errors from the push to one second after its end."""
     example: Trajectory
     """World 0."""
 

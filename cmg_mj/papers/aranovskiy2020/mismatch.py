@@ -82,7 +82,7 @@ class MismatchRuns(NamedTuple):
     plant: Plant
     """The symmetric rig."""
     symmetric: Result
-    """Its run, of all worlds."""
+    """Run of the symmetric rig, of all worlds."""
     broken: dict[tuple[str, float], Result]
     """(kind, size) -> run."""
 

@@ -70,7 +70,7 @@ class Residuals(NamedTuple):
     torque: float
     """The gimbal's torque less tau_c of (2) [N m]."""
     torque_turned_J2: float
-    """The same with the sign of the last term turned [N m]."""
+    """That difference with the sign of the last term turned [N m]."""
     torque_without_flywheel: float
     """The torque without the flywheel's term: the servo supplies that term [N m]."""
     torque_size: float

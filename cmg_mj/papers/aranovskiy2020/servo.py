@@ -68,7 +68,7 @@ class Servos(NamedTuple):
     velocity: Mapping[float, Result]
     """Deadband [rad/s] -> runs with the servo in velocity mode."""
     soft: Result
-    """Without a deadband, the soft servo in velocity mode."""
+    """Runs of the soft servo in velocity mode, without a deadband."""
 
 
 def run(worlds: int, seed: int, duration_s: float = DURATION_S) -> Servos:

@@ -26,7 +26,7 @@ MASS_KG = 4.0 * TABLE_1["m"]
 SPEED = TABLE_1["omega_d"]
 DURATION_S, PUSH_S = 3.0, 0.1
 PUSHES_N_M = (1.0, 2.0, 3.0)
-"""On either axis, of a body of four cubes [N m]; the rig of two has 1."""
+"""Pushes on either axis of a body of four modules [N m]; the rig of two has 1."""
 SMALL = 0.05
 """Two axes are separate if either changes the other by less than this share of the largest tilt."""
 WEIGHTS = (426.0, 1.7, 0.01, 0.08)

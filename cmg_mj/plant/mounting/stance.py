@@ -28,7 +28,7 @@ MOST_TRIES = 5
 
 
 class Place(NamedTuple):
-    """Where the modules go on a robot, and the line that it tilts about."""
+    """The place of the modules on a robot, and the line that it tilts about."""
 
     joint: str
     """The hinge that the robot tilts about, or its free joint."""

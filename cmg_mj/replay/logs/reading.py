@@ -136,7 +136,7 @@ class _Rows:
 
     @property
     def referred(self) -> bool:
-        """Whether there is a reference."""
+        """True if there is a reference."""
         return "rate" in self.signals
 
     @property

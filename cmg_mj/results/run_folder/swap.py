@@ -29,7 +29,7 @@ from cmg_mj.results.run_folder.manifest import (
 )
 
 ASIDE = "incomplete"
-"""Where in a folder goes what may not take the place of the result there."""
+"""Subfolder for a result that may not replace the one in the folder."""
 
 
 def stage(folder: Path) -> Path:

@@ -90,19 +90,19 @@ class SimulatedPush(NamedTuple):
     """Largest impulse about the line, as a push of 0.1 s either way, that all worlds stand, less a tenth [N m s]. If
     the search is complete, twenty others stand it too. 0 if it does not stand, or not the smallest push tried."""
     complete: bool = True
-    """Whether the search came to its end within its time."""
+    """True if the search came to its end within its time."""
     servo_torque: float | None = None
     """Largest torque of a gimbal servo that this push takes [N m]; None if that was not seen."""
     servo_rate: float | None = None
     """Largest rate of a gimbal that it takes [rad/s]."""
     others_fell: bool = False
-    """Whether the time ended after some of the twenty others had fallen with a larger push than `impulse`."""
+    """True if the time ended after some of the twenty others had fallen with a larger push than `impulse`."""
     worlds: int = WORLDS
     """Worlds that were tried without a push: ten, and twenty others where it is `Prospects.noisy`."""
 
     @property
     def falls(self) -> bool:
-        """Whether a world falls without a push."""
+        """True if a world falls without a push."""
         return self.standing is not None and self.standing < self.worlds
 
 
@@ -210,7 +210,7 @@ class _Attempt(NamedTuple):
 
     @property
     def all_stand(self) -> bool:
-        """Whether no world fell."""
+        """True if no world fell."""
         return self.standing == self.worlds
 
 
