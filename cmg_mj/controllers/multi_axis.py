@@ -51,14 +51,14 @@ class MultiAxisController:
     """Runs a controller an axis, tick after tick.
 
     Where the rig turns about the vertical at w, the momenta of axis j, its wheels' and its tilt's, are swept round with
-    it, and what torque that takes acts about axis i. Its gimbals cancel it at the rate
+    it. This takes a torque, which acts about axis i. The gimbals of axis i cancel this torque at the rate
 
         u_i = w sum_j (c_ij sin(x3_j) + d_ij x2_j) / cos(x3_i)
 
     (`YawCoupling`) beside the law's own u, with the x2_j that is fed back (the observers', unless `feedback` says
-    otherwise). The observers are told the law's u alone: the rest makes no torque. From the accelerometers' angular
-    acceleration w k_ij x2_j is taken, with x2_j of the tick before. w is what a cheap gyro about the frame's vertical
-    shows.
+    otherwise). The observers get the law's u alone: the rest makes no torque. w k_ij x2_j, with x2_j of the tick
+    before, is subtracted from the accelerometers' angular acceleration. w is the reading of a cheap gyro about the
+    frame's vertical.
 
     Args:
         parts: The controllers, one an axis, of one control period.

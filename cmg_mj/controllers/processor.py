@@ -71,7 +71,7 @@ class ProcessorController(Controller):
         observer: The observer that the processor runs.
         law: The law that it runs.
         sensors: What stands between the ideal readings and the processor.
-        plant: What the controller knows of the plant.
+        plant: The controller's knowledge of the plant.
         **options: Those of `Controller`.
 
     Raises:

@@ -41,7 +41,7 @@ class LinearTimeVarying:
 
     H is advanced by its exact solution for an A' held over half a step (`riccati.py`), the estimate by
     `model_copy.follow` with H at the beginning, in the middle and at the end of the step: one step a sample, or more if
-    Q asks for a faster observer than that bears.
+    Q makes the observer too fast for one.
 
     Attributes:
         dt: Sample period [s].

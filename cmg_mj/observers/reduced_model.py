@@ -24,7 +24,7 @@ Terms = tuple[Scalar, Scalar, Scalar]
 
 
 MARGIN = 1e-6
-"""A mode that takes longer than 1/MARGIN to fade, eleven days, is none that fades [1/s].
+"""Least rate of a mode that counts as fading [1/s]. 1/MARGIN is eleven days.
 
 Rounding moves a pole at zero by about 1e-16 times the largest entry, to either side and otherwise on every processor.
 """

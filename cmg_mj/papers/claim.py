@@ -57,7 +57,7 @@ class Claim:
         statement: Statement of the paper there, in our words.
         result: Result obtained, with its figures, in words.
         table: A Markdown table of further figures, below the words.
-        holds: Whether what was obtained bears the paper out, computed from the figures; or that by each of several
+        holds: True if the figures confirm the claim, computed from them; or such a value for each of several
             measures, all of which must hold.
         assumes: Assumptions of ours that the claim depends on, each with its size in a few words.
         is_general: Whether the statement is a general one, which was tried on some systems and not proved.
@@ -67,7 +67,7 @@ class Claim:
         figures: The numbers behind `result`, by names that end in their unit, as JSON can hold them.
         pictures: Plots.
         is_ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
-        measures: Measure -> whether it holds by it, if `holds` was told by each.
+        measures: Measure -> true if the claim holds by it; empty if `holds` is one value.
     """
 
     place: str

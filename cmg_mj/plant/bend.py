@@ -163,7 +163,7 @@ def mode_inertia(model: mujoco.MjModel, key: int, line: HingeLine, *, slides: bo
         model: The compiled model, with the bend.
         key: The keyframe.
         line: The tilt's hinge.
-        slides: Whether the pivot slides freely. It then gives way, with all that nothing holds.
+        slides: True if the pivot slides freely. It then moves with the mode, as all unheld joints do.
     """
     data = at_keyframe(model, key)
     dense = np.zeros((model.nv, model.nv))

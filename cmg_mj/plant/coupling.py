@@ -58,7 +58,7 @@ def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarr
 
 
 def _tilting(model: mujoco.MjModel, root: int) -> list[int]:
-    """A body and all that hangs on it."""
+    """Return a body and its descendants."""
     bodies = {root}
     for body in range(root + 1, model.nbody):  # children come after their parents
         if int(model.body_parentid[body]) in bodies:

@@ -177,7 +177,7 @@ def line_at_site(model: mujoco.MjModel, data: mujoco.MjData, site: int, key: int
         key: The keyframe.
 
     Returns:
-        The line; None if the body neither hangs on a hinge along it nor is free.
+        The line; None if the body has no hinge along it and is not free.
     """
     at, axes = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
     body = int(model.site_bodyid[site])

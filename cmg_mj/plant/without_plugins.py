@@ -171,7 +171,7 @@ def _named_files(element: _Element, file: Path, model: Path) -> Iterator[tuple[_
 
 
 def _elements(text: str) -> Iterator[_Element]:
-    """List what an MJCF's <plugin>, <instance>, <include> and <model> elements are; what is never closed is none."""
+    """List the closed <plugin>, <instance>, <include> and <model> elements of an MJCF."""
     opened: list[_Element] = []
     for token in _TOKEN.finditer(text):
         tag, attributes = token["tag"], token["attributes"]

@@ -117,7 +117,7 @@ def replay_log(
 
     Args:
         log: The log.
-        observers: Names, or `package.module:Class`; all by default. Observers whose needs the log lacks are left out.
+        observers: Names, or `package.module:Class`; all by default. Observers whose needs the log lacks are omitted.
         model: The pendulum, if it is known.
         noise: The sensors' noise that observers assume; by default `noise_of(log)`.
         parameters: Observer -> parameter -> value, where not the default.

@@ -73,8 +73,8 @@ def acceleration_floor(noise: TiltNoise, dt: float) -> float:
 class TiltFloor:
     """The best causal linear filter of y1 alone, found afterwards: by least squares to the true rate itself.
 
-    Without a model y1 bounds nothing unless it is told what motions there are. This filter is told more than any
-    observer can know: what the rate was, in the very world that is judged. No time-invariant linear filter of y1 with
+    Without a model y1 gives no bound, unless the motions are known. This filter knows more than any observer can: the
+    true rate in the very world that is judged. No time-invariant linear filter of y1 with
     its taps (16 over 0.5 s at 200 Hz), started at rest, has a smaller error there, however it is tuned. Filters with
     more taps, or that vary with time, may have. The whole run and the push windows have a filter each. One filter for
     all of 20 worlds has an error 1 % larger over the whole run of push_recovery, and 6 % in the push window: so much is

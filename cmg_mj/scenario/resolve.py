@@ -122,8 +122,8 @@ def differences(base: Mapping[str, Any], scenario: Mapping[str, Any]) -> dict[st
     """Compare two resolved scenarios.
 
     Args:
-        base: The one that the other is told apart from.
-        scenario: The other.
+        base: The scenario that `scenario` is compared with.
+        scenario: A scenario.
 
     Returns:
         Field, `section.field` -> its value in the other; None where it has no such field. The parameters of different

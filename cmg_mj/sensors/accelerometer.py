@@ -142,7 +142,7 @@ class Accelerometer:
 
     @property
     def sample_sigma(self) -> float:
-        """Standard deviation of one sample with the quantisation, as filters are told it [m/s^2]."""
+        """Standard deviation of one sample with the quantisation, as filters assume it [m/s^2]."""
         step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
         return math.hypot(self.white_noise_sigma, step / math.sqrt(12.0))
 

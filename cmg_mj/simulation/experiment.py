@@ -294,7 +294,7 @@ class Experiment:
     def differences(self) -> dict[str, Any]:
         """Differences from the bundled scenario it is based on: `section.field` -> its value.
 
-        Title, seed and observer are left out; a scenario of the user's own differs from none.
+        Title, seed and observer are ignored; a scenario of the user's own differs from none.
         """
         base = base_of(self.scenario)
         if base is None:

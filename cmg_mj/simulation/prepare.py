@@ -37,10 +37,10 @@ def plant_on_grid(scenario: Scenario, grid: TimeGrid, like: Plant | None = None)
 
 
 def check_scenario(scenario: Scenario, plant: Plant) -> None:
-    """Refuse what a scenario asks of a plant that it is not, or cannot do.
+    """Refuse a scenario that does not fit a plant.
 
     Raises:
-        InputError: An axis is none of the plant's, the pivot cannot be moved, or its track cannot be read.
+        InputError: The plant lacks an axis, the pivot cannot be moved, or its track cannot be read.
     """
     check_axes(scenario, plant)
     for i, pivot in enumerate(scenario.pivot):

@@ -52,8 +52,8 @@ class Lqg:
     weights, continuous control has Table 2's gains to their printed digits on the papers' rig.
 
     Integral action is there twice. A bias e or a constant torque moves the equilibrium: the rig balances where gravity
-    bears the torque, at x1 = -torque/(n M), M the gravity torque of one of n gimbals' shares, and the tilt is fed back
-    from there. While the torque is still being learnt, and where something else turns the gimbals steadily, the
+    cancels the torque, at x1 = -torque/(n M), M the gravity torque of one of n gimbals' shares. The law feeds back the
+    tilt from there. While the torque is still being learnt, and where something else turns the gimbals steadily, the
     integrator of (8) brings them back, fed with the estimated angle and exact for a u held: x_e+ = x_e - dt (x3 + dt
     u/2). While the command is limited, it takes no step that would push it further into the limit.
 

@@ -1,6 +1,6 @@
 """Scissored pairs whose halves are not alike: Hypotheses 1 and 2 of aranovskiy2020 broken on purpose.
 
-Neither the controller nor the observers know of it.
+The controller and the observers do not know the change.
 """
 
 from __future__ import annotations

@@ -155,7 +155,7 @@ def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Moti
 
 
 def _about_the_joint(data: mujoco.MjData, body: int) -> float:
-    """Return the vertical part of the momentum of all that hangs on a body, about the world's origin [N m s]."""
+    """Return the vertical part of the momentum of a body and its descendants, about the world's origin [N m s]."""
     arm, moving = data.subtree_com[body], data.subtree_linvel[body] * MASS_KG
     return data.subtree_angmom[body][2] + arm[0] * moving[1] - arm[1] * moving[0]
 
