@@ -58,7 +58,7 @@ def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     """
     for plugin in spec.plugins:
         if plugin.plugin_name.startswith(OWN):
-            raise InputError(f"{path}: the plugin {plugin.plugin_name} cannot be left out; take it out of the file")
+            raise InputError(f"{path}: the plugin {plugin.plugin_name} cannot be ignored; take it out of the file")
     try:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")

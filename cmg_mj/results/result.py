@@ -179,7 +179,7 @@ class Result(NamedColumns):
         """Split the worlds into groups of equal size, in the order in which `run_many` was given them."""
         worlds = len(self.outcomes)
         if count < 1 or worlds % count:
-            raise InputError(f"groups({count}): {worlds} worlds cannot be parted so")
+            raise InputError(f"groups({count}): {worlds} worlds cannot be split into groups of equal size")
         if count == 1:
             return [self]
         size = worlds // count

@@ -72,7 +72,7 @@ def check_axes(scenario: Scenario, plant: Plant) -> None:
     known = [*plant.axis_names, *plant.settings.locked_axes]
     for name in scenario.axes:
         if known == [""]:
-            raise InputError(f"axes.{name}: the rig has one axis, without a name; what it has stands in [plant], ...")
+            raise InputError(f"axes.{name}: the rig has one axis, without a name; set its values in [plant], ...")
         if name not in known:
             raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
     torques = [(f"push.{i}.axis", push.axis) for i, push in enumerate(scenario.push)]

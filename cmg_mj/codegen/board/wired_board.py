@@ -116,7 +116,7 @@ class WiredBoard:
         self._hello = self._shake(HELLO)
         if not self._hello.payload:  # the question, which carries nothing
             raise InputError(
-                f"{name}: sends back what it receives: a loopback plug or an echoing terminal is there, and no board"
+                f"{name}: echoes all that it receives: a loopback plug or an echoing terminal is there, not a board"
             )
         self.identity = read_identity(self._hello, name)
         self.identity.require(expected, name)

@@ -180,8 +180,8 @@ def _support(
     height = float(data.subtree_com[int(model.jnt_bodyid[joint])][2] - middle[2])
     if math.degrees(math.atan2(0.5 * width, max(height, 1e-9))) > STANDS_DEG:
         raise InputError(
-            f"{path}: stands by itself: what it stands on is {width:.3g} m wide across the axis; a pair balances what "
-            "stands on a line or a point (another --axis?)"
+            f"{path}: stands by itself: its support is {width:.3g} m wide across the axis; a pair balances a robot "
+            "that stands on a line or a point (another --axis?)"
         )
     return middle, direction
 
