@@ -80,4 +80,5 @@ def main(run: Path) -> None:
         write_reproduced(run, report)
 
 
-main(Path(sys.argv[1]))
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
