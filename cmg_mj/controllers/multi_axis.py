@@ -151,5 +151,5 @@ class MultiAxisController:
 
 
 def _fed_back(feedback: Feedback, tick: Tick, ideal: IdealReading) -> Scalar:
-    """The tilt rate of an axis that its law is given [rad/s]."""
+    """Return the tilt rate of an axis that its law is given [rad/s]."""
     return tick.estimates[0][1] if feedback == "observer" else tick.fog if feedback == "fog" else ideal.rate

@@ -52,7 +52,7 @@ def _fields(section: type) -> Mapping[str, FieldInfo]:
 
 
 def _classes_in(annotation: Any) -> list[type]:
-    """All classes that a type is put together from."""
+    """Return all classes that a type is put together from."""
     arguments = get_args(annotation)
     if arguments:
         return [part for argument in arguments for part in _classes_in(argument)]

@@ -226,7 +226,7 @@ class Adaptive:
 
 
 def _midpoint_rule(h: float, l1: float, l2: float, a: Scalar) -> Callable:
-    """The step (1 - h/2 M) v+ = (1 + h/2 M) v + h w with M = [[l1, 1], [l2, a]], of (v1, v2, w1, w2)."""
+    """Return the step (1 - h/2 M) v+ = (1 + h/2 M) v + h w with M = [[l1, 1], [l2, a]], of (v1, v2, w1, w2)."""
     k = 0.5 * h
     scale = 1.0 / ((1.0 - k * l1) * (1.0 - k * a) - k * k * l2)
 

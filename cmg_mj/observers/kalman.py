@@ -149,7 +149,7 @@ class Kalman:
         return State(*x, P), TorqueEstimate(*x)
 
     def _predicted(self, state: State, u: Scalar) -> tuple[Four, Covariance]:
-        """The state and its covariance a sample period later: F P F' + Q."""
+        """Return the state and its covariance a sample period later: F P F' + Q."""
         x1, x2, x3, torque, P = state
         p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = P
         f2, a, b, c, d = self.model.slopes(x1, x2, x3, u, torque)

@@ -118,7 +118,7 @@ def _refuse_torques_of_hinge(rigid: mujoco.MjModel, line: HingeLine, settings: P
 
 
 def step_for_bend(settings: PlantSettings, step: float, path: Path) -> float:
-    """The longest physics step that follows the mode, and settings that go together with it.
+    """Return the longest physics step that follows the mode, and settings that go together with it.
 
     Args:
         settings: The plant's settings.

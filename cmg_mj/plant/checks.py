@@ -84,7 +84,7 @@ class RigChecker:
             self._momentum([module for modules in complete.values() for module in modules])
 
     def _axis(self, name: str, modules: Sequence[str]) -> Iterator[str]:
-        """All of one axis."""
+        """Check all of one axis."""
         model, data = self.model, self.data
         self.prefix = f"{name}/" if name else ""
         self.what = what = self.prefix + TILT_ELEMENT
@@ -121,7 +121,7 @@ class RigChecker:
         return gimbal, flywheel, servo, motor
 
     def _upright(self) -> Iterator[str]:
-        """The centre of mass of all that tilts lies above the tilt axis, which is horizontal."""
+        """Check that the centre of mass of all that tilts lies above the tilt axis, which is horizontal."""
         assert self.tilt is not None
         if abs(_degrees_between(self.axis, np.array([0.0, 0.0, 1.0])) - 90.0) > MOUNTED_DEG:
             yield f"{self.what!r} must lie along a horizontal axis"

@@ -137,7 +137,7 @@ def _contacts(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
 
 
 def _null_space(matrix: np.ndarray) -> np.ndarray:
-    """An orthonormal basis of what a matrix (m, n) takes to zero, (n, k)."""
+    """Return an orthonormal basis of the null space of a matrix (m, n), (n, k)."""
     _, sizes, directions = np.linalg.svd(matrix)
     rank = int(np.sum(sizes > SMALL * sizes[0])) if sizes[0] > 0.0 else 0
     return directions[rank:].T

@@ -259,13 +259,13 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
 
 
 def frame_bodies(model: mujoco.MjModel, axis: Axis) -> list[int]:
-    """The frame, and the part of it beyond a bend if there is one."""
+    """Return the frame, and the part of it beyond a bend if there is one."""
     part = element_id(model, "body", BEND_JOINT)
     return [axis.frame, *([part] if part >= 0 else [])]
 
 
 def _hinge(axis: Axis, path: Path) -> int:
-    """The degree of freedom that friction of the tilt acts on."""
+    """Return the degree of freedom that friction of the tilt acts on."""
     if not isinstance(axis.line, HingeLine):
         raise InputError(f"plant.tilt_friction_n_m, plant.tilt_damping_n_m_s: {path} tilts about no hinge")
     return axis.line.dof

@@ -38,7 +38,7 @@ def safe_name(text: str) -> str:
 
 
 def _first(texts: list[str], count: int, rest: str) -> list[str]:
-    """The first ones, and how many more there are."""
+    """Return the first ones, and how many more there are."""
     more = len(texts) - count
     return texts if more <= 0 else [*texts[:count], rest.format(more).strip()]
 

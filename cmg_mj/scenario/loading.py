@@ -81,14 +81,14 @@ def _drop_gains(fields: dict[str, Any], overrides: Iterable[str], has_law_change
 
 
 def _kind_of(fields: Mapping[str, Any], section: str) -> Any:
-    """The kind of observer or law that a file names, or the default."""
+    """Return the kind of observer or law that a file names, or the default."""
     usual = {"observer": ObserverSettings().kind, "controller": ControllerSettings().kind}[section]
     section_fields = fields.get(section)
     return section_fields.get("kind", usual) if isinstance(section_fields, Mapping) else usual
 
 
 def _read(path: Path, name: str) -> dict[str, Any]:
-    """The content of a TOML file."""
+    """Read the content of a TOML file."""
     text = read_text(path, name, SCENARIO_FILE)
     if text.lstrip().startswith("<"):
         raise InputError(f"{name}: is XML, not a scenario; a scenario names its model with plant.model")

@@ -167,7 +167,7 @@ class Accelerometer:
         return {name: value for name in optional if (value := getattr(self, name)) not in (0.0, (0.0, 0.0), ())}
 
     def constant_errors(self) -> Callable[[Forces], Forces]:
-        """A function: true specific forces (inner x, z, outer x, z) -> what parts without noise show [m/s^2].
+        """Return a function: true specific forces (inner x, z, outer x, z) -> what parts without noise show [m/s^2].
 
         Floats become a tuple of four floats, an array (4, n_worlds) one of the same shape.
         """
@@ -207,7 +207,7 @@ class Accelerometer:
         drift: Callable[[], Forces] | None = None,
         vibration: Callable[[IdealReading], Forces] | None = None,
     ) -> Callable[[IdealReading, Sequence[Scalar]], Forces]:
-        """The parts at work: to be called once for every sample that they take (`raw_rate_hz`).
+        """Return the parts at work: to be called once for every sample that they take (`raw_rate_hz`).
 
         Args:
             drift: What the 1/f noise adds to the next sample, four numbers or an array (4, n_worlds) [m/s^2].

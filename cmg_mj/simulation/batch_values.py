@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 def batch_values(values: Sequence[T]) -> T:
-    """One value that stands for a value a world.
+    """Stack the values of the worlds into one value.
 
     Args:
         values: A world each: numbers, or tuples or frozen dataclasses of such.

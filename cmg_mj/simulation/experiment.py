@@ -188,7 +188,7 @@ class Experiment:
         return self.axes or (self,)
 
     def with_varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
-        """The scenario with other settings in each world; worlds with equal settings share one.
+        """Return the scenario with other settings in each world; worlds with equal settings share one.
 
         Args:
             vary: Field -> its value in each world. A field is named as with `--set`; one of [plant] by itself too.
@@ -287,7 +287,7 @@ class Experiment:
             part.design.dry_run(worlds)
 
     def resolved(self) -> dict[str, Any]:
-        """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
+        """Return the scenario with every default written out, and the versions it ran with, as TOML can hold it."""
         return resolved(self.scenario, {part.plant.axis.name: part.design for part in self.parts})
 
     @functools.cached_property
@@ -311,7 +311,7 @@ class Experiment:
         return law_change | differences(bundled.resolved(), self.resolved())
 
     def as_toml(self, driver: Driver = "native", world: int = 0, wire: WireSettings | None = None) -> str:
-        """The resolved scenario: running it again gives the same run; its head says if that needs options."""
+        """Return the resolved scenario: running it again gives the same run; its head says if that needs options."""
         return rerun_head(driver, world, wire) + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path) -> None:

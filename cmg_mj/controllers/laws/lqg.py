@@ -168,7 +168,7 @@ class Lqg:
 def sampled_cost(
     A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray, dt: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The integral of x'Qx + u'Ru along x' = A x + B u, for a u held over a period (Van Loan).
+    """Return the integral of x'Qx + u'Ru along x' = A x + B u, for a u held over a period (Van Loan).
 
     Args:
         A: State matrix, (n, n).
@@ -194,7 +194,7 @@ def sampled_cost(
 
 
 def _solved(what: str, solve: Callable[[], tuple[Any, Any, Any]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A gain, the Riccati equation's solution, and the poles.
+    """Return a gain, the Riccati equation's solution, and the poles.
 
     Raises:
         ValueError: There is no stabilising one.

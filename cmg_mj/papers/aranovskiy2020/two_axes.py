@@ -102,7 +102,7 @@ def at_rest(model: mujoco.MjModel) -> mujoco.MjData:
 
 
 def reduced(model: mujoco.MjModel, axis: int) -> ReducedModel:
-    """One axis' reduced model, by a gimbal's share of its pair, read off the mass matrix; J2 is small beside J1."""
+    """Return the reduced model of an axis, by a gimbal's share of its pair, off the mass matrix; J2 is small."""
     data, tilt = at_rest(model), addresses(model, axis).tilt
     J1 = float(_mass_matrix(model, data)[tilt, tilt]) / 2.0
     data.qvel[:] = 0.0

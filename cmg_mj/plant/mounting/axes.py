@@ -90,7 +90,7 @@ def _vector(axis: AxisLike, hinges: Sequence[str], path: Path) -> np.ndarray:
 
 
 def _level(direction: np.ndarray, what: str, path: Path) -> np.ndarray:
-    """The direction made exactly horizontal, if it nearly is."""
+    """Make a direction exactly horizontal, if it nearly is."""
     steep = math.degrees(math.asin(min(1.0, abs(float(direction @ UP)))))
     if steep > LEVEL_DEG:
         word = "along gravity" if steep > 90.0 - LEVEL_DEG else f"{steep:.3g} deg steep"

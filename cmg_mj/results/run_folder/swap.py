@@ -203,7 +203,7 @@ def _is_link(one: Path, other: Path) -> bool:
 
 
 def _unused(path: Path) -> Path:
-    """A name beside a file that is taken."""
+    """Return an unused name beside a file."""
     number = 1
     while os.path.lexists(path.with_name(f"{path.name}.{number}")):
         number += 1
