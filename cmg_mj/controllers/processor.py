@@ -43,7 +43,7 @@ class Processor(Protocol):
             The decision.
 
         Raises:
-            RunStopped: There is none.
+            RunStopped: The processor gives no decision.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""The line that a rig tilts about: a hinge, or, for a body that is free, a line through what it stands on."""
+"""The line that a rig tilts about: a hinge, or, for a free body, a line through its contacts with the floor."""
 
 from __future__ import annotations
 

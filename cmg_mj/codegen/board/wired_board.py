@@ -240,7 +240,7 @@ class WiredBoard:
         """Ask something outside of a run, again and again until there is an answer.
 
         Raises:
-            InputError: There is none.
+            InputError: The board does not answer.
         """
         frame = self._next(kind, b"")
         start = time.perf_counter()

@@ -75,7 +75,7 @@ class Prospects:
         hints = []
         if not abs(self.pole / self.limit.pole - 1.0) < POLE_DIFFERENCE:
             reason = self.overlap or (
-                "what it stands on rolls or gives way (soft contacts, or joints held softly), or the hinge that it "
+                "its support rolls or is soft (soft contacts, or joints held softly), or the hinge that it "
                 "tilts about has a spring or damping"
             )
             hints.append(
