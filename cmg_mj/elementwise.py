@@ -85,7 +85,7 @@ def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
 
 
 def radians(degrees: Scalar) -> Scalar:
-    """An angle in rad, elementwise; of a float what `math.radians` says."""
+    """Return an angle in rad, elementwise; for a float equal to `math.radians`."""
     return degrees * (math.pi / 180.0)
 
 

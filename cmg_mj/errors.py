@@ -64,12 +64,12 @@ def raised(error: BaseException) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST_SHOWN) -> str:
-    """The beginning of a text, with `...` where more follows."""
+    """Return the beginning of a text, with `...` where more follows."""
     return text if len(text) <= longest else f"{text[:longest]}..."
 
 
 def _safely(make: Callable[[], str], otherwise: str) -> str:
-    """A user's object as text; its own methods may raise anything."""
+    """Return a user's object as text; its own methods may raise anything."""
     try:
         return make()
     except KeyboardInterrupt:
@@ -79,7 +79,7 @@ def _safely(make: Callable[[], str], otherwise: str) -> str:
 
 
 def shown(value: TomlValue) -> str:
-    """A value as the user wrote it in TOML, shortened; strings in Python's quotes, which TOML takes too."""
+    """Return a value as the user wrote it in TOML, shortened; strings in Python's quotes, which TOML takes too."""
     return _safely(lambda: shortened(_as_toml(value)), "what cannot be shown")
 
 

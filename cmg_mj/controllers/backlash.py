@@ -1,7 +1,7 @@
 """Play between the servos' motors and their gimbals, held by friction: a gimbal rests until its motor has crossed it.
 
-In velocity mode a servo's motor turns at the commanded rate and does not know of the gap behind it. Encoders sit on the
-gimbals. The observers are told the command, not what the gimbals make of it.
+In velocity mode a servo's motor turns at the commanded rate, whatever the gap behind it. Encoders sit on the gimbals.
+The observers get the command, not the motion of the gimbals.
 """
 
 from __future__ import annotations

@@ -83,8 +83,8 @@ class Controller:
     Args:
         observer: The observer whose estimate the law uses.
         law: The control law; its `dt` is the control period, beyond its `rate_limit` no command goes.
-        sensors: What stands between the ideal readings and the controller.
-        plant: What it knows of the plant.
+        sensors: The sensors between the ideal readings and the controller.
+        plant: The controller's knowledge of the plant.
         seed: Seed of the sensors' noise.
         worlds: The number of one world, on floats, or the numbers of many, on arrays.
         feedback: Which rate the law uses: the observer's, the gyro's or the true one.

@@ -125,7 +125,7 @@ def _given(returned: Any, wanted: int) -> str:
 
 
 def _check_number(call: str, name: str, value: Any, worlds: int | None, tilt: float = TILTS[1]) -> None:
-    """A part of what a step returned is a number of each world."""
+    """Check that a part of a step's result is a number of each world."""
     number = np.asarray(value)
     if number.dtype.kind not in "fiu" or number.shape != (() if worlds is None else (worlds,)):
         raise InputError(f"{call} must return {_wanted(worlds)} for {name}, not {shown(value)}{_hint(worlds)}")

@@ -62,7 +62,7 @@ class LawRunner:
             self.trim(x_e)
 
     def decide(self, y: Measurement, x: FeedbackState, u: Scalar, step: int) -> tuple[Scalar, Scalar]:
-        """The command of a tick.
+        """Return the command of a tick.
 
         Args:
             y: What is measured.
@@ -129,7 +129,7 @@ class LawTakeover:
         return self._successor if self._begun else self._predecessor
 
     def decide(self, y: Measurement, x: FeedbackState, u: Scalar, step: int) -> tuple[Scalar, Scalar]:
-        """The command of a tick: see `LawRunner.decide`."""
+        """Return the command of a tick: see `LawRunner.decide`."""
         if not self._begun:
             self._successor.start(y, step)
             self._successor.take_integrator(self._predecessor)
@@ -141,13 +141,13 @@ Laws = LawRunner | LawTakeover
 
 
 def _of_worlds(value: Scalar, y: Measurement) -> np.ndarray:
-    """A user's numbers, which may be one for all worlds, as an array (n_worlds,) of its own."""
+    """Return a user's numbers, which may be one for all worlds, as an array (n_worlds,) of its own."""
     numbers = real_array(value, "the law returned")
     return numbers.astype(float) if numbers.shape == y.y1.shape else np.full(y.y1.shape, numbers, dtype=float)
 
 
 def _number(value: Scalar) -> float:
-    """A user's number, which may be NumPy's, as Python's own."""
+    """Return a user's number, which may be NumPy's, as Python's own."""
     number = np.asarray(value)
     if number.dtype.kind not in "fiub" or number.shape:
         raise TypeError(f"the law returned {number.dtype} of shape {number.shape}, not a real number")

@@ -29,7 +29,7 @@ def make_controller(
         observer: The observer in the loop.
         law: The control law.
         sensors: What stands between the ideal readings and the controller.
-        plant: What it knows of the plant.
+        plant: The controller's knowledge of the plant.
         processor: Takes the decisions in the host's place, such as a board.
         **options: Those of `Controller`.
 

@@ -20,23 +20,23 @@ Matrix = Sequence[Sequence[float]]
 
 
 class YawCoupling(NamedTuple):
-    """By how much the axes of a rig that turns at w couple, (n_axes, n_axes) each, zero on the diagonals.
+    """Coupling of the axes of a rig that turns at w, (n_axes, n_axes) each, zero on the diagonals.
 
-    In a frame that turns at w about the vertical z, with n_i along axis i, two momenta of axis j are swept round. That
-    of its wheels, its gimbals at x3_j, is s_j sin(x3_j), where s_j = sum over its modules of direction (gimbal axis x
-    momentum at x3 = 0); it changes by
+    In a frame that turns at w about the vertical z, with n_i along axis i, two momenta of axis j are swept round. The
+    momentum of its wheels, its gimbals at x3_j, is s_j sin(x3_j), where s_j = sum over its modules of direction (gimbal
+    axis x momentum at x3 = 0). It changes by
 
         s_j cos(x3_j) u_j + w (z x s_j) sin(x3_j),
 
-    and the frame gets the opposite torque. That of all that tilts, whose inertia about the vertical is I_z and about
-    the axes I_i and I_j, tilting at x2_j, is a torque (I_i + I_j - I_z) w x2_j n_i . (n_j x z) about axis i (Euler's
-    equations in that frame). Of both nothing is left with
+    and the frame gets the opposite torque. The bodies that tilt have the inertias I_z about the vertical, I_i and I_j
+    about the axes. Tilting at x2_j, they make a torque (I_i + I_j - I_z) w x2_j n_i . (n_j x z) about axis i (Euler's
+    equations in that frame). Both cancel with
 
         u_i = w sum_j (c_ij sin(x3_j) + d_ij x2_j) / cos(x3_i),
         c_ij = -n_i . (z x s_j)/(n_i . s_i),   d_ij = (I_i + I_j - I_z) n_i . (n_j x z)/(n_i . s_i).
 
-    And what accelerometers show as the angular acceleration about axis i has w k_ij x2_j in it that is none,
-    k_ij = 2 n_i . (z x n_j): Coriolis' acceleration, once of the frame and once of the point in it.
+    The angular acceleration that accelerometers show about axis i also contains w k_ij x2_j, k_ij = 2 n_i . (z x n_j):
+    Coriolis' acceleration, once of the frame and once of the point in it.
     """
 
     flywheels: np.ndarray
@@ -51,14 +51,14 @@ class MultiAxisController:
     """Runs a controller an axis, tick after tick.
 
     Where the rig turns about the vertical at w, the momenta of axis j, its wheels' and its tilt's, are swept round with
-    it, and what torque that takes acts about axis i. Its gimbals cancel it at the rate
+    it. This takes a torque, which acts about axis i. The gimbals of axis i cancel this torque at the rate
 
         u_i = w sum_j (c_ij sin(x3_j) + d_ij x2_j) / cos(x3_i)
 
     (`YawCoupling`) beside the law's own u, with the x2_j that is fed back (the observers', unless `feedback` says
-    otherwise). The observers are told the law's u alone: the rest makes no torque. From the accelerometers' angular
-    acceleration w k_ij x2_j is taken, with x2_j of the tick before. w is what a cheap gyro about the frame's vertical
-    shows.
+    otherwise). The observers get the law's u alone: the rest makes no torque. w k_ij x2_j, with x2_j of the tick
+    before, is subtracted from the accelerometers' angular acceleration. w is the reading of a cheap gyro about the
+    frame's vertical.
 
     Args:
         parts: The controllers, one an axis, of one control period.
@@ -151,5 +151,5 @@ class MultiAxisController:
 
 
 def _fed_back(feedback: Feedback, tick: Tick, ideal: IdealReading) -> Scalar:
-    """The tilt rate of an axis that its law is given [rad/s]."""
+    """Return the tilt rate of an axis that its law is given [rad/s]."""
     return tick.estimates[0][1] if feedback == "observer" else tick.fog if feedback == "fog" else ideal.rate

@@ -1,4 +1,4 @@
-"""A notch on the command: what the law asks for at the frequency of a mode does not reach the gimbals."""
+"""A notch on the command: it removes the part of the law's command at the frequency of a mode."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from cmg_mj.elementwise import Scalar, clip
 
 DEPTH_DAMPING, WIDTH_DAMPING = 0.02, 0.5
-"""Damping ratios of the notch's zeros and poles: a 25th of the command is left at its middle."""
+"""Damping ratios of the notch's zeros and poles: a 25th of the command remains at its middle."""
 
 
 class Notch:

@@ -30,10 +30,10 @@ class Processor(Protocol):
     """A processor that takes the control decision in the controller's place, in C or otherwise."""
 
     def start(self) -> None:
-        """The next update is the first."""
+        """Make the next update the first one."""
 
     def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
-        """One control period, from what the sensors show.
+        """Run one control period on the readings of the sensors.
 
         Args:
             accelerations: Inner x, z, outer x, z [m/s^2].
@@ -43,7 +43,7 @@ class Processor(Protocol):
             The decision.
 
         Raises:
-            RunStopped: There is none.
+            RunStopped: The processor gives no decision.
         """
         ...
 
@@ -71,7 +71,7 @@ class ProcessorController(Controller):
         observer: The observer that the processor runs.
         law: The law that it runs.
         sensors: What stands between the ideal readings and the processor.
-        plant: What the controller knows of the plant.
+        plant: The controller's knowledge of the plant.
         **options: Those of `Controller`.
 
     Raises:

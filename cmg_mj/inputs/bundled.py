@@ -1,4 +1,4 @@
-"""Where the bundled models and scenarios are."""
+"""Paths of the bundled models and scenarios."""
 
 from __future__ import annotations
 

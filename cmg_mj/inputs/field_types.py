@@ -70,4 +70,4 @@ Line = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")
 """A line of text, which terminals, plots and recordings show."""
 
 STRICT = ConfigDict(extra="forbid", arbitrary_types_allowed=True, allow_inf_nan=False)
-"""For pydantic's dataclasses: an unknown field, infinity and NaN are refused."""
+"""Configuration of pydantic's dataclasses: an unknown field, infinity and NaN are refused."""

@@ -56,7 +56,7 @@ def _checked(path: Path, root: Path, within: tuple[Path, ...]) -> Iterator[tuple
         )
     if path.suffix.lower() == ".mjb":
         raise InputError(
-            f"{root}: is a model that MuJoCo has compiled, whose parts cannot be told apart any more; give the MJCF "
+            f"{root}: is a model that MuJoCo has compiled, whose parts cannot be read any more; give the MJCF "
             "that it was made from (.xml)"
         )
     name = str(root) if path == root else f"{root}: {path.name}"

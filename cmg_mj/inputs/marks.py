@@ -12,7 +12,7 @@ Mark = TypeVar("Mark")
 
 
 def marked_fields(section: type, mark: type[Mark]) -> dict[str, Mark]:
-    """Find the fields that bear a mark.
+    """Find the fields that have a mark.
 
     Args:
         section: A class of pydantic's.
@@ -30,7 +30,7 @@ def marked_fields(section: type, mark: type[Mark]) -> dict[str, Mark]:
 
 
 def marked_values(section: BaseModel, mark: type[Mark]) -> Iterator[tuple[str, float, Mark]]:
-    """Go through the numbers of a section that bear a mark.
+    """Go through the numbers of a section that have a mark.
 
     Args:
         section: The section, such as a scenario.
@@ -52,7 +52,7 @@ def _fields(section: type) -> Mapping[str, FieldInfo]:
 
 
 def _classes_in(annotation: Any) -> list[type]:
-    """All classes that a type is put together from."""
+    """Return all classes that a type is put together from."""
     arguments = get_args(annotation)
     if arguments:
         return [part for argument in arguments for part in _classes_in(argument)]

@@ -41,7 +41,7 @@ def expected(annotation: Any) -> str:
 
 
 def _unwrapped(annotation: Any) -> tuple[Any, list[Any]]:
-    """A type without `Annotated`, and all bounds on it."""
+    """Return a type without `Annotated`, and all bounds on it."""
     bounds: list[Any] = []
     while get_origin(annotation) is Annotated:
         annotation, *extra = get_args(annotation)
@@ -66,7 +66,7 @@ def _text_bounds(metadata: Iterable[Any]) -> list[str]:
 
 
 def _plural(phrase: str) -> str:
-    """`a number greater than 0` -> `numbers greater than 0`."""
+    """Turn `a number greater than 0` into `numbers greater than 0`."""
     for one, many in (
         ("a whole number", "whole numbers"),
         ("a number", "numbers"),

@@ -31,7 +31,7 @@ def require_file(path: Path) -> None:
     """Refuse a path that names no ordinary file.
 
     Raises:
-        InputError: It is none.
+        InputError: The path names no ordinary file.
     """
     name = path if is_text(str(path)) else shown(str(path))
     try:

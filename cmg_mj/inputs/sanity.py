@@ -12,7 +12,7 @@ SMALLEST, LARGEST = 1e-30, 1e30
 MOST_BITS = 128
 """Bits of a whole number; seeds that NumPy makes have so many."""
 DEEPEST = 12
-"""So many sections and lists may lie in one another; the scenario's own are four deep."""
+"""Deepest nesting of sections and lists; the scenario's own are four deep."""
 
 
 def is_text(text: str) -> bool:

@@ -9,12 +9,12 @@ from cmg_mj.errors import InputError
 
 
 class TextFormat(NamedTuple):
-    """What a text file must be to be read."""
+    """The requirements on a text file."""
 
     noun: str
-    """What the file is, for messages: `scenario`."""
+    """Noun for the file in messages: `scenario`."""
     largest: int
-    """Its largest size [bytes]."""
+    """Largest size of the file [bytes]."""
     encoding: str
     not_text: str
     """Message on bytes that are no text in the encoding."""

@@ -50,7 +50,7 @@ class UserClassKind:
             The class.
 
         Raises:
-            InputError: There is none, or its module cannot be imported.
+            InputError: There is no such class, or its module cannot be imported.
         """
         setting = f"{self.section}.kind = {kind!r}"
         if ":" not in kind and kind not in self.known:

@@ -152,7 +152,7 @@ class Adaptive:
 
     @cached_property
     def _shown(self) -> list[int]:
-        """Which states of the exosystem are the extra signals: a constant, and the second part of a sinusoid."""
+        """Indices of the exosystem's states that are extra signals: a constant, and the second part of a sinusoid."""
         return [-1 if name == SINUSOID else 0 for name in self.extra_signals]
 
     @cached_property
@@ -226,7 +226,7 @@ class Adaptive:
 
 
 def _midpoint_rule(h: float, l1: float, l2: float, a: Scalar) -> Callable:
-    """The step (1 - h/2 M) v+ = (1 + h/2 M) v + h w with M = [[l1, 1], [l2, a]], of (v1, v2, w1, w2)."""
+    """Return the step (1 - h/2 M) v+ = (1 + h/2 M) v + h w with M = [[l1, 1], [l2, a]], of (v1, v2, w1, w2)."""
     k = 0.5 * h
     scale = 1.0 / ((1.0 - k * l1) * (1.0 - k * a) - k * k * l2)
 

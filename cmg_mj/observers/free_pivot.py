@@ -46,11 +46,11 @@ class State(NamedTuple):
     pivot: Scalar
     """Variance of w [rad^2]."""
     share: Scalar
-    """Weight of the next sample in it."""
+    """Weight of the next sample in that variance."""
     y1: Scalar
     """y1 of the sample before."""
     step: Scalar
-    """Its difference from y1 of the sample before that."""
+    """Difference of `y1` from y1 one sample earlier."""
 
 
 @dataclass(frozen=True, config=STRICT)

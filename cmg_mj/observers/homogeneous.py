@@ -52,7 +52,7 @@ class Homogeneous:
         if resistance * self.dt > LARGEST_RATE:
             raise ValueError(
                 f"friction_n_m, damping_n_m_s: too much for the sample period: friction_n_m/friction_width_rad_s + "
-                f"damping_n_m_s must be below {LARGEST_RATE / self.dt / resistance:.3g} times what it is"
+                f"damping_n_m_s must be below {LARGEST_RATE / self.dt / resistance:.3g} times its value"
             )
 
     @cached_property

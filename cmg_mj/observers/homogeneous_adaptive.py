@@ -1,4 +1,4 @@
-"""The homogeneous differentiator, told the equilibrium bias by the adaptive observer."""
+"""The homogeneous differentiator with the equilibrium bias that the adaptive observer estimates."""
 
 from __future__ import annotations
 

@@ -20,9 +20,9 @@ TERMS = 6
 times the sample period is below 1/20. On the bundled rig that product is 0.037, and the rest is below 6e-13."""
 
 PAIRS = tuple((i, j) for i in range(4) for j in range(i, 4))
-"""Rows and columns of what is kept of a symmetric 4x4 matrix: 11, 12, 13, 14, 22, 23, 24, 33, 34, 44."""
+"""Rows and columns of the stored entries of a symmetric 4x4 matrix: 11, 12, 13, 14, 22, 23, 24, 33, 34, 44."""
 COLUMNS = tuple(tuple(PAIRS.index((min(i, j), max(i, j))) for j in range(4)) for i in range(4))
-"""Where in that list the entries of a column are."""
+"""Indices in `PAIRS` of the entries of each column."""
 
 
 Four = tuple[Scalar, Scalar, Scalar, Scalar]
@@ -149,7 +149,7 @@ class Kalman:
         return State(*x, P), TorqueEstimate(*x)
 
     def _predicted(self, state: State, u: Scalar) -> tuple[Four, Covariance]:
-        """The state and its covariance a sample period later: F P F' + Q."""
+        """Return the state and its covariance a sample period later: F P F' + Q."""
         x1, x2, x3, torque, P = state
         p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = P
         f2, a, b, c, d = self.model.slopes(x1, x2, x3, u, torque)

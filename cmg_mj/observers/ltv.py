@@ -41,7 +41,7 @@ class LinearTimeVarying:
 
     H is advanced by its exact solution for an A' held over half a step (`riccati.py`), the estimate by
     `model_copy.follow` with H at the beginning, in the middle and at the end of the step: one step a sample, or more if
-    Q asks for a faster observer than that bears.
+    Q makes the observer too fast for one.
 
     Attributes:
         dt: Sample period [s].
@@ -116,7 +116,7 @@ class LinearTimeVarying:
 def _third_row(
     x3: Scalar, h: float, u: Scalar, y2_before: Scalar, y2: Scalar, h33: tuple[Scalar, Scalar, Scalar]
 ) -> Scalar:
-    """The same step of x3' = u - H33 (x3 - y2), which the other two rows do not enter."""
+    """Take the step of x3' = u - H33 (x3 - y2), which the other two rows do not enter."""
     y2_middle = 0.5 * (y2_before + y2)
     p = u - h33[0] * (x3 - y2_before)
     q = u - h33[1] * (x3 + 0.5 * h * p - y2_middle)

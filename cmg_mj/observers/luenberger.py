@@ -58,7 +58,7 @@ class Luenberger:
 
     @cached_property
     def _rows(self) -> list[list[float]]:
-        """For each state its coefficients of (x1, x2, x3, y1_{k-1}, y2_{k-1}, y1_k, y2_k, u)."""
+        """Coefficients of (x1, x2, x3, y1_{k-1}, y2_{k-1}, y1_k, y2_k, u) for each state."""
         Phi, hold_y, ramp_y = hold_matrices(self.error_matrix, np.array(self.L), self.dt)
         _, hold_u, _ = hold_matrices(self.error_matrix, self.model.B, self.dt)
         return np.hstack([Phi, hold_y - ramp_y, ramp_y, hold_u]).tolist()

@@ -81,7 +81,7 @@ def follow(
     end: Stage,
     gains: Sequence[Any] = (None, None, None),
 ) -> tuple[Scalar, Scalar]:
-    """One classical Runge-Kutta step of x1' = x2 - c1, x2' = known - loss x2 - c2, (c1, c2) = correction(e, gain).
+    """Take one classical Runge-Kutta step of x1' = x2 - c1, x2' = known - loss x2 - c2, (c1, c2) = correction(e, gain).
 
     Args:
         correction: The observer's correction.

@@ -31,7 +31,7 @@ class Measurement(_Angles):
     acceleration: Scalar = math.nan
 
     def __new__(cls, y1: Scalar, y2: Scalar, acceleration: Scalar = math.nan) -> Measurement:
-        """The angles [rad], and the angular acceleration if it is measured [rad/s^2]."""
+        """Make a measurement of the angles [rad], and of the angular acceleration if it is measured [rad/s^2]."""
         y = _new(cls, (y1, y2))
         y.acceleration = acceleration
         return y
@@ -67,7 +67,7 @@ class Observer(Protocol):
     """
 
     def init(self, y: Measurement) -> State:
-        """The state at the first sample. The estimate of that sample is (y1, 0, y2)."""
+        """Return the state at the first sample. The estimate of that sample is (y1, 0, y2)."""
         ...
 
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:

@@ -24,7 +24,7 @@ Terms = tuple[Scalar, Scalar, Scalar]
 
 
 MARGIN = 1e-6
-"""A mode that takes longer than 1/MARGIN to fade, eleven days, is none that fades [1/s].
+"""Least rate of a mode that counts as fading [1/s]. 1/MARGIN is eleven days.
 
 Rounding moves a pole at zero by about 1e-16 times the largest entry, to either side and otherwise on every processor.
 """
@@ -75,7 +75,7 @@ class ReducedModel:
         return -self.pivot_arm * (tilt_acceleration * cos(x1) - x2 * x2 * sin(x1))
 
     def measured_tilt(self, height: float, gravity: float) -> tuple[float, float]:
-        """The linearised y1 = c1 x1 + d u, where accelerometers take a point of the radial line to be at rest.
+        """Return the linearised y1 = c1 x1 + d u, where accelerometers take a point of the radial line to be at rest.
 
         From y1 = x1 - a/g, a = (height - pivot_arm) x2' the acceleration of that point, and (6).
 
@@ -165,7 +165,7 @@ class ReducedModel:
         return np.vstack([self.B, [[0.0]]])
 
     def linear_system(self) -> control.StateSpace:
-        """The linearisation (6) with the measured outputs, for python-control."""
+        """Return the linearisation (6) with the measured outputs, for python-control."""
         import control
 
         return control.StateSpace(
@@ -173,7 +173,7 @@ class ReducedModel:
         )
 
     def nonlinear_system(self) -> control.NonlinearIOSystem:
-        """The reduced model (4) itself, for python-control."""
+        """Return the reduced model (4) itself, for python-control."""
         import control
 
         def update(t: float, x: np.ndarray, u: np.ndarray, params: dict) -> np.ndarray:

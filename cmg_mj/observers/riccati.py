@@ -69,7 +69,7 @@ def exact_step(
 
 
 def map_of_one(q: float, span: float) -> tuple[float, float]:
-    """The same for one state that only integrates, H' = q - H^2: H -> (H + up)/(down H + 1).
+    """Return the map for one state that only integrates, H' = q - H^2: H -> (H + up)/(down H + 1).
 
     Args:
         q: Q.

@@ -43,9 +43,9 @@ class Scales(NamedTuple):
     """The units of a rig, in those of the papers' rig."""
 
     time: float
-    """Tau: the rig falls so many times as slowly."""
+    """Tau: the rig falls this many times as slowly."""
     inertia: float = 1.0
-    """So many times as heavy about the tilt axis."""
+    """Ratio of the inertias about the tilt axis."""
 
 
 @dataclass(frozen=True)

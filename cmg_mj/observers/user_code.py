@@ -40,7 +40,7 @@ class UserCode(NamedTuple):
 
 
 def real_array(value: ArrayLike, name: str) -> np.ndarray:
-    """A user's number or numbers as NumPy's.
+    """Return a user's number or numbers as NumPy's.
 
     Raises:
         TypeError: They are no real numbers.

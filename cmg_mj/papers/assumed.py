@@ -1,4 +1,4 @@
-"""What the papers do not give of the experiments on the six-body rig, and the scenario push_recovery has."""
+"""Data of the experiments on the six-body rig that the papers do not give; the scenario push_recovery has them."""
 
 from __future__ import annotations
 

@@ -13,13 +13,13 @@ Verdict = Literal[
 ]
 
 MEANINGS: dict[Verdict, str] = {
-    "reproduced": "it holds, and all that it depends on is printed in the paper",
-    "reproduced within stated conditions": "it holds with something assumed by us (a push, a bias e, noise, a drive), "
-    "with a misprint mended, or for a part of what is said; that stands below the claim",
-    "illustrated": "it is a general statement, and holds for the systems on which it was tried; that is no proof",
-    "cannot be tested": "whether it holds depends on something that the paper does not give, such as a recording, a "
-    "gain or a threshold; so what came out with ours speaks neither for it nor against it",
-    "not reproduced": "it does not hold, and the reason stands below the claim",
+    "reproduced": "the claim holds, and the paper prints all that the claim depends on",
+    "reproduced within stated conditions": "the claim holds with an assumption of ours (a push, a bias e, noise, a "
+    "drive), with a misprint mended, or in part. These conditions stand below the claim",
+    "illustrated": "the claim is a general statement and holds for the systems on which it was tried. This is no proof",
+    "cannot be tested": "the outcome depends on something that the paper does not give, such as a recording, a gain or "
+    "a threshold. A result with our choice speaks neither for the claim nor against it",
+    "not reproduced": "the claim does not hold, and the reason stands below it",
 }
 """The rule by which `Claim.verdict` decides, in words."""
 
@@ -56,8 +56,8 @@ class Claim:
         place: Place in the paper: `Fig. 2`, `Remark 1`, `Section V`.
         statement: Statement of the paper there, in our words.
         result: Result obtained, with its figures, in words.
-        table: More figures than a sentence bears, as a Markdown table below the words.
-        holds: Whether what was obtained bears the paper out, computed from the figures; or that by each of several
+        table: A Markdown table of further figures, below the words.
+        holds: True if the figures confirm the claim, computed from them; or such a value for each of several
             measures, all of which must hold.
         assumes: Assumptions of ours that the claim depends on, each with its size in a few words.
         is_general: Whether the statement is a general one, which was tried on some systems and not proved.
@@ -67,7 +67,7 @@ class Claim:
         figures: The numbers behind `result`, by names that end in their unit, as JSON can hold them.
         pictures: Plots.
         is_ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
-        measures: Measure -> whether it holds by it, if `holds` was told by each.
+        measures: Measure -> true if the claim holds by it; empty if `holds` is one value.
     """
 
     place: str
@@ -79,7 +79,7 @@ class Claim:
     is_general: bool = False
     missing_data: str = ""
     conditions: str = ""
-    otherwise: str = "The figures above do not bear it out."
+    otherwise: str = "The figures above contradict the claim."
     figures: Mapping[str, Any] = field(default_factory=dict)
     pictures: Sequence[Picture] = ()
     is_ours: bool = False

@@ -211,8 +211,8 @@ def claim(paper: Paper) -> Claim:
     condition_values = ", ".join(f"{value} at q2 = {angle}" for angle, value in symbolic.values.items())
     gap, factor, printed_factor = not zero_d_is_singular(), inertia_factor(paper), PRINTED[paper].factor
     remarks = {
-        "The printed proof has a gap: d = 0 alone does not make Psi singular (m1 = 1, Psi = [[0, 1], [1, 0]]); the "
-        "same argument for c, from B_(1), closes it: m1 (m1'/m1)' not constant makes both c and d zero.": gap,
+        "The printed proof has a gap: d = 0 alone does not make Psi singular (m1 = 1, Psi = [[0, 1], [1, 0]]). The "
+        "same argument for c, from B_(1), closes the gap: m1 (m1'/m1)' not constant makes both c and d zero.": gap,
         "The equality of the mixed derivatives is printed with a wrong sign: it is "
         "m1 (m1'/m1)' d = +2 d''.": mixed_derivatives() and not mixed_derivatives(sign=-1),
         f"By (2) the factor before (J1 + J2 cos^2 q2)/(I_c + I_d) is {factor}, not {printed_factor}, since both "
@@ -226,9 +226,9 @@ def claim(paper: Paper) -> Claim:
         result=f"No such Psi exists: m1 (m1'/m1)' is {condition_values} (I_cd = I_c + I_d), which differ for every J2 "
         f"other than 0. The checker can say yes: constant m1 has Psi = {_text(constant.Psi)}, "
         + ", ".join(f"m1 = {decision.m1} has Psi = {_text(decision.Psi)}" for decision in other_decisions)
-        + ", their B_(i) skew-symmetric by substitution in the definition. The paper's necessary condition is also "
-        "sufficient: a column of Psi serves exactly if it is a Killing field of M. An m1 > 0 on the whole line has "
-        "two independent ones exactly if m1 = (A exp(k q2) + D exp(-k q2))^2 with A, D >= 0."
+        + ". Substituted in the definition, these Psi make the B_(i) skew-symmetric. The paper's necessary condition "
+        "is also sufficient: a column of Psi serves exactly if it is a Killing field of M. An m1 > 0 on the whole line "
+        "has two independent ones exactly if m1 = (A exp(k q2) + D exp(-k q2))^2 with A, D >= 0."
         + (" The paper prints no proof; this is one." if paper == "sokolov2019" else ""),
         holds=not result.failures,
         conditions=on_printed_proof if paper == "aranovskiy2020" else "",

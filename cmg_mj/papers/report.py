@@ -86,17 +86,18 @@ def report_text(entries: Sequence[Reproduction]) -> str:
             parts.append("**Interrupted: not all of this paper's claims are here.**")
         log = SentenceLog()
         parts += [part for claim in entry.claims for part in _parts_of_claim(claim, log)]
-    return "\n\n".join(parts) + "\n"
+    counts = _count_of_verdicts(entries)  # one sentence a line, which other pages quote
+    return "\n\n".join(part if part == counts else markdown.wrap(part) for part in parts) + "\n"
 
 
 def _opening(entries: Sequence[Reproduction]) -> list[str]:
     """List the meanings of the verdicts, their counts, and the claims that do not hold or cannot be tested."""
     parts = [
-        "Each claim stands beside what this software obtains. Its verdict is computed, by one rule, from the figures "
-        "behind it and from what it is declared to depend on; no parameter was tuned to bring one about.",
+        "Each claim stands beside the result of this software. One rule computes the verdict from the claim's figures "
+        "and from the assumptions that the claim declares. No parameter was tuned to bring a verdict about.",
         "\n".join(f"- *{verdict}*: {meaning}." for verdict, meaning in MEANINGS.items()),
-        "A claim of several measures is judged by each: all must hold. What the bench assumes of the rig, claim or no "
-        "claim, is in docs/assumptions.md.",
+        "If a claim has several measures, all must hold. docs/assumptions.md lists the assumptions about the rig that "
+        "every claim shares.",
         _count_of_verdicts(entries),
     ]
     for verdict in ("not reproduced", "cannot be tested"):
@@ -142,7 +143,7 @@ def _parts_of_claim(claim: Claim, log: SentenceLog) -> list[str]:
 
 
 def _count_of_verdicts(entries: Sequence[Reproduction]) -> str:
-    """Count the claims by verdict, the papers' and ours apart, and say how long they took."""
+    """Count the claims by verdict, the papers' and ours apart, and say how long they took; a paragraph each."""
     claims = [claim for entry in entries for claim in entry.claims]
     sentences = []
     for is_ours, words in ((False, "claims of the papers"), (True, "beside them, not the papers'")):
@@ -151,7 +152,7 @@ def _count_of_verdicts(entries: Sequence[Reproduction]) -> str:
             order = [OURS[v] if is_ours else v for v in OURS]
             counts_text = ", ".join(_counted(counts[v], v) for v in order if counts[v])
             sentences.append(f"{sum(counts.values())} {words}: {counts_text}.")
-    return " ".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
+    return "\n\n".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
 
 
 def _counted(count: int, verdict: str) -> str:

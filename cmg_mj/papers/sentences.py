@@ -40,7 +40,7 @@ class SentenceLog:
             place: Place of their claim.
 
         Returns:
-            The rest, after `As at Fig. 2.` where something is left out.
+            The rest, after `As at Fig. 2.` where a sentence is omitted.
         """
         new, before = [], []
         for sentence in split_sentences(text):

@@ -78,7 +78,7 @@ class Axis:
 
     @cached_property
     def directions(self) -> list[float]:
-        """For each gimbal the sign of u that it is given."""
+        """Sign of u for each gimbal."""
         return [module.direction for module in self.modules]
 
     @cached_property
@@ -128,7 +128,7 @@ class Axis:
     def apparent_bias(self, accelerometer: Accelerometer, gravity: float) -> float:
         """Return the bias an observer should find: e less the tilt made by the accelerometers' constant errors.
 
-        With y1 = x1 - e + offset, the two cannot be told apart.
+        Since y1 = x1 - e + offset, no observer can separate the two.
 
         Args:
             accelerometer: The sensors of the tilt.
@@ -258,7 +258,7 @@ def pivot_rows(model: mujoco.MjModel, key: int, axis: Axis) -> tuple[np.ndarray,
 def _pivot_arm(model: mujoco.MjModel, key: int, axis: Axis, rates: np.ndarray) -> float:
     """Find how far the pivot slides back, across the axis, for a tilt of 1 rad while the joints have these rates [m].
 
-    It is 0 where the pivot is at rest, and where what the hinge hangs on turns with it: that is no sliding pivot.
+    This is 0 if the pivot is at rest. It is also 0 if the body that carries the hinge turns with the tilt.
     """
     across, about = pivot_rows(model, key, axis)
     if abs(float(about @ rates) - 1.0) > TURNS_ALIKE:

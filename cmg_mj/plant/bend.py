@@ -24,7 +24,7 @@ STEP_SHARE = 0.25
 RK4 is then 3.3e-5 slow (z^4/120) and takes z^5/72 = 1.4e-5 of the mode's energy a radian.
 """
 RIGID_SHARE = 0.999
-"""So much of the frame's own inertia may lie on one side of the bend: a part without mass does not move."""
+"""Largest share of the frame's own inertia on one side of the bend: a part without mass does not move."""
 
 
 def bend_frame(
@@ -118,7 +118,7 @@ def _refuse_torques_of_hinge(rigid: mujoco.MjModel, line: HingeLine, settings: P
 
 
 def step_for_bend(settings: PlantSettings, step: float, path: Path) -> float:
-    """The longest physics step that follows the mode, and settings that go together with it.
+    """Return the longest physics step that follows the mode, and settings that go together with it.
 
     Args:
         settings: The plant's settings.
@@ -163,7 +163,7 @@ def mode_inertia(model: mujoco.MjModel, key: int, line: HingeLine, *, slides: bo
         model: The compiled model, with the bend.
         key: The keyframe.
         line: The tilt's hinge.
-        slides: Whether the pivot slides freely. It then gives way, with all that nothing holds.
+        slides: True if the pivot slides freely. It then moves with the mode, as all unheld joints do.
     """
     data = at_keyframe(model, key)
     dense = np.zeros((model.nv, model.nv))

@@ -20,7 +20,7 @@ TRUE_DEG = 0.05
 MOUNTED_DEG = 5.0
 """A sensor or axis farther off is mounted otherwise, not inaccurately: no observer stands so much [deg]."""
 FIRST_S = 0.02
-"""So far physics is tried, within 4 to 100 steps [s]."""
+"""Simulated time of the trial of the physics, in 4 to 100 steps [s]."""
 HUGE = 1e10  # MuJoCo's mjMAXVAL
 STEPS_S = 1e-6, 0.1
 """Physics steps that a model may ask for [s]."""
@@ -84,7 +84,7 @@ class RigChecker:
             self._momentum([module for modules in complete.values() for module in modules])
 
     def _axis(self, name: str, modules: Sequence[str]) -> Iterator[str]:
-        """All of one axis."""
+        """Check all of one axis."""
         model, data = self.model, self.data
         self.prefix = f"{name}/" if name else ""
         self.what = what = self.prefix + TILT_ELEMENT
@@ -121,7 +121,7 @@ class RigChecker:
         return gimbal, flywheel, servo, motor
 
     def _upright(self) -> Iterator[str]:
-        """The centre of mass of all that tilts lies above the tilt axis, which is horizontal."""
+        """Check that the centre of mass of all that tilts lies above the tilt axis, which is horizontal."""
         assert self.tilt is not None
         if abs(_degrees_between(self.axis, np.array([0.0, 0.0, 1.0])) - 90.0) > MOUNTED_DEG:
             yield f"{self.what!r} must lie along a horizontal axis"
@@ -141,7 +141,7 @@ class RigChecker:
             )
 
     def _module(self, module: str) -> Iterator[str]:
-        """Its axes are at right angles, its flywheel turns, its servo holds where it stands."""
+        """Check a module: its axes are at right angles, its flywheel turns, its servo holds where it stands."""
         model, data = self.model, self.data
         gimbal, flywheel, servo, motor = self._addresses(module)
         turns, spins = data.xaxis[gimbal], data.xaxis[flywheel]
@@ -231,7 +231,7 @@ class RigChecker:
             yield f"{names[1]} must lie farther from the tilt axis than {names[0]}"
 
     def _momentum(self, modules: list[str]) -> None:
-        """On a free thrust bearing the flywheels' momenta must cancel, or the rig turns with every tilt."""
+        """Check that the flywheels' momenta cancel on a free thrust bearing; else the rig turns with every tilt."""
         model, data = self.model, self.data
         momenta = []
         for module in modules:

@@ -47,7 +47,7 @@ def _turned(model: mujoco.MjModel, data: mujoco.MjData, module: Module) -> np.nd
 
 
 def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarray:
-    """The inertia of all that tilts about a point of the line, in the world (3, 3) [kg m^2]."""
+    """Return the inertia of all that tilts about a point of the line, in the world (3, 3) [kg m^2]."""
     pivot = data.xpos[axis.frame] + data.xmat[axis.frame].reshape(3, 3) @ axis.point
     inertia = np.zeros((3, 3))
     for body in _tilting(model, int(model.jnt_bodyid[axis.line.joint])):
@@ -58,7 +58,7 @@ def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarr
 
 
 def _tilting(model: mujoco.MjModel, root: int) -> list[int]:
-    """A body and all that hangs on it."""
+    """Return a body and its descendants."""
     bodies = {root}
     for body in range(root + 1, model.nbody):  # children come after their parents
         if int(model.body_parentid[body]) in bodies:

@@ -1,4 +1,4 @@
-"""The inertia that a tilt feels: what hangs on the line, less what what it hangs on gives way."""
+"""The effective inertia about a tilt line. Bodies that are free to move reduce it."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ SMALL = 1e-9
 
 @dataclass(frozen=True)
 class Inertia:
-    """About a line.
+    """The effective inertia about a line.
 
     Attributes:
-        coupling_row: Couples a tilt with every joint, (nv,).
-        tilt_inertia: The tilt's [kg m^2].
-        rates: The joints' rates while it tilts by 1 rad/s and all that nothing holds gives way, (nv,).
+        coupling_row: Row of the mass matrix that couples a tilt with every joint, (nv,).
+        tilt_inertia: Effective inertia of the tilt [kg m^2].
+        rates: Rates of the joints while the plant tilts by 1 rad/s and the unheld joints move freely, (nv,).
     """
 
     coupling_row: np.ndarray
@@ -32,15 +32,15 @@ class Inertia:
 
 
 def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int, float]) -> Inertia:
-    """The inertia of all that tilts at the keyframe, with some joint angles replaced.
+    """Compute the effective inertia of a tilt at the keyframe, with some joint angles replaced.
 
-    What a hinge's body hangs on may move: the tilt then feels less inertia, that which is left when all that nothing
-    holds gives way. The floor does not, nor what stands on it at the keyframe, as far as the contacts hold that.
+    The body that carries a hinge may be free to move. All unheld joints then move with the tilt, which reduces the
+    inertia. The floor does not move, nor do bodies that stand on it at the keyframe, as far as the contacts hold them.
 
     Args:
         model: The compiled model.
         key: The keyframe at which the rig stands upright.
-        line: What it tilts about.
+        line: The line of the tilt.
         angles: Joint angles by their addresses in qpos, the others being those of the keyframe [rad].
 
     Returns:
@@ -137,7 +137,7 @@ def _contacts(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
 
 
 def _null_space(matrix: np.ndarray) -> np.ndarray:
-    """An orthonormal basis of what a matrix (m, n) takes to zero, (n, k)."""
+    """Return an orthonormal basis of the null space of a matrix (m, n), (n, k)."""
     _, sizes, directions = np.linalg.svd(matrix)
     rank = int(np.sum(sizes > SMALL * sizes[0])) if sizes[0] > 0.0 else 0
     return directions[rank:].T

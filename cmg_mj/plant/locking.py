@@ -18,10 +18,10 @@ YAW = "yaw"
 
 
 def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:
-    """Take the yaw joint out.
+    """Remove the yaw joint.
 
     Raises:
-        InputError: There is none.
+        InputError: There is no yaw joint.
     """
     if YAW not in [joint.name for joint in spec.joints]:
         raise InputError(f"plant.lock_thrust_bearing = true: {path} has no joint 'yaw' to lock")

@@ -39,7 +39,7 @@ def parse(path: Path) -> mujoco.MjSpec:
 
 
 def _parse(path: Path) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
-    """Read a model file; the names are those of the plugins that were left out."""
+    """Read a model file; the names are those of the plugins that were removed."""
     check_files(path)
     stripped = strip_plugins(path)
     try:
@@ -58,7 +58,7 @@ def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     """
     for plugin in spec.plugins:
         if plugin.plugin_name.startswith(OWN):
-            raise InputError(f"{path}: the plugin {plugin.plugin_name} cannot be left out; take it out of the file")
+            raise InputError(f"{path}: the plugin {plugin.plugin_name} cannot be ignored; take it out of the file")
     try:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
@@ -177,10 +177,10 @@ def check_rig(path: Path, name: Path) -> None:
 
     Args:
         path: The file.
-        name: What to call it in messages.
+        name: Name of the file in messages.
 
     Raises:
-        InputError: It is none.
+        InputError: The file is not a rig.
     """
     try:
         load_rig(path, lock=False)

@@ -11,7 +11,7 @@ import numpy as np
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """No warnings from MuJoCo or numpy, nor MUJOCO_LOG.TXT in the current folder: what goes wrong is said otherwise."""
+    """Switch off warnings of MuJoCo and numpy, and MUJOCO_LOG.TXT in the current folder. Callers report faults."""
     before, config = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
     config.logto_console = config.logto_file = False
     config.set()

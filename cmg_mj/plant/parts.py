@@ -60,7 +60,7 @@ class Module:
 
     @property
     def of_axis(self) -> str:
-        """Its name without the axis': `cube1` of `roll/cube1`."""
+        """The module's name without that of its axis: `cube1` of `roll/cube1`."""
         return self.name.rpartition("/")[2]
 
 
@@ -151,7 +151,7 @@ def axes_of(model: mujoco.MjModel) -> dict[str, list[str]]:
 
 
 def _missing(kind: str, names: list[str], known: list[str]) -> str:
-    """`the model has no joint 'tilt'; did you mean 'tlit'? its joints: tlit, yaw`."""
+    """Write `the model has no joint 'tilt'; did you mean 'tlit'? its joints: tlit, yaw`."""
     hints = [nearest(name, known, f"its {kind}s") for name in names]
     meant = [hint.removeprefix("did you mean ").partition("? ")[0] for hint in hints if "? its " in hint]
     listing = hints[0].rpartition("? ")[2]

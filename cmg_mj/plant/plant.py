@@ -94,7 +94,7 @@ class Plant:
         grid: TimeGrid | None = None,
         of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
     ) -> Plant:
-        """The same rig with other settings, without compiling its file again.
+        """Return the rig with other settings, without compiling its file again.
 
         Args:
             settings: Settings with the same model file, the same locks and the same bend.
@@ -180,7 +180,7 @@ class Plant:
         return parse_drawn(self.path, self.settings, self._module_names)
 
     def single_axis(self, axis: str) -> Plant:
-        """The rig as one of its axes sees it: with that axis alone.
+        """Return the rig as one of its axes sees it: with that axis alone.
 
         Args:
             axis: Its name.
@@ -208,7 +208,7 @@ class Plant:
         return turning(self._as_filed, self.key, self.axes)
 
     def largest_tilt(self, qpos: Addressed) -> Scalar:
-        """The tilt from the keyframe of the axis that is farthest from it [rad]."""
+        """Return the tilt from the keyframe of the axis that is farthest from it [rad]."""
         if len(self.axes) == 1:
             return self.axis.line.lean(qpos)
         leans = np.array([axis.line.lean(qpos) for axis in self.axes])

@@ -35,7 +35,7 @@ QUANTITIES = ("estimate", "command", "tilt", "gimbal_angle", "acceleration", "in
 """Quantities of each axis that the plugin shows as sensors."""
 EXACT_DIGITS = 17
 PHYSICS = ("body_", "jnt_", "dof_", "site_pos", "site_quat", "actuator_", "eq_", "tendon_", "pair_", "exclude_")
-"""Beginnings of the names of what the written model must have in common with the plant."""
+"""Prefixes of the attributes that the written model must have in common with the plant."""
 SEEN_OR_DERIVED = ("bvh", "_plugin", "name", "geom", "mocapid", "sameframe", "length0", "dof_length", "_user")
 """Parts of the names of what geoms that are only seen change, or that no physics of a rig takes."""
 

@@ -29,7 +29,7 @@ def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int)
         world: Number of the world.
 
     Raises:
-        InputError: The model has no such plugin, a number is none that a plugin takes, or the noise has begun.
+        InputError: The model has no such plugin, a number is outside the plugin's range, or the noise has begun.
     """
     for name, number in (("seed", seed), ("world", world)):
         if not 0 <= number <= LARGEST_SEED or number != int(number):

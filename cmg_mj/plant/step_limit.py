@@ -18,7 +18,7 @@ OTHERS_LIMIT_S = 0.001
 
 
 def largest_step(model: mujoco.MjModel, key: int, own_s: float, shake_rate: float = 0.0) -> float:
-    """The largest physics step that is accurate enough for a rig [s].
+    """Return the largest physics step that is accurate enough for a rig [s].
 
     Args:
         model: The compiled model, with its friction and its integrator.
@@ -35,7 +35,7 @@ def largest_step(model: mujoco.MjModel, key: int, own_s: float, shake_rate: floa
 
 
 def fastest_rate(model: mujoco.MjModel, key: int) -> float:
-    """The largest modulus of a pole of a rig without dry friction, linearised at a keyframe by central differences.
+    """Return the largest modulus of a pole of a rig without dry friction, linearised at a keyframe.
 
     Args:
         model: The compiled model.
@@ -51,7 +51,7 @@ def fastest_rate(model: mujoco.MjModel, key: int) -> float:
 
 
 def state_matrix(model: mujoco.MjModel, key: int) -> np.ndarray:
-    """The matrix A of a rig without dry friction, linearised at a keyframe by central differences.
+    """Return the matrix A of a rig without dry friction, linearised at a keyframe by central differences.
 
     Args:
         model: The compiled model.
@@ -85,7 +85,7 @@ def state_matrix(model: mujoco.MjModel, key: int) -> np.ndarray:
 
 
 def input_column(model: mujoco.MjModel, key: int, command: np.ndarray) -> np.ndarray:
-    """The column of B for commands in given proportions.
+    """Return the column of B for commands in given proportions.
 
     Args:
         model: The compiled model.

@@ -1,4 +1,4 @@
-"""The line that a rig tilts about: a hinge, or, for a body that is free, a line through what it stands on."""
+"""The line that a rig tilts about: a hinge, or, for a free body, a line through its contacts with the floor."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class HingeLine:
         return [self.dof], [self.sign]
 
     def motion(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-        """The joints' rates of a tilt rate of 1 rad/s, (nv,)."""
+        """Return the joints' rates of a tilt rate of 1 rad/s, (nv,)."""
         rates = np.zeros(model.nv)
         rates[self.dof] = self.sign
         return rates
@@ -107,7 +107,7 @@ class SupportLine:
         return [self.dof + 3, self.dof + 4, self.dof + 5], self._y
 
     def motion(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-        """The joints' rates of a tilt rate of 1 rad/s about the line, (nv,)."""
+        """Return the joints' rates of a tilt rate of 1 rad/s about the line, (nv,)."""
         turn = data.xmat[int(model.jnt_bodyid[self.joint])].reshape(3, 3)
         rates = np.zeros(model.nv)
         rates[self.dof : self.dof + 3] = np.cross(turn @ self.axes[:, 1], turn @ -self.point)
@@ -153,7 +153,7 @@ def apply_torques(applied: np.ndarray, lines: Sequence[Line], torques: Sequence[
 
 
 def line_of_joint(model: mujoco.MjModel, joint: int, key: int) -> HingeLine:
-    """The axis of a hinge.
+    """Return the axis of a hinge.
 
     Args:
         model: The compiled model.
@@ -168,7 +168,7 @@ def line_of_joint(model: mujoco.MjModel, joint: int, key: int) -> HingeLine:
 
 
 def line_at_site(model: mujoco.MjModel, data: mujoco.MjData, site: int, key: int) -> Line | None:
-    """The line along a site's y axis: of the hinge there, or of the free body that carries it.
+    """Return the line along a site's y axis: of the hinge there, or of the free body that carries it.
 
     Args:
         model: The compiled model.
@@ -177,7 +177,7 @@ def line_at_site(model: mujoco.MjModel, data: mujoco.MjData, site: int, key: int
         key: The keyframe.
 
     Returns:
-        The line; None if the body neither hangs on a hinge along it nor is free.
+        The line; None if the body has no hinge along it and is not free.
     """
     at, axes = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
     body = int(model.site_bodyid[site])

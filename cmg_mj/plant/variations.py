@@ -37,14 +37,14 @@ def vary(
 
     Args:
         model: The model, as its file has it.
-        settings: What is to differ; what is left out stays.
+        settings: The properties to change; a property without a value stays.
         path: The file, for messages.
         axes: What the rig tilts about.
         held: Modules of axes that are locked.
 
     Raises:
-        InputError: The body that tilts has no mass of its own to move or no joint for friction, or a servo is none that
-            has what is to differ; or a bend does not go together with the rest.
+        InputError: The body that tilts has no mass of its own to move or no joint for friction; a servo lacks a
+            property to change; or a bend does not go together with the rest.
     """
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
@@ -140,7 +140,7 @@ def place_accelerometers(
 
     Args:
         model: The model, as its file has it.
-        settings: Their distances from the tilt axis, what is left out stays; and how far off these they sit.
+        settings: Their distances from the tilt axis, which stay without a value, and their offsets from these.
         axis: The axis, as its file has it.
         path: The model's file, for messages.
         above_centre: Height above the common mass centre of the point that the tilt estimate of a pivot that slides
@@ -259,13 +259,13 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
 
 
 def frame_bodies(model: mujoco.MjModel, axis: Axis) -> list[int]:
-    """The frame, and the part of it beyond a bend if there is one."""
+    """Return the frame, and the part of it beyond a bend if there is one."""
     part = element_id(model, "body", BEND_JOINT)
     return [axis.frame, *([part] if part >= 0 else [])]
 
 
 def _hinge(axis: Axis, path: Path) -> int:
-    """The degree of freedom that friction of the tilt acts on."""
+    """Return the degree of freedom that friction of the tilt acts on."""
     if not isinstance(axis.line, HingeLine):
         raise InputError(f"plant.tilt_friction_n_m, plant.tilt_damping_n_m_s: {path} tilts about no hinge")
     return axis.line.dof

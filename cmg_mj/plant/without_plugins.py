@@ -20,7 +20,7 @@ from cmg_mj.inputs.includes import MODEL_FILE, model_files
 from cmg_mj.inputs.text_files import read_text
 
 OWN = "cmg_mj."
-"""How the names of this package's plugins begin."""
+"""Prefix of the names of this package's plugins."""
 _TOKEN = re.compile(
     r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>"
     r"|<(?P<end>/?)(?P<tag>[\w:.-]+)(?P<attributes>(?:[^<>\"']|\"[^\"]*\"|'[^']*')*)>",
@@ -28,7 +28,7 @@ _TOKEN = re.compile(
 )
 _ATTRIBUTE = re.compile(r"""([\w:.-]+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 _COPY = "#{} without plugins of "
-"""What stands before a file's name in that of its copy: MuJoCo takes files of the same name for each other."""
+"""Prefix of the name of a file's copy: MuJoCo takes files of the same name for each other."""
 NAMES_OF_COPIES = re.compile(_COPY.format(r"\d+"))
 
 
@@ -171,7 +171,7 @@ def _named_files(element: _Element, file: Path, model: Path) -> Iterator[tuple[_
 
 
 def _elements(text: str) -> Iterator[_Element]:
-    """List what an MJCF's <plugin>, <instance>, <include> and <model> elements are; what is never closed is none."""
+    """List the closed <plugin>, <instance>, <include> and <model> elements of an MJCF."""
     opened: list[_Element] = []
     for token in _TOKEN.finditer(text):
         tag, attributes = token["tag"], token["attributes"]

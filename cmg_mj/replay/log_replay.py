@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 SETTLE_S = 1.0
 """Default time at the start of each part that is not scored [s]."""
 NO_MODEL = ReducedModel(J1=math.nan, J2=math.nan, J_d=math.nan, omega_d=math.nan, gravity_torque=math.nan)
-"""For observers that need no model: whatever uses it is not a number."""
+"""Model for observers that need none: a computation with it gives NaN."""
 NEEDS_IN_WORDS = {
     "model": "a model (--model)",
     "gimbals": "the gimbal angle and the command (--columns gimbal=...,command=...)",
@@ -117,7 +117,7 @@ def replay_log(
 
     Args:
         log: The log.
-        observers: Names, or `package.module:Class`; all by default. Observers whose needs the log lacks are left out.
+        observers: Names, or `package.module:Class`; all by default. Observers whose needs the log lacks are omitted.
         model: The pendulum, if it is known.
         noise: The sensors' noise that observers assume; by default `noise_of(log)`.
         parameters: Observer -> parameter -> value, where not the default.

@@ -17,7 +17,7 @@ from cmg_mj.replay.user_noise import noise_in
 OFF = 0.005
 """Deviation of the reference's scale from 1, or its offset by its RMS, from which it matters, if it is significant."""
 NEAR = 0.05
-"""The same deviation, up to which a reference that correlates less than `AGREES` still agrees."""
+"""Largest such deviation at which a reference that correlates less than `AGREES` still agrees."""
 SURE = 2.365
 """Standard errors of a 95 % interval: Student's, of the seven degrees of freedom of eight stretches."""
 CLEAR = 4.03

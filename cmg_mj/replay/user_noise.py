@@ -25,10 +25,10 @@ NOISES = ("accelerometer", "tilt", "acceleration")
 
 
 def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> TiltNoise:
-    """Return the noise of a log's sensors that observers assume: told, else by the log itself, else assumed.
+    """Return the noise of a log's sensors that observers assume: the user's, else the log's own, else a default.
 
     Args:
-        log: With two accelerometers, both noises follow from a told density, and the resolution is the bench's.
+        log: With two accelerometers, both noises follow from a given density, and the resolution is the bench's.
         noises: Noises from `noise_numbers` that replace the log's.
 
     Returns:

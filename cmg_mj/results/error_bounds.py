@@ -27,14 +27,14 @@ NO_ACCELERATION_FLOOR = (
 MEMORY_S = 0.5
 """Memory of the filters of y1 that are tried for its floor [s]."""
 SINGLE, WIDER = 4, 1.3
-"""Their newest samples have a tap each; older ones share one, and every share is so much wider than the one before.
-A tap a sample takes 0.3 to 0.8 % off the floor of a whole run of 15 s, 200 taps over a second 2 to 4 %. About 3 % are
-due to their number alone: so much of a world's noise do 200 taps learn of its 3,000 samples
+"""Number of newest samples with a tap each, and the factor by which the taps of older samples widen.
+A tap a sample lowers the floor of a whole run of 15 s by 0.3 to 0.8 %, 200 taps over a second by 2 to 4 %. About 3 %
+are due to their number alone: 200 taps fit this share of the noise in a world's 3,000 samples
 (docs/studies/gyro_free.py --parts taps)."""
 PIECE = 16
 """Worlds whose sums are taken together: so many stay in a processor's cache."""
 ROWS_A_TAP = 10
-"""So many samples a tap, or there is no fit."""
+"""Fewest samples for each tap of a fit."""
 
 
 @lru_cache(maxsize=256)
@@ -73,8 +73,8 @@ def acceleration_floor(noise: TiltNoise, dt: float) -> float:
 class TiltFloor:
     """The best causal linear filter of y1 alone, found afterwards: by least squares to the true rate itself.
 
-    Without a model y1 bounds nothing unless it is told what motions there are. This filter is told more than any
-    observer can know: what the rate was, in the very world that is judged. No time-invariant linear filter of y1 with
+    Without a model y1 gives no bound, unless the motions are known. This filter knows more than any observer can: the
+    true rate in the very world that is judged. No time-invariant linear filter of y1 with
     its taps (16 over 0.5 s at 200 Hz), started at rest, has a smaller error there, however it is tuned. Filters with
     more taps, or that vary with time, may have. The whole run and the push windows have a filter each. One filter for
     all of 20 worlds has an error 1 % larger over the whole run of push_recovery, and 6 % in the push window: so much is

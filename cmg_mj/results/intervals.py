@@ -79,7 +79,7 @@ def positive_mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
         InputError: There are fewer values.
     """
     if len(values) < FEWEST:
-        raise InputError(f"an interval of what cannot be negative needs four worlds or more, not {len(values)}")
+        raise InputError(f"an interval of a non-negative figure needs four worlds or more, not {len(values)}")
     mean, low, high = mean_interval(values)
     if not mean > 0.0:  # all are zero, or one is no number
         return Interval(mean, low, high)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 Driver = Literal["native", "callback", "board", "plugin"]
-"""Who calls the controller, or is it. `simulate` knows the first two: a board is the controller's processor."""
+"""The caller of the controller, or the controller itself. `simulate` knows the first two; `board` is a processor."""
 
 
 @dataclass
@@ -78,12 +78,12 @@ class Result(NamedColumns):
 
     @property
     def stood(self) -> np.ndarray:
-        """Which worlds stood to the end, (n_worlds,)."""
+        """True for each world that stood to the end, (n_worlds,)."""
         return np.array([outcome.kind == "done" for outcome in self.outcomes])
 
     @property
     def fell(self) -> np.ndarray:
-        """Which worlds fell, (n_worlds,)."""
+        """True for each world that fell, (n_worlds,)."""
         return np.array([outcome.fell for outcome in self.outcomes])
 
     def values(self, key: str, estimator: str | None = None) -> np.ndarray:
@@ -179,7 +179,7 @@ class Result(NamedColumns):
         """Split the worlds into groups of equal size, in the order in which `run_many` was given them."""
         worlds = len(self.outcomes)
         if count < 1 or worlds % count:
-            raise InputError(f"groups({count}): {worlds} worlds cannot be parted so")
+            raise InputError(f"groups({count}): {worlds} worlds cannot be split into groups of equal size")
         if count == 1:
             return [self]
         size = worlds // count

@@ -1,4 +1,4 @@
-"""What a run over a wire leaves beside its figures."""
+"""The settings and records of a run over a wire."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from cmg_mj.scenario.schema import LqrSettings, Scenario
 NEAR = 0.4
 """A transfer that comes nearer to -1 has little margin: disturbances at that frequency grow by 2.5."""
 BENDS_SHARE = 0.8
-"""So much of the rigid loop's distance from -1 left, a small distance is the rigid loop's fault and not the bend's."""
+"""Share of the rigid loop's distance from -1. Above it a small distance is the rigid loop's fault, not the bend's."""
 CURED = 0.2
 """A loop that comes nearer to -1 is not cured: an eighth of a turn more of phase, or less gain, fells it."""
 NOTCHES = (1.08, 1.0, 0.92)

@@ -179,7 +179,7 @@ def _motion(decays: np.ndarray, fell: np.ndarray) -> Motion:
 def _reading(
     tilt: RadialTilt, gravity: float, y1: Scalar, acceleration: Scalar, y2: Scalar, rate: Scalar, gyro: Scalar
 ) -> IdealReading:
-    """What perfect sensors show of a motion about the pivot."""
+    """Return the readings of perfect sensors in a motion about the pivot."""
     radial, across = gravity * np.cos(y1), -gravity * np.sin(y1)
     forces = [across + tilt.r_inner * acceleration, radial, across + tilt.r_outer * acceleration, radial]
     return IdealReading(np.array(forces), [y2], gyro, rate)

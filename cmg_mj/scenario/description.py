@@ -91,7 +91,7 @@ def _about(torque: Push | Swing) -> str:
 
 
 def _pivot_rows(rig: PlantParameters) -> Iterator[tuple[str, str]]:
-    """Where a pivot slides: what the tilt is taken about, and what of the sliding is in the reduced model."""
+    """Describe a sliding pivot: the point that the tilt is taken about, and the model's share of the sliding."""
     if rig.reduced.pivot_arm:
         yield "pivot", sliding_words(rig)
         yield "", f"in the reduced model: {IN_THE_MODEL}"
@@ -99,7 +99,7 @@ def _pivot_rows(rig: PlantParameters) -> Iterator[tuple[str, str]]:
 
 
 def _bend_rows(scenario: Scenario, rig: PlantParameters, trial: Trial | None) -> Iterator[tuple[str, str]]:
-    """The mode of a frame that bends, the loop around it, and a cure for that if it needs one."""
+    """Return the mode of a frame that bends, the loop around it, and a cure for that if it needs one."""
     if rig.bend is None:
         return
     plant, bend = scenario.plant, rig.bend
@@ -137,7 +137,7 @@ def _quoted(setting: str) -> str:
 def _law_rows(
     scenario: Scenario, design: Design, rig: PlantParameters, fields: Mapping[str, TomlValue]
 ) -> Iterator[tuple[str, str]]:
-    """The law, its inputs, and of the papers' law the closed loop on the reduced model."""
+    """Return the law, its inputs, and of the papers' law the closed loop on the reduced model."""
     controller, law = scenario.controller, design.law
     limits = f"at {controller.rate_hz:g} Hz, at most {controller.rate_limit_rad_s:g} rad/s"
     inputs = f"tilt rate from the {controller.feedback}, {controller.angle_source} angles"
@@ -200,7 +200,7 @@ def rig_description(
 
 
 def lines(title: str, rows: Iterable[tuple[str, str]]) -> str:
-    """A title, and rows of a label and a text."""
+    """Join a title, and rows of a label and a text."""
     return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows)])
 
 
@@ -210,7 +210,7 @@ def assignments(values: Mapping[str, TomlValue]) -> str:
 
 
 def number(value: TomlValue) -> str:
-    """A value as TOML writes it, to six digits."""
+    """Return a value as TOML writes it, to six digits."""
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(number(item) for item in value)}]"
     if isinstance(value, bool):

@@ -75,7 +75,7 @@ class Design:
         """Make a fresh controller.
 
         Args:
-            plant: What it knows of the plant.
+            plant: The controller's knowledge of the plant.
             worlds: The number of one world, or the numbers of many.
             axis: The number of the plant's axis.
             processor: Takes the decisions in the host's place.

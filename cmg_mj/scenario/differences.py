@@ -11,7 +11,7 @@ from cmg_mj.errors import TomlValue
 LONGEST_NAME = 60
 """Longest text of the differences in a folder's name [characters]."""
 SHOWN = 3
-"""So many differences are shown in one line."""
+"""Most differences in one line."""
 
 
 def describe_differences(differing: Mapping[str, TomlValue | None]) -> str:
@@ -38,7 +38,7 @@ def safe_name(text: str) -> str:
 
 
 def _first(texts: list[str], count: int, rest: str) -> list[str]:
-    """The first ones, and how many more there are."""
+    """Return the first ones, and how many more there are."""
     more = len(texts) - count
     return texts if more <= 0 else [*texts[:count], rest.format(more).strip()]
 

@@ -72,7 +72,7 @@ class Swing:
 
 
 def push_windows(pushes: Iterable[Push]) -> list[Window]:
-    """From each push's start to a second after its end; those that overlap or touch are one."""
+    """Return the windows from each push's start to a second after its end; windows that overlap or touch are one."""
     windows: list[Window] = []
     for start, end in sorted((push.start_s, push.end_s + AFTER_PUSH_S) for push in pushes):
         if windows and start <= windows[-1][1]:
@@ -83,7 +83,7 @@ def push_windows(pushes: Iterable[Push]) -> list[Window]:
 
 
 def inside(time: np.ndarray, windows: Sequence[Window]) -> np.ndarray:
-    """Which of these times [s] lie in any of the windows; the same shape."""
+    """Return a mask of the times [s] that lie in any of the windows, of the same shape."""
     mask = np.zeros(np.shape(time), dtype=bool)
     for start, end in windows:
         mask |= (time > start - 1e-9) & (time < end - 1e-9)

@@ -81,14 +81,14 @@ def _drop_gains(fields: dict[str, Any], overrides: Iterable[str], has_law_change
 
 
 def _kind_of(fields: Mapping[str, Any], section: str) -> Any:
-    """The kind of observer or law that a file names, or the default."""
+    """Return the kind of observer or law that a file names, or the default."""
     usual = {"observer": ObserverSettings().kind, "controller": ControllerSettings().kind}[section]
     section_fields = fields.get(section)
     return section_fields.get("kind", usual) if isinstance(section_fields, Mapping) else usual
 
 
 def _read(path: Path, name: str) -> dict[str, Any]:
-    """The content of a TOML file."""
+    """Read the content of a TOML file."""
     text = read_text(path, name, SCENARIO_FILE)
     if text.lstrip().startswith("<"):
         raise InputError(f"{name}: is XML, not a scenario; a scenario names its model with plant.model")
@@ -105,14 +105,14 @@ def _read(path: Path, name: str) -> dict[str, Any]:
 
 
 def base_of(scenario: Scenario) -> Scenario | None:
-    """The bundled scenario that one is told apart from, if there is one."""
+    """Return the bundled scenario that a scenario is compared with, if there is one."""
     if scenario.based_on not in bundled("scenarios"):
         return None
     return load_scenario(str(folder("scenarios") / f"{scenario.based_on}.toml"))
 
 
 def find_model(scenario: Scenario, beside: Path) -> Scenario:
-    """The same with the path of its model, which a scenario file names relative to itself."""
+    """Return a scenario with the path of its model, which a scenario file names relative to itself."""
     with scenario.named_in_errors():
         model = find("models", scenario.plant.model, ".xml", "plant.model =", beside)
     return scenario.model_copy(update={"plant": dataclasses.replace(scenario.plant, model=str(model))})

@@ -1,4 +1,4 @@
-"""Names what of a real rig is in a scenario, and in neither the reduced model nor anything computed from it."""
+"""Names the properties of a real rig that a scenario has, but not the reduced model or anything computed from it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ IN_THE_MODEL = (
     "plant.accelerometer_outer_misplaced_mm",
     "plant.bend_frequency_hz",
 )
-"""Those of them that the plant's MuJoCo model itself has, whoever steps it."""
+"""The properties that the plant's MuJoCo model itself has, whoever steps it."""
 
 
 def omissions(scenario: Scenario) -> dict[str, str]:

@@ -108,7 +108,7 @@ def _column(path: Path, heading: list[str], column: str | None) -> int:
     if column is None:
         if len(names) > 1:
             raise InputError(
-                f"{path}: has the columns {shown(', '.join(names))}: which is the acceleration? see column"
+                f"{path}: has the columns {shown(', '.join(names))}; name that of the acceleration with column"
             )
         return 1
     if column not in names:

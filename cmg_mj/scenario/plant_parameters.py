@@ -43,6 +43,6 @@ class PlantParameters(NamedTuple):
     slide: Callable[[], LinearPlant] | None = None
 
     def noise(self, sensors: Sensors) -> TiltNoise:
-        """The noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""
+        """Return the noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""
         gimbal = sensors.encoder.sample_sigma / math.sqrt(self.reduced.gimbals)
         return replace(self.tilt.noise(sensors.accelerometer.sample_sigma, self.gravity), gimbal=gimbal)

@@ -57,7 +57,7 @@ def resolved(scenario: Scenario, designs: Mapping[str, Design]) -> dict[str, Any
 
 
 def _resolved(scenario: Scenario, design: Design) -> dict[str, Any]:
-    """The scenario with the defaults of one axis' law and observer."""
+    """Return the scenario with the defaults of one axis' law and observer."""
     fields = scenario.as_fields()
     path = design.rig.path.resolve()
     fields["plant"]["model"] = path.name if path.parent == folder("models").resolve() else str(path)
@@ -84,7 +84,7 @@ def _resolved(scenario: Scenario, design: Design) -> dict[str, Any]:
 
 
 def _parameters(parameters: dict[str, Any], part: Any, by_bench: Collection[str]) -> dict[str, Any]:
-    """The parameters that were given, and the defaults of the rest as far as they are known and TOML can hold them."""
+    """Return the given parameters, and the defaults of the rest as far as they are known and TOML can hold them."""
     if not dataclasses.is_dataclass(part):
         return parameters
     names = [f.name for f in dataclasses.fields(part) if f.init and f.name not in by_bench]
@@ -122,8 +122,8 @@ def differences(base: Mapping[str, Any], scenario: Mapping[str, Any]) -> dict[st
     """Compare two resolved scenarios.
 
     Args:
-        base: The one that the other is told apart from.
-        scenario: The other.
+        base: The scenario that `scenario` is compared with.
+        scenario: A scenario.
 
     Returns:
         Field, `section.field` -> its value in the other; None where it has no such field. The parameters of different

@@ -181,7 +181,7 @@ def plant_hints(scenario: Scenario, design: Design, rig: PlantParameters) -> lis
 
 
 def _loop_hint(scenario: Scenario, law: StateFeedback, rig: PlantParameters) -> str | None:
-    """Return the fault of the loop on the reduced model; the margin that a notch takes for a bend's sake is none."""
+    """Return the fault of the loop on the reduced model. Margin that a notch against a bend takes is no fault."""
     loop = closed_loop(scenario, law, rig.reduced)
     is_for_bend = rig.bend is not None and scenario.controller.notch_hz > 0.0
     return None if is_for_bend and loop.slowest < -MARGIN else loop.hint

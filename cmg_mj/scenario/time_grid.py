@@ -138,7 +138,7 @@ def time_grid(scenario: Scenario) -> TimeGrid:
 
 
 def common_period(scenario: Scenario) -> float:
-    """The longest time that divides every period and time of a scenario [s].
+    """Return the longest time that divides every period and time of a scenario [s].
 
     Raises:
         InputError: It is shorter than `FINEST_S`; the first field that makes it so is named.
@@ -155,7 +155,7 @@ def common_period(scenario: Scenario) -> float:
 
 
 def _grid_times(scenario: Scenario) -> Iterator[_GridTime]:
-    """All periods and times of a scenario and of its axes: rates first, then times."""
+    """Return all periods and times of a scenario and of its axes: rates first, then times."""
     for prefix, part in {"": scenario, **{f"axes.{name}.": part for name, part in scenario.of_axes.items()}}.items():
         numbers = [(prefix + field, number, mark.unit) for field, number, mark in marked_values(part, OnGrid)]
         for field, rate, unit in numbers:

@@ -142,7 +142,7 @@ class Accelerometer:
 
     @property
     def sample_sigma(self) -> float:
-        """Standard deviation of one sample with the quantisation, as filters are told it [m/s^2]."""
+        """Standard deviation of one sample with the quantisation, as filters assume it [m/s^2]."""
         step = STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
         return math.hypot(self.white_noise_sigma, step / math.sqrt(12.0))
 
@@ -167,7 +167,7 @@ class Accelerometer:
         return {name: value for name in optional if (value := getattr(self, name)) not in (0.0, (0.0, 0.0), ())}
 
     def constant_errors(self) -> Callable[[Forces], Forces]:
-        """A function: true specific forces (inner x, z, outer x, z) -> what parts without noise show [m/s^2].
+        """Return a function: true specific forces (inner x, z, outer x, z) -> what parts without noise show [m/s^2].
 
         Floats become a tuple of four floats, an array (4, n_worlds) one of the same shape.
         """
@@ -207,7 +207,7 @@ class Accelerometer:
         drift: Callable[[], Forces] | None = None,
         vibration: Callable[[IdealReading], Forces] | None = None,
     ) -> Callable[[IdealReading, Sequence[Scalar]], Forces]:
-        """The parts at work: to be called once for every sample that they take (`raw_rate_hz`).
+        """Return the parts at work: to be called once for every sample that they take (`raw_rate_hz`).
 
         Args:
             drift: What the 1/f noise adds to the next sample, four numbers or an array (4, n_worlds) [m/s^2].

@@ -34,7 +34,7 @@ class Encoder:
         return 2.0 * math.pi / self.counts_per_revolution / math.sqrt(12.0) if self.counts_per_revolution else 0.0
 
     def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Sequence[Scalar]]:
-        """A function (ideal reading, nothing) -> gimbal angles [rad]."""
+        """Return a function (ideal reading, nothing) -> gimbal angles [rad]."""
         if not self.counts_per_revolution:
             return lambda ideal, normal: ideal.gimbals
         step = 2.0 * math.pi / self.counts_per_revolution

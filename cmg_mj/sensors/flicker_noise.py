@@ -44,7 +44,7 @@ class Flicker:
         self._wander = sigma * normals
 
     def advance(self, normals: np.ndarray) -> np.ndarray:
-        """The noise of the next samples.
+        """Return the noise of the next samples.
 
         Args:
             normals: Standard normals, (n, len(CORNERS_HZ), ...).

@@ -44,7 +44,7 @@ class Fog:
         return radians(self.angle_random_walk_deg_rth) / 60.0 * math.sqrt(self.rate_hz)
 
     def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Scalar]:
-        """A function (ideal reading, standard normals) -> tilt rate [rad/s]. It remembers its low-pass."""
+        """Return a function (ideal reading, standard normals) -> tilt rate [rad/s]. It remembers its low-pass."""
         sigma = self.white_noise_sigma
         bias = math.radians(self.bias_deg_h) / 3600.0
         limit = math.radians(self.range_deg_s)

@@ -28,7 +28,7 @@ class IdealReading(NamedTuple):
 
 
 class MultiAxisReading(NamedTuple):
-    """The same of a rig of several axes."""
+    """The readings of a rig of several axes."""
 
     axes: Sequence[IdealReading]
     """Readings of each axis."""

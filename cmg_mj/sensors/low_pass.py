@@ -11,7 +11,7 @@ from cmg_mj.elementwise import Scalar
 
 
 def noise_gain(bandwidth_hz: float, rate_hz: float) -> float:
-    """The variance of white noise after the filter, by that before.
+    """Return the variance of white noise after the filter, by that before.
 
     The bilinear transform makes |H|^2 = 1/(1 + (w/t)^4), w = tan(omega/2), t = tan(pi bandwidth/rate); its mean over
     omega, by partial fractions.
@@ -28,7 +28,7 @@ def noise_gain(bandwidth_hz: float, rate_hz: float) -> float:
 
 
 def low_pass(bandwidth_hz: float, rate_hz: float, start: Scalar) -> Callable[[Scalar], Scalar]:
-    """A filter at work, which has seen the same value for ever.
+    """Return a filter at work, which has seen the same value for ever.
 
     Args:
         bandwidth_hz: Where it has halved the power [Hz].

@@ -16,7 +16,7 @@ from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
 from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker
 
 PIECE = 1000
-"""So many samples before the run are made together, whatever the rate."""
+"""Samples before the run that are made together, whatever the rate."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -74,7 +74,7 @@ class MemsGyro:
         return math.radians(self.bias_instability_deg_h) / 3600.0
 
     def make_reading_function(self, dt: float, noise: Iterator) -> Callable[[np.ndarray], np.ndarray]:
-        """The gyro at work.
+        """Return the gyro at work.
 
         Args:
             dt: Sample period [s].
@@ -124,11 +124,11 @@ class MemsGyro:
         return digitise((1.0 + self.scale_error) * rate + errors, math.radians(self.range_deg_s), step)
 
     def _errors(self, dt: float, noise: Iterator) -> tuple[Callable[[int], np.ndarray], np.ndarray | float]:
-        """The noise of the next n samples, (n, n_worlds), and its mean over the rest before the run [rad/s]."""
+        """Return the noise of the next n samples, (n, n_worlds), and its mean over the rest before the run [rad/s]."""
         sigma = self.white_noise_sigma(dt)
 
         def drawn(n: int) -> np.ndarray:
-            """(n, channels, n_worlds)."""
+            """Draw noise, (n, channels, n_worlds)."""
             samples = list(islice(noise, n))
             if isinstance(samples[0], list):  # of floats: np.array takes three times as long over nested ones
                 return np.fromiter(chain.from_iterable(samples), float).reshape(n, self.channels, 1)

@@ -90,7 +90,7 @@ class SampledSensor(Generic[Reading]):
             self._on_the_way.append((step + self.latency, self._newest))
 
     def read(self, step: int) -> Reading:
-        """The newest sample delivered by a physics step; before the start the rig stood still."""
+        """Return the newest sample delivered by a physics step; before the start the rig stood still."""
         if not self.latency:
             return self._newest
         while self._on_the_way and (self._on_the_way[0][0] <= step or not self._has_delivered):
@@ -146,7 +146,7 @@ class UnevenPair(SampledSensor[Forces]):
 
 
 def _combine_samples(inner: Forces, outer: Forces) -> Forces:
-    """The inner accelerometer's forces at one instant and the outer's at another."""
+    """Combine the inner accelerometer's forces at one instant with the outer's at another."""
     if isinstance(inner, np.ndarray):
         return np.concatenate([inner[:2], outer[2:]])
     return (*inner[:2], *outer[2:])

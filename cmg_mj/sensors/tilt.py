@@ -111,7 +111,7 @@ class RadialTilt:
         return (outer_x - inner_x) / (self.r_outer - self.r_inner)
 
     def noise(self, sigma: float, gravity: float) -> TiltNoise:
-        """The noise of tilt and angular acceleration, to first order in the noise of the accelerometers.
+        """Return the noise of tilt and angular acceleration, to first order in the noise of the accelerometers.
 
         Args:
             sigma: Standard deviation of one axis' sample, independent from axis to axis [m/s^2].

@@ -33,7 +33,7 @@ def whole_steps(duration: float, timestep: float, field: str, text: str) -> int:
 
 
 def steps_until(delay: float, timestep: float) -> int:
-    """The first physics step that is no earlier than a delay after step 0.
+    """Return the first physics step that is no earlier than a delay after step 0.
 
     Args:
         delay: The delay [s], any number.

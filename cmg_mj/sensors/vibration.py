@@ -50,7 +50,7 @@ class BroadbandVibration:
         self._integral, self._value = list(start[:AXES]), list(start[AXES:])
 
     def advance(self) -> list[Scalar]:
-        """The next sample of each axis."""
+        """Return the next sample of each axis."""
         (a, b, d, e), (first, cross, second) = self._phi, self._spread
         drawn = next(self._noise)
         for i in range(AXES):
@@ -76,7 +76,7 @@ class WheelTones:
         self._starts: list[Scalar] = []
 
     def advance(self, rates: Sequence[Scalar]) -> list[Scalar]:
-        """The next sample of each axis, at the flywheels' rates there, one a wheel [rad/s]."""
+        """Return the next sample of each axis, at the flywheels' rates there, one a wheel [rad/s]."""
         if not self._angles:
             self._angles, self._rates = [0.0 * rate for rate in rates], rates
             draws = (next(self._noise) for _ in range(AXES * len(rates) * len(self._harmonics)))

@@ -59,12 +59,12 @@ class BatchKey:
     parts: tuple[tuple[KeyPart, Hashable], ...]
 
     def first_difference(self, other: BatchKey) -> KeyPart | None:
-        """The first part in which two keys differ."""
+        """Return the first part in which two keys differ."""
         a, b = dict(self.parts), dict(other.parts)
         return next((part for part in (*a, *b) if a.get(part) != b.get(part)), None)
 
     def without_observer(self) -> BatchKey:
-        """The key of worlds that may also differ in their observer."""
+        """Return the key of worlds that may also differ in their observer."""
         return BatchKey(tuple((part, value) for part, value in self.parts if not part.is_of_observer))
 
 
@@ -83,7 +83,7 @@ class AxisPart(NamedTuple):
     scenario: Scenario
     design: Design
     axis: str
-    """Its name; empty on a plant of one axis."""
+    """Name of the axis; empty on a plant of one axis."""
 
 
 def batch_key(parts: Sequence[AxisPart]) -> BatchKey:
@@ -116,7 +116,7 @@ def _leaves(fields: Any, at: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def hashable(value: Any) -> Hashable:
-    """A value of a field as a key, by which 1, 1.0 and true are different."""
+    """Return a value of a field as a key, by which 1, 1.0 and true are different."""
     if isinstance(value, Mapping):
         return tuple((name, hashable(item)) for name, item in value.items())
     if isinstance(value, (list, tuple)):
@@ -257,12 +257,12 @@ def batched_open_loop_observers(designs: Sequence[Design]) -> dict[str, Observer
 
 
 def once(items: Sequence[T]) -> list[T]:
-    """Each of some things once."""
+    """Return each of some things once."""
     return list({id(item): item for item in items}.values())
 
 
 def _batched_law(laws: Sequence[Law]) -> Law:
-    """One law that stands for a law a world, which differ in what may be arrays alone."""
+    """Return one law for a law of each world; the laws differ in their array fields alone."""
     law = laws[0]
     arrays = {
         name: batch_values([getattr(world_law, name) for world_law in laws]) for name in getattr(law, "arrays", ())

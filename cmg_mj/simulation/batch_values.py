@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 def batch_values(values: Sequence[T]) -> T:
-    """One value that stands for a value a world.
+    """Stack the values of the worlds into one value.
 
     Args:
         values: A world each: numbers, or tuples or frozen dataclasses of such.
@@ -39,7 +39,7 @@ def batch_values(values: Sequence[T]) -> T:
     if isinstance(first, tuple) and {len(value) for value in values} == {len(first)}:  # type: ignore[arg-type]
         return tuple(map(batch_values, zip(*values, strict=True)))  # type: ignore[call-overload,return-value]
     if not all(type(value) in (int, float) for value in values):
-        raise InputError("must be the same in worlds that run together")
+        raise InputError("must have one value for all worlds of a batch")
     return np.array(values, dtype=float)  # type: ignore[return-value]
 
 

@@ -63,7 +63,7 @@ def run_side_by_side(runs: Sequence[BatchJob], **options: Unpack[SimulationOptio
 
 
 def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
-    """The jobs' indices, those together that may share a batch."""
+    """Return the jobs' indices, those together that may share a batch."""
     alike: dict[SharedKey | int, list[int]] = {}
     for i, job in enumerate(jobs):
         alike.setdefault(_shared_key(job) or i, []).append(i)
@@ -115,7 +115,7 @@ def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[
 
 
 def _renamed(result: Result, observer: str) -> Result:
-    """The same with the name of the observer that these worlds had."""
+    """Return a result with the name of the observer that these worlds had."""
     before, *open_loop = result.observers
     trajectory = result.trajectory
     if trajectory is not None and before != observer:

@@ -31,7 +31,7 @@ def control(plant: Plant, controller: AnyController, data: mujoco.MjData) -> boo
         Whether a control tick was due.
 
     Raises:
-        InputError: Steps at which something was due were left out.
+        InputError: The caller skipped steps at which something was due.
         RunStopped: The plant diverged, or an observer failed.
     """
     with set_control_callback(None):  # the forward pass is a look at the sensors, no step

@@ -34,7 +34,7 @@ class Ending(NamedTuple):
     step: int
     """Number of the physics step."""
     tilt: float = 0.0
-    """Its tilt from the keyframe, beyond the fall angle or no number [rad]."""
+    """Tilt of the world from the keyframe, beyond the fall angle or no number [rad]."""
     message: str = ""
     """Description of the observer's or law's return value, if that is the reason."""
 

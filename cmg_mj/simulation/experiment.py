@@ -188,7 +188,7 @@ class Experiment:
         return self.axes or (self,)
 
     def with_varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
-        """The scenario with other settings in each world; worlds with equal settings share one.
+        """Return the scenario with other settings in each world; worlds with equal settings share one.
 
         Args:
             vary: Field -> its value in each world. A field is named as with `--set`; one of [plant] by itself too.
@@ -204,7 +204,7 @@ class Experiment:
         return [experiments[key] for key, _ in keyed]
 
     def with_settings(self, values: Mapping[str, Any]) -> Experiment:
-        """The same with other values of some fields.
+        """Return the experiment with other values of some fields.
 
         Args:
             values: By field, named as with `--set`.
@@ -287,14 +287,14 @@ class Experiment:
             part.design.dry_run(worlds)
 
     def resolved(self) -> dict[str, Any]:
-        """The scenario with every default written out, and the versions it ran with, as TOML can hold it."""
+        """Return the scenario with every default written out, and the versions it ran with, as TOML can hold it."""
         return resolved(self.scenario, {part.plant.axis.name: part.design for part in self.parts})
 
     @functools.cached_property
     def differences(self) -> dict[str, Any]:
         """Differences from the bundled scenario it is based on: `section.field` -> its value.
 
-        Title, seed and observer are left out; a scenario of the user's own differs from none.
+        Title, seed and observer are ignored; a scenario of the user's own differs from none.
         """
         base = base_of(self.scenario)
         if base is None:
@@ -311,7 +311,7 @@ class Experiment:
         return law_change | differences(bundled.resolved(), self.resolved())
 
     def as_toml(self, driver: Driver = "native", world: int = 0, wire: WireSettings | None = None) -> str:
-        """The resolved scenario: running it again gives the same run; its head says if that needs options."""
+        """Return the resolved scenario: running it again gives the same run; its head says if that needs options."""
         return rerun_head(driver, world, wire) + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path) -> None:

@@ -43,7 +43,7 @@ MOST = 1e6
 SIZE = (480, 640)
 """Height and width of a picture [pixels]."""
 VIEW = (132.0, -18.0)
-"""From where it is taken: azimuth and elevation [deg]."""
+"""Camera of a picture: azimuth and elevation [deg]."""
 
 
 class ScissoredPairEnv(gymnasium.Env):
@@ -254,7 +254,7 @@ class ScissoredPairEnv(gymnasium.Env):
         return observation, info
 
     def render(self) -> np.ndarray | None:
-        """A picture of the rig, (480, 640, 3); None without a render mode. MUJOCO_GL names what draws it."""
+        """Return a picture of the rig, (480, 640, 3); None without a render mode. MUJOCO_GL names what draws it."""
         if self.render_mode is None:
             return None
         model = self.experiment.plant.drawn_model

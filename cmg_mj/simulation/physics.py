@@ -37,7 +37,7 @@ class Physics(Protocol):
 
     @property
     def running(self) -> np.ndarray | None:
-        """Which worlds are still stepped, (n_worlds,); None for one world."""
+        """True for each world that is still stepped, (n_worlds,); None for one world."""
         ...
 
     @property

@@ -94,7 +94,7 @@ def describe_rig(experiment: PluginSource, name: str, world: int = 0) -> PluginR
     for part in experiment.parts:
         for field, clause in omissions(part.scenario).items():
             if field not in IN_THE_MODEL:
-                raise InputError(f"{field}: {clause}: a plugin has no such thing")
+                raise InputError(f"{field}: {clause}: a plugin does not have it")
     axes = []
     for i, part in enumerate(experiment.parts):
         axis = part.plant.axis
@@ -207,7 +207,7 @@ def write_plugin_or_sources(made: PluginTexts, out: Path | RunFolder) -> Plugin:
         place = folder.write(_writers(made), all_or_none=True)
     raise InputError(
         f"plugin: {library_name(made.name)} is missing, for no C compiler was found (CC, cc, gcc, clang); the other "
-        f"files are in {place}: where there is one, `make` there compiles it"
+        f"files are in {place}: run `make` there where there is a compiler"
     )
 
 

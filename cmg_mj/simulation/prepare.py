@@ -37,10 +37,10 @@ def plant_on_grid(scenario: Scenario, grid: TimeGrid, like: Plant | None = None)
 
 
 def check_scenario(scenario: Scenario, plant: Plant) -> None:
-    """Refuse what a scenario asks of a plant that it is not, or cannot do.
+    """Refuse a scenario that does not fit a plant.
 
     Raises:
-        InputError: An axis is none of the plant's, the pivot cannot be moved, or its track cannot be read.
+        InputError: The plant lacks an axis, the pivot cannot be moved, or its track cannot be read.
     """
     check_axes(scenario, plant)
     for i, pivot in enumerate(scenario.pivot):
@@ -72,7 +72,7 @@ def check_axes(scenario: Scenario, plant: Plant) -> None:
     known = [*plant.axis_names, *plant.settings.locked_axes]
     for name in scenario.axes:
         if known == [""]:
-            raise InputError(f"axes.{name}: the rig has one axis, without a name; what it has stands in [plant], ...")
+            raise InputError(f"axes.{name}: the rig has one axis, without a name; set its values in [plant], ...")
         if name not in known:
             raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
     torques = [(f"push.{i}.axis", push.axis) for i, push in enumerate(scenario.push)]

@@ -19,7 +19,7 @@ from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.simulation.physics import Joints
 
 TICKS_A_PIECE = 256
-"""So many ticks wait until they are made into columns together, which is much cheaper than one by one."""
+"""Ticks that are made into columns together, which is much cheaper than one by one."""
 
 
 class TickRecorder:
@@ -115,14 +115,14 @@ class TickRecorder:
         return TickBlock(x1, x2, body_rate, x3, y1, fog, u, named, self._layout.named(signals), ended)
 
     def _columns(self, ticks: Sequence) -> np.ndarray:
-        """(n_ticks, n_signals[, n_worlds]) -> (n_signals, n_ticks, n_worlds)."""
+        """Turn (n_ticks, n_signals[, n_worlds]) into (n_signals, n_ticks, n_worlds)."""
         if self._single:  # fromiter: np.array takes five times as long over nested sequences of floats
             flat = np.fromiter(chain.from_iterable(ticks), dtype=float)
             return flat.reshape(len(ticks), -1).T[:, :, None]
         return np.swapaxes(np.array(ticks), 0, 1)
 
     def trajectory(self) -> Trajectory | None:
-        """All that was kept: in memory, or read from the file when it is asked for."""
+        """Return all that was kept: in memory, or read from the file when it is asked for."""
         if not self._keep:
             return None
         if self._kept.in_memory:
@@ -132,7 +132,7 @@ class TickRecorder:
         return Trajectory(columns, layout=self._layout)
 
     def since(self, tick: int) -> Trajectory:
-        """The ticks from one on, of one world whose trajectory is kept, as far as the run has come.
+        """Return the ticks from one on, of one world whose trajectory is kept, as far as the run has come.
 
         Those that wait go on waiting: whoever looks on changes no number.
         """
@@ -169,11 +169,11 @@ class MultiAxisRecorder:
         self.rows = rows
 
     def trajectory(self) -> Trajectory | None:
-        """All that was kept."""
+        """Return all that was kept."""
         return self._joined({name: rows.trajectory() for name, rows in self.rows.items()})
 
     def since(self, tick: int) -> Trajectory:
-        """The ticks from one on: see `TickRecorder.since`."""
+        """Return the ticks from one on: see `TickRecorder.since`."""
         trajectory = self._joined({name: rows.since(tick) for name, rows in self.rows.items()})
         assert trajectory is not None
         return trajectory

@@ -53,7 +53,7 @@ class SimulationOptions(TypedDict, total=False):
     spool: Path
     """Folder whose disk takes what a long trajectory of one world would need in memory; it is read from there."""
     threads: int
-    """On which many worlds are stepped; 0: as many as there are processors."""
+    """Number of threads that step many worlds; 0: as many as there are processors."""
 
 
 @quiet()

@@ -240,12 +240,12 @@ def _bare_many(experiment: Experiment, worlds: int) -> _Cost:
 
 
 def _closed_one(experiment: Experiment) -> _Cost:
-    """A whole run, its trajectory and summary included."""
+    """Time a whole run, its trajectory and summary included."""
     return _timed(lambda: _finished(experiment.run()).seconds, 1)
 
 
 def _closed_many(experiment: Experiment, worlds: int) -> _Cost:
-    """A batch run without trajectory."""
+    """Time a batch run without trajectory."""
     return _timed(lambda: _finished(experiment.run_many(worlds, keep_trajectory=False)).seconds, worlds)
 
 

@@ -23,7 +23,7 @@ from cmg_mj.simulation.plugin_files import make_plugin, unused_name, write_plugi
 
 REPEATS = 15
 STEPS = 400
-"""So far both have stood from the start: a model without a controller falls, and costs as much as one that stands."""
+"""Simulated time in which both stand: a model without a controller falls, and costs as much as one that stands."""
 WAYS = ("one world, mj_step", "worlds, rollout", "worlds, Batch")
 
 

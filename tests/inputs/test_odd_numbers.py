@@ -38,7 +38,7 @@ def test_of_a_robot(wrong_input: tuple[str, str], fragments: list[str]) -> None:
     (
         "a kilometre up",
         ["--position", "0 0 1000"],
-        "falls too slowly, with 0.099 1/s; a pair is for what falls with 0.69",
+        "falls too slowly, with 0.099 1/s; a pair is for robots that fall with 0.69",
     ),
     ("far up", ["--position", "0 0 1e10"], "does not compile: its masses and inertias are of too different sizes"),
     ("beyond all numbers", ["--position", "0 0 1e308"], "its physics fails while it settles on the floor"),

@@ -122,7 +122,7 @@ def test_going_back_in_time_gives_the_same_noise() -> None:
         ("", None, "line 1: must be a heading"),
         ("0.0,1.0\n1.0,2.0\n", None, "line 1: must be a heading"),
         ("time_s\n0\n1\n", None, "line 1: one column"),
-        ("t,a,b\n0,1,2\n1,1,2\n", None, "has the columns 'a, b': which is the acceleration? see column"),
+        ("t,a,b\n0,1,2\n1,1,2\n", None, "has the columns 'a, b'; name that of the acceleration with column"),
         ("t,a,b\n0,1,2\n1,1,2\n", "bb", "no column 'bb'; did you mean 'b'"),
         ("t,a\n0,1\n", None, "too few samples (1); a track has at least two"),
         ("t,a\n0,1\n\n1,x\n", None, "line 4: 'x' is not a finite number"),

@@ -132,5 +132,5 @@ def test_a_stack_gives_every_world_its_own_back() -> None:
 
 
 def test_what_is_no_number_cannot_differ() -> None:
-    with pytest.raises(InputError, match="must be the same in worlds that run together"):
+    with pytest.raises(InputError, match="must have one value for all worlds of a batch"):
         batch_values(["a", "b"])

@@ -89,7 +89,7 @@ class FrameReader:
         return self.feed(b"")
 
     def end(self) -> list[Frame]:
-        """Return the frames behind whatever the stream ends with that is none."""
+        """Return the frames behind the bytes at the end of the stream that are no frame."""
         frames = []
         while self._buffer:
             frames += self.resync()

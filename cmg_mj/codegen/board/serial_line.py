@@ -76,7 +76,7 @@ class SerialLine:
                     raise Closed("the board is gone")
                 self._waiting += self._reader.feed(data)
                 if self._reader.damaged:
-                    raise RunStopped("the board sent a message that was damaged on the line, or bytes that are none")
+                    raise RunStopped("the board sent a message damaged on the line, or bytes that are no message")
         except TimeoutError as error:
             raise Silent(f"the board has not answered for {self.patience_s:g} s") from error
         except OSError as error:

@@ -37,8 +37,8 @@ def require() -> None:
     packages = missing()
     if packages:
         raise InputError(
-            f"the emulated board needs what is not installed here: apt install {' '.join(packages)} (Debian's names: "
-            "a C compiler and newlib for ARM Cortex-M, and QEMU for ARM)"
+            f"the emulated board needs packages that are not installed: apt install {' '.join(packages)} (Debian's "
+            "names: a C compiler and newlib for ARM Cortex-M, and QEMU for ARM)"
         )
 
 

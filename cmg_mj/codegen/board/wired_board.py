@@ -45,7 +45,7 @@ _COST = struct.Struct("<3I")
 
 @dataclass
 class WireCounts:
-    """What has gone over a wire during a run.
+    """The traffic over a wire during a run.
 
     Attributes:
         sent_again: Number of samples that were sent again.
@@ -116,7 +116,7 @@ class WiredBoard:
         self._hello = self._shake(HELLO)
         if not self._hello.payload:  # the question, which carries nothing
             raise InputError(
-                f"{name}: sends back what it receives: a loopback plug or an echoing terminal is there, and no board"
+                f"{name}: echoes all that it receives: a loopback plug or an echoing terminal is there, not a board"
             )
         self.identity = read_identity(self._hello, name)
         self.identity.require(expected, name)
@@ -240,7 +240,7 @@ class WiredBoard:
         """Ask something outside of a run, again and again until there is an answer.
 
         Raises:
-            InputError: There is none.
+            InputError: The board does not answer.
         """
         frame = self._next(kind, b"")
         start = time.perf_counter()

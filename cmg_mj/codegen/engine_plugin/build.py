@@ -54,7 +54,7 @@ def check_platform() -> None:
     """Refuse platforms on which no plugin has been tested.
 
     Raises:
-        InputError: This is none of them.
+        InputError: No plugin has been tested on this platform.
     """
     here = platform.system(), platform.libc_ver()[0]
     if here != TESTED_PLATFORM:

@@ -76,7 +76,7 @@ def find_library(target: str) -> Path:
         The library.
 
     Raises:
-        InputError: There is none, or several.
+        InputError: There is no library, or there are several.
     """
     if not target:
         raise InputError("--install '': name a library, a folder with one, or a plugin")
@@ -139,7 +139,7 @@ def uninstall(name: str) -> str:
         Its name under which MuJoCo knew it.
 
     Raises:
-        InputError: There is none of that name, or the folder is not the user's alone or cannot be written.
+        InputError: No plugin has that name, or the folder is not the user's alone or cannot be written.
     """
     name = name.removeprefix("cmg_mj.")
     names = [status.name for status in list_plugins()[1]]

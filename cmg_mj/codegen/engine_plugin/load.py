@@ -222,7 +222,7 @@ def open_library(library: str, name: str) -> None:
 
 
 def _read(folder: str, file: str, most: int = -1) -> bytes:
-    """Read an ordinary file of the user's; a link or a pipe is none."""
+    """Read an ordinary file of the user's; refuse a link or a pipe."""
     refusal = f"{file} is no ordinary file of this user's"
     try:
         descriptor = os.open(os.path.join(folder, file), os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)

@@ -68,7 +68,7 @@ class PluginRig:
 
     @property
     def clock(self) -> Clock:
-        """Its clock."""
+        """The clock of the plugin."""
         controller = self.axes[0].controller
         return Clock(controller.timestep, self.instant_steps, controller.period)
 

@@ -261,4 +261,4 @@ def _text(node: Node, arguments: list[Text], inputs: Sequence[str], precision: P
         tight = ATOM if precedence == UNARY else UNARY if operation != SELECT else PLUS
         parts = [x.inside(tight) for x in arguments]
         return Text(template.format(*parts, zero=f"0.0{suffix}", one=f"1.0{suffix}"), precedence)
-    raise InputError(f"CasADi's operation {operation} is none that can be exported")
+    raise InputError(f"CasADi's operation {operation} cannot be exported")

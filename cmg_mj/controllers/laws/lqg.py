@@ -52,8 +52,8 @@ class Lqg:
     weights, continuous control has Table 2's gains to their printed digits on the papers' rig.
 
     Integral action is there twice. A bias e or a constant torque moves the equilibrium: the rig balances where gravity
-    bears the torque, at x1 = -torque/(n M), M the gravity torque of one of n gimbals' shares, and the tilt is fed back
-    from there. While the torque is still being learnt, and where something else turns the gimbals steadily, the
+    cancels the torque, at x1 = -torque/(n M), M the gravity torque of one of n gimbals' shares. The law feeds back the
+    tilt from there. While the torque is still being learnt, and where something else turns the gimbals steadily, the
     integrator of (8) brings them back, fed with the estimated angle and exact for a u held: x_e+ = x_e - dt (x3 + dt
     u/2). While the command is limited, it takes no step that would push it further into the limit.
 
@@ -144,7 +144,7 @@ class Lqg:
         return self.innovation_gain.tolist(), np.hstack([F, G]).tolist(), per_torque
 
     def init(self, y: Measurement) -> LqgState:
-        """At rest at the measured angles, with no torque."""
+        """Start at rest at the measured angles, with no torque."""
         zero = 0.0 * y.y1
         return LqgState(y.y1, zero, y.y2, zero, zero)
 
@@ -168,7 +168,7 @@ class Lqg:
 def sampled_cost(
     A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray, dt: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The integral of x'Qx + u'Ru along x' = A x + B u, for a u held over a period (Van Loan).
+    """Return the integral of x'Qx + u'Ru along x' = A x + B u, for a u held over a period (Van Loan).
 
     Args:
         A: State matrix, (n, n).
@@ -194,7 +194,7 @@ def sampled_cost(
 
 
 def _solved(what: str, solve: Callable[[], tuple[Any, Any, Any]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A gain, the Riccati equation's solution, and the poles.
+    """Return a gain, the Riccati equation's solution, and the poles.
 
     Raises:
         ValueError: There is no stabilising one.

@@ -59,7 +59,7 @@ class Law(Protocol):
     def rate_limit(self) -> Scalar: ...  # noqa: D102
 
     def init(self, y: Measurement) -> State:
-        """The state before the first sample is fed back."""
+        """Return the state before the first sample is fed back."""
         ...
 
     def step(self, state: State, y: Measurement, x: FeedbackState, u: Scalar) -> tuple[State, Scalar]:

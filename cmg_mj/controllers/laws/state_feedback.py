@@ -50,7 +50,7 @@ def lqr_gains(model: ReducedModel, state_cost: Sequence[float], input_cost: floa
 
 
 def scaled_gains(model: ReducedModel) -> tuple[float, float, float, float]:
-    """The gains that make a rig's linearised loop the papers' own, slowed down or sped up.
+    """Return the gains that make a rig's linearised loop the papers' own, slowed down or sped up.
 
     With b = J_d omega_d/J1 and g = m g h/J1 of this rig, its time runs tau = sqrt(g0/g) times as slowly as that of the
     papers' rig, and a gimbal rate does 1/r as much, r = b0/b. Then [k1 r/tau^2, k2 r/tau, k3/tau, k4/tau^2] has the

@@ -165,5 +165,5 @@ def _largest(function: Any, *arguments: Array) -> Array:
 
 
 def _not_zero(m: Array) -> Array:
-    """For hbar = 1, m3 = 0 and there is no stationary point: any will do."""
+    """Replace 0 by a tiny number: for hbar = 1, m3 = 0 and there is no stationary point."""
     return np.where(m == 0.0, 1e-300, m)

@@ -37,8 +37,8 @@ def correction(run: Run, nominal: Replay) -> Claim:
         f"With b = {b_inside:.4f}, inside (21) and (22), it is {rms_inside:.5f}.",
         assumes=ASSUMED,
         holds=difference < 0.01 * rms,
-        conditions="With the parameters of section 3.1. What homogeneity gives is the right to use Omega_2; where the "
-        "correction matters is large errors, as in Theorem 1 on system (1).",
+        conditions="With the parameters of section 3.1. Homogeneity gives the right to use Omega_2. The correction "
+        "matters for large errors, as in Theorem 1 on system (1).",
         otherwise="The correction has its part in it.",
         is_ours=True,
         figures={
@@ -79,8 +79,8 @@ def simple_copy(study: Study) -> Claim:
         "to choose.",
         result="A copy of (14) with hbar = 0.8 does not use the measurement; the noise changes the observers' "
         f"estimates by {least:.4f} RMS and more. From t = 10 to 20, at u = 0.02, the copy's error of eta1 + eta2 keeps "
-        f"{share_left:.3f} of its size, as exp(-0.02 * 10) = {expected_share:.3f} demands, whatever one would like. In "
-        f"this example it does no harm: after t = 5 the copy's RMS error is {error:.3f}, the best observer's "
+        f"{share_left:.3f} of its size, as exp(-0.02 * 10) = {expected_share:.3f} demands. No parameter changes this. "
+        f"In this example it does no harm: after t = 5 the copy's RMS error is {error:.3f}, the best observer's "
         f"{best_rms:.3f}.",
         holds=abs(share_left - expected_share) < 0.01 and least > SEEN_NOISE * best_rms,
         otherwise="The copy is not as the footnote says.",

@@ -43,8 +43,8 @@ def figure_2(study: Study) -> Claim:
     means, loud_means = rms.mean(axis=1), loud.mean(axis=1)
     remark = (
         "Initial values are not given: the plant's and the observers' are drawn from M_eta for each seed, and the "
-        "error is counted from t = 5. The noise is a new value every 10 ms, running straight in between. That the "
-        "third is best is due to Omega_2, not to the homogeneous correction (see the claim on the correction)."
+        "error is counted from t = 5. The noise is a new value every 10 ms, running straight in between. The "
+        "third is best because of Omega_2, not of the homogeneous correction (see the claim on the correction)."
     )
     return Claim(
         place="Fig. 2",

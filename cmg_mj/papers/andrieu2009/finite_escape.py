@@ -34,7 +34,7 @@ class Escape(NamedTuple):
     error: np.ndarray
     """|x2_hat - x2|/x2, (n,)."""
     end_time: float
-    """When the solution ends."""
+    """Time at which the solution ends."""
     moved: float
     """Distance that y has moved until then; infinite if without bound."""
 
@@ -108,8 +108,8 @@ def no_observer_beyond_1() -> Claim:
     count = sum(misses)
     one_observer = (
         "One observer, (7) and (8) with d_inf = 0.5, l = (2, 1), phi1 = 0.5, phi2 = 2, phi3 = 1, g = 0, without input, "
-        "started at the measured x1 and x2_hat = 0. The statement is one about all observers, proved elsewhere "
-        "(Astolfi and Praly 2006); this shows what stands in their way, it is no proof."
+        "started at the measured x1 and x2_hat = 0. The statement is about all observers and is proved "
+        "elsewhere (Astolfi and Praly 2006). This example shows the obstacle, and is no proof."
     )
     first = f" From x2(0) = {STARTS[misses.index(True)]:g} on it is missed." if count else ""
     return Claim(

@@ -35,7 +35,7 @@ class Study(NamedTuple):
     """Runs with noise of 10 % of the domain."""
     quiet_run: Run
     quiet: dict[str, Replay]
-    """Without noise, one run."""
+    """Replays without noise, on one run."""
     exact: dict[str, Replay]
     """Runs with noise, without error of hbar."""
     rate: np.ndarray
@@ -46,7 +46,7 @@ ASSUMED: Mapping[Assumption, str] = {
     "initial values": "drawn from M_eta for each seed",
     "noise": "a new value every 10 ms, straight in between",
 }
-"""What the paper does not give of Figs 1 and 2."""
+"""Data of Figs 1 and 2 that the paper does not give."""
 
 
 def study(seeds: int, seed: int = 0, dt: float = 0.01) -> Study:

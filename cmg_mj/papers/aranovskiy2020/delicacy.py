@@ -117,16 +117,16 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
             f"(Runge-Kutta 4) and {at_200['exact step (ours)'].error:.0e} (exact); in single precision by "
             f"{float32['explicit Euler'].error:.0%} and {float32['Runge-Kutta 4'].error:.1e}. Along "
             f"a closed-loop run H's condition number rises to {condition:.2g}, its least eigenvalue stays above "
-            f"{least:.2f}; all twelve equations by Euler would change the estimated rate by "
+            f"{least:.2f}. All twelve equations by Euler would change the estimated rate by "
             f"{comparison.difference:.3f} rad/s RMS and its error from {comparison.error:.3f} to "
             f"{comparison.other_error:.3f} rad/s."
         ),
         assumes={"control rate": f"{1.0 / DT:g} Hz", "method": "explicit Euler, Runge-Kutta 4, the exact step"},
         holds=euler_first and rk4_fine and ours_fine,
         conditions=(
-            "At 200 Hz the equation is delicate for explicit Euler alone, and H only until it has settled, the "
-            "estimate throughout; Runge-Kutta 4 does well enough even in single precision, the exact (Davison-Maki) "
-            "step at any rate."
+            "At 200 Hz the equation is delicate for explicit Euler alone: H until it has settled, the estimate "
+            "throughout. Runge-Kutta 4 does well enough even in single precision. The exact (Davison-Maki) step does "
+            "so at any rate."
         ),
         otherwise="It is not the method by which they are told apart.",
         figures={

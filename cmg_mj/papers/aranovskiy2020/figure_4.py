@@ -31,7 +31,7 @@ class OpenLoopRuns(NamedTuple):
     whole: dict[str, np.ndarray]
     """RMS of the estimated rate less the gyro's over the whole run, (n_worlds,) [rad/s]; `zero`: of zero."""
     after_push: dict[str, np.ndarray]
-    """The same from the push to one second after its end."""
+    """Errors from the push to one second after its end."""
     example: Trajectory
     """World 0."""
 
@@ -83,7 +83,7 @@ def _comparable(span: str, rms_errors: Mapping[str, np.ndarray], suffix: str, pi
             f"[rad/s]: {_list_errors(errors)}. The largest is {spread:.2f} times the smallest."
         ),
         assumes={**PUSH_RECOVERY, "threshold": f"comparable is within a factor of {COMPARABLE:g}"},
-        missing_data="The paper gives neither this recording, with its push, e and noise, nor what is comparable.",
+        missing_data="The paper gives neither this recording, with its push, e and noise, nor a limit for comparable.",
         holds=spread < COMPARABLE,
         conditions=_zero_sentence(errors),
         otherwise=(

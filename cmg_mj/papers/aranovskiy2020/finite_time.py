@@ -16,7 +16,7 @@ from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 ALPHAS = (0.55, 0.7, 0.85, 1.0)
 DECADES = 12
-"""So many powers of ten the error is followed down."""
+"""Powers of ten that the error is followed down."""
 STEP = 5e-4
 """Step of the integration [s], at the error's first size."""
 FINE_DT = 1e-4
@@ -31,7 +31,7 @@ class Decay(NamedTuple):
     decades: np.ndarray
     """Powers of ten by which its homogeneous size has fallen, (n,)."""
     time_s: np.ndarray
-    """When, (n,) [s]."""
+    """Times of these sizes, (n,) [s]."""
     rate: np.ndarray
     """The rate's error then, of 1 at first, (n,) [rad/s]."""
 
@@ -53,7 +53,7 @@ class Decay(NamedTuple):
 
     @property
     def end_s(self) -> float:
-        """When it is gone: the last turn and the geometric series of all turns to come; infinite if none is quicker."""
+        """Time at which the error is zero: the last turn plus the geometric series of all turns to come, or inf."""
         factor, (before, last) = self.shrink_factor, self.time_s[self.turns[-2:]]
         return math.inf if factor > 0.99 else float(last + (last - before) * factor / (1.0 - factor))
 

@@ -101,7 +101,7 @@ def broken_claim(runs: MismatchRuns) -> Claim:
             f"The second cube changed on purpose, {WORLDS} seeds a case, the same push. In {DURATION_S:g} s body A "
             f"turns by up to {turns_text}. Conservation of the momentum about the vertical gives its rate to "
             f"{balance:.1%} of the largest; from the symmetric rig's run the turn is foreseen to {min(ratios):.2f} to "
-            f"{max(ratios):.2f} of what it is. The velocity RMS error changes by at most {velocity:.1%} and the tilt "
+            f"{max(ratios):.2f} of its size. The velocity RMS error changes by at most {velocity:.1%} and the tilt "
             f"RMS by at most {tilt:.0%}; {runs.fell} worlds fall."
         ),
         holds=runs.fell == 0 and velocity < 0.1,
@@ -183,7 +183,7 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
             f"With a speed loop of 0.11 s and at most 0.5 N m the speed strays by at most {speed_error:.2f} rad/s "
             f"({speed_error / nominal:.2%}) under the push. It is {nominal / max(gimbal, tilt):.0f} times the fastest "
             f"gimbal rate ({gimbal:.2f} rad/s) and {nominal / tilt:.0f} times the fastest tilt rate. The term with "
-            f"omega_d' that (3) leaves out is {share:.2%} of the tilt acceleration (RMS)."
+            f"omega_d' that (3) omits is {share:.2%} of the tilt acceleration (RMS)."
         ),
         assumes={**PUSH_RECOVERY, "drive": "a speed loop of 0.11 s, at most 0.5 N m"},
         holds=speed_error / nominal < 0.01 and share < 0.01 and nominal > 10.0 * max(gimbal, tilt),

@@ -96,9 +96,10 @@ def joint_claim(studies: Studies) -> Claim:
         result=(
             f"{len(studies)} pushes at several noises, {len(candidates)} experiments, each recorded once for all "
             f"three. In {len(tunable)} of them all three can be tuned to follow the gyro better than an estimate of "
-            f"zero does. Of these Table 2's lines come nearest to being the best together at {nearest.words}. There "
-            f"Table 2's error by that of the tuned is {ratios}. Zero left aside it is {least.words}, where the worst "
-            f"has {least.largest_ratio:.2f} times the error of the tuned. {_describe_separate_optima(studies)}"
+            f"zero does. Among these, Table 2's lines come nearest to being the best together at {nearest.words}. "
+            f"There Table 2's error by that of the tuned is {ratios}. Without the comparison to zero it is "
+            f"{least.words}, where the worst has {least.largest_ratio:.2f} times the error of the tuned. "
+            f"{_describe_separate_optima(studies)}"
         ),
         assumes=assumed(nearest),
         missing_data=UNRECORDED,

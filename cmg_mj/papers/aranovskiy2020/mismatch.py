@@ -1,6 +1,6 @@
 """Scissored pairs whose halves are not alike: Hypotheses 1 and 2 of aranovskiy2020 broken on purpose.
 
-Neither the controller nor the observers know of it.
+The controller and the observers do not know the change.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class MismatchRuns(NamedTuple):
     plant: Plant
     """The symmetric rig."""
     symmetric: Result
-    """Its run, of all worlds."""
+    """Run of the symmetric rig, of all worlds."""
     broken: dict[tuple[str, float], Result]
     """(kind, size) -> run."""
 

@@ -70,9 +70,9 @@ class Residuals(NamedTuple):
     torque: float
     """The gimbal's torque less tau_c of (2) [N m]."""
     torque_turned_J2: float
-    """The same with the sign of the last term turned [N m]."""
+    """That difference with the sign of the last term turned [N m]."""
     torque_without_flywheel: float
-    """Without the flywheel's term, which is what the servo has to bear [N m]."""
+    """The torque without the flywheel's term: the servo supplies that term [N m]."""
     torque_size: float
     """RMS of the torque itself [N m]."""
 
@@ -134,7 +134,7 @@ def equations_2_to_4(r: Residuals, states: int) -> Claim:
         result=(
             f"At {states} random symmetric states the six-body model's tilt acceleration (RMS {r.size:.1f} rad/s^2) "
             f"equals (3) to {r.tilt:.1e} once J_d omega_d' sin x3 is added, and body A's is {r.yaw:.1e}. With motor "
-            f"torques up to 0.2 N m what (3) leaves out is {r.tilt_as_printed:.2f} rad/s^2; J2's sign turned would be "
+            f"torques up to 0.2 N m (3) as printed is {r.tilt_as_printed:.2f} rad/s^2 off; with J2's sign turned it is "
             f"{r.tilt_turned_J2:.1e} off."
         ),
         holds=r.tilt < 1e-9 * r.size and r.yaw < 1e-9 * r.size and r.tilt_turned_J2 > 1e3 * r.tilt,
@@ -154,7 +154,7 @@ def gimbals_line(r: Residuals, states: int) -> Claim:
         result=(
             f"At the same {states} states, under gimbal torques of {r.torque_size:.2f} N m RMS, the six bodies have it "
             f"to {r.torque:.1e} N m. With the sign of the last term turned it would be {r.torque_turned_J2:.1e} off. "
-            f"The flywheel's term, which a servo has to bear while the rig tilts, is {r.torque_without_flywheel:.2f} "
+            f"The flywheel's term, which a servo has to supply while the rig tilts, is {r.torque_without_flywheel:.2f} "
             "N m RMS."
         ),
         holds=r.torque < 1e-9 * r.torque_size and r.torque_turned_J2 > 1e3 * r.torque,

@@ -21,7 +21,7 @@ class Inverse(NamedTuple):
     optimal: bool
     """True if some Q >= 0 makes K the LQR gain (Kalman 1964: the minimum is not below 1)."""
     Q: np.ndarray | None
-    """Such a Q, (n, n), of rank 1."""
+    """A Q of that kind, (n, n), of rank 1."""
     recovered: float
     """Relative error of the Riccati equation's gain for that Q."""
     diagonal: np.ndarray
@@ -78,9 +78,9 @@ class Diagonal(NamedTuple):
     """The diagonal Q whose LQR gain comes nearest to a printed one."""
 
     Q: np.ndarray
-    """Its entries, none below 0, (n,)."""
+    """Entries of the diagonal, none below 0, (n,)."""
     gain: np.ndarray
-    """Its gain with R = 1, (n,)."""
+    """LQR gain with R = 1, (n,)."""
     off: float
     """Largest difference from the printed gain, by half a unit of the digit it is printed with: 1 is rounding's."""
 

@@ -55,7 +55,7 @@ def cause(errors: Errors) -> Claim:
     share_text = "-" if share is None else f"{share:.0%}"
     return Claim(
         place="Section V, the cause of the second place",
-        statement="That (10) comes after (11) is partly due to the numerical computations that (10) takes.",
+        statement="(10) comes after (11) partly because of the numerical computations that (10) takes.",
         result=(
             f"The loop closed on either, {len(errors[TEN])} seeds, e = 0.5 deg, 400 ug/rtHz, the law on measured "
             f"angles. Velocity RMS error of (10) less that of (11): {plus_minus(exact)} rad/s with exact steps, "

@@ -24,7 +24,7 @@ LAG_S, SOFT_LAG_S = 0.001, 0.005
 COMMAND_LAG_S = 0.0005
 """Half a physics step: Runge-Kutta 4 follows nothing much faster [s]."""
 RESOLUTION = 0.0119
-"""0.114 rev/min, the unit in which the MX-106 is told a speed in wheel mode (e-Manual, MX-106) [rad/s]."""
+"""0.114 rev/min, the unit of the speed command of the MX-106 in wheel mode (e-Manual, MX-106) [rad/s]."""
 DEADBANDS = (0.0, RESOLUTION, 0.05, 0.1, 0.2, 0.4)
 """Speeds below which the gimbal stands still [rad/s]; the paper says nothing of one."""
 MEANS_S = 0.1
@@ -68,7 +68,7 @@ class Servos(NamedTuple):
     velocity: Mapping[float, Result]
     """Deadband [rad/s] -> runs with the servo in velocity mode."""
     soft: Result
-    """Without a deadband, the soft servo in velocity mode."""
+    """Runs of the soft servo in velocity mode, without a deadband."""
 
 
 def run(worlds: int, seed: int, duration_s: float = DURATION_S) -> Servos:

@@ -36,8 +36,8 @@ def table_2_claim(case: Tuning, studies: Studies, experiment: JointExperiment) -
             f"Fitted on {len(level.rms)} seeds, scored on as many others, from the push to a second after it. At "
             f"{experiment.words}, where the three lines come nearest to being the best together, the best is "
             f"{_sizes(level)}. Table 2's error is {level.given_rms.mean():.4f} rad/s, that of the tuned "
-            f"{level.rms.mean():.4f}, the ratio {with_ends(level.ratio)}. That of an estimate of zero is "
-            f"{level.zero_rms:.4f}. {_describe_all_pushes(case, studies)}"
+            f"{level.rms.mean():.4f}, the ratio {with_ends(level.ratio)}. An estimate of zero has an "
+            f"error of {level.zero_rms:.4f}. {_describe_all_pushes(case, studies)}"
         ),
         assumes=assumed(experiment),
         missing_data=UNRECORDED,
@@ -91,7 +91,7 @@ def _describe_first_push(case: Tuning, studies: Studies) -> str:
 def _describe_single_line(case: Tuning, studies: Studies) -> str:
     level = least_lost(case, studies)
     return _describe_first_push(case, studies) + (
-        " What is the best for this line alone is not the best for the other two." if is_best(level) else ""
+        " The best experiment for this line alone is not the best for the other two." if is_best(level) else ""
     )
 
 

@@ -215,14 +215,14 @@ def _conditions(experiment: Factorial, safe_gains: Sequence[str]) -> str:
     sentences = [f"At e = {JUDGED_DEG:g} deg, with {join_with_and(cells)}." if cells else "Nowhere."]
     if FROZEN in safe_gains:
         sentences.append(
-            "It is not that the gain is constant: frozen at the value at which the Riccati equation settles, it "
-            "stands with either model at every bias tried."
+            "A constant gain is not the cause: frozen at the value at which the Riccati equation settles, it stands "
+            "with either model at every bias tried."
         )
     sensitive_models = [model for model in MODELS if experiment.falls_at((PREDECESSOR, model))]
     if len(sensitive_models) == 2:
         first = {model: min(experiment.falls_at((PREDECESSOR, model))) for model in MODELS}
         sentences.append(
-            f"It is that the gain is small, and then the model: the predecessor's falls from {first[LINEAR]:g} deg "
+            f"The cause is a small gain, and then the model: the predecessor's falls from {first[LINEAR]:g} deg "
             f"with {LINEAR}, from {first[MEASURED]:g} deg with {MEASURED}."
         )
     return " ".join(sentences)

@@ -124,4 +124,4 @@ def _describe_losses(loops: list[Trial]) -> str:
     ]
     if not parts:
         return "In the loop no tuned observer is worse than Table 2's."
-    return f"It is no fit for the loop: there the tuned are worse than Table 2's for {'; '.join(parts)}."
+    return f"This fit does not suit the loop. There the tuned are worse than Table 2's for {'; '.join(parts)}."

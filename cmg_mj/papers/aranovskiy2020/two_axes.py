@@ -26,7 +26,7 @@ MASS_KG = 4.0 * TABLE_1["m"]
 SPEED = TABLE_1["omega_d"]
 DURATION_S, PUSH_S = 3.0, 0.1
 PUSHES_N_M = (1.0, 2.0, 3.0)
-"""On either axis, of a body of four cubes [N m]; the rig of two has 1."""
+"""Pushes on either axis of a body of four modules [N m]; the rig of two has 1."""
 SMALL = 0.05
 """Two axes are separate if either changes the other by less than this share of the largest tilt."""
 WEIGHTS = (426.0, 1.7, 0.01, 0.08)
@@ -102,7 +102,7 @@ def at_rest(model: mujoco.MjModel) -> mujoco.MjData:
 
 
 def reduced(model: mujoco.MjModel, axis: int) -> ReducedModel:
-    """One axis' reduced model, by a gimbal's share of its pair, read off the mass matrix; J2 is small beside J1."""
+    """Return the reduced model of an axis, by a gimbal's share of its pair, off the mass matrix; J2 is small."""
     data, tilt = at_rest(model), addresses(model, axis).tilt
     J1 = float(_mass_matrix(model, data)[tilt, tilt]) / 2.0
     data.qvel[:] = 0.0
@@ -155,7 +155,7 @@ def run(pushes_n_m: tuple[float, float], duration_s: float = DURATION_S) -> Moti
 
 
 def _about_the_joint(data: mujoco.MjData, body: int) -> float:
-    """Return the vertical part of the momentum of all that hangs on a body, about the world's origin [N m s]."""
+    """Return the vertical part of the momentum of a body and its descendants, about the world's origin [N m s]."""
     arm, moving = data.subtree_com[body], data.subtree_linvel[body] * MASS_KG
     return data.subtree_angmom[body][2] + arm[0] * moving[1] - arm[1] * moving[0]
 
@@ -210,9 +210,9 @@ def axes_claim(couplings: dict[float, Coupling]) -> Claim:
         },
         conditions=(
             f"Up to pushes of {max(separate_pushes, default=0.0):g} N m for {PUSH_S:g} s, under which the other axis "
-            f"changes less than {SMALL:.0%} of the tilt, on a body that does not turn about the vertical. What a pair "
-            "holds along its own axis makes a torque about the vertical as soon as the other axis moves; the ground "
-            "must bear it."
+            f"changes less than {SMALL:.0%} of the tilt, on a body that does not turn about the vertical. The momentum "
+            "that a pair holds along its own axis makes a torque about the vertical when the other axis moves. The "
+            "ground must take this torque."
         ),
         otherwise="The axes are felt in each other.",
         figures={

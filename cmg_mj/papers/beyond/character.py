@@ -114,7 +114,7 @@ def push_lag(observer: Observer, model: ReducedModel, dt: float) -> float | None
 
 
 def _first_passing(time_s: np.ndarray, values: np.ndarray, level: float) -> float | None:
-    """When a signal first passes a level on its way from zero [s]; None if it never does."""
+    """Return the time at which a signal first passes a level on its way from zero [s]; None if it never does."""
     passing = np.flatnonzero(values / level >= 1.0)
     if not len(passing):
         return None

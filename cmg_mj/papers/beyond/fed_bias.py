@@ -1,4 +1,4 @@
-"""(11) told the equilibrium bias by `adaptive`, beside each of the two alone."""
+"""(11) with the equilibrium bias from `adaptive`, beside each of the two alone."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def claims(on_share: OnShare) -> list[Claim]:
 def fed_bias(
     worlds: int, seed: int, on_share: OnShare, biases_deg: Sequence[float] = BIASES_DEG, settings: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
-    """Run (11) alone, `adaptive` alone, and (11) told the bias by `adaptive`, at several biases.
+    """Run (11) alone, `adaptive` alone, and (11) with the bias from `adaptive`, at several biases.
 
     Args:
         worlds: Worlds a bias, the same ones each time.
@@ -37,7 +37,7 @@ def fed_bias(
         settings: Settings `section.field=value` that differ in `push_recovery`.
 
     Returns:
-        A row a bias: each observer's velocity RMS error and share of falls, and what (11) gains by being told.
+        A row a bias: each observer's velocity RMS error and share of falls, and the gain of (11) by the bias.
     """
     by_kind = {}
     for i, kind in enumerate(KINDS):

@@ -63,15 +63,15 @@ def friction_claim(figures: dict[str, Any]) -> Claim:
         result=(
             f"On a rig with {FRICTION_N_M:g} N m of dry friction on the tilt axis the same friction in (11) takes "
             f"{_milli(rough)} off the velocity RMS error ({error_without} to {error_with} rad/s). But on "
-            f"a rig without it, it takes {_milli(smooth)} off as well: it also damps the estimate of a "
-            f"rate whose true value is small. What is due to knowing the friction is the difference, {_milli(due)}."
+            f"a rig without friction, it takes {_milli(smooth)} off as well: it also damps the estimate of a "
+            f"rate whose true value is small. Knowing the friction is worth the difference, {_milli(due)}."
         ),
         assumes={**PUSH_RECOVERY, "friction": f"{FRICTION_N_M:g} N m, dry, on the tilt axis"},
         holds=due is not None and due.low > 0.0,
         conditions=(
             "Most of the gain is damping that would help without any friction; push_recovery, e = 0.5 deg, 400 ug/rtHz."
         ),
-        otherwise="What it takes off on the rig that rubs is, within chance, damping that helps without any friction.",
+        otherwise="Its gain on the rig with friction is, within chance, damping that helps without any friction.",
         figures=figures,
     )
 

@@ -77,15 +77,16 @@ def speed_claim(study: Study) -> Claim:
     learning_times, ideal_times = state_settle_times(study.proposed)
     middle, yardstick = float(np.median(learning_times)), float(np.median(ideal_times))
     meaning = (
-        f"{UNSTATED} Quickly is taken to mean: the median time until the error, as a vector, stays below {SETTLED} is "
-        f"at most {QUICK:g} times that of an observer with the same L that knows the parameters and the disturbance."
+        f"{UNSTATED} We call it soon if the median time until the error, as a vector, stays below {SETTLED} is at most "
+        f"{QUICK:g} times that of a reference. The reference is an observer with the same L that knows the parameters "
+        "and the disturbance."
     )
     return Claim(
         place="Fig. 2(b), how fast",
         statement="With the proposed observer the error of the state tends to zero soon.",
         result=f"At Sigma = 10 the state's error stays below {SETTLED} from {words_of_time(middle)} on (median of "
         f"{len(learning_times)} motions); with all of xm known, L takes {yardstick:.1f} s. It is "
-        f"{middle / yardstick:.0f} times as slow: what takes long is to learn the parameters.",
+        f"{middle / yardstick:.0f} times as slow, because it has to learn the parameters.",
         assumes={**ASSUMED, "threshold": f"soon is at most {QUICK:g} times as slow as knowing all"},
         missing_data="The paper gives no time within which it counts as quick.",
         holds=middle <= QUICK * yardstick,

@@ -31,14 +31,15 @@ def separated_errors(on_share: OnShare) -> Claim:
     largest = max(errors.values())
     return Claim(
         place="Equations (7) to (9)",
-        statement="With T from (8), the error of the state parts from that of the exosystem.",
+        statement="With T from (8), the error of the state decouples from that of the exosystem.",
         result="z = (x^ - x) - T (xm^ - xm) obeys z' = (A + L C2) z whatever Gamma and Sigma, along a motion that is "
         f"chaotic, to {largest:.0e} at worst. It does so in continuous time for 6 s (1.5 s at Sigma = 1000) and, "
         "sampled at 200 Hz, for 40 s.",
         is_general=True,
         assumes={"initial values": "one motion", "control rate": "200 Hz"},
         holds=largest < 1e-8,
-        conditions="On the pendulum robot; the paper has (7) to (9) for any system, and does not say what they part.",
+        conditions="On the pendulum robot. The paper has (7) to (9) for any system, and does not say that they "
+        "decouple the errors.",
         is_ours=True,
         figures={"identity_error": errors, "largest_z": max(*sizes, size)},
     )

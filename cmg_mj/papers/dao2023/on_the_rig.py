@@ -85,7 +85,7 @@ def velocity(seed: int = 51_000, worlds: int = 5) -> Claim:
 
     remark = (
         f"As above, {worlds} worlds a bias, the observer in the loop, no push. Without bias there "
-        "is nothing to learn, and what learning costs in noise shows: there, homogeneous has "
+        "is nothing to learn, and learning costs noise: there, homogeneous has "
         f"{means['homogeneous'][0]:.3f} and adaptive {means['adaptive'][0]:.3f} rad/s."
     )
     picture = Picture(

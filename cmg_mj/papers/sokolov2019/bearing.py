@@ -128,19 +128,19 @@ def claim(runs: Study) -> Claim:
             f"{plus_minus(peak, 3)} N m at a push ({worlds} seeds; {peak_of_mean:.3f} in their mean). Noise makes "
             f"{plus_minus(noise_torque, 3)} N m RMS of it before; a scissored pair's bearing carries {pair:.0e} N m. A "
             f"free bearing, with the exact rate in the law: {falls_text}. There the yaw takes up the tilt: (J_d "
-            f"w_d)^2/(2 I_z) is {k.gyroscopic:.2f} N m/rad against gravity's {k.gravity:.2f}. So little is left to "
-            "bring the gimbal back with, and of the wrong sign: the linearised law has a pole at "
-            f"{np.real(k.poles).max():+.3f} 1/s, and a start off the upright makes the gimbal run away."
+            f"w_d)^2/(2 I_z) is {k.gyroscopic:.2f} N m/rad against gravity's {k.gravity:.2f}. The rest that "
+            "brings the gimbal back is small and has the wrong sign: the linearised law has a pole at "
+            f"{np.real(k.poles).max():+.3f} 1/s. A start off the upright makes the gimbal run away."
         ),
         assumes={**PUSH_AND_NOISE, "bearing": "locked"},
         holds=error < 1e-9 and pair < 1e-6 * peak.mean,
         conditions=(
-            "It is so with the thrust bearing locked; on a free one the tilt turns the rig about the vertical, and the "
-            "law lets it fall."
+            "It is so with the thrust bearing locked. On a free bearing the tilt turns the rig about the vertical, and "
+            "the law lets the rig fall."
             if falls["a push of the upright rig"] > 0.5
             else ""
         ),
-        otherwise="What the bearing carries is not what the closed form says.",
+        otherwise="The bearing does not carry the torque of the closed form.",
         figures={
             "peak_torque_at_push_n_m": list(peak),
             "peak_of_the_mean_torque_n_m": peak_of_mean,

@@ -155,14 +155,14 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
         result=(
             f"y2 does not reach its rate: noise of 1 rad on y2 changes it by {reach:.0e} rad/s. But with every "
             f"term in y2 put back in its relative error at the push is {with_y2.mean:.2f} instead of "
-            f"{without_y2.mean:.2f}. What (9) lacks is the push: d/J1 through (s + 20)/(s^2 + 20 s + "
+            f"{without_y2.mean:.2f}. (9) does not know the push: d/J1 through (s + 20)/(s^2 + 20 s + "
             f"{stiffness(tuning.prepared.plant.reduced):.1f}) explains {explained_share:.0%} of its error's variance "
             f"there (and the bias e the {bias_error:+.3f} rad/s before)."
         ),
         assumes=ASSUMED,
         holds={"y2 is ignored": reach == 0.0, "the push is missed for this reason": with_y2.high < 1.0},
         otherwise=(
-            "That y2 is ignored is so; that the push is missed for this reason is not: with y2 it is missed as well."
+            "(9) does ignore y2, but does not miss the push for this reason: with y2 it misses the push as well."
             if reach == 0.0
             else "y2 does reach its rate."
         ),

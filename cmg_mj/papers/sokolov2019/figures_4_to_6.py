@@ -202,8 +202,8 @@ def figure_6_at_rest(lags: Lags, cycles: Cycles) -> Claim:
         otherwise="Nothing oscillates."
         if not ratios_text
         else (
-            f"What makes (8) and (9) oscillate makes (10) oscillate as well, {ratios_text} times as far. A slow "
-            "servo makes (8) oscillate and not (10), but not (9) either."
+            f"The causes that make (8) and (9) oscillate make (10) oscillate as well, {ratios_text} times as far. A "
+            "slow servo makes (8) oscillate and not (10), but not (9) either."
         ),
         figures={f"cycle_amplitude_{name}_deg": cycle.amplitude_deg for name, cycle in cycles.ends.items()},
     )

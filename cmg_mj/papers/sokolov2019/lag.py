@@ -36,11 +36,11 @@ class Prediction(NamedTuple):
     servo_lag_s: float | None
     """The least servo lag at which it oscillates, as stiff."""
     softened_lag_s: float | None
-    """The same for a critically damped servo that is less stiff."""
+    """The least servo lag of a critically damped servo that is less stiff."""
     latency_s: float | None
     """The least latency of y1, in whole physics steps."""
     pole: complex
-    """Its least damped oscillation with the model's servo [1/s]."""
+    """Pole of its least damped oscillation with the model's servo [1/s]."""
 
     @property
     def damping(self) -> float:
@@ -49,7 +49,7 @@ class Prediction(NamedTuple):
 
     @property
     def frequency_hz(self) -> float:
-        """Its frequency [Hz]."""
+        """Frequency of that oscillation [Hz]."""
         return self.pole.imag / (2.0 * np.pi)
 
 

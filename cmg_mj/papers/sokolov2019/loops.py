@@ -32,11 +32,11 @@ class Loops(NamedTuple):
     """The closed loops over seeds."""
 
     by_bias: dict[float, dict[str, Result]]
-    """Without backlash: e [deg] -> observer -> runs."""
+    """Runs without backlash: e [deg] -> observer -> runs."""
     gap: dict[str, Result]
     """Runs with the datasheet's backlash, at the bias of the pictures."""
     quiet: dict[str, Result]
-    """Without backlash or noise, one world at the bias of the pictures: what the push leaves behind."""
+    """Runs without backlash or noise, one world at the bias of the pictures: the rest of the push's motion."""
     gyro: Result
     """The law fed by the gyro, without backlash, at the bias of the pictures."""
     worlds: int

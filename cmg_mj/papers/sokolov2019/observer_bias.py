@@ -15,7 +15,7 @@ from cmg_mj.papers.sokolov2019 import paper
 from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment
 
 REST_S = 35.0
-"""So long until the law's slowest poles, -0.19 +- 0.29j 1/s, have faded to 1e-3 [s]."""
+"""Time until the law's slowest poles, -0.19 +- 0.29j 1/s, have faded to 1e-3 [s]."""
 
 
 class Rest(NamedTuple):

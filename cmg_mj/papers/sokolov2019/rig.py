@@ -24,7 +24,7 @@ NO_NOISE = (
 )
 
 PUSH_AND_NOISE: Mapping[Assumption, str] = {"push": "0.5 N m for 0.1 s", "noise": "400 ug/rtHz"}
-"""What the paper does not give of its experiments, beside e: the scenario single_gimbal."""
+"""Data of its experiments that the paper does not give, beside e: the scenario single_gimbal."""
 
 FINE = "plant.timestep_s=0.001"
 """A servo that is slow because of its damping is stiff: it asks for a smaller step than the rig's own."""

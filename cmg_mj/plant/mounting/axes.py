@@ -63,7 +63,7 @@ def hinge_or_direction(
         return None, direction
     if not parallel:
         raise InputError(
-            f"--axis {_axis_text(axis)}: {path} hangs body {model.body(body).name!r} on no hinge along it, and the "
+            f"--axis {_axis_text(axis)}: {path}: body {model.body(body).name!r} has no hinge along it, and the "
             f"body is not free; its hinges: {', '.join(by_name) or 'none'} (--free-base lets it stand on the floor)"
         )
     joint = parallel[0]
@@ -74,7 +74,7 @@ def _vector(axis: AxisLike, hinges: Sequence[str], path: Path) -> np.ndarray:
     if isinstance(axis, str):
         if axis not in NAMED:
             raise InputError(
-                f"--axis {axis}: must be x, y, three numbers, or a hinge that the body hangs on; {path}: "
+                f"--axis {axis}: must be x, y, three numbers, or a hinge that carries the body; {path}: "
                 f"{nearest(axis, hinges, 'its hinges')}"
             )
         return np.array(NAMED[axis])
@@ -90,7 +90,7 @@ def _vector(axis: AxisLike, hinges: Sequence[str], path: Path) -> np.ndarray:
 
 
 def _level(direction: np.ndarray, what: str, path: Path) -> np.ndarray:
-    """The direction made exactly horizontal, if it nearly is."""
+    """Make a direction exactly horizontal, if it nearly is."""
     steep = math.degrees(math.asin(min(1.0, abs(float(direction @ UP)))))
     if steep > LEVEL_DEG:
         word = "along gravity" if steep > 90.0 - LEVEL_DEG else f"{steep:.3g} deg steep"

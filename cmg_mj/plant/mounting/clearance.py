@@ -37,7 +37,7 @@ def check_room(
     )
     if floor is not None and lowest < floor - TOUCH_M:
         raise InputError(
-            f"{path}: no room: the modules reach {floor - lowest:.3g} m below what it stands on; use a smaller "
+            f"{path}: no room: the modules reach {floor - lowest:.3g} m below its support; use a smaller "
             "--scale, or a higher --position"
         )
     for other in names:

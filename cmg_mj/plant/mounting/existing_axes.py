@@ -40,7 +40,8 @@ def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, pa
         The hinges, joints and speeds of these axes.
 
     Raises:
-        InputError: It has one and the new one has no name, or has half of one, or a keyframe of that name that is none.
+        InputError: It has an axis and the new one has no name; it has half of an axis; or its keyframe of that name
+            does not fit.
     """
     elements = [element.name for kind in (spec.joints, spec.sites, spec.sensors) for element in kind]
     names = axes_in(elements)

@@ -14,9 +14,9 @@ from cmg_mj.plant.mounting.servos import holds
 
 Hold = Literal["constraints", "servos"]
 IMPEDANCE = 0.9999
-"""Impedance of a constraint that holds a joint, MuJoCo's largest. A joint gives way by 1 less this, in shares of every
-acceleration: with MuJoCo's default of 0.9 to 0.95 a trunk on its waist jerks with every change of the command, and its
-accelerometers show that as tilt."""
+"""Impedance of a constraint that holds a joint, MuJoCo's largest. A held joint still follows the share 1 - IMPEDANCE
+of every acceleration. With MuJoCo's default of 0.9 to 0.95 a trunk on its waist jerks with every change of the command,
+and its accelerometers show that as tilt."""
 SAME_PLACE = 1e-3
 """Largest distance of a joint from where a constraint of the file holds it [rad, m]; files have six digits."""
 

@@ -138,8 +138,8 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
         touching = overlap(model, key, line, pole)
         if pole and not touching:
             raise InputError(
-                f"{path}: falls too slowly, with {pole:.2g} 1/s; a pair is for what falls with {SLOWEST:.2g} 1/s or "
-                "faster (--position is in metres; a mass far up falls slowly)"
+                f"{path}: falls too slowly, with {pole:.2g} 1/s; a pair is for robots that fall with {SLOWEST:.2g} "
+                "1/s or faster (--position is in metres; a mass far up falls slowly)"
             )
         reason = f"{touching}; let them not collide (<exclude>)" if touching else "it stands by itself"
         raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: {reason}")

@@ -22,11 +22,11 @@ UPRIGHT_DEG = 0.005
 MOST_ROUNDS = 40
 """Most rounds of resting and leaning; on flat tyres each takes an eighth off the lean."""
 LARGEST_LEAN_DEG = 20.0
-"""A robot whose mass lies farther off what it stands on has fallen, whatever holds it [deg]."""
+"""A robot whose mass lies farther from its line of support has fallen, whatever holds it [deg]."""
 STANDS_DEG = 2.0
 """A robot that must lean so far before it falls stands by itself [deg]."""
 LONG_M = 0.02
-"""Contacts farther apart along the axis say how it lies [m]."""
+"""Contacts farther apart than this along the axis determine its direction [m]."""
 
 
 class Support(NamedTuple):
@@ -37,11 +37,11 @@ class Support(NamedTuple):
     point: np.ndarray
     """A point of the line, in the world (3,) [m]."""
     direction: np.ndarray
-    """Along the line, horizontal, in the world (3,)."""
+    """Direction of the line, horizontal, in the world (3,)."""
 
 
 def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.ndarray, path: Path) -> Support:
-    """Let a free robot settle on the floor, its mass above a line through what it stands on.
+    """Let a free robot settle on the floor, its mass above a line through its contacts.
 
     Args:
         model: The robot with its modules, all joints held that are to be.
@@ -180,8 +180,8 @@ def _support(
     height = float(data.subtree_com[int(model.jnt_bodyid[joint])][2] - middle[2])
     if math.degrees(math.atan2(0.5 * width, max(height, 1e-9))) > STANDS_DEG:
         raise InputError(
-            f"{path}: stands by itself: what it stands on is {width:.3g} m wide across the axis; a pair balances what "
-            "stands on a line or a point (another --axis?)"
+            f"{path}: stands by itself: its support is {width:.3g} m wide across the axis; a pair balances a robot "
+            "that stands on a line or a point (another --axis?)"
         )
     return middle, direction
 

@@ -28,7 +28,7 @@ MOST_TRIES = 5
 
 
 class Place(NamedTuple):
-    """Where the modules go on a robot, and the line that it tilts about."""
+    """The place of the modules on a robot, and the line that it tilts about."""
 
     joint: str
     """The hinge that the robot tilts about, or its free joint."""
@@ -81,7 +81,7 @@ def stand_upright(
         spec: The robot with its modules, all joints held that are to be; the modules are placed in it.
         poses: Where its joints are at first, by name.
         place: Where the modules go.
-        mounts: What each module hangs on.
+        mounts: The body that carries each module.
         others: The hinges of other axes, which are to stand upright too.
         request: The body, the modules' scale.
         path: The file, for messages.

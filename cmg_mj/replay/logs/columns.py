@@ -197,7 +197,7 @@ def _check_together(names: Mapping[str, str]) -> None:
             "--columns: there is no tilt; name one, or ax and az, or inner_x, inner_z, outer_x and outer_z"
         )
     if "acceleration" in names and accelerometers:
-        raise InputError("--columns: two accelerometers show the angular acceleration; acceleration is one too many")
+        raise InputError("--columns: two accelerometers show the angular acceleration; leave acceleration out")
     if ("gimbal1" in names) != ("gimbal2" in names):
         raise InputError("--columns: gimbal1 and gimbal2 go together; one gimbal is gimbal")
     if "gimbal" in names and "gimbal1" in names:

@@ -178,7 +178,7 @@ def _complaint(path: Path, error: BaseException) -> str:
 
 @contextmanager
 def claimed(folder: RunFolder | Path, names: Iterable[str] = ()) -> Iterator[RunFolder]:
-    """A folder that may have been claimed already; if not, for files of these names."""
+    """Enter a folder that may have been claimed already; if not, claim it for files of these names."""
     with nullcontext(folder) if isinstance(folder, RunFolder) else RunFolder(folder, names) as claim:
         yield claim
 

@@ -40,7 +40,7 @@ class Manifest:
 
     @staticmethod
     def of(folder: Path, complete: bool) -> Manifest:
-        """The files there are in a folder."""
+        """Return the files of a folder."""
         return Manifest({path.name: _digest(path) for path in sorted(folder.iterdir()) if path.is_file()}, complete)
 
     @staticmethod

@@ -29,7 +29,7 @@ from cmg_mj.results.run_folder.manifest import (
 )
 
 ASIDE = "incomplete"
-"""Where in a folder goes what may not take the place of the result there."""
+"""Subfolder for a result that may not replace the one in the folder."""
 
 
 def stage(folder: Path) -> Path:
@@ -203,7 +203,7 @@ def _is_link(one: Path, other: Path) -> bool:
 
 
 def _unused(path: Path) -> Path:
-    """A name beside a file that is taken."""
+    """Return an unused name beside a file."""
     number = 1
     while os.path.lexists(path.with_name(f"{path.name}.{number}")):
         number += 1

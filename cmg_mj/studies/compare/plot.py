@@ -23,7 +23,7 @@ COLUMNS = 3
 LOGARITHMIC = 10.0
 """Positive figures that differ by more than this factor are drawn on a logarithmic axis."""
 FAR_OUT = 3.0
-"""On a linear axis, figures this many quartile ranges outside the observers' means are drawn at the edge."""
+"""Quartile ranges outside the observers' means, beyond which a linear axis shows a figure at its edge."""
 
 
 def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) -> None:

@@ -23,7 +23,7 @@ from cmg_mj.studies.push_limits.recoverable_states import ceiling
 
 WORLDS = 10
 LEVELS = 24
-"""So many pushes are tried at once, and then as many between the largest tolerated and the next."""
+"""Pushes tried at once, and then as many between the largest tolerated one and the next."""
 PUSH_S = 0.1
 BEFORE_S = 1.0
 """The loop runs for so long before the push comes [s]."""

@@ -35,7 +35,7 @@ class MountTuning(NamedTuple):
     margin: float
     """E of the reduced model, as mounted [N m s]."""
     tuned_margin: float
-    """With the tuned parameters."""
+    """E of the reduced model with the tuned parameters [N m s]."""
     in_use: bool
     """True if the scenario has the tuned parameters now."""
     whole: bool

@@ -23,8 +23,7 @@ START_DEG, START_SHARE = 1.0, 0.25
 POLE_DIFFERENCE = 0.1
 """Relative difference of the simulated pole from the reduced model's, from which the robot is unlike that model."""
 NOISY = 0.75
-"""Where the worst world of the reduced model recovers from less than this share of E, the sensors' noise alone may fell
-a robot."""
+"""Share of E. If the worst world of the reduced model recovers from less, the sensors' noise alone may fell a robot."""
 
 NOISE_HINT = "the pair is so small that the sensors' noise alone may fell the robot"
 """Beginning of the hint that tells so."""
@@ -62,7 +61,7 @@ class Prospects:
 
     @property
     def noisy(self) -> bool:
-        """Whether the sensors' noise alone may fell the robot, by its reduced model."""
+        """True if the sensors' noise alone may fell the robot, by its reduced model."""
         return self.push_margin.worst_impulse < NOISY * self.push_margin.median_impulse
 
     @property
@@ -76,7 +75,7 @@ class Prospects:
         hints = []
         if not abs(self.pole / self.limit.pole - 1.0) < POLE_DIFFERENCE:
             reason = self.overlap or (
-                "what it stands on rolls or gives way (soft contacts, or joints held softly), or the hinge that it "
+                "its support rolls or is soft (soft contacts, or joints held softly), or the hinge that it "
                 "tilts about has a spring or damping"
             )
             hints.append(

@@ -112,7 +112,7 @@ def simulated_push(
     """Find the largest push that all worlds of a mounted robot stand, by bisection in MuJoCo.
 
     Args:
-        experiment: The robot and its controller. Its pushes are left out.
+        experiment: The robot and its controller. Pushes of its scenario are ignored.
         limits: The limits by the reduced model.
         axis: Name of the axis, if there are several.
         time_limit: The time that the search may take; by default a minute.

@@ -75,7 +75,7 @@ def check_points(design: str, n: int, axes: int) -> None:
             raise InputError(f"--sobol {shown(n)}: must be a power of two, such as {near}")
         if axes < 2:
             raise InputError(
-                "--sobol: indices part what several fields do; vary two or more (fields with + between count as one)"
+                "--sobol: indices compare several fields; vary two or more (fields with + between count as one)"
             )
 
 

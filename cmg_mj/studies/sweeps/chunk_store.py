@@ -178,7 +178,7 @@ class Store:
         """
         if hash_of_models(self.study) != self._ours.model:
             model = self.study.scenario.plant.model
-            raise RunStopped(f"{model}: has changed since the sweep began; what is finished is of the file as it was")
+            raise RunStopped(f"{model}: has changed since the sweep began; the finished trials used the earlier file")
         try:
             mark = replace(self._mark(number), rows=len(table), content=hash_of_table(table))
             marked = table.replace_schema_metadata(mark.as_metadata())

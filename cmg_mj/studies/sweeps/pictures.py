@@ -136,7 +136,7 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
     x, y = values[across][x_order], values[up][y_order]
 
     def gridded(points: np.ndarray) -> np.ndarray:
-        """(n_points, ...) -> (n_y, n_x, ...); points go through the second field first."""
+        """Reshape (n_points, ...) to (n_y, n_x, ...); points go through the second field first."""
         return points.reshape(len(x), len(y), *points.shape[1:]).swapaxes(0, 1)[y_order][:, x_order]
 
     fell, known = (gridded(counts) for counts in fall_counts(trials))

@@ -62,7 +62,7 @@ class Indices(NamedTuple):
 
     @property
     def decisive(self) -> np.ndarray:
-        """Where the total index's interval lies above that of every other field, (n_fields,)."""
+        """True for each field whose total index's interval lies above that of every other field, (n_fields,)."""
         others = np.array([np.delete(self.total_high, i).max(initial=-np.inf) for i in range(len(self.total))])
         return (self.total_low > others) & (len(self.total) > 1)
 

@@ -83,8 +83,8 @@ def test_a_late_answer_of_another_number_is_no_damage() -> None:
 @pytest.mark.parametrize(
     ("received", "message"),
     [
-        (b"\xa5u\x01\x00\x00\x00", "damaged on the line, or bytes that are none$"),
-        (b"hello" + Frame("u", 1, b"").encode(), "damaged on the line, or bytes that are none$"),
+        (b"\xa5u\x01\x00\x00\x00", "damaged on the line, or bytes that are no message$"),
+        (b"hello" + Frame("u", 1, b"").encode(), "damaged on the line, or bytes that are no message$"),
         (Frame("?", 1, b"").encode(), "knows no message 'u' of 0 bytes"),
         (Frame("u", 2, b"").encode(), "answered something else than what 'u' asked$"),
         (b"\xa5u\x01", "has not answered for 0.05 s$"),

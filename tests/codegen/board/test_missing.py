@@ -39,7 +39,7 @@ def test_it_is_said_what_to_install(
     monkeypatch.setenv("PATH", f"{programs}{os.pathsep}/bin/nowhere")
     assert missing() == packages.split()
     assert not available()
-    line = f"the emulated board needs what is not installed here: apt install {packages} (Debian's names: "
+    line = f"the emulated board needs packages that are not installed: apt install {packages} (Debian's names: "
     assert cmg_mj("run", "push_recovery", "--driver", "board").complaint.startswith(line)
     assert cmg_mj("bench", "board", "--observers", "linear").complaint.startswith(line)
     assert not Path("runs").exists()

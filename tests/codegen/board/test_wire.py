@@ -105,7 +105,7 @@ def test_what_cannot_be_exported_is_refused_without_casadi(
 
 
 def test_a_line_that_sends_back_what_it_receives_is_no_board() -> None:
-    with pytest.raises(InputError, match=r"^the port: sends back what it receives: a loopback plug or an echoing term"):
+    with pytest.raises(InputError, match=r"^the port: echoes all that it receives: a loopback plug or an echoing term"):
         connect(PythonBoard(answers=lambda frame, answer: [frame]))
 
 

@@ -77,7 +77,7 @@ def test_without_a_compiler_all_else_is_written(monkeypatch: pytest.MonkeyPatch)
     assert (outcome.status, outcome.out) == (2, "")
     assert outcome.err.splitlines()[-1] == (
         "cmg-mj: plugin: libcmg_mj_linear.so is missing, for no C compiler was found (CC, cc, gcc, clang); the other "
-        "files are in balance: where there is one, `make` there compiles it"
+        "files are in balance: run `make` there where there is a compiler"
     )
     assert not Path("balance/libcmg_mj_linear.so").exists()
     subprocess.run(["make", "-C", "balance"], check=True, timeout=300, capture_output=True)

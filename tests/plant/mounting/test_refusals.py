@@ -62,7 +62,7 @@ REFUSALS: dict[str, tuple[mujoco.MjSpec, dict[str, Any], str]] = {
     "an unknown hinge": (pole(), {"axis": "ankel"}, "--axis ankel: .*did you mean 'ankle'"),
     "along gravity": (pole(), {"axis": "z"}, "--axis z: robot: lies along gravity"),
     "a hinge along gravity": (pole(), {"axis": "twist"}, "hinge 'twist': robot: lies along gravity"),
-    "no hinge there": (pole(), {"axis": "x"}, "hangs body 'pole' on no hinge along it.*--free-base"),
+    "no hinge there": (pole(), {"axis": "x"}, "body 'pole' has no hinge along it.*--free-base"),
     "three numbers": (pole(), {"axis": (0.0, 0.0, 0.0)}, "must be x, y, three numbers that are not all 0"),
     "no numbers": (pole(), {"axis": ("a", "b", "c")}, "must be x, y, three numbers"),
     "unknown released joint": (
@@ -117,7 +117,7 @@ REFUSALS: dict[str, tuple[mujoco.MjSpec, dict[str, Any], str]] = {
     "no room above the floor": (
         torso(),
         {"body": "torso", "axis": "x", "position": (0.0, 0.0, -0.7)},
-        "no room: the modules reach .* m below what it stands on",
+        "no room: the modules reach .* m below its support",
     ),
 }
 

@@ -276,7 +276,7 @@ def test_flat_tyres_are_as_wide_as_they_are(half_width: float, beside: float, ah
 
 def test_a_bicycle_that_is_too_low_for_its_tyres_is_told_their_width() -> None:
     spec = mujoco.MjSpec.from_string(bicycle(0.01, radius=0.16, height=0.05, ahead=0.1, mass=4.0))
-    with pytest.raises(InputError, match=r"stands by itself: what it stands on is 0\.02\d* m wide across the axis"):
+    with pytest.raises(InputError, match=r"stands by itself: its support is 0\.02\d* m wide across the axis"):
         mount(spec, "frame", axis="x", position=(0.0, 0.0, 0.15))
 
 

@@ -42,7 +42,7 @@ def nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--vary", f"{BIAS}=0:1", "--sobol", "4"], "--sobol: indices part what several fields do; vary two or more"),
+        (["--vary", f"{BIAS}=0:1", "--sobol", "4"], "--sobol: indices compare several fields; vary two or more"),
         (["--vary", "seed=1,2"], "--vary seed: is not varied: .* --worlds says how many, --seed which"),
         (["--vary", "observer.kind=linear,ltv"], "--vary observer.kind: is not varied: --observers names them"),
         (["--vary", "title=a,b"], "--vary title: is not varied: no trial depends on it"),

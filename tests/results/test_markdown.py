@@ -1,0 +1,53 @@
+"""Markdown prose is wrapped, and stays the Markdown that it was."""
+
+from __future__ import annotations
+
+import pytest
+
+from cmg_mj.results.markdown import WIDTH, table, wrap
+
+WORDS = "a sentence of several words, " * 12
+
+
+def test_prose_is_wrapped() -> None:
+    lines = wrap(WORDS).splitlines()
+    assert len(lines) > 3
+    assert max(map(len, lines)) <= WIDTH
+    assert " ".join(lines) == WORDS.strip()
+
+
+def test_the_items_of_a_list_stay_apart() -> None:
+    lines = wrap(f"- one\n- {WORDS}\n- three").splitlines()
+    assert (lines[0], lines[-1]) == ("- one", "- three")
+    assert lines[1].startswith("- a sentence")
+    assert all(line.startswith("  a") or line[2:] in WORDS for line in lines[2:-1])
+
+
+@pytest.mark.parametrize(
+    "paragraph",
+    [
+        f"## {WORDS}",
+        f"![{WORDS}](picture.png)",
+        table(("what", "how"), [("tilt", WORDS)], text_columns=2),
+        f"```sh\n{WORDS}\n```",
+    ],
+)
+def test_what_is_no_prose_keeps_its_lines(paragraph: str) -> None:
+    assert wrap(paragraph) == paragraph
+
+
+@pytest.mark.parametrize("word", ["-", "+", "*", ">", ">=", "#", "1.", "12)", "=", "---"])
+def test_no_line_begins_with_markup(word: str) -> None:
+    """A minus at the beginning of a line would begin a list: `a - b` stays together."""
+    for before in range(80, 110):
+        lines = wrap(f"{'x' * before} {word} {WORDS}").splitlines()
+        assert not [line for line in lines if line.split()[0] == word]
+
+
+def test_a_wrapped_text_stays_as_it_is() -> None:
+    text = wrap(f"# Title\n\n{WORDS}\n\n- one\n- {WORDS}")
+    assert wrap(text) == text
+
+
+def test_a_long_word_is_not_broken() -> None:
+    assert wrap(f"short {'x' * 150} short") == f"short\n{'x' * 150}\nshort"
