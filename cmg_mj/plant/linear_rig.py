@@ -1,0 +1,45 @@
+"""A rig linearised at its keyframe: from command and push to what its sensors show, servos and viscous friction in."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from cmg_mj.plant.axis import Axis
+from cmg_mj.plant.linearisation import output_matrix, state_and_input
+from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.plant import Plant
+from cmg_mj.plant.step_limit import input_column
+from cmg_mj.scenario.linear_rig import LinearRig
+
+
+def linear_rig(plant: Plant) -> LinearRig:
+    """Linearise a plant's only axis at its keyframe, whether its frame bends or its pivot slides.
+
+    Args:
+        plant: The plant.
+
+    Returns:
+        The rig, without what neither a command or a push reaches nor a sensor shows.
+    """
+    model, key, axis = plant.model, plant.key, plant.axis
+    A, command = state_and_input(model, key, axis)
+    push = input_column(model, key, np.zeros(model.nu), _push_forces(model, axis))
+    n = len(A)
+    whole = np.zeros((n + 2, n + 2))  # command and push as two more states: their columns of C are D
+    whole[:n] = np.hstack([A, command, push[:, None]])
+    on_mast = plant.settings.bends and plant.settings.bend_beyond != "both"
+    C = output_matrix(model, key, axis, whole, on_mast=on_mast, height=axis.radial_tilt.height)
+    x1 = np.zeros(n + 2)
+    x1[: model.nv] = axis.line.motion(model, at_keyframe(model, key))
+    y1, acceleration, y2, rate, gyro = C
+    C = np.array([x1, rate, y2, y1, acceleration, gyro])
+    return LinearRig(A, whole[:n, n:], C[:, :n], C[:, n:]).minimal()
+
+
+def _push_forces(model: mujoco.MjModel, axis: Axis) -> np.ndarray:
+    """Return the generalised forces of a torque of 1 N m about the tilt line, (nv,)."""
+    forces = np.zeros(model.nv)
+    for dof, share in zip(*axis.line.push, strict=True):
+        forces[dof] += share
+    return forces
