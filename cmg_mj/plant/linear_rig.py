@@ -5,9 +5,11 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.linearisation import output_matrix, state_and_input
 from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.parts import TILT_ELEMENT
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.step_limit import input_column
 from cmg_mj.scenario.linear_rig import LinearRig
@@ -20,9 +22,17 @@ def linear_rig(plant: Plant) -> LinearRig:
         plant: The plant.
 
     Returns:
-        The rig, without what neither a command or a push reaches nor a sensor shows.
+        The rig, without what no command or push reaches, and without what no sensor shows.
+
+    Raises:
+        InputError: The plant tilts about other axes too, which this axis' loop does not hold up.
     """
     model, key, axis = plant.model, plant.key, plant.axis
+    if others := sorted(_other_axes(model, axis) - set(plant.settings.locked_axes)):
+        raise InputError(
+            f"{axis.name}: the rig tilts about {', '.join(others)} too, which the loop of one axis does not hold up; "
+            'take linear_closed_loop(plant="reduced"), or lock the others'
+        )
     A, command = state_and_input(model, key, axis)
     push = input_column(model, key, np.zeros(model.nu), _push_forces(model, axis))
     n = len(A)
@@ -35,6 +45,13 @@ def linear_rig(plant: Plant) -> LinearRig:
     y1, acceleration, y2, rate, gyro = C
     C = np.array([x1, rate, y2, y1, acceleration, gyro])
     return LinearRig(A, whole[:n, n:], C[:, :n], C[:, n:]).minimal()
+
+
+def _other_axes(model: mujoco.MjModel, axis: Axis) -> set[str]:
+    """Return the names of the axes that a model has besides, locked or not."""
+    elements = [model.joint(i).name for i in range(model.njnt)] + [model.site(i).name for i in range(model.nsite)]
+    names = {name.removesuffix(TILT_ELEMENT) for name in elements if f"/{name}".endswith(f"/{TILT_ELEMENT}")}
+    return {name.rstrip("/") for name in names - {axis.prefix}}
 
 
 def _push_forces(model: mujoco.MjModel, axis: Axis) -> np.ndarray:
