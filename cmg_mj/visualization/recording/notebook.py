@@ -1,0 +1,39 @@
+"""A recording shown in a notebook's cell."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+from cmg_mj.errors import InputError
+
+
+def show_recording(path: Path | str, *, height: int = 600) -> Any:
+    """Show a recording in the cell of a notebook: make this call the cell's last line.
+
+    The viewer runs in the browser and needs nothing from the network. It holds the whole recording in memory.
+
+    Args:
+        path: The file, `recording.rrd`, of a run or a comparison.
+        height: Height of the viewer [px]. The viewer is as wide as the cell.
+
+    Returns:
+        The viewer: a Jupyter widget, `rerun_notebook.Viewer`.
+
+    Raises:
+        InputError: The file cannot be read, or rerun's notebook viewer is not installed.
+    """
+    try:
+        recording = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    try:
+        viewer = importlib.import_module("rerun_notebook").Viewer(width="auto", height=height)
+    except ImportError as error:
+        raise InputError(
+            "show_recording: rerun's notebook viewer is not installed. Install it with `python -m pip install "
+            f'"cmg_mj[notebook]"`, or run `rerun {path}`'
+        ) from error
+    viewer.send_rrd(recording)
+    return viewer
