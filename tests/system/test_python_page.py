@@ -23,7 +23,7 @@ def run_blocks(blocks: list[tuple[str, str]]) -> list[tuple[str, str]]:
     for i, (code, wanted) in enumerate(blocks):
         output = io.StringIO()
         with contextlib.redirect_stdout(output):
-            exec(compile(code, f"{PAGE.name}, block {i + 1}", "exec"), session)
+            exec(compile(code, f"{PAGE.name}, block {i + 1}", "exec", dont_inherit=True), session)
         printed.append((wanted, output.getvalue()))
     return printed
 
