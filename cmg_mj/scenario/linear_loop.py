@@ -105,7 +105,7 @@ def linear_closed_loop(design: Design, rig: LinearRig) -> control.StateSpace:
     kept = needed_states(A, C)
     names = [name for name, is_kept in zip(loop.states, kept, strict=True) if is_kept]
     return control.StateSpace(
-        *(A[np.ix_(kept, kept)], B[kept], C[:, kept], D, design.law.dt),
+        *(A[kept][:, kept], B[kept], C[:, kept], D, design.law.dt),
         inputs=list(INPUTS),
         outputs=outputs,
         states=names,

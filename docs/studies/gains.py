@@ -80,9 +80,10 @@ def main() -> None:
         changed = rigs(Path(place))
         gains_rows, observer_rows, scale_rows = [], [], []
         for rig, assignments in changed.items():
+            model = prepared("gyro_free", assignments).plant.reduced
             for name, choice in GAINS.items():
                 experiment = prepared("gyro_free", [*assignments, *choice])
-                law, model = experiment.law, experiment.plant.reduced
+                law = experiment.law
                 assert isinstance(law, StateFeedback)
                 loop = closed_loop(experiment.scenario, law, model)
                 margins = [f"{loop.slowest:.2f}", f"{loop.damping:.2f}", f"{distance(experiment):.2f}"]

@@ -51,4 +51,4 @@ def test_the_law_of_the_page_of_laws_is_one() -> None:
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     names: dict = {"__name__": __name__}
     exec(compile(code, "laws.md", "exec", dont_inherit=True), names)
-    dry_run_law(names["TwoGains"](dt=0.005, rate_limit=4.7), 0)
+    dry_run_law(names["TwoGains"](dt=0.005, rate_limit=4.7), 0, None)
