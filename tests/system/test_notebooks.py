@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 import warnings
 from pathlib import Path
@@ -97,7 +98,10 @@ def test_a_recording_is_shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     monkeypatch.setattr(
         notebook.importlib, "import_module", lambda name: module if name == "rerun_notebook" else real(name)
     )
+    monkeypatch.setenv("RERUN_NOTEBOOK_ASSET", "")
+    monkeypatch.delenv("RERUN_NOTEBOOK_ASSET")
     viewer = cmg_mj.show_recording(path, height=300)
+    assert os.environ["RERUN_NOTEBOOK_ASSET"] == "serve-local"
     assert viewer.sent == b"RRF2"
     assert viewer.options == {"width": "auto", "height": 300}
 
