@@ -112,6 +112,9 @@ class Experiment:
             processor: Takes the decisions in the host's place.
             observer: Instead of the scenario's.
 
+        Returns:
+            The controller.
+
         Raises:
             InputError: The plant has several axes.
         """
@@ -268,6 +271,9 @@ class Experiment:
 
         Args:
             what: The operation that takes one axis, for the message.
+
+        Returns:
+            The experiment of that axis.
 
         Raises:
             InputError: The rig has several.
