@@ -12,6 +12,7 @@ from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import TILT_ELEMENT
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.step_limit import input_column
+from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.linear_rig import LinearRig
 
 
@@ -25,9 +26,14 @@ def linear_rig(plant: Plant) -> LinearRig:
         The rig, without what no command or push reaches, and without what no sensor shows.
 
     Raises:
-        InputError: The plant tilts about other axes too, which this axis' loop does not hold up.
+        InputError: The plant stands freely on contacts, or tilts about other axes too.
     """
     model, key, axis = plant.model, plant.key, plant.axis
+    if not isinstance(axis.line, HingeLine):
+        raise InputError(
+            f"plant.model = {plant.settings.model!r}: it stands freely, on contacts, which are not linear; take "
+            'linear_closed_loop(plant="reduced")'
+        )
     if others := sorted(_other_axes(model, axis) - set(plant.settings.locked_axes)):
         raise InputError(
             f"{axis.name}: the rig tilts about {', '.join(others)} too, which the loop of one axis does not hold up; "

@@ -298,7 +298,7 @@ class Experiment:
         - Left out: dry friction, range, resolution, the rate limit, `bias_trim_s`, and what an observer learns from
           noise.
         - Refused: observers without a slope at rest (`homogeneous`, `homogeneous_adaptive`, `super_twisting`),
-          backlash, several axes, sensors slower than the controller.
+          backlash, several axes, sensors slower than the controller, and with `rig` a robot that stands on contacts.
 
         A gain that varies, as of `ltv` or `kalman`, counts with the value it has at rest.
 

@@ -6,19 +6,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import control
+import mujoco
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from cmg_mj import Experiment, InputError, Measurement, load_scenario, parse_scenario, prepare
+from cmg_mj import Experiment, InputError, Measurement, Scenario, load_scenario, mount, parse_scenario, prepare
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.plant.linear_rig import linear_rig
 from cmg_mj.plant.linearisation import state_and_input
 from cmg_mj.scenario.linear_loop import INPUTS, WITH_A_SLOPE
 from cmg_mj.scenario.rest_slopes import observer_slopes
+from cmg_mj.studies.push_limits.mount_files import write_scenario
+from tests.command import ROOT
+from tests.studies.push_limits.robots import cart_pole
 
 DT = 0.005
 QUIET = {
@@ -27,9 +32,11 @@ QUIET = {
 }
 
 
-def experiment(kind: str = "linear", torque: float = 0.0, **settings: Any) -> Experiment:
-    """The bundled rig at e = 0, at rest, with sensors that show what is there, pushed at 0.5 s."""
-    fields = load_scenario("push_recovery").as_fields()
+def experiment(
+    kind: str = "linear", torque: float = 0.0, scenario: Scenario | None = None, **settings: Any
+) -> Experiment:
+    """A rig, by default the bundled one, at e = 0 and rest, with sensors that show what is there, pushed at 0.5 s."""
+    fields = (scenario or load_scenario("push_recovery")).as_fields()
     fields["plant"] |= {"equilibrium_bias_deg": 0.0, "initial_tilt_deg": 0.0}
     fields |= {"observer": {"kind": kind}, "open_loop_observers": [], "sensors": QUIET, "duration_s": 3.0}
     fields["push"] = [{"start_s": 0.5, "duration_s": 0.1, "torque_n_m": torque}] if torque else []
@@ -198,6 +205,32 @@ def test_the_simulation_grows_where_a_pole_is_outside(kind: str, field: str, sta
 @pytest.mark.parametrize("value", [0.005, 0.015])
 def test_a_latency_decides_on_stability(value: float) -> None:
     assert is_stable(experiment("linear", sensors__accelerometer__latency_s=value)) == (value < 0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("release", [["slider"], []], ids=["slides", "held"])
+def test_a_mounted_robot_has_a_loop(release: list[str], tmp_path: Path) -> None:
+    """On a cart that slides or is held; a tilt that is taken about the wrong point makes a pole outside, and a fall."""
+    spec = mujoco.MjSpec.from_string(cart_pole(1.0, 0.0, 5e-4))
+    model = mount(spec, "pole", axis="hinge", release=release).save(tmp_path / "cart.xml")
+    scenario = write_scenario(model, model, "adaptive").scenario
+    assert worst_difference(experiment("adaptive", 0.01, scenario)) < 3e-3
+    if release:
+        wrong = experiment("adaptive", 0.01, scenario, plant__pivot_slides=False)
+        assert not is_stable(wrong)
+        assert wrong.run().fell.all()
+        with pytest.raises(InputError, match=r"its pivot slides; take linear_closed_loop\(plant=\"rig\"\)"):
+            wrong.linear_closed_loop("reduced")
+
+
+@pytest.mark.slow
+def test_a_robot_on_contacts_has_the_loop_of_its_reduced_model(tmp_path: Path) -> None:
+    spec = mujoco.MjSpec.from_file(str(ROOT / "examples/robots/torso.xml"))
+    model = mount(spec, "torso", axis="x", scale=1.21).save(tmp_path / "torso.xml")
+    standing = write_scenario(model, model, "adaptive")
+    with pytest.raises(InputError, match=r"it stands freely, on contacts, .* take linear_closed_loop\(plant="):
+        standing.linear_closed_loop()
+    assert np.max(np.abs(standing.linear_closed_loop("reduced").poles())) < 1.0
 
 
 @pytest.mark.slow
