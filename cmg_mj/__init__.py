@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     from cmg_mj.studies.sweeps.api import sweep as sweep
     from cmg_mj.studies.tuning import TuningResult as TuningResult
     from cmg_mj.studies.tuning import tune as tune
+    from cmg_mj.visualization.recording.notebook import show_recording as show_recording
 
 
 def _listed_names() -> dict[str, str]:

@@ -7,6 +7,7 @@ left as plain text.
 from __future__ import annotations
 
 import ast
+import json
 import posixpath
 import re
 from pathlib import Path
@@ -45,11 +46,27 @@ def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
 def _examples() -> str:
     """All examples on one page, each under what it says it is."""
     parts = ["# Examples", "Each is a file of `examples/` and runs as it is: `python examples/own_loop.py`."]
+    parts.append("The two notebooks at the end open in Jupyter, with the extra `notebook`.")
     for path in sorted((ROOT / "examples").glob("*.py")):
         code = path.read_text(encoding="utf-8")
         about = (ast.get_docstring(ast.parse(code)) or "").split("\n\n")[0]
         parts += [f"## {path.stem}", about, f"```python\n{code}```"]
+    for path in sorted((ROOT / "examples").glob("*.ipynb")):
+        parts += [f"## {path.stem}", *_notebook(path)]
     return "\n\n".join(parts) + "\n"
+
+
+def _notebook(path: Path) -> list[str]:
+    """The cells of a notebook; its title is the section's, and its sections stand below. Links become plain text."""
+    parts = []
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        text = "".join(cell["source"])
+        if cell["cell_type"] == "code":
+            parts.append(f"```python\n{text}\n```")
+        else:
+            text = re.sub(r"^# .*\n*", "", text)
+            parts.append(LINK.sub(r"\2", re.sub(r"^## (.*)", r"**\1**", text, flags=re.MULTILINE)))
+    return parts
 
 
 def _linked(markdown: str, folder: str, page: str, files: Files) -> str:
@@ -61,7 +78,7 @@ def _linked(markdown: str, folder: str, page: str, files: Files) -> str:
         if path in PAGES:
             place = PAGES[path]
         elif path == "examples" or path.startswith("examples/"):
-            place, anchor = EXAMPLES, f"#{Path(path).stem}" if path.endswith(".py") else ""
+            place, anchor = EXAMPLES, f"#{Path(path).stem}" if path.endswith((".py", ".ipynb")) else ""
         else:
             place = path.removeprefix("docs/")
             if not path.startswith("docs/") or place not in files.src_uris:

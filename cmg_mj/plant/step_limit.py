@@ -84,13 +84,14 @@ def state_matrix(model: mujoco.MjModel, key: int) -> np.ndarray:
     return np.array(columns).T
 
 
-def input_column(model: mujoco.MjModel, key: int, command: np.ndarray) -> np.ndarray:
-    """Return the column of B for commands in given proportions.
+def input_column(model: mujoco.MjModel, key: int, command: np.ndarray, forces: np.ndarray | float = 0.0) -> np.ndarray:
+    """Return the column of B for commands and forces in given proportions.
 
     Args:
         model: The compiled model.
         key: The keyframe.
         command: What each actuator gets, (nu,).
+        forces: What each joint gets beside it, (nv,) [N or N m].
 
     Returns:
         The slope of the state of `state_matrix` by the command, (n,).
@@ -102,6 +103,7 @@ def input_column(model: mujoco.MjModel, key: int, command: np.ndarray) -> np.nda
     def slope(size: float) -> np.ndarray:
         mujoco.mj_resetDataKeyframe(smooth, data, key)
         data.ctrl[:] += size * command
+        data.qfrc_applied[:] = size * forces
         mujoco.mj_forward(smooth, data)
         return np.concatenate([data.qvel, data.qacc, data.act_dot])
 

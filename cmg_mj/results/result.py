@@ -176,10 +176,22 @@ class Result(NamedColumns):
         return self._table_columns
 
     def split(self, count: int) -> list[Result]:
-        """Split the worlds into groups of equal size, in the order in which `run_many` was given them."""
+        """Split the worlds into groups of equal size, in the order in which `run_many` was given them.
+
+        Args:
+            count: How many groups.
+
+        Returns:
+            A result a group, (count,).
+
+        Raises:
+            InputError: The worlds do not make so many equal groups.
+        """
         worlds = len(self.outcomes)
         if count < 1 or worlds % count:
-            raise InputError(f"groups({count}): {worlds} worlds cannot be split into groups of equal size")
+            raise InputError(
+                f"split({count}): {worlds} worlds do not make {count} equal groups. Give a divisor of {worlds}"
+            )
         if count == 1:
             return [self]
         size = worlds // count

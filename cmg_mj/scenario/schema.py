@@ -238,7 +238,11 @@ class Scenario(BaseModel):
 
     @contextmanager
     def named_in_errors(self) -> Iterator[None]:
-        """Put the scenario's source before the message of an `InputError`."""
+        """Put the scenario's source before the message of an `InputError`.
+
+        Raises:
+            InputError: That of the block, with the source before its message.
+        """
         try:
             yield
         except InputError as error:

@@ -65,6 +65,9 @@ class MemsGyro:
 
         Args:
             dt: Sample period [s].
+
+        Returns:
+            The standard deviation [rad/s].
         """
         return math.radians(self.noise_density_deg_s_rthz) * math.sqrt(0.5 / dt)
 

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 import tomli_w
@@ -19,6 +19,7 @@ from cmg_mj.controllers.processor import Processor
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
+from cmg_mj.plant.linear_rig import linear_rig
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.rerun_head import rerun_head
@@ -26,6 +27,8 @@ from cmg_mj.results.result import Driver, Result
 from cmg_mj.results.wire import WireSettings
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.disturbances import Push
+from cmg_mj.scenario.linear_loop import linear_closed_loop, require_model, require_rigid
+from cmg_mj.scenario.linear_rig import reduced_rig
 from cmg_mj.scenario.loading import base_of
 from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.resolve import differences, resolved
@@ -46,6 +49,9 @@ from cmg_mj.simulation.batch import (
 )
 from cmg_mj.simulation.prepare import check_scenario, plant_on_grid
 from cmg_mj.simulation.simulate import SimulationOptions, simulate
+
+if TYPE_CHECKING:
+    import control
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,6 +111,9 @@ class Experiment:
             worlds: The number of one world, or the numbers of many.
             processor: Takes the decisions in the host's place.
             observer: Instead of the scenario's.
+
+        Returns:
+            The controller.
 
         Raises:
             InputError: The plant has several axes.
@@ -263,6 +272,9 @@ class Experiment:
         Args:
             what: The operation that takes one axis, for the message.
 
+        Returns:
+            The experiment of that axis.
+
         Raises:
             InputError: The rig has several.
         """
@@ -273,6 +285,54 @@ class Experiment:
                 f'others, as with --set plant.locked_axes=["{names[-1]}"]'
             )
         return self.parts[0]
+
+    def linear_closed_loop(self, plant: Literal["rig", "reduced"] = "rig") -> control.StateSpace:
+        """Make the closed loop, with the observer in it, a linear system for python-control.
+
+        The system is discrete at the control period. The plant is sampled exactly with the command held. Observer and
+        law are the scenario's own code, whose slopes at rest are taken by differences. The loop is linear about
+        upright at e = 0.
+
+        - Covered: sample rates, latencies, skew, low-pass and constant errors of the sensors; notch, `feedback`,
+          `angle_source`, laws and observers of one's own.
+        - Left out: dry friction, range, resolution, the rate limit, `bias_trim_s`, and what an observer learns from
+          noise.
+        - Refused: observers without a slope at rest (`homogeneous`, `homogeneous_adaptive`, `super_twisting`),
+          backlash, several axes, sensors slower than the controller, and with `rig` a robot that stands on contacts.
+
+        A gain that varies, as of `ltv` or `kalman`, counts with the value it has at rest.
+
+        Inputs, each held for a period:
+
+        - `push_n_m`: a tilting torque on the rig [N m].
+        - `y1_noise_rad`, `acceleration_noise_rad_s2`, `y2_noise_rad`, `fog_noise_rad_s`: added to a measurement [rad,
+          rad/s^2, rad, rad/s]. An equilibrium bias e acts as a constant `y1_noise_rad` of -e.
+        - `gimbal_rate_noise_rad_s`: gimbal rate beside the command [rad/s]. The observer does not know it. The loop
+          transfer at the gimbals is L = -H/(1 + H), where H is the system from here to `u_rad_s`.
+
+        Outputs at the tick, after its decision:
+
+        - `x1_rad`, `x2_rad_s`, `x3_rad`: true tilt, tilt rate and gimbal angle [rad, rad/s, rad].
+        - `u_rad_s`: the command [rad/s].
+        - `estimated_x1_rad`, `estimated_x2_rad_s`, `estimated_x3_rad`, and the observer's extra signals.
+
+        Args:
+            plant: `rig`: the rig as it is simulated, linearised at its keyframe, with its servos, viscous friction, and
+                a bend or a pivot that slides. `reduced`: the reduced model (6), whose gimbals turn as commanded.
+
+        Returns:
+            A `control.StateSpace` with these names. States that no output depends on are left out.
+
+        Raises:
+            InputError: Something in the loop is not linear, or not covered; the message names it.
+        """
+        part = self.require_single_axis("linear_closed_loop")
+        with part.scenario.named_in_errors():
+            require_model(plant)
+            if plant == "rig":
+                return linear_closed_loop(part.design, linear_rig(part.plant))
+            require_rigid(part.design)
+            return linear_closed_loop(part.design, reduced_rig(part.plant.reduced))
 
     @property
     def hints(self) -> list[str]:

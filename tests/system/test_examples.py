@@ -21,6 +21,7 @@ OUTPUT = {
     "bias_estimation": "found",
     "bicycle": "fed back by the observer: 5 of 5 stood",
     "bode_and_step": "phase margin 65.9 deg",
+    "closed_loop": "gyro_free: largest pole 0.9990, comes within 0.80 of -1, tilts by 1.45 deg",
     "control_callback": "the tilt is",
     "gymnasium_env": "observer and law: stood until 4.00 s",
     "gymnasium_robot": "pushed with 1.8 of E: 0 of 5 stood",

@@ -1,0 +1,116 @@
+"""The notebooks of examples/: clean as they are stored, and every cell runs."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import cmg_mj
+from cmg_mj.visualization.recording import notebook
+from tests.command import ROOT
+
+NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
+LONGEST_S = 60.0
+"""A notebook says that it runs in less than a minute."""
+
+
+def stored(path: Path) -> dict[str, Any]:
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def executed(path: Path, folder: Path) -> Any:
+    """Run a notebook in a kernel of its own, which starts in a folder."""
+    with warnings.catch_warnings():  # of Jupyter's own, on Pythons newer than they know
+        warnings.simplefilter("ignore", DeprecationWarning)
+        import nbformat
+        from nbclient import NotebookClient
+
+        cells = nbformat.read(path, as_version=4)
+        NotebookClient(cells, timeout=300, kernel_name="python3", resources={"metadata": {"path": folder}}).execute()
+    return cells
+
+
+def test_there_are_two() -> None:
+    assert [path.stem for path in NOTEBOOKS] == ["compare_observers", "your_robot"]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_is_stored_clean(path: Path) -> None:
+    cells = stored(path)
+    assert cells["metadata"]["kernelspec"] == {"display_name": "Python 3", "language": "python", "name": "python3"}
+    assert cells["metadata"]["language_info"] == {"name": "python"}
+    assert cells["cells"][0]["source"][0].startswith("# ")
+    for cell in cells["cells"]:
+        assert not cell.get("outputs")
+        assert cell.get("execution_count") is None
+        assert cell["metadata"] == {}
+    text = path.read_text(encoding="utf-8")
+    assert "/home/" not in text
+    assert "/work/" not in text
+    assert text.endswith("}\n")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_every_cell_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    monkeypatch.setenv("JUPYTER_RUNTIME_DIR", str(tmp_path / "runtime"))
+    (tmp_path / "cwd").mkdir()
+    start = time.process_time()
+    cells = executed(path, tmp_path / "cwd")
+    assert time.process_time() - start < LONGEST_S
+    outputs = [output for cell in cells.cells for output in cell.get("outputs", [])]
+    assert not [output for output in outputs if output.get("name") == "stderr"]
+    data = [output["data"] for output in outputs if "data" in output]
+    assert sum("image/png" in each for each in data) == 1
+    assert sum("text/html" in each for each in data) >= 1  # a frame
+    try:
+        import rerun_notebook  # noqa: F401  # type: ignore[import-not-found]
+    except ImportError:
+        printed = "".join(output.get("text", "") for output in outputs)
+        assert "show_recording: rerun's notebook viewer is not installed" in printed
+    else:
+        assert "application/vnd.jupyter.widget-view+json" in data[-1]
+    assert list((tmp_path / "cwd").iterdir()) == []
+
+
+class Widget:
+    """In place of the widget: keeps what it is sent."""
+
+    def __init__(self, **options: Any) -> None:
+        self.options, self.sent = options, b""
+
+    def send_rrd(self, data: bytes) -> None:
+        self.sent += data
+
+
+def test_a_recording_is_shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    path = tmp_path / "recording.rrd"
+    path.write_bytes(b"RRF2")
+    real = notebook.importlib.import_module
+    module = type("module", (), {"Viewer": Widget})
+    monkeypatch.setattr(
+        notebook.importlib, "import_module", lambda name: module if name == "rerun_notebook" else real(name)
+    )
+    monkeypatch.setenv("RERUN_NOTEBOOK_ASSET", "")
+    monkeypatch.delenv("RERUN_NOTEBOOK_ASSET")
+    viewer = cmg_mj.show_recording(path, height=300)
+    assert os.environ["RERUN_NOTEBOOK_ASSET"] == "serve-local"
+    assert viewer.sent == b"RRF2"
+    assert viewer.options == {"width": "auto", "height": 300}
+
+
+def test_a_recording_that_cannot_be_shown_says_why(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    path = tmp_path / "recording.rrd"
+    with pytest.raises(cmg_mj.InputError, match=r"recording\.rrd: No such file or directory"):
+        cmg_mj.show_recording(path)
+    path.write_bytes(b"RRF2")
+    monkeypatch.setitem(__import__("sys").modules, "rerun_notebook", None)
+    with pytest.raises(cmg_mj.InputError, match=r'not installed. Install it with .*"cmg_mj\[notebook\]"`, or run'):
+        cmg_mj.show_recording(path)
