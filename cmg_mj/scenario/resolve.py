@@ -122,7 +122,7 @@ def differences(base: Mapping[str, Any], scenario: Mapping[str, Any]) -> dict[st
     """Compare two resolved scenarios.
 
     Args:
-        base: The one that the other is told apart from.
+        base: Scenario that the other one changes.
         scenario: The other.
 
     Returns:
