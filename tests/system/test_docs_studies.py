@@ -135,7 +135,7 @@ def test_the_table_of_gymnasium() -> None:
     process = subprocess.run(command, capture_output=True, text=True, check=True)
     row = r"\| InvertedPendulum-v5, cart held \| +0.001 \| +10 of 10 \| +10 of 10 \| +0 of 10 \(\d+ to \d+ steps\) \|"
     assert re.search(row, process.stdout)
-    assert re.search(row, (STUDIES.parent / "plugin.md").read_text(encoding="utf-8"))
+    assert re.search(row, (STUDIES.parent / "plugin_evidence.md").read_text(encoding="utf-8"))
 
 
 @pytest.mark.slow
