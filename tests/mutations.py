@@ -207,8 +207,8 @@ names the first test that then fails. `slow:` marks a test that is not in the da
 
 The tests see the effect of a parameter and do not compare its default with a literal, with two exceptions:
 
-- `kalman`: a test states its defaults. A fifth more or less of any of them but `torque_white` moves the mean errors in
-  push_recovery by less than 0.2 %, over the run and in the push window.
+- `kalman`: a test states its defaults. A fifth more or less of any but `torque_white` moves the mean errors in
+  push_recovery by less than 0.2 %. This holds over the run and in the push window.
 - `rate_start`, `bias_walk` and `jerk` of `gyro_free`: a fifth moves the mean errors by less than 0.3 %. A test compares
   `gyro_free` with `free_pivot` on a pivot at rest, which has its own values of these parameters.
 """
