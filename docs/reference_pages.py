@@ -666,7 +666,7 @@ COMMANDS: dict[str, Notes] = {
         "sweep.md",
     ),
     "tune": Notes(
-        "about three seconds for `linear`, {slow_tune}.",
+        "about three seconds for `linear`, a minute for `kalman`.",
         ("cmg-mj tune observer_tuning --observer linear",),
         "api/tools.md",
     ),

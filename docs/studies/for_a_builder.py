@@ -1,6 +1,8 @@
 """Every observer on push_recovery: the table of docs/which_observer.md.
 
-python docs/studies/for_a_builder.py [--worlds 20] (about two minutes on two quiet cores; shows its progress)
+python docs/studies/for_a_builder.py [--worlds 20] [--observers linear,gyro_free]
+
+About two minutes on two quiet cores, eight on busy ones; a bar shows the progress.
 
 Errors are those of `cmg-mj compare push_recovery`: the same worlds and noise for every observer, each in its own loop.
 The bias range that a loop tolerates is `bias_limits.py`'s, under the same push. Instructions are those of `cmg-mj bench
@@ -70,9 +72,11 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--worlds", type=int, default=20)
-    worlds = parser.parse_args().worlds
+    parser.add_argument("--observers", default=",".join(OBSERVERS), help="names, separated by commas")
+    options = parser.parse_args()
+    worlds, names = options.worlds, list(dict.fromkeys([*options.observers.split(","), LOOP_OF_BASELINES]))
     rows, results = [], {}
-    for name in track(OBSERVERS, "observers", console=Console(stderr=True)):
+    for name in track(names, "observers", console=Console(stderr=True)):
         result = prepare(load_scenario("push_recovery", [], name)).run_many(worlds, keep_trajectory=False)
         results[name] = result
         asked = [WORDS[need] for need in needs(OBSERVER_CLASSES.find(name))]
