@@ -115,7 +115,7 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     "with_tuning",
     is_flag=True,
     help="Then tune the observer's parameters on the robot in MuJoCo (up to two minutes), and write them if they are "
-    "better on other worlds and stand no less.",
+    "better on other worlds and withstand no smaller push.",
 )
 @json_option()
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount; not what has changed since.")
@@ -131,11 +131,11 @@ def mount(
     overwrite: bool,
     **options: Unpack[MountOptions],
 ) -> None:
-    """Mount control moment gyroscopes on a robot, and print the largest push it stands.
+    """Mount control moment gyroscopes on a robot, and print the largest push it withstands.
 
     Writes the robot with the pair as a model that plain MuJoCo loads too, and a scenario to run. The scenario has the
-    gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest that the robot stands in
-    MuJoCo.
+    gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest that the robot withstands
+    in MuJoCo.
     """
     from cmg_mj.plant.mounting.request import MountRequest
     from cmg_mj.studies.push_limits.mount_files import mount_and_write

@@ -42,9 +42,9 @@ _NOT_CALLED = (
     type=click.Choice(["keyframe", "spinning"]),
     default="keyframe",
     show_default=True,
-    help="What sets the flywheels going: the program, with the model's keyframe, or the plugin.",
+    help="Spin the flywheels up in the program, with the model's keyframe, or in the plugin.",
 )
-@click.option("--no-sensors", is_flag=True, help="Leave the plugin's own sensors out of the model.")
+@click.option("--no-sensors", is_flag=True, help="Omit the plugin's own sensors from the model.")
 @click.option(
     "--install",
     metavar="PATH",

@@ -1,9 +1,9 @@
-"""What a cheap gyro is worth in the first seconds and whatever its offset, and the floor over accelerometers' places.
+"""The worth of a cheap gyro in the first seconds and at any offset, and the floor over accelerometers' places.
 
-    python docs/studies/baselines.py [--worlds 20]
+    python docs/studies/baselines.py [--worlds 20] (about five seconds)
 
 - gyros: in the loop of `gyro_free` in push_recovery, RMS errors over parts of the run: the gyro as bought, after
-  a second at rest (and with an offset since), fused with y1, and fused by a filter that is told nothing of the rate at
+  a second at rest (and with an offset since), fused with y1, and fused by a filter that does not know the rate at
   the start.
 - places: `floor_accel` by the two accelerometers' distances from the pivot.
 """

@@ -1,4 +1,4 @@
-"""What the angular acceleration is worth: `gyro_free` and `kalman` beside the ten observers of y1, y2 and u.
+"""The worth of the angular acceleration: `gyro_free` and `kalman` beside the ten observers of y1, y2 and u.
 
     python docs/studies/gyro_free.py [--worlds 100] [--noise 200,400,800] [--e 0,0.5,1,1.5] [--parts bars,...]
 

@@ -112,7 +112,7 @@ def main() -> None:
     with ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) as pool:
         waiting = [pool.submit(row, case, options.worlds) for case in cases]
         rows = [each.result() for each in track(waiting, "cases", console=Console(stderr=True))]
-    heads = ["what is wrong", *(f"`{name}`" for name in (*OBSERVERS, *BASELINES)), "fell with the true rate"]
+    heads = ["disturbance", *(f"`{name}`" for name in (*OBSERVERS, *BASELINES)), "fell with the true rate"]
     print(f"velocity RMS error [1e-3 rad/s], {options.worlds} worlds\n")
     print(table(heads, rows))
 

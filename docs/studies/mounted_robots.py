@@ -1,4 +1,4 @@
-"""What pairs do on robots: the table of docs/mount_evidence.md.
+"""Pairs on robots: the table of docs/mount_evidence.md.
 
 python docs/studies/mounted_robots.py [ROBOT ...] (about six minutes on a quiet core)
 python docs/studies/mounted_robots.py --commands (with what each is mounted)

@@ -1,6 +1,6 @@
 """Writes docs/reproduced.md, the report, and its pictures, made small, into docs/reproduced/.
 
-cmg-mj reproduce all && python docs/studies/reproduced.py runs/reproduce-all
+cmg-mj reproduce all && python docs/studies/reproduced.py runs/reproduce-all (about three minutes on two quiet cores)
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the accelerometers' imperfections do to every observer, in its own loop: each alone, and all together.
+"""The effect of the accelerometers' imperfections on every observer, in its own loop: each alone, and all together.
 
     python docs/studies/sensor_errors.py alone [--worlds 20] [--observers all] [--jobs 2] [--only skew]
     python docs/studies/sensor_errors.py together [--worlds 10] [--parts 4] [--observers gyro_free,kalman,adaptive]

@@ -1,4 +1,4 @@
-"""What the physics step and MuJoCo's integrators cost, and how far they are from the limit.
+"""The cost of the physics step and MuJoCo's integrators, and their distance from the limit.
 
     python docs/studies/steps.py [--scenario push_recovery] [--worlds 64] [--set plant.flywheel_imbalance_kg_m=1e-5 ...]
 
