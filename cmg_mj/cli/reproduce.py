@@ -19,11 +19,17 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     PAPER may also be beyond: a table of every observer over 100 seeds, which is in no paper and takes some minutes.
 
     Writes a folder: report.md, its plots, and figures.json. The report compares every claim of the paper with the
-    figures obtained here. One rule decides the verdicts: reproduced if it holds and all that it depends on is printed
-    in the paper; reproduced within stated conditions if something is assumed by us (a push, a bias, noise, a drive);
-    illustrated if it is a general statement tried on some systems; cannot be tested if it is about data that the paper
-    does not give; else not reproduced, and why. The exit status is 0 whatever the verdicts are.
-    """
+    figures obtained here. One rule decides the verdict of a claim:
+
+    \b
+      reproduced                it holds; the paper prints all it depends on
+      within stated conditions  it holds, with an assumption of ours (push, noise)
+      illustrated               a general statement, tried on some systems
+      cannot be tested          the paper does not give its data
+      not reproduced            otherwise, with the reason
+
+    The exit status is 0 whatever the verdicts are.
+    """  # noqa: D301  (click wants the character itself)
     from cmg_mj.papers import BEYOND, PAPERS, check_installed
     from cmg_mj.papers import reproduce as reproduce_papers
     from cmg_mj.papers.report import REPORT_FILES, figures_of, save_report, verdict_table

@@ -167,9 +167,9 @@ def tune_log(
     \b
       cmg-mj tune-log LOG.csv --columns tilt=pitch_deg,rate=gyro_dps --observer linear
 
-    The score is the RMS of the estimated rate less the reference, compared with that of the parameters as given: better
-    is better by more than 1 % and beyond chance. Sixteen short worlds show what both do in a closed loop. Logs are read
-    as in replay. Writes a folder with tuned.json.
+    The score is the RMS of the estimated rate less the reference, compared with that of the parameters as given. Tuned
+    parameters count as better by more than 1 % and beyond chance. Sixteen short worlds compare both in a closed loop.
+    Logs are read as in replay. Writes a folder with tuned.json.
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.replay.logs import read_log
     from cmg_mj.replay.logs.checks import check_distinct_logs
