@@ -666,7 +666,7 @@ COMMANDS: dict[str, Notes] = {
         "sweep.md",
     ),
     "tune": Notes(
-        "about three seconds for `linear`, a minute for `kalman`.",
+        "about three seconds for `linear`, a minute for `kalman`, two for `free_pivot`.",
         ("cmg-mj tune observer_tuning --observer linear",),
         "api/tools.md",
     ),
