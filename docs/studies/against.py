@@ -83,8 +83,8 @@ def recorded(path: Path) -> None:
     """Write the measurements and commands of 256 worlds of `push_recovery`."""
     trajectory = prepare(load_scenario("push_recovery")).run_many(256).trajectory
     assert trajectory is not None
-    columns = {"y1": "y1_rad", "y2": "y2_rad", "a": "acceleration_rad_s2", "u": "u_rad_s"}
-    np.savez(path, **{name: trajectory[column] for name, column in columns.items()})
+    y1, y2, u = (trajectory[name] for name in ("y1_rad", "y2_rad", "u_rad_s"))
+    np.savez(path, y1=y1, y2=y2, a=trajectory["acceleration_rad_s2"], u=u)
 
 
 def largest(a: np.ndarray, b: np.ndarray) -> str:
