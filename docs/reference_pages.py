@@ -346,7 +346,7 @@ On the command line the observer has an option of its own:
 need quotes: `--set 'observer.Q=[1,1e7,1]'`.
 
 `cmg-mj list observers` and `cmg-mj list laws` print names and defaults. The equations are in the
-[API reference](api/observers.md).
+[API reference](api/observers.md). [Which observer?](which_observer.md) says where each leads and where it fails.
 """
 
 
@@ -666,7 +666,7 @@ COMMANDS: dict[str, Notes] = {
         "sweep.md",
     ),
     "tune": Notes(
-        "about three seconds for `linear`, {slow_tune}.",
+        "about three seconds for `linear`, a minute for `kalman`, two for `free_pivot`.",
         ("cmg-mj tune observer_tuning --observer linear",),
         "api/tools.md",
     ),

@@ -19,6 +19,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -31,6 +32,8 @@ from tests.papers import mutants  # noqa: E402
 from tests.papers.mutants import MUTANTS, Mutant  # noqa: E402
 
 FACTORS = (0.8, 1.2)
+WIDTH = 100
+"""Columns of a page of the documentation."""
 NUMBER = r"(-?[0-9][0-9.e+-]*)"
 # Equations first: they name the culprit; the closed loop last.
 TESTS = [
@@ -194,18 +197,37 @@ def report_caught_by(mutant: Mutant) -> str:
     return first_failure(change, [mutants.TESTS + mutant.test], "papers")
 
 
-PARAMETERS_SAY = (
-    "Each parameter multiplied in a copy of the sources, and the first test that then fails; a dash is a survivor.\n"
-    "`slow:` stands before those that no test of the daily tier catches.\n"
-    "Each is caught by its effect, not by comparing a default with a literal, but for `kalman`: a test says what its\n"
-    "defaults are, since a fifth more or less of any but `torque_white` moves its mean errors in push_recovery, over\n"
-    "the run and in the push window, by less than 0.2 %. By less than 0.3 % it is for `rate_start`, `bias_walk` and\n"
-    "`jerk` of `gyro_free`: it no longer equals `free_pivot` on a pivot at rest, which has numbers of its own."
-)
-REPORTS_SAY = (
-    "Each line of the papers' reports changed as `tests/papers/mutants.py` has it, and the test that then fails;\n"
-    "a dash would be a survivor."
-)
+PAGE_SAYS = """\
+This page lists deliberate errors, mutations, and the test that catches each. `python tests/mutations.py` writes it in
+about half an hour on two cores. A dash marks a mutation that no test catches.
+"""
+PARAMETERS_SAY = """\
+The script multiplies each parameter of the law, the observers and the reduced model in a copy of the sources. A cell
+names the first test that then fails. `slow:` marks a test that is not in the daily tier.
+
+The tests see the effect of a parameter and do not compare its default with a literal, with two exceptions:
+
+- `kalman`: a test states its defaults. A fifth more or less of any but `torque_white` moves the mean errors in
+  push_recovery by less than 0.2 %. This holds over the run and in the push window.
+- `rate_start`, `bias_walk` and `jerk` of `gyro_free`: a fifth moves the mean errors by less than 0.3 %. A test compares
+  `gyro_free` with `free_pivot` on a pivot at rest, which has its own values of these parameters.
+"""
+REPORTS_SAY = """\
+The script changes one line of the papers' reports at a time, as `tests/papers/mutants.py` lists them. The last column
+names the test that then fails.
+"""
+
+
+def wrapped(text: str) -> str:
+    """Wrap paragraphs and lists at the width of the documentation; code stays in one piece."""
+    return "\n\n".join("\n".join(map(filled, re.split(r"\n(?=- )", part))) for part in text.strip().split("\n\n"))
+
+
+def filled(part: str) -> str:
+    """Wrap a paragraph or an item of a list."""
+    whole = re.sub(r"`[^`]*`", lambda code: code[0].replace(" ", "\0"), " ".join(part.split()))
+    indent = "  " if part.startswith("- ") else ""
+    return textwrap.fill(whole, WIDTH, subsequent_indent=indent, break_on_hyphens=False).replace("\0", " ")
 
 
 def parameter_table(pool: ThreadPoolExecutor, part: str) -> tuple[str, list[str]]:
@@ -234,13 +256,13 @@ def main() -> None:
             mutated(name, FACTORS[0])
         return
     selection = sys.argv[1] if len(sys.argv) > 1 else ""
-    parts, survivors = ["# Which test catches what", "Written by `python tests/mutations.py`."], []
+    parts, survivors = ["# Which test catches what", wrapped(PAGE_SAYS)], []
     with ThreadPoolExecutor(2) as pool:
         if selection != "papers":
             if (failed := caught_by(MUTATIONS[0].parameter, 1.0)) != "-":
                 sys.exit(f"{failed} fails without any mutation: mend that first")
             table, survived = parameter_table(pool, selection)
-            parts += ["## Wrong parameters", PARAMETERS_SAY, table]
+            parts += ["## Wrong parameters", wrapped(PARAMETERS_SAY), table]
             survivors += survived
         if selection in ("", "papers"):
             part = sys.argv[2] if len(sys.argv) > 2 else ""
@@ -248,7 +270,7 @@ def main() -> None:
             if (failed := first_failure(lambda copy: None, whole, "papers")) != "-":
                 sys.exit(f"{failed} fails without any mutation: mend that first")
             table, survived = report_table(pool, part)
-            parts += ["## Wrong reports", REPORTS_SAY, table]
+            parts += ["## Wrong reports", wrapped(REPORTS_SAY), table]
             survivors += survived
     text = "\n\n".join(parts) + "\n"
     if not selection:

@@ -56,15 +56,14 @@ class Adaptive:
     Attributes:
         dt: Sample period [s].
         model: The reduced model.
-        bias: Whether to estimate the equilibrium bias e.
-        torque: Whether to estimate a constant tilting torque on the whole rig instead.
+        bias: Estimate the equilibrium bias e.
+        torque: Estimate a constant tilting torque on the whole rig instead of the bias.
         sinusoid_hz: Frequency of a sinusoidal tilting torque to estimate, such as a gait's [Hz]; 0 for none.
-        known_bias_deg: e, where it is not estimated [deg].
-        L: Gain on (x1, x2); A + L C2 is Hurwitz if both are negative. Default: docs/studies/tune_adaptive.py, as are
-            the next two: poles of 25 rad/s and damping ratio 0.7, a bias learnt at 1/s.
-        Gamma: Weights, the diagonal of Gamma: of the bias [rad^2], of a constant torque and of the two parts of a
-            sinusoid [(N m)^2].
-        Sigma: Weight of the measured tilt [1/(rad^2 s)].
+        known_bias_deg: Equilibrium bias e, if the observer does not estimate it [deg].
+        L: Gains on x1 and x2; negative gains are stable. Default: docs/studies/tune_adaptive.py, as are Gamma and
+            Sigma (poles of 25 rad/s, damping ratio 0.7, a bias learnt at 1/s).
+        Gamma: Learning weights of the bias [rad^2], of a constant torque and of the two parts of a sinusoid [(N m)^2].
+        Sigma: Learning weight of the measured tilt [1/(rad^2 s)].
     """
 
     dt: Positive

@@ -1,4 +1,4 @@
-"""`gyro_free` on a pivot that moves: it finds out how strongly, and trusts the tilt so much less.
+"""`gyro_free` for a pivot that moves: it learns how strongly, and trusts the measured tilt less.
 
 Accelerometers take the pivot's acceleration for gravity, which makes y1 wrong by its horizontal part over g. The
 angular acceleration is the difference between two accelerometers on one body: the pivot's motion is not in it.
@@ -84,20 +84,21 @@ class FreePivot:
         model: The reduced model (not used).
         noise: Of tilt and angular acceleration, by the sensors' datasheet.
         rate_start: Standard deviation of the rate at the start, about zero [rad/s].
-        bias_start: The same of b [rad/s^2]. On the bundled rig the default is 7 mg between the two accelerometers: more
-            than in `gyro_free`, because an offset beyond what is expected looks like a pivot that moves.
-        bias_walk: How fast b may change: standard deviation after a second [rad/s^2].
-        jerk: How far alpha is off the straight line between samples: standard deviation of its mean [rad/s^2].
-        pivot_hz: How quickly w is renewed. Not the corner of the motion, which is not known [Hz].
-        pivot_start: Standard deviation of w that is expected at the start [rad].
-        pivot_floor: The least one [rad].
-        pivot_s: Time over which S is learnt [s].
-        learn_s: The same at the start [s].
-        surprise: Weight of the innovation in it.
-        noise_s: Time over which r is learnt [s].
-        hurry: How much faster S rises than it falls, over `share`.
-        doubt: How much of a rise is added to p's variance, over `share`.
-        inflation: How much a rise of S, in shares of y1's variance, multiplies the covariance of p and z, over `share`.
+        bias_start: Standard deviation of the acceleration's offset b at the start [rad/s^2]. On the bundled rig the
+            default stands for 7 mg between the accelerometers, more than in `gyro_free`: a larger offset would look
+            like a pivot that moves.
+        bias_walk: Random walk of the offset b: its standard deviation after a second [rad/s^2].
+        jerk: Standard deviation of the mean acceleration between two samples from that of a straight line [rad/s^2].
+        pivot_hz: Corner frequency of the filter's model of w, the pivot's share of y1; not that of the motion [Hz].
+        pivot_start: Standard deviation of w at the start [rad].
+        pivot_floor: Least standard deviation of w [rad].
+        pivot_s: Time over which the filter learns S, the variance of w [s].
+        learn_s: Time over which the filter learns S at the start [s].
+        surprise: Weight of the innovation in the learning of S.
+        noise_s: Time over which the filter learns r, the variance of the measured tilt over the datasheet's [s].
+        hurry: Factor by which S rises faster than it falls, over `share`.
+        doubt: Part of a rise of S that is added to the variance of p, over `share`.
+        inflation: Factor on the covariance of p and z for a rise of S by the variance of y1, over `share`.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("acceleration",)

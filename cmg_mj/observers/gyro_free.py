@@ -1,4 +1,4 @@
-"""The tilt rate from tilt and angular acceleration alone, as a gyro-free inertial measurement unit finds it.
+"""The tilt rate from tilt and angular acceleration alone, as in a gyro-free inertial measurement unit.
 
 A Kalman filter that the measured angular acceleration drives; no model of what moves the body. The idea is that of
 E. Edwan, S. Knedlik, O. Loffeld, "Angular motion estimation using dynamic models in a gyro-free inertial measurement
@@ -51,12 +51,12 @@ class GyroFree:
         dt: Sample period [s].
         model: The reduced model (not used).
         noise: Of tilt and angular acceleration, by the sensors' datasheet.
-        rate_start: Standard deviation of the rate at the start, about zero [rad/s]. The default is about what remains
-            of it later.
-        bias_start: The same of b [rad/s^2]. On the bundled rig the default is 5 mg between the two accelerometers, or
-            one of them misaligned by 0.3 degrees. For parts mounted worse than that, give what they may be off.
-        bias_walk: How fast b may change: standard deviation after a second [rad/s^2].
-        jerk: How far alpha is off the straight line between samples: standard deviation of its mean [rad/s^2].
+        rate_start: Standard deviation of the rate at the start, about zero [rad/s].
+        bias_start: Standard deviation of the acceleration's offset b at the start [rad/s^2]. On the bundled rig the
+            default stands for 5 mg between the accelerometers, or a misalignment of 0.3 degrees. Worse mounted sensors
+            need more.
+        bias_walk: Random walk of the offset b: its standard deviation after a second [rad/s^2].
+        jerk: Standard deviation of the mean acceleration between two samples from that of a straight line [rad/s^2].
     """
 
     needs: ClassVar[tuple[str, ...]] = ("acceleration",)

@@ -66,14 +66,15 @@ class HighGain:
     Attributes:
         dt: Sample period [s].
         model: The reduced model.
-        l1: First gain, times L [1/s]. Default: docs/studies/tune_high_gain.py, as of l2, d_inf and b.
-        l2: Second gain over the first, times L [1/s]. (s^2 + l1 s + l1 l2 is Hurwitz for all positive l1, l2.)
-        d_inf: Degree at infinity, in [0, 1), the paper's p.
-        b: Exponent of the scaling, below (1 - d_inf)/d_inf by (21). s is in units of phi2^b: with phi2 = 1, b only
-            matters once L moves.
-        phi1: See `updated_gain`. Default: andrieu2009 section 3.1, as of phi2 and phi3.
-        phi2: See `updated_gain`.
-        phi3: See `updated_gain`.
+        l1: Gain of the tilt's correction, which L multiplies [1/s]. Default: docs/studies/tune_high_gain.py, as are
+            l2, d_inf and b.
+        l2: Ratio of the rate's gain to l1, which L multiplies [1/s]. All positive l1, l2 are stable.
+        d_inf: Degree at infinity, the paper's p; 0 makes the corrections linear.
+        b: Exponent of L in the scaling, below (1 - d_inf)/d_inf by (21). With phi2 = 1 it matters only while L moves.
+        phi1: Rate at which the gain L returns, per unit of L; see `updated_gain`. Default: andrieu2009 section 3.1, as
+            are phi2 and phi3.
+        phi2: Least value of the gain L; see `updated_gain`.
+        phi3: Weight of the local incremental rate, which makes L rise; see `updated_gain`.
     """
 
     dt: Positive

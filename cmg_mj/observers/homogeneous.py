@@ -29,13 +29,13 @@ class Homogeneous:
     Attributes:
         dt: Sample period [s].
         model: The reduced model.
-        k1: First gain. Default: Table 2.
-        k2: Second gain. Default: Table 2. (s^2 + k1 s + k2 is Hurwitz for all positive gains.)
-        alpha: Exponent in (1/2, 1]. Default: Table 2.
+        k1: Gain of the tilt's correction. Default: Table 2.
+        k2: Gain of the rate's correction. Default: Table 2. All positive gains k1, k2 are stable.
+        alpha: Exponent of the corrections; 1 makes the observer linear. Default: Table 2.
         friction_n_m: Dry friction torque of the tilt axis, of the whole rig [N m].
         damping_n_m_s: Viscous friction of the tilt axis, of the whole rig [N m s].
-        friction_width_rad_s: The rate at which the dry friction has reached 0.7 of its torque [rad/s]; about the
-            error of the estimate, below which its sign is unknown.
+        friction_width_rad_s: Rate at which dry friction reaches 0.7 of its torque; take about the error of the
+            estimate [rad/s].
     """
 
     dt: Positive

@@ -1,4 +1,4 @@
-"""The homogeneous differentiator with the equilibrium bias that the adaptive observer estimates."""
+"""The homogeneous differentiator, which takes the equilibrium bias from the adaptive observer."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ class HomogeneousAdaptive:
     Attributes:
         dt: Sample period [s].
         model: The reduced model.
-        k1: First gain of (11).
-        k2: Second gain of (11).
-        alpha: Exponent of (11), in (1/2, 1].
-        L: Gains of the adaptive observer on (x1, x2).
-        Gamma: Weight of the bias in the adaptive observer [rad^2].
-        Sigma: Weight of the measured tilt in the adaptive observer [1/(rad^2 s)].
+        k1: Gain of the tilt's correction in (11).
+        k2: Gain of the rate's correction in (11).
+        alpha: Exponent of the corrections in (11); 1 makes them linear.
+        L: Gains of the adaptive observer on x1 and x2.
+        Gamma: Learning weight of the bias in the adaptive observer [rad^2].
+        Sigma: Learning weight of the measured tilt in the adaptive observer [1/(rad^2 s)].
     """
 
     dt: Positive

@@ -1,4 +1,4 @@
-"""The extended Kalman filter of the reduced model with an unknown torque on it: what an engineer tries first."""
+"""The extended Kalman filter of the reduced model with an unknown torque: an engineer's first choice."""
 
 from __future__ import annotations
 
@@ -86,13 +86,14 @@ class Kalman:
         dt: Sample period [s].
         model: The reduced model.
         noise: Of the tilt and of the gimbal angle, by the sensors' datasheet.
-        torque_walk: How fast the torque may change: standard deviation after a second [N m]. Not tuned: it would be
-            none, since e does not change there.
-        torque_white: White torque: the standard deviation of its integral after a second [N m s]. Default, as of the
-            next one: `cmg-mj tune observer_tuning --seed 60000`.
-        gimbal_white: White part of the gimbals' rate: the standard deviation of its integral after a second [rad].
+        torque_walk: Random walk of the unknown torque: its standard deviation after a second [N m]. Not tuned: a
+            constant e would tune it to zero.
+        torque_white: White torque: standard deviation of its integral after a second [N m s]. Default: tuned with
+            `cmg-mj tune observer_tuning --seed 60000`, as is gimbal_white.
+        gimbal_white: White noise of the gimbals' rate: standard deviation of its integral after a second [rad].
         rate_start: Standard deviation of the rate at the start, about zero [rad/s].
-        torque_start: The same of the torque [N m]. On the bundled rig a bias of 1.7 degrees makes 0.2 of it.
+        torque_start: Standard deviation of the torque at the start [N m]. On the bundled rig, 1.7 degrees of e make
+            0.2 N m.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("model", "gimbals")

@@ -25,7 +25,7 @@ class LinearDifferentiator:
     Attributes:
         dt: Sample period [s].
         model: The reduced model (not used: this observer is model-free).
-        tau: Time constant [s]. Default: Table 2.
+        tau: Time constant of the filter [s]. Default: Table 2.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()

@@ -30,9 +30,9 @@ class LinearHighGain:
     Attributes:
         dt: Sample period [s].
         model: The reduced model (not used: this observer is model-free).
-        epsilon: The gain's inverse [s]. Default: tuned, docs/assumptions.md.
-        a1: First coefficient of s^2 + a1 s + a2. Default: sqrt(2), Butterworth poles.
-        a2: Second coefficient.
+        epsilon: Time constant; the gains are its inverse powers [s]. Default: tuned, docs/assumptions.md.
+        a1: Coefficient a1 of the polynomial s^2 + a1 s + a2. Default: sqrt(2), Butterworth poles.
+        a2: Coefficient a2 of the polynomial s^2 + a1 s + a2.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()

@@ -46,8 +46,8 @@ class LinearTimeVarying:
     Attributes:
         dt: Sample period [s].
         model: The reduced model.
-        Q: Diagonal of Q. Default: Table 2.
-        H0: Diagonal of H_0. Default: Table 2.
+        Q: Diagonal of the Riccati equation's weight Q. Default: Table 2.
+        H0: Diagonal of the Riccati matrix at the start. Default: Table 2.
     """
 
     dt: Positive

@@ -34,7 +34,7 @@ class Luenberger:
     Attributes:
         dt: Sample period [s].
         model: The reduced model.
-        L: Gain, 3 rows of 2. Default: sokolov2019 Table II.
+        L: Gain matrix, from the errors of y1 and y2 to x1, x2, x3. Default: sokolov2019 Table II.
     """
 
     dt: Positive

@@ -34,9 +34,9 @@ class SuperTwisting:
     Attributes:
         dt: Sample period [s].
         model: The reduced model (not used: this observer is model-free).
-        L: Bound of the second derivative [rad/s^2]. Default: tuned, docs/assumptions.md.
-        l0: First gain. Default: Levant's 1.5.
-        l1: Second gain. Default: Levant's 1.1.
+        L: Bound on the size of the tilt's second derivative [rad/s^2]. Default: tuned, docs/assumptions.md.
+        l0: Gain of the tilt's correction. Default: Levant's 1.5.
+        l1: Gain of the rate's correction. Default: Levant's 1.1.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()

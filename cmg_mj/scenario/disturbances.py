@@ -23,13 +23,13 @@ Window = tuple[float, float]
 
 @dataclass(frozen=True, config=STRICT)
 class Push:
-    """A torque from outside.
+    """A constant torque about the tilt axis for a while.
 
     Attributes:
-        start_s: When it begins [s].
-        duration_s: How long it lasts [s].
+        start_s: Time at which the push begins [s].
+        duration_s: Duration of the push [s].
         torque_n_m: Torque about the tilt axis [N m].
-        axis: Name of that axis, on a rig of several.
+        axis: Name of the tilt axis, on a rig of several axes.
     """
 
     start_s: GridInstant
@@ -45,15 +45,15 @@ class Push:
 
 @dataclass(frozen=True, config=STRICT)
 class Swing:
-    """A sinusoidal torque from outside. It is held from sample to sample, at its value in the middle.
+    """A sinusoidal torque about the tilt axis, such as a gait's. Each sample holds the value at its middle.
 
     Attributes:
-        frequency_hz: Of the sinusoid [Hz].
-        amplitude_n_m: Of the torque about the tilt axis [N m].
-        phase_deg: At its start [deg].
-        start_s: When it begins [s].
-        duration_s: How long it lasts; left out, to the end [s].
-        axis: Name of the axis, on a rig of several.
+        frequency_hz: Frequency of the torque [Hz].
+        amplitude_n_m: Amplitude of the torque about the tilt axis [N m].
+        phase_deg: Phase of the torque at its start [deg].
+        start_s: Time at which the torque begins [s].
+        duration_s: Duration of the torque; without it, to the end of the run [s].
+        axis: Name of the tilt axis, on a rig of several axes.
     """
 
     frequency_hz: Annotated[float, Field(gt=0.0, le=20.0)]

@@ -105,7 +105,7 @@ def _read(path: Path, name: str) -> dict[str, Any]:
 
 
 def base_of(scenario: Scenario) -> Scenario | None:
-    """Return the bundled scenario that a scenario is compared with, if there is one."""
+    """Return the bundled scenario that a scenario changes, if there is one."""
     if scenario.based_on not in bundled("scenarios"):
         return None
     return load_scenario(str(folder("scenarios") / f"{scenario.based_on}.toml"))

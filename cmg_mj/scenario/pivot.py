@@ -30,24 +30,24 @@ Frequency = Annotated[float, Field(gt=0.0, le=FASTEST_HZ)]
 
 @dataclass(frozen=True, config=STRICT)
 class Pivot:
-    """A motion of the pivot. Its acceleration is held from sample to sample, at its mean over that time.
+    """An acceleration of the pivot. Each sample holds the mean over its period.
 
     The tilt axis at the keyframe gives the directions. They do not turn with the rig.
 
     Attributes:
         kind: Form of the motion.
-        direction: `across`: horizontal, at right angles to the tilt axis, to the side that a positive tilt leans to;
-            `along`: along the tilt axis; `vertical`: upwards.
+        direction: Direction of the acceleration: `across` the tilt axis, horizontally to the side of a positive tilt;
+            `along` the tilt axis; or `vertical`, upwards.
         acceleration_m_s2: Amplitude of a sine, height of a step, RMS of noise [m/s^2].
         frequency_hz: Frequency of a sine [Hz].
         phase_deg: Phase of a sine at its start [deg].
-        corner_hz: Half-power frequency of noise, white behind a second-order Butterworth low-pass [Hz].
-        file: CSV file of a track, by its path: a heading, times [s], accelerations [m/s^2].
-        column: Heading of the track's acceleration; left out, the only one beside the time.
-        scale: Factor on a track.
-        start_s: When it begins [s].
-        duration_s: How long it lasts; left out, to the end of the track or of the run [s].
-        axis: Name of the tilt axis that gives the direction, on a rig of several; `vertical` needs none.
+        corner_hz: Corner frequency of noise: white noise behind a second-order Butterworth low-pass [Hz].
+        file: Path of a track's CSV file: a heading, times [s], accelerations [m/s^2].
+        column: Heading of a track's acceleration; needed if the file has several columns beside the time.
+        scale: Factor on the accelerations of a track.
+        start_s: Time at which the motion begins [s].
+        duration_s: Duration of the motion; without it, to the end of the track or of the run [s].
+        axis: Name of the tilt axis that gives the direction, on a rig of several axes; `vertical` needs no axis.
     """
 
     kind: Literal["sine", "step", "track", "noise"]

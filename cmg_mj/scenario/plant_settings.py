@@ -23,43 +23,44 @@ BendBeyond = Literal["sensors", "modules", "both"]
 
 @dataclass(frozen=True, config=STRICT)
 class PlantSettings:
-    """Which rig, and how it differs from its model file. Where a field is None, the file decides.
+    """The rig, and its differences from its model file. The file decides where a field is not set.
 
     Attributes:
-        model: A bundled MJCF by name, or a path.
-        equilibrium_bias_deg: e: the centre of mass of all that tilts is turned about the pivot by this angle [deg].
-        initial_tilt_deg: x1(0), from the true equilibrium [deg].
-        timestep_s: Physics step [s]; left out, the largest that divides the control's and the sensors' periods, meets
-            the pushes' edges, follows the rig's fastest motion (`step_limit.py`) and is not above the model file's own.
+        model: Model file in MJCF: the name of a bundled one, or a path.
+        equilibrium_bias_deg: Equilibrium bias e: the mass centre is turned about the pivot by this angle, so that the
+            rig does not balance where its sensors show upright [deg].
+        initial_tilt_deg: Tilt at the start, measured from the true equilibrium [deg].
+        timestep_s: Physics step [s]. Without it, the step is the largest that the model file, the sampling, the pushes
+            and the rig's fastest motion allow.
         integrator: MuJoCo's integrator. Fast flywheels need RK4.
-        lock_thrust_bearing: Take the yaw joint out.
-        locked_axes: Names of the axes whose hinges are removed. Their modules stay: wheels turn, gimbals are held.
-        turn_rate_rad_s: At which the rig turns about the vertical from the start, held by its `yaw_servo` [rad/s].
-        gimbal_armature_kg_m2: Reflected inertia of each gimbal's gearbox [kg m^2].
+        lock_thrust_bearing: Remove the joint that lets the rig turn about the vertical.
+        locked_axes: Names of axes whose hinges are removed. Their flywheels turn; their gimbals are held.
+        turn_rate_rad_s: Rate at which the rig turns about the vertical, held by its `yaw_servo` [rad/s].
+        gimbal_armature_kg_m2: Inertia of each gimbal's gearbox, reflected to the gimbal [kg m^2].
         gimbal_friction_n_m: Dry friction of each gimbal [N m].
         gimbal_damping_n_m_s: Viscous friction of each gimbal [N m s/rad].
-        gimbal_backlash_arcmin: Play between each gimbal and its servo's motor, held by friction [arcmin].
-        servo_stiffness_n_m_rad: Of each gimbal servo's position loop [N m/rad].
-        servo_damping_n_m_s_rad: Of each gimbal servo's position loop [N m s/rad].
-        accelerometer_inner_m: The inner accelerometer's distance from the tilt axis on the radial line [m]. The tilt
-            estimate knows it.
-        accelerometer_outer_m: The outer accelerometer's [m].
-        accelerometer_inner_misplaced_mm: So much farther out the inner accelerometer sits than the tilt estimate
-            knows [mm].
-        accelerometer_outer_misplaced_mm: The outer accelerometer likewise [mm].
-        pivot_slides: What the tilt joint hangs on slides freely, as a light cart does, and the tilt estimate knows it:
-            it counts the accelerometers' distances from the common mass centre, which stays where it is. Otherwise
-            from the pivot.
+        gimbal_backlash_arcmin: Backlash between each gimbal and its servo's motor [arcmin].
+        servo_stiffness_n_m_rad: Stiffness of each gimbal servo's position loop [N m/rad].
+        servo_damping_n_m_s_rad: Damping of each gimbal servo's position loop [N m s/rad].
+        accelerometer_inner_m: Distance of the inner accelerometer from the tilt axis, which the tilt estimate
+            uses [m].
+        accelerometer_outer_m: Distance of the outer accelerometer from the tilt axis, which the tilt estimate
+            uses [m].
+        accelerometer_inner_misplaced_mm: True distance of the inner accelerometer less the distance that the tilt
+            estimate uses [mm].
+        accelerometer_outer_misplaced_mm: True distance of the outer accelerometer less the distance that the tilt
+            estimate uses [mm].
+        pivot_slides: The body below the tilt joint slides freely, as a light cart does. The tilt estimate then counts
+            the accelerometers' distances from the common mass centre instead of the pivot.
         tilt_friction_n_m: Dry friction of the tilt joint [N m].
         tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
-        flywheel_speed_rad_s: At which all flywheels turn, each in its own direction [rad/s]. The controller knows it.
-        flywheel_imbalance_kg_m: Static imbalance of each flywheel, mass times offset [kg m].
-        bend_frequency_hz: The frame bends: the undamped frequency of its torsional mode about the tilt axis with the
-            hinge free, all else at rest and no gravity; 0 of a rigid frame [Hz].
-        bend_damping_ratio: Damping ratio of that mode.
+        flywheel_speed_rad_s: Speed of all flywheels, each in its own direction, which the controller uses [rad/s].
+        flywheel_imbalance_kg_m: Static imbalance of each flywheel: its mass times the offset of its mass centre [kg m].
+        bend_frequency_hz: Undamped frequency of the frame's torsional mode about the tilt axis, with the hinge free
+            and without gravity; 0 for a rigid frame [Hz].
+        bend_damping_ratio: Damping ratio of the frame's torsional mode.
         bend_share: Share of the inertia about the tilt axis that lies beyond the bend, seen from the pivot.
-        bend_beyond: Beyond the bend are the `sensors` (on a mast; the modules are before it), the `modules` (the
-            sensors are before it, on the base) or `both` (on the base there is neither).
+        bend_beyond: Parts beyond the bend, seen from the pivot: the `sensors` on a mast, the `modules`, or `both`.
     """
 
     model: str = "scissored_pair.xml"

@@ -64,26 +64,26 @@ class ControllerSettings(BaseModel):
     kind: Annotated[str, OfOneLaw()] = "state_feedback"
     """A name that `cmg-mj list laws` shows, or package.module:Class."""
     rate_hz: Annotated[Rate, OnAllAxes()] = 200.0
-    """Control ticks a second; divides the physics rate."""
+    """Updates of the controller a second; the physics rate is a whole multiple of this rate."""
     gains: Annotated[
         tuple[float, float, float, float] | Literal["scaled"] | None, Batched(law_field="gains"), OfOneLaw()
     ] = None
-    """K_e on [x1, x2, x3, x_e], of a law that takes gains; Table 2's if neither gains nor lqr is given;
-    `scaled`: Table 2's by the rig's time scale and authority."""
+    """The gains K_e on [x1, x2, x3, x_e]. `scaled` carries Table 2's gains over to the rig's time scale and authority.
+    Without `gains` and `lqr` the law takes Table 2's gains."""
     lqr: Annotated[LqrSettings | None, Batched(law_field="gains"), OfOneLaw()] = None
-    """Weights to solve for the gains instead."""
+    """Weights of a quadratic cost; the law then solves for its gains, instead of `gains`."""
     rate_limit_rad_s: Annotated[Positive, Batched(law_field="rate_limit")] = 4.7
-    """Largest gimbal rate."""
+    """Largest gimbal rate that the law commands."""
     feedback: Annotated[Feedback, WhateverTheLaw()] = "observer"
-    """Which rate the law uses."""
+    """Tilt rate that the law uses: the observer's estimate, the fibre-optic gyro's reading, or the exact rate."""
     angle_source: AngleSource = "measured"
-    """Source of the law's angles: measured, as in (8), or estimated, as in the text after (10)."""
+    """Angles that the law uses: measured, as in (8), or the observer's, as in the text after (10)."""
     compensate_turning: Annotated[bool, OnAllAxes(), WhateverTheLaw()] = True
-    """Several axes: whether the gimbals also turn against what a turn about the vertical couples."""
+    """On a rig of several axes, compensate the torques that a turn about the vertical couples into each axis."""
     bias_trim_s: Instant = 0.0
-    """For so long from the start the integrator is held where the observer's bias estimate asks for it."""
+    """Time from the start in which the law holds its integrator at the value for the estimated bias."""
     notch_hz: Annotated[NonNegative, WhateverTheLaw()] = 0.0
-    """The middle of a notch on the law's command, for a frame that bends; 0: none."""
+    """Centre frequency of a notch filter on the command, for a frame that bends; 0 for no notch."""
 
     @model_validator(mode="after")
     def _one_source_of_gains(self) -> ControllerSettings:
@@ -145,9 +145,9 @@ class MetricsSettings:
     """Limits that count as settled and as fallen, and the time from which a bias estimate is judged.
 
     Attributes:
-        settle_band_deg: Settled is |x1| inside this band until the end [deg].
-        fall_angle_deg: Fallen is |q_b + pi/4| beyond this angle [deg].
-        bias_from_s: A bias estimate is judged from this time on, when it has had time to converge [s].
+        settle_band_deg: The rig has settled once |x1| stays below this angle until the end [deg].
+        fall_angle_deg: The rig has fallen once it is farther than this from upright [deg].
+        bias_from_s: Time from which a bias estimate is scored, after it has converged [s].
     """
 
     settle_band_deg: Positive = 1.0
@@ -160,9 +160,9 @@ class CompareSettings(BaseModel):
 
     model_config = FORBID
     observers: Annotated[list[str], Field(min_length=1)] | Literal["all"] = "all"
-    """Observers to compare; the scenario's own with its parameters, the others with their defaults."""
+    """Observers to compare. The scenario's observer keeps its parameters; the others have their defaults."""
     worlds: Annotated[int, Field(ge=1)] = 20
-    """Runs an observer."""
+    """Number of runs of each observer, each with its own noise."""
 
     def names(self) -> list[str]:
         """The observers, spelled out."""
@@ -204,12 +204,12 @@ class Scenario(BaseModel):
     duration_s: GridDuration = 15.0
     """Simulated time [s]."""
     seed: Annotated[int, Field(ge=0)] = 0
-    """Seed of the sensors' noise."""
+    """Seed of the random numbers, such as the sensors' noise."""
     plant: PlantSettings = Field(default_factory=PlantSettings)
     controller: ControllerSettings = Field(default_factory=ControllerSettings)
     observer: ObserverSettings = Field(default_factory=ObserverSettings)
     open_loop_observers: list[str] | Literal["all"] = Field(default_factory=list)
-    """Observers that run open loop, with their default parameters."""
+    """Observers that run in open loop: the law does not use their estimates. They have their default parameters."""
     sensors: Sensors = Field(default_factory=Sensors)
     axes: dict[str, AxisSettings] = Field(default_factory=dict)
     """Settings of single axes, by name."""
@@ -220,9 +220,9 @@ class Scenario(BaseModel):
     compare: Annotated[CompareSettings | None, NoEffect()] = None
     """Written by `cmg-mj compare`, so that its scenario runs to the same comparison."""
     based_on: Annotated[str, NoEffect()] = ""
-    """The bundled scenario that this one is told apart from in folders' names, titles and summaries."""
+    """Bundled scenario that this one changes; folder names, titles and summaries say so."""
     versions: Annotated[dict[str, str], NoEffect()] = Field(default_factory=dict)
-    """Written by a run, not read."""
+    """Versions of the packages of a run; the run writes this field, and no command reads it."""
     _source: str = PrivateAttr("")
 
     @property

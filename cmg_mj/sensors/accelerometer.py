@@ -38,31 +38,32 @@ Angle = Annotated[float, Field(gt=-45.0, lt=45.0)]
 class Accelerometer:
     """A pair of accelerometers of the MPU-6050 class (InvenSense PS-MPU-6000A: 400 ug/rtHz, +-2 g, 16384 counts/g).
 
-    Its zero-g offset is tens of mg before calibration; the default is what calibration leaves, zero. An offset
-    on the tangential axes acts like the equilibrium bias e. What else a part and its mounting do is off by default; the
-    datasheet allows a scale error of 3 % and a cross-axis sensitivity of 2 % before calibration.
+    The offset is tens of mg before calibration; the default is that of a calibrated sensor, zero. An offset on the
+    tangential axes acts like the equilibrium bias e. All other errors of the sensor and its mounting are off by
+    default. The datasheet allows a scale error of 3 % and a cross-axis sensitivity of 2 % before calibration.
 
-    What happens to a reading, in this order: vibration, misalignment, cross-axis, scale, offset, noise (white, then
-    1/f), range, low-pass, resolution. What the low-pass overshoots is cut off at the range once more.
+    A reading gets its errors in this order: vibration, misalignment, cross-axis, scale, offset, noise (white, then
+    1/f), range, low-pass, resolution. An overshoot of the low-pass is clipped at the range once more.
 
     Attributes:
-        rate_hz: Samples a second.
-        noise_density_ug_rthz: White noise, one-sided density; one sample's sigma is density * sqrt(rate/2).
+        rate_hz: Sampling rate of both accelerometers.
+        noise_density_ug_rthz: One-sided density of the white noise; one sample's sigma is density * sqrt(rate/2).
         bias_mg: Offsets of the tangential axes of the inner and the outer accelerometer [mg].
-        range_g: Readings saturate here [g].
-        counts_per_g: Resolution; 0 for none.
-        latency_s: From sampling to delivery [s].
-        scale_error: The slope less one of both axes, of the inner and the outer accelerometer.
-        misalignment_deg: How far the inner and the outer accelerometer are turned in the tilting plane, positive as a
-            positive tilt [deg].
-        cross_axis: The share of its other axis that each axis shows, of the inner and the outer accelerometer.
-        skew_s: How much older the outer's sample is than the inner's [s]; at most one sample period.
-        bias_instability_ug: Floor of the Allan deviation that each axis' 1/f noise has [ug].
-        bandwidth_hz: Of the part's second-order low-pass, which works at 1 kHz [Hz]; 0 for none. (The MPU-6050 can be
-            set to 5, 10, 21, 44, 94 or 184 Hz.)
-        vibration_mg: RMS of the broadband vibration of each axis, independent of the others' [mg].
-        vibration_band_hz: Its half-power frequencies [Hz].
-        wheel_harmonics_mg: Amplitudes of the tones at 1, 2, 3, ... times the speed of each flywheel, in each axis [mg].
+        range_g: Largest acceleration that a reading shows [g].
+        counts_per_g: Resolution; 0 for readings that are not rounded.
+        latency_s: Delay from the sampling of a reading to its use by the controller [s].
+        scale_error: Relative scale errors of the inner and the outer accelerometer, the same for both axes of each.
+        misalignment_deg: Angles by which the inner and the outer accelerometer are turned in the tilting plane,
+            positive in the direction of a positive tilt [deg].
+        cross_axis: Cross-axis sensitivities of the inner and the outer accelerometer: the share of its other axis that
+            each axis shows.
+        skew_s: Age of the outer accelerometer's sample when the inner one is sampled, at most one sample period [s].
+        bias_instability_ug: Bias instability of each axis: the floor of its Allan deviation, made by 1/f noise [ug].
+        bandwidth_hz: Bandwidth of the sensor's second-order low-pass, which runs at 1 kHz; 0 for no low-pass. The
+            MPU-6050 has 5, 10, 21, 44, 94 and 184 Hz.
+        vibration_mg: RMS of broadband vibration, independent in each axis [mg].
+        vibration_band_hz: Half-power frequencies of the broadband vibration, lower and upper [Hz].
+        wheel_harmonics_mg: Amplitudes of tones at 1, 2, 3, ... times the speed of each flywheel, in each axis [mg].
     """
 
     rate_hz: Rate = 200.0

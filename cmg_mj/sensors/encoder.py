@@ -17,9 +17,9 @@ class Encoder:
     """The gimbals' absolute encoders (AS5045 in the Dynamixel MX-106: 12 bit).
 
     Attributes:
-        rate_hz: Samples a second (the servo is polled once a control period).
-        counts_per_revolution: Resolution; 0 for none.
-        latency_s: From sampling to delivery [s].
+        rate_hz: Sampling rate of the encoders; the papers' servos are polled once a control period.
+        counts_per_revolution: Resolution; 0 for readings that are not rounded.
+        latency_s: Delay from the sampling of a reading to its use by the controller [s].
     """
 
     rate_hz: Rate = 200.0

@@ -15,18 +15,18 @@ from cmg_mj.sensors.ideal import IdealReading
 
 @dataclass(frozen=True, config=STRICT)
 class Fog:
-    """A fibre-optic gyro on the frame, along the tilt axis: what estimates are judged by on a real rig.
+    """A fibre-optic gyro on the frame, along the tilt axis: the reference for estimates on a real rig.
 
-    The class of KVH's DSP-1750 (angle random walk 0.013 deg/rt(h), range 490 deg/s, bandwidth 440 Hz), with
+    Its class is that of KVH's DSP-1750 (angle random walk 0.013 deg/rt(h), range 490 deg/s, bandwidth 440 Hz), with
     a margin on the noise.
 
     Attributes:
-        rate_hz: Samples a second.
-        angle_random_walk_deg_rth: White rate noise N; one sample's sigma is N * sqrt(rate).
-        bias_deg_h: Constant offset [deg/h].
-        bandwidth_hz: First-order low-pass, exact between samples; 0 for none.
-        range_deg_s: Readings saturate here [deg/s].
-        latency_s: From sampling to delivery [s].
+        rate_hz: Sampling rate of the gyro.
+        angle_random_walk_deg_rth: Angle random walk N, made by white noise; one sample's sigma is N * sqrt(rate).
+        bias_deg_h: Constant offset of the rate [deg/h].
+        bandwidth_hz: Bandwidth of the gyro's first-order low-pass; 0 for no low-pass.
+        range_deg_s: Largest rate that a reading shows [deg/s].
+        latency_s: Delay from the sampling of a reading to its use by the controller [s].
     """
 
     rate_hz: Rate = 200.0

@@ -23,28 +23,28 @@ PIECE = 1000
 class MemsGyro:
     """A gyro of the MPU-6050 class: it sits in the accelerometers' own package (InvenSense PS-MPU-6000A, 3.4, 6.1).
 
-    It shows the rate at every control tick. The white noise is the datasheet's 0.005 deg/s/rtHz. For the bias
-    instability the datasheet has the noise from 1 to 10 Hz, 0.033 deg/s RMS: less the white noise's part,
-    0.005 sqrt(9), it makes 1/f noise of 0.0194^2/f (deg/s)^2/Hz, whose Allan deviation stays at 82 deg/h. The scale
-    error is the largest that the datasheet allows at 25 degrees Celsius. The delay of the chip's own filter is left
-    out, as with the accelerometers.
+    The gyro shows the rate at every sample of the controller, without the delay of the chip's own filter. The white
+    noise is the datasheet's 0.005 deg/s/rtHz. The bias instability follows from the datasheet's noise from 1 to 10 Hz,
+    0.033 deg/s RMS. Less the white noise's part, 0.005 sqrt(9), this noise is 1/f noise of 0.0194^2/f (deg/s)^2/Hz,
+    whose Allan deviation stays at 82 deg/h. The scale error is the largest that the datasheet allows at 25 degrees
+    Celsius.
 
-    As bought it has an offset of up to 20 deg/s at 25 degrees, and one of up to 20 deg/s more over the temperature,
-    -40 to 85 degrees: 0.33 deg/s/K over the 60 K above 25 degrees. Both are taken at these limits, with signs that are
-    drawn for every world, and the part warms up all the time (by how much is assumed). Calibrated, a mean at rest has
-    taken the offset off just before a run at constant temperature.
+    As bought, a gyro has an offset of up to 20 deg/s at 25 degrees. The temperature, -40 to 85 degrees, adds up to
+    20 deg/s: 0.33 deg/s/K over the 60 K above 25 degrees. Both offsets have these sizes, with random signs in every
+    world, and the gyro warms up all the time at an assumed rate. A calibrated gyro has lost its offset by a mean at
+    rest, just before a run at constant temperature.
 
     Attributes:
-        noise_density_deg_s_rthz: White noise, one-sided density; one sample's sigma is density * sqrt(rate/2).
-        bias_instability_deg_h: Floor of the Allan deviation that the 1/f noise has [deg/h].
-        scale_error: The reading's slope less one.
-        bias_deg_s: Constant offset that the mean at rest has not seen [deg/s].
-        calibration_s: How long the mean at rest is taken [s]; 0 for no such mean.
-        as_bought_offset_deg_s: Size of the offset of a part as bought [deg/s].
-        as_bought_drift_deg_s_k: Size of its change with the temperature [deg/s/K].
-        warming_k_min: By how much the part warms up from the start on [K/min].
-        range_deg_s: Readings saturate here [deg/s].
-        counts_per_deg_s: Resolution; 0 for none.
+        noise_density_deg_s_rthz: One-sided density of the white noise; one sample's sigma is density * sqrt(rate/2).
+        bias_instability_deg_h: Bias instability: the floor of the Allan deviation, made by 1/f noise [deg/h].
+        scale_error: Relative scale error of the reading.
+        bias_deg_s: Constant offset that the calibration does not remove [deg/s].
+        calibration_s: Duration of the calibration, a mean at rest before the run; 0 for no calibration [s].
+        as_bought_offset_deg_s: Size of the offset of a gyro as bought [deg/s].
+        as_bought_drift_deg_s_k: Change of the offset of a gyro as bought with the temperature [deg/s/K].
+        warming_k_min: Rate at which the gyro warms up from the start on [K/min].
+        range_deg_s: Largest rate that a reading shows [deg/s].
+        counts_per_deg_s: Resolution; 0 for readings that are not rounded.
     """
 
     noise_density_deg_s_rthz: NonNegative = 0.005

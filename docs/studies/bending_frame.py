@@ -1,7 +1,8 @@
-"""Prints the tables of docs/real_rigs_evidence.md about a frame that bends: who stands, and with which cure.
+"""The tables of docs/real_rigs_evidence.md about a frame that bends: who stands, and with which cure.
 
-python docs/studies/bending_frame.py [WORLDS]
-python docs/studies/bending_frame.py --border    # check's verdicts beside the simulation, near the border of stability
+python docs/studies/bending_frame.py [WORLDS] (about three minutes on two quiet cores)
+python docs/studies/bending_frame.py --border (about a minute: check's verdicts beside the simulation, near the border
+    of stability)
 """
 
 from __future__ import annotations

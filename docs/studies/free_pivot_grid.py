@@ -3,6 +3,8 @@
     python docs/studies/free_pivot_grid.py [--worlds 100] [--parts open,loop] [--jobs 2] [--only pivot] [--seed 130000]
         [--keep FOLDER]
 
+About five minutes a part on two quiet cores.
+
 push_recovery (400 ug/rtHz, e = 0.5 deg, a push of 1 N m for 0.1 s). Every cell differs from it in one thing. Noise of
 the pivot has its RMS and its corner; a sine has the same RMS, so that its amplitude is 1.41 times that. The parts:
 

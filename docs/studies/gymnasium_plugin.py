@@ -1,4 +1,4 @@
-"""Mounted robots in stock Gymnasium, with the plugin and without: the table of docs/plugin.md.
+"""Mounted robots in stock Gymnasium, with the plugin and without: the table of docs/plugin_evidence.md.
 
     python docs/studies/gymnasium_plugin.py [ROBOT ...] (about eight minutes; ROBOT is a part of a name)
 

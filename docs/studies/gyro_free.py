@@ -2,6 +2,8 @@
 
     python docs/studies/gyro_free.py [--worlds 100] [--noise 200,400,800] [--e 0,0.5,1,1.5] [--parts bars,...]
 
+About eleven minutes of processor time with 10 worlds; tables of the docs have 100.
+
 push_recovery with every observer in a loop of its own; world i has the same noise for all, so differences are taken
 world by world. Means over the worlds; intervals are of 95 %. The parts:
 

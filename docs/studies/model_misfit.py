@@ -1,6 +1,6 @@
 """Misfits of right and wrong models: `model_misfit` of runs whose model is known, over seeds.
 
-    python docs/studies/model_misfit.py [SEEDS]
+    python docs/studies/model_misfit.py [SEEDS] (about half a minute)
 
 Prints the least and the largest misfit of each condition, with the right model and with wrong ones, and those of the
 shipped log of a motor with the pendulum of the example.

@@ -1,7 +1,7 @@
 """Writes the pages of the papers' claims from the reports of `cmg-mj reproduce`.
 
-cmg-mj reproduce all && python docs/studies/reproduced.py runs/reproduce-all
-cmg-mj reproduce beyond && python docs/studies/reproduced.py runs/reproduce-beyond
+cmg-mj reproduce all && python docs/studies/reproduced.py runs/reproduce-all (about three minutes on two quiet cores)
+cmg-mj reproduce beyond && python docs/studies/reproduced.py runs/reproduce-beyond (about four minutes)
 
 The first writes docs/reproduced.md and, into docs/reproduced/, its pictures, made small. The second writes
 docs/beyond.md, without pictures.

@@ -1,6 +1,6 @@
 """Where a Savitzky-Golay differentiator of the last samples stands among the observers: on the bench, not on one log.
 
-    python docs/studies/savitzky_golay.py [WORLDS]
+    python docs/studies/savitzky_golay.py [WORLDS] (about a minute with 8 worlds)
 
 The rate is the slope, at the newest sample, of the polynomial that fits the last samples best (scipy's
 `savgol_coeffs`). Window and order are chosen on the worlds of seed 1000, as are the single parameters of `linear` and

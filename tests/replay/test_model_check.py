@@ -127,4 +127,4 @@ def test_the_most_of_right_models_is_that_of_the_docs() -> None:
     remark = model_remark(2.0)
     assert remark is not None
     assert "(of right models at most 1.15)" in remark
-    assert "right ones have at most 1.15" in (ROOT / "docs" / "replay.md").read_text(encoding="utf-8")
+    assert "right ones have at most 1.15" in (ROOT / "docs" / "replay_evidence.md").read_text(encoding="utf-8")

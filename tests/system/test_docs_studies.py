@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import re
 import subprocess
 import sys
@@ -40,6 +41,39 @@ def test_the_tables_of_the_accelerometers_errors() -> None:
     assert [len(row) for row in rows] == [10, 5]
     assert float(rows[0][1]) == 0.14  # atan(0.5 * 5e-3)
     assert "- to the MEMS gyro: in " in process.stdout
+
+
+@pytest.mark.slow
+def test_the_table_of_gyro_free_against_the_others() -> None:
+    """Two cells whose sign does not depend on the worlds; the rows of the page are those of the study."""
+    arguments = "--worlds 2 --jobs 1 --only"
+    command = [sys.executable, STUDIES / "gyro_free_against.py", *arguments.split(), "mast of 10 Hz"]
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert re.search(r"\| mast of 10 Hz +\| +- \(2 fell\) \| +- \(2 fell\) \| +\d\d \|", process.stdout)
+    assert "100%" in process.stderr
+    study = STUDIES / "gyro_free_against.py"
+    spec = importlib.util.spec_from_file_location("gyro_free_against", study)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    page = (STUDIES.parent / "which_observer_evidence.md").read_text(encoding="utf-8")
+    cases = [*module.sensor_errors(), *module.pivots(), *module.bends()]
+    rows = re.findall(r"(?m)^\| ([^|]+) \|", page)[1:]
+    assert rows == [case.name for case in cases]
+
+
+@pytest.mark.slow
+def test_the_table_for_a_builder() -> None:
+    """Its rows, and the heads that docs/which_observer.md has too."""
+    command = [sys.executable, STUDIES / "for_a_builder.py", "--worlds", "2", "--observers", "linear,gyro_free"]
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in process.stdout.splitlines()[2:]]
+    page = (STUDIES.parent / "which_observer.md").read_text(encoding="utf-8")
+    assert "| " + " | ".join(rows[0]) + " |" in page
+    assert [row[0] for row in rows[2:]][:3] == ["`linear`", "`gyro_free`", "`zero`"]
+    assert rows[2][4] == "-3.00 to 2.00"
+    assert "100%" in process.stderr
 
 
 @pytest.mark.slow
@@ -135,7 +169,7 @@ def test_the_table_of_gymnasium() -> None:
     process = subprocess.run(command, capture_output=True, text=True, check=True)
     row = r"\| InvertedPendulum-v5, cart held \| +0.001 \| +10 of 10 \| +10 of 10 \| +0 of 10 \(\d+ to \d+ steps\) \|"
     assert re.search(row, process.stdout)
-    assert re.search(row, (STUDIES.parent / "plugin.md").read_text(encoding="utf-8"))
+    assert re.search(row, (STUDIES.parent / "plugin_evidence.md").read_text(encoding="utf-8"))
 
 
 @pytest.mark.slow

@@ -69,6 +69,12 @@ def test_a_page_is_what_the_generator_writes(page: str) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES)
+def test_no_placeholder_is_left(page: str) -> None:
+    """A text that should have been formatted; TOML and figures in braces have more than a name in them."""
+    assert re.findall(r"\{\w*\}", PAGES[page]) == []
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_a_page_can_be_read_in_one_go(page: str) -> None:
     assert len(PAGES[page].split()) < LONGEST_PAGE
 

@@ -64,9 +64,9 @@ class Lqg:
         noise: Of the tilt and of the gimbal angle, by the sensors' datasheet.
         state_cost: Weights of x1, x2, x3, x_e.
         input_cost: Weight of u.
-        torque_walk: How fast the torque may change: standard deviation after a second [N m].
-        torque_white: White torque: the standard deviation of its integral after a second [N m s].
-        gimbal_white: White part of the gimbals' rate: the standard deviation of its integral after a second [rad].
+        torque_walk: Random walk of the unknown torque: its standard deviation after a second [N m].
+        torque_white: White torque: standard deviation of its integral after a second [N m s].
+        gimbal_white: White noise of the gimbals' rate: standard deviation of its integral after a second [rad].
     """
 
     needs: ClassVar[tuple[str, ...]] = ()

@@ -55,7 +55,7 @@ def test_command_that_makes_a_plugin(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 def test_bench(capsys: pytest.CaptureFixture[str]) -> None:
-    """What it prints; how fast it is, docs/plugin.md says."""
+    """What it prints; how fast it is, docs/plugin_evidence.md says."""
     main(["bench", "plugin", "--observers", "gyro_free", "--worlds", "4", "--json"])
     (figures,) = json.loads(capsys.readouterr().out)
     assert set(figures["over_bare"]) == {"one world, mj_step", "worlds, rollout", "worlds, Batch"}
