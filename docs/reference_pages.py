@@ -688,7 +688,7 @@ COMMANDS: dict[str, Notes] = {
         "plugin.md",
     ),
     "reproduce": Notes(
-        "about half a minute for `dao2023`, three minutes for `all`, and four minutes for `beyond`.",
+        "about half a minute for `dao2023`, three minutes for `all`, four for `beyond`.",
         ("cmg-mj reproduce dao2023",),
         "reproduced.md",
     ),

@@ -86,8 +86,7 @@ def report_text(entries: Sequence[Reproduction]) -> str:
             parts.append("**Interrupted: not all of this paper's claims are here.**")
         log = SentenceLog()
         parts += [part for claim in entry.claims for part in _parts_of_claim(claim, log)]
-    counts = _count_of_verdicts(entries)  # one sentence a line, which other pages quote
-    return "\n\n".join(part if part == counts else markdown.wrap(part) for part in parts) + "\n"
+    return "\n\n".join(markdown.wrap(part) for part in parts) + "\n"
 
 
 def _opening(entries: Sequence[Reproduction]) -> list[str]:

@@ -64,7 +64,7 @@ def distance(experiment: cmg_mj.Experiment) -> float:
 
 
 def pushed(experiment: cmg_mj.Experiment, worlds: int) -> list[str]:
-    """How many worlds stood, and of these the tilt's RMS and the gimbals' peak."""
+    """Return how many worlds stood, and their mean RMS of the tilt and peak of the gimbals."""
     result = experiment.run_many(worlds, keep_trajectory=False)
     figures = [result.mean(key) for key in ("tilt_rms_deg", "gimbal_peak_deg")]
     shown = ["-" if figure is None else f"{figure:.{digits}f}" for figure, digits in zip(figures, (2, 0), strict=True)]

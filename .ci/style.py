@@ -1,4 +1,4 @@
-"""Counts style: python docs/style.py [ROOT] [--worst 20] [--json] (three seconds).
+"""Counts style: python .ci/style.py [ROOT] [--worst 20] [--json] (three seconds).
 
 Pages, docstrings, help texts and messages of a checkout, by default of this one. One row a page or group:
 
@@ -8,7 +8,7 @@ Pages, docstrings, help texts and messages of a checkout, by default of this one
 - openers: sentences that begin with Of, What, That of or Those; docstrings also with As, How, Whether or Which.
 - colons: sentences with two or more colons and semicolons.
 - banned: words for which the bench has another (`BANNED`).
-- wide: lines of prose over 100 columns, without tables, code and link targets.
+- wide: lines of prose over 100 columns, without tables, code, link targets, headings and pictures.
 - widest: columns of the longest such line.
 """
 
@@ -161,13 +161,17 @@ def page_texts(page: Path) -> list[Text]:
 
 
 def wide_lines(page: Path) -> dict[int, int]:
-    """Return columns of the lines over 100, by line number: without tables, code and link targets."""
+    """Return columns of the lines over 100, by line number.
+
+    Tables, code, link targets, headings and pictures do not count: they cannot be wrapped.
+    """
     text = page.read_text(encoding="utf-8")
     skipped: set[int] = set()
     for token in MarkdownIt().enable("table").parse(text):
         if token.type in ("table_open", "fence", "code_block", "html_block") and token.map:
             skipped.update(range(*token.map))
-    shown = [re.sub(r"\]\([^)]*\)|^\[[^]]+\]: .*", "]", line) for line in text.splitlines()]
+    unbroken = r"\]\([^)]*\)|^\[[^]]+\]: .*|^#.*|^!\[.*"
+    shown = [re.sub(unbroken, "]", line) for line in text.splitlines()]
     return {i + 1: len(s) for i, s in enumerate(shown) if i not in skipped and len(s) > MOST_COLUMNS}
 
 
