@@ -15,7 +15,7 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.visualization.plots.colours import BOUND_COLOURS, colour, colours, hexadecimal
 from cmg_mj.visualization.plots.figure_spec import Panel, Picture
-from cmg_mj.visualization.plots.map_plot import draw_map
+from cmg_mj.visualization.plots.map_plot import draw_map, draw_surface, mappable
 from cmg_mj.visualization.plots.readability import (
     RANKING_KEYS,
     Summary,
@@ -62,9 +62,13 @@ def draw(path: Path, picture: Picture) -> None:
         path: The PNG to write.
         picture: The figure's data.
     """
+    if picture.first_height is not None:
+        figure = _with_large_first(picture, picture.first_height)
+        save_figure(path, figure, picture.title, dpi=100)
+        return
     columns = picture.columns
     rows = -(-len(picture.panels) // columns)
-    size = (9.0 if columns == 1 else 5.5 * columns, 0.8 + picture.panel_height * rows)
+    size = (9.0 if columns == 1 else picture.panel_width * columns, 0.8 + picture.panel_height * rows)
     figure, grid = pyplot().subplots(
         rows, columns, sharex="col" if picture.share_x else False, figsize=size, layout="constrained", squeeze=False
     )
@@ -80,6 +84,36 @@ def draw(path: Path, picture: Picture) -> None:
             axes.tick_params(labelbottom=True)
     figure.align_ylabels()
     save_figure(path, figure, picture.title, dpi=100)
+
+
+def _with_large_first(picture: Picture, first_height: float) -> Figure:
+    """Draw the first panel over the whole width, and the others, small, in a grid below; surfaces share one scale."""
+    first, others = picture.panels[0], picture.panels[1:]
+    rows = -(-len(others) // picture.columns)
+    heights = [first_height, *[picture.panel_height] * rows]
+    size = (max(9.0, picture.panel_width * picture.columns), 0.8 + sum(heights))
+    figure = pyplot().figure(figsize=size, layout="constrained")
+    grid = figure.add_gridspec(len(heights), picture.columns, height_ratios=heights)
+    axes = figure.add_subplot(grid[0, :])
+    _draw_panel(axes, first)
+    axes.set_xlabel(first.x_label)
+    below: list[Axes] = []
+    surface = None
+    for i, panel in enumerate(others):
+        row, column = divmod(i, picture.columns)
+        axes = figure.add_subplot(grid[1 + row, column])
+        _draw_panel(axes, panel)
+        below.append(axes)
+        surface = panel.surface or surface
+        lowest = i + picture.columns >= len(others)
+        axes.set_xlabel(panel.x_label if lowest else "", fontsize="small")
+        axes.set_ylabel(panel.y_label if column == 0 else "", fontsize="small")
+        axes.tick_params(labelbottom=lowest, labelleft=column == 0, labelsize="small")
+    if surface is not None:
+        bar = figure.colorbar(mappable(surface), ax=below, label=surface.label, location="bottom", aspect=60)
+        bar.set_ticks(surface.levels or surface.limits, labels=[f"{x:.3g}" for x in surface.levels or surface.limits])
+        bar.minorticks_off()
+    return figure
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:
@@ -106,6 +140,9 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     _mark(axes.yaxis, panel.y_ticks)
     if panel.map is not None:
         draw_map(axes, panel.map)
+        return
+    if panel.surface is not None:
+        draw_surface(axes, panel.surface)
         return
     axes.grid(alpha=0.3)
     marks_only = all(set(line.style) <= set("o.x+s") for line in panel.lines)
