@@ -205,7 +205,7 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
         ticked = {"x_ticks": ticks_of(x), "y_ticks": ticks_of(y)}
         best_of = panel(title=f"Best observer, by colour; thin lines: its {value}", **ticked, map=cells)
         few = {"x_ticks": ticks_of(x, FEW_TICKS), "y_ticks": ticks_of(y, FEW_TICKS)}
-        surfaces = _surfaces(x, y, alone, label)
+        surfaces = _surfaces(x, y, alone, label, (0.5,) if key == "fell" else None)
         titles = short_names(list(surfaces))
         each = [panel(title=titles[name], **few, surface=surface) for name, surface in surfaces.items()]
         pictures.append(
@@ -222,13 +222,15 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
     return pictures
 
 
-def _surfaces(x: np.ndarray, y: np.ndarray, alone: Mapping[str, np.ndarray], label: str) -> dict[str, Surface]:
-    """Make a surface an observer of values (n_y, n_x), all on one scale of colours."""
+def _surfaces(
+    x: np.ndarray, y: np.ndarray, alone: Mapping[str, np.ndarray], label: str, levels: Sequence[float] | None
+) -> dict[str, Surface]:
+    """Make a surface an observer of values (n_y, n_x), all on one scale of colours; None for round levels."""
     values = np.stack(list(alone.values()))
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
     scale: Literal["linear", "log"] = "log" if 0.0 < LOGARITHMIC * low < high else "linear"
-    levels = round_values(known)
+    levels = round_values(known) if levels is None else levels
     limits = (low, high) if low < high else (low - 0.5, high + 0.5)
     return {name: Surface(x, y, own, label, limits, scale, levels) for name, own in alone.items()}
 

@@ -107,11 +107,12 @@ def _with_large_first(picture: Picture, first_height: float) -> Figure:
         surface = panel.surface or surface
         lowest = i + picture.columns >= len(others)
         axes.set_xlabel(panel.x_label if lowest else "", fontsize="small")
-        axes.set_ylabel(panel.y_label if column == 0 else "", fontsize="small")
+        axes.set_ylabel(panel.y_label.replace(" [", "\n[") if column == 0 else "", fontsize="x-small")
         axes.tick_params(labelbottom=lowest, labelleft=column == 0, labelsize="small")
     if surface is not None:
         bar = figure.colorbar(mappable(surface), ax=below, label=surface.label, location="bottom", aspect=60)
-        bar.set_ticks(surface.levels or surface.limits, labels=[f"{x:.3g}" for x in surface.levels or surface.limits])
+        ticks = sorted({*surface.levels, *([] if len(surface.levels) > 2 else surface.limits)})
+        bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
         bar.minorticks_off()
     return figure
 
