@@ -220,6 +220,12 @@ def _plot(path: Path, run: Run, experiment: Experiment) -> None:
         run.summary,
         settle_band_deg=experiment.scenario.metrics.settle_band_deg,
         rate_limit_rad_s=experiment.law.rate_limit,
+        pushes=[push for push in experiment.scenario.push if run.axis is None or push.axis == run.axis],
+        swings=[
+            swing
+            for swing in experiment.scenario.swing
+            if run.axis is None or (swing.axis or experiment.plant.axis_names[0]) == run.axis
+        ],
     )
 
 
@@ -234,6 +240,7 @@ def recording_header(
         plant=experiment.plant,
         title=(title or "Run") + ", on the board" if driver == "board" else title,
         pushes=scenario.push,
+        swings=scenario.swing,
         settings=scenario.metrics,
         rate_limit_rad_s=experiment.law.rate_limit,
         scenario_toml=experiment.as_toml(driver, world, wire),

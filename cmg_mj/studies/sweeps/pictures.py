@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -17,11 +17,14 @@ from cmg_mj.studies.sweeps.axes import is_number
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
 from cmg_mj.studies.sweeps.leads import baselines_ahead, least_error, smallest
 from cmg_mj.studies.sweeps.study import counted
-from cmg_mj.visualization.plots.figure_spec import Line, Map, Panel, Picture
+from cmg_mj.visualization.plots.figure_spec import Line, Map, Panel, Picture, Surface
+from cmg_mj.visualization.plots.readability import short_names
 
 ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
 """Figures that are drawn, and whose indices are shown, where a trial has them; tables show the first."""
-MOST_TICKS = 10
+MOST_TICKS, FEW_TICKS = 10, 4
+COLUMNS = 4
+"""Small panels, one an observer, in a row below a map."""
 CURVES = "curves"
 LOGARITHMIC = 10.0
 """Errors that differ by more than this factor are drawn on a logarithmic axis."""
@@ -30,6 +33,30 @@ ASIDE = 0.3
 TRUE_RATE = "true"
 """Name of the true rate in the loop, as baselines' trials have it, in a map."""
 UNKNOWN = Interval(math.nan, math.nan, math.nan)
+SECTIONS = ("plant", "controller", "observer", "sensors", "axes", "metrics")
+"""Sections of a scenario that add nothing to a field's name."""
+UNITS = {
+    "_ug_rthz": "ug/rtHz",
+    "_deg_s_rthz": "deg/s/rtHz",
+    "_deg_s": "deg/s",
+    "_rad_s": "rad/s",
+    "_kg_m2": "kg m^2",
+    "_n_m_s_rad": "N m s/rad",
+    "_n_m_rad": "N m/rad",
+    "_n_m_s": "N m s/rad",
+    "_n_m": "N m",
+    "_m_s2": "m/s^2",
+    "_arcmin": "arcmin",
+    "_deg": "deg",
+    "_hz": "Hz",
+    "_mm": "mm",
+    "_mg": "mg",
+    "_ms": "ms",
+    "_kg": "kg",
+    "_m": "m",
+    "_s": "s",
+}
+"""The end of a field's name -> its unit; the first that fits."""
 MAPS = {ERRORS[0]: "map_velocity_error", ERRORS[1]: "map_push_error", "fell": "map_falls"}
 """Figure -> its picture."""
 
@@ -58,7 +85,7 @@ def curves(trials: Trials, field: str) -> Picture:
     scale = scale_of(trials, field, x)
     panel = partial(
         Panel,
-        x_label=field,
+        x_label=in_words(field),
         x_scale=scale,
         x_ticks=ticks_of(x) if study.design == "grid" else None,
     )
@@ -153,29 +180,72 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
                 continue
             best, sure, least = _least_falls(fell, known, places)
             ahead = {}
-            label, value, levels, nobody = "share of falls", "share", (0.1, 0.9), "several alike"
+            alone = {study.observers[place]: shares[:, :, place] for place in places}
+            if study.references:
+                alone[TRUE_RATE] = halves[TRUE_RATE]
+            label, value, levels, nobody = "share of falls", "share of falls", (0.1, 0.9), "several alike"
         else:
             figure = gridded(trials.figure(key))
             if not np.isfinite(figure).any():
                 continue
             best, sure, least = least_error(figure, places)
             ahead = baselines_ahead(study, figure, least)
-            label, value, levels, nobody = heading(key), "mean", round_values(least), "none stood in every world"
+            alone = {name: figure[:, :, place].mean(axis=-1) for place, name in enumerate(study.observers)}
+            label, value, levels, nobody = heading(key), "mean error", round_values(least), "none stood in every world"
         half = "half of the worlds fall"
         cells = Map(x, y, study.observers, best, sure, least, levels, boundaries, nobody, half, ahead)
-        panel = Panel(
-            up,
+        panel = partial(
+            Panel,
+            in_words(up),
             (),
-            f"colour: the best observer; contours: its {value}",
-            across,
-            scale_of(trials, across, x),
-            scale_of(trials, up, y),
-            x_ticks=ticks_of(x),
-            y_ticks=ticks_of(y),
-            map=cells,
+            x_label=in_words(across),
+            x_scale=scale_of(trials, across, x),
+            y_scale=scale_of(trials, up, y),
         )
-        pictures.append(Picture(name, title_of(trials, label), [panel], panel_height=4.7))
+        ticked = {"x_ticks": ticks_of(x), "y_ticks": ticks_of(y)}
+        best_of = panel(title=f"Best observer, by colour; thin lines: its {value}", **ticked, map=cells)
+        few = {"x_ticks": ticks_of(x, FEW_TICKS), "y_ticks": ticks_of(y, FEW_TICKS)}
+        surfaces = _surfaces(x, y, alone, label, (0.5,) if key == "fell" else None)
+        titles = short_names(list(surfaces))
+        each = [panel(title=titles[name], **few, surface=surface) for name, surface in surfaces.items()]
+        pictures.append(
+            Picture(
+                name,
+                title_of(trials, label),
+                [best_of, *each],
+                columns=min(COLUMNS, len(each)),
+                panel_height=2.1,
+                panel_width=10.4 / min(COLUMNS, len(each)),
+                first_height=4.7,
+            )
+        )
     return pictures
+
+
+def _surfaces(
+    x: np.ndarray, y: np.ndarray, alone: Mapping[str, np.ndarray], label: str, levels: Sequence[float] | None
+) -> dict[str, Surface]:
+    """Make a surface an observer of values (n_y, n_x), all on one scale of colours; None for round levels."""
+    values = np.stack(list(alone.values()))
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    scale: Literal["linear", "log"] = "log" if 0.0 < LOGARITHMIC * low < high else "linear"
+    levels = round_values(known) if levels is None else levels
+    limits = (low, high) if low < high else (low - 0.5, high + 0.5)
+    return {name: Surface(x, y, own, label, limits, scale, levels) for name, own in alone.items()}
+
+
+def in_words(field: str) -> str:
+    """Name a scenario's field in words, with its unit: `push.0.torque_n_m` is `push torque [N m]`."""
+    *sections, name = field.split(".")
+    unit = ""
+    for ending, written in UNITS.items():
+        if name.endswith(ending):
+            name, unit = name.removesuffix(ending), f" [{written}]"
+            break
+    kept = [part for part in sections if part not in SECTIONS and part != "0"]
+    parts = [str(int(part) + 1) if part.isdigit() else part for part in kept]
+    return " ".join([*parts, *name.split("_")]) + unit
 
 
 def _least_falls(fell: np.ndarray, known: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -211,9 +281,9 @@ def scale_of(trials: Trials, field: str, values: np.ndarray) -> Literal["linear"
     return "log" if (axis.log if axis.is_range else is_logarithmic(values)) else "linear"
 
 
-def ticks_of(values: np.ndarray) -> list[float]:
+def ticks_of(values: np.ndarray, most: int = MOST_TICKS) -> list[float]:
     """Choose values to mark, not too many."""
-    return [float(value) for value in values[:: math.ceil(len(values) / MOST_TICKS)]]
+    return [float(value) for value in values[:: math.ceil(len(values) / most)]]
 
 
 def round_values(values: np.ndarray) -> tuple[float, ...]:

@@ -41,6 +41,12 @@ BASELINE_COLOURS: dict[str, Colour] = {
 }
 """The signals that observers are compared with."""
 
+BOUND_COLOURS: dict[str, Colour] = {
+    "settle band": (0, 140, 100),
+    "rate limit": (205, 90, 100),
+}
+"""Bounds that signals are held against: green like the phase `settled`, red like the one of a run that is lost."""
+
 USER_COLOURS: tuple[Colour, ...] = ((91, 85, 128), (47, 157, 113), (236, 15, 72), (212, 88, 142))
 """Observers of users: the name decides which."""
 

@@ -68,6 +68,29 @@ class Map:
 
 
 @dataclass(frozen=True)
+class Surface:
+    """The figure of one candidate, over two quantities.
+
+    Attributes:
+        x: Centres of the cells to the right, (n_x,), rising.
+        y: Centres of the cells upward, (n_y,), rising.
+        values: Value of each cell, (n_y, n_x); NaN for none.
+        label: Name of the values, with their unit, for the scale of colours.
+        limits: Values at the ends of the scale of colours, the same in all panels of a figure.
+        scale: Linear or logarithmic scale of colours.
+        levels: Levels of the contours, which are labelled, unless the cells are few enough for numbers.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    values: np.ndarray
+    label: str
+    limits: tuple[float, float]
+    scale: Literal["linear", "log"] = "linear"
+    levels: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
 class Panel:
     """One set of axes.
 
@@ -83,6 +106,7 @@ class Panel:
         x_ticks: Ticks on x; None for matplotlib's choice.
         y_ticks: Ticks on y; None for matplotlib's choice.
         map: A map to draw instead of lines.
+        surface: A candidate's figure to draw instead of lines.
     """
 
     y_label: str
@@ -96,6 +120,7 @@ class Panel:
     x_ticks: Sequence[float] | None = None
     y_ticks: Sequence[float] | None = None
     map: Map | None = None
+    surface: Surface | None = None
 
 
 @dataclass(frozen=True)
@@ -109,6 +134,9 @@ class Picture:
         share_x: Whether all panels have the same abscissa.
         columns: Number of panels beside each other.
         panel_height: Height of each panel [inch].
+        panel_width: Width of each of several columns [inch].
+        first_height: Height of the first panel, which then has a row of its own; None for a panel like the others
+            [inch].
     """
 
     name: str
@@ -117,3 +145,5 @@ class Picture:
     share_x: bool = True
     columns: int = 1
     panel_height: float = 2.3
+    panel_width: float = 5.5
+    first_height: float | None = None

@@ -1,4 +1,4 @@
-"""Draws a map: the best candidate over two quantities, its value, and the boundaries where candidates break down."""
+"""Draws maps over two quantities: the best candidate with the boundaries of all, and one candidate's figure."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
-from cmg_mj.visualization.plots.figure_spec import Map
+from cmg_mj.visualization.plots.figure_spec import Map, Surface
 from cmg_mj.visualization.plots.readability import short_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.contour import QuadContourSet
 
 EMPTY = (232, 232, 232)
 """Colour of a cell without a best."""
@@ -20,6 +22,8 @@ BOUNDARY, DASH = 2.4, 2.5
 """Width of a boundary [points], and of its dashes [line widths]."""
 AHEAD = 3.2
 """Width of the dotted line within which something that is no candidate is ahead [points]."""
+NUMBERED = 6
+"""Most cells along an axis of a surface whose cells have room for numbers."""
 CASING = "white"
 """Colour under every line, so that the line is seen on every other colour."""
 
@@ -73,9 +77,51 @@ def _contours(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray) -> None:
         return
     values = _to_edges(spec, x, y, spec.values)
     axes.contour(*values, spec.levels, colors=CASING, linewidths=2.2)
-    lines = axes.contour(*values, spec.levels, colors="0.1", linewidths=0.8)
-    for text in axes.clabel(lines, fmt="%g", fontsize="small"):
-        text.set_bbox({"facecolor": CASING, "edgecolor": "none", "alpha": 0.8, "pad": 0.8})
+    _labelled(axes, axes.contour(*values, spec.levels, colors="0.1", linewidths=0.8))
+
+
+def _labelled(axes: Axes, lines: QuadContourSet) -> None:
+    """Label every level, in the middle of its longest piece: matplotlib leaves short lines without a label."""
+    places = []
+    for paths in lines.get_paths():
+        pieces = [piece for piece in paths.to_polygons(closed_only=False) if len(piece) > 1]
+        if pieces:
+            longest = max(pieces, key=len)
+            places.append(longest[len(longest) // 2])
+    if places:
+        for text in axes.clabel(lines, fmt="%g", fontsize="small", manual=places, inline=False):
+            text.set_color("0.1")
+            text.set_bbox({"facecolor": CASING, "edgecolor": "none", "alpha": 0.8, "pad": 0.8})
+
+
+def draw_surface(axes: Axes, spec: Surface) -> None:
+    """Draw one candidate's figure on axes whose scales are set: its value by colour, and as numbers or contours."""
+    scale = mappable(spec)
+    x = edges(spec.x, log=axes.get_xscale() == "log")
+    y = edges(spec.y, log=axes.get_yscale() == "log")
+    axes.set_facecolor(hexadecimal(EMPTY))
+    axes.pcolormesh(x, y, np.ma.masked_invalid(spec.values), cmap=scale.cmap, norm=scale.norm)
+    if max(spec.values.shape) <= NUMBERED:
+        for (row, column), value in np.ndenumerate(spec.values):
+            if np.isfinite(value):
+                ink = "white" if scale.norm(value) < 0.6 else "black"
+                place = {"ha": "center", "va": "center", "fontsize": "x-small", "color": ink}
+                axes.text(spec.x[column], spec.y[row], f"{value:.3g}", **place)
+    elif len(spec.levels) and np.isfinite(spec.values).any():
+        across, up = np.meshgrid(spec.x, spec.y)
+        lines = axes.contour(across, up, np.ma.masked_invalid(spec.values), spec.levels, colors=CASING, linewidths=0.9)
+        _labelled(axes, lines)
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(y[0], y[-1])
+
+
+def mappable(spec: Surface) -> ScalarMappable:
+    """Make the scale of colours of a figure's surfaces."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm, Normalize
+
+    norm = LogNorm if spec.scale == "log" else Normalize
+    return ScalarMappable(norm(*spec.limits), "viridis")
 
 
 def _boundaries(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Sequence[str]) -> None:

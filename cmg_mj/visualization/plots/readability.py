@@ -29,6 +29,18 @@ REACH = 3.0
 
 MARGIN = 0.05
 
+LABEL_POINTS = 21.0
+"""Distance between two ticks from which rerun's viewer labels them so that one can read them [points]."""
+
+LABELLED = 2
+"""Least number of labelled ticks on an axis."""
+
+TICK_MARGIN = 0.03
+"""Room beyond the outermost labelled tick, in steps between ticks."""
+
+FALL_REACH = 1.0
+"""A fall stretches an axis by at most this many spans of what came before the fall, on each side."""
+
 LEGEND = (0.35, 0.6)
 """Shares of a plot's width and height that a legend takes."""
 
@@ -110,6 +122,95 @@ def axis_range(required: Sequence[np.ndarray], optional: Sequence[np.ndarray] = 
         low, high = min(low, max(least, lowest)), max(high, min(most, highest))
     margin = MARGIN * (high - low)
     return (float(low - margin), float(high + margin)) if 0.0 < margin < math.inf else None
+
+
+def error_range(rates: Sequence[np.ndarray], errors: Sequence[np.ndarray]) -> tuple[float, float] | None:
+    """Choose the range of an axis of errors: it shows zero, and spans at least as much as the axis of the rates.
+
+    Args:
+        rates: True rates. An error stretches the axis by at most `REACH` of their spans, on each side.
+        errors: Errors of the estimates of the rates.
+
+    Returns:
+        Lowest and highest value; None if there is no value.
+    """
+    rate, both, own = axis_range(rates), axis_range(rates, errors), axis_range([], errors)
+    if rate is None or both is None:
+        return own
+    low, high = (max(both[0], min(own[0], 0.0)), min(both[1], max(own[1], 0.0))) if own else (0.0, 0.0)
+    more = max(0.0, rate[1] - rate[0] - (high - low)) / 2.0
+    return low - more, high + more
+
+
+def labelled_step(axis: tuple[float, float], height: float) -> float:
+    """Return the step between the ticks that a viewer labels: rerun labels multiples of a power of ten.
+
+    Args:
+        axis: Range of the axis.
+        height: Height of the plot [points].
+    """
+    return 10.0 ** math.ceil(math.log10((axis[1] - axis[0]) * LABEL_POINTS / height) - 1e-9)
+
+
+def labelled_ticks(axis: tuple[float, float], height: float) -> list[float]:
+    """Return the ticks that a viewer labels on an axis of some height [points]."""
+    step = labelled_step(axis, height)
+    return [i * step for i in range(math.ceil(axis[0] / step - 1e-9), math.floor(axis[1] / step + 1e-9) + 1)]
+
+
+def with_scale(axis: tuple[float, float], height: float) -> tuple[float, float]:
+    """Widen an axis by as little as makes two of its ticks labelled; one tick alone gives no scale."""
+    if len(labelled_ticks(axis, height)) >= LABELLED:
+        return axis
+    step, (low, high) = labelled_step(axis, height), axis
+    first = [math.floor(low / step) + i for i in range(3)]
+    more = TICK_MARGIN * step
+    ranges = [(min(low, i * step - more), max(high, (i + LABELLED - 1) * step + more)) for i in first]
+    return min(ranges, key=lambda ends: ends[1] - ends[0])
+
+
+def fall_start(time: np.ndarray, tilt: np.ndarray, *, fell: bool) -> float:
+    """Find the time from which a run that fell only fell.
+
+    Args:
+        time: Times, (n,) [s].
+        tilt: True tilt, (n,) [rad].
+        fell: Whether the run fell.
+
+    Returns:
+        The time from which the tilt's magnitude rises to its last value [s]; infinity for a run that did not fall.
+    """
+    if not fell or not len(time):
+        return math.inf
+    is_rising = np.diff(np.abs(tilt)) > 0.0
+    others = np.flatnonzero(~is_rising)
+    return float(time[others[-1] + 1] if len(others) else time[0])
+
+
+def stretched(axis: tuple[float, float] | None, after: Sequence[np.ndarray]) -> tuple[float, float] | None:
+    """Stretch an axis towards what followed the start of a fall, by at most `FALL_REACH` of its spans on each side.
+
+    Args:
+        axis: Result of `axis_range` for what came before the fall.
+        after: Arrays of what followed.
+
+    Returns:
+        The axis; the range of all that followed, if nothing came before.
+    """
+    if axis is None:
+        return axis_range(after)
+    low, high = axis
+    reach = FALL_REACH * (high - low)
+    for values in _finite(after):
+        low, high = min(low, max(axis[0] - reach, values.min())), max(high, min(axis[1] + reach, values.max()))
+    return float(low), float(high)
+
+
+def is_seen(values: np.ndarray, axis: tuple[float, float] | None) -> bool:
+    """Judge whether lines, (n,) or (n, n_lines), have any part within an axis; any axis, if it is None."""
+    columns = (column[np.isfinite(column)] for column in values.reshape(len(values), -1).T)
+    low, high = axis or (-math.inf, math.inf)
+    return any(len(column) and column.max() >= low and column.min() <= high for column in columns)
 
 
 def free_corner(

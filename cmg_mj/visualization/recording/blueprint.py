@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import rerun.blueprint as rrb
 
@@ -24,10 +25,10 @@ from cmg_mj.visualization.recording.views import (
 )
 
 ESTIMATE_PLOTS = (
-    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 2.8),
-    Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",), 2.8),
+    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 2.75),
+    Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",), 2.75),
 )
-TILT_PLOTS = (Plot("Tilt [deg]", ("tilt/",), 1.7), *ESTIMATE_PLOTS)
+TILT_PLOTS = (Plot("Tilt [deg]", ("tilt/",), 1.9), *ESTIMATE_PLOTS)
 BIAS_PLOT = Plot("Estimated equilibrium bias [deg]", ("bias/",), 1.3)
 """Shown only if an observer estimates the bias."""
 ACTUATOR_PLOTS = (
@@ -46,8 +47,10 @@ COMPARED_ACTUATOR_PLOTS = (
     Plot("Integrator [rad s]", ("integrator/x_e",)),
 )
 
-LANE, COLUMN = 40.0, 820.0
-"""Height of a lane of phases and of a column of plots [pixels]."""
+LANE, COLUMN = 40.0, 870.0
+"""Height of a lane of phases and of a column of plots in a window of 900 points [points]."""
+FRAME = 44.0
+"""Height of a plot's title and time axis [points]."""
 
 ALL = "All observers"
 
@@ -76,6 +79,7 @@ def default_blueprint(plant: Plant, branches: Sequence[Branch], *, live: bool = 
 def _dashboard(branch: Branch, names: Sequence[str]) -> rrb.Container:
     """Lay out everything about one run."""
     tilt = (*TILT_PLOTS, BIAS_PLOT) if _has_bias(branch) else TILT_PLOTS
+    tilt, actuators = _sized(tilt, COLUMN - _lanes_height([branch])), _sized(ACTUATOR_PLOTS, COLUMN)
     mechanism = mechanism_view(branch, f"Rig (flywheels drawn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed)")
     return _columns(
         branch.label,
@@ -84,13 +88,13 @@ def _dashboard(branch: Branch, names: Sequence[str]) -> rrb.Container:
             mechanism, page_tabs(names, "Observers" if branch.run.open_loop_observers else "Summary"), row_shares=[1, 1]
         ),
         _below_lanes([branch], tilt, _plot_views(tilt, branch)),
-        _stack(ACTUATOR_PLOTS, _plot_views(ACTUATOR_PLOTS, branch)),
+        _stack(actuators, _plot_views(actuators, branch)),
     )
 
 
 def _all_observers(branch: Branch) -> rrb.Container:
     """Lay out the estimates of every observer of a run, with all observers in the legend."""
-    rates = _plot_views(ESTIMATE_PLOTS, branch, full_legend=True)
+    rates = _plot_views(_sized(ESTIMATE_PLOTS, COLUMN), branch, full_legend=True)
     bias = _plot_views([BIAS_PLOT], branch, full_legend=True) if _has_bias(branch) else []
     return _columns(
         ALL, [3, 2], rrb.Vertical(*rates), rrb.Vertical(*bias, page_tabs(_page_names([branch]), "Observers"))
@@ -102,16 +106,18 @@ def _comparison(plant: Plant, branches: Sequence[Branch]) -> list[rrb.Container]
     few = [branch.run.name for branch in branches if branch.entry.is_best]
     module = plant.axis.modules[0].of_axis
     best = [branch for branch in branches if branch.entry.is_best]
-    tilt = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_TILT_PLOTS]
-    actuators = [overlay_view(plot, branches, module, Choice(few)) for plot in COMPARED_ACTUATOR_PLOTS]
+    tilt_plots = _sized(COMPARED_TILT_PLOTS, COLUMN - _lanes_height(best))
+    actuator_plots = _sized(COMPARED_ACTUATOR_PLOTS, COLUMN)
+    tilt = [overlay_view(plot, branches, module, Choice(few)) for plot in tilt_plots]
+    actuators = [overlay_view(plot, branches, module, Choice(few)) for plot in actuator_plots]
     mechanisms = rrb.Tabs(*(mechanism_view(branch, branch.label) for branch in best), active_tab=0)
     names = _page_names(branches)
     board = _columns(
         "Comparison" if branches[0].run.axis is None else "All axes",
         [9, 8, 6],
         rrb.Vertical(mechanisms, page_tabs(names, "Summary"), row_shares=[1, 1]),
-        _below_lanes(best, COMPARED_TILT_PLOTS, tilt),
-        _stack(COMPARED_ACTUATOR_PLOTS, actuators),
+        _below_lanes(best, tilt_plots, tilt),
+        _stack(actuator_plots, actuators),
     )
     if len(best) == len(branches):
         return [board]
@@ -148,6 +154,12 @@ def _page_names(branches: Sequence[Branch]) -> list[str]:
 
 def _columns(name: str, shares: list[float], *columns: rrb.Container | rrb.View) -> rrb.Container:
     return rrb.Horizontal(*columns, column_shares=shares, name=name)
+
+
+def _sized(plots: Sequence[Plot], height: float) -> tuple[Plot, ...]:
+    """Give plots that share a column of some height [points] the heights that they get."""
+    share = height / sum(plot.height for plot in plots)
+    return tuple(replace(plot, points=plot.height * share - FRAME) for plot in plots)
 
 
 def _stack(plots: Sequence[Plot], views: Sequence[rrb.View]) -> rrb.Container:

@@ -10,6 +10,7 @@ import numpy as np
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.stored_columns import STRETCH
 from cmg_mj.scenario.disturbances import Push
+from cmg_mj.visualization.plots.readability import fall_start
 from cmg_mj.visualization.recording.camera import POSES, Ball, enclosing_ball
 from cmg_mj.visualization.recording.legend import LegendEntry, legend
 from cmg_mj.visualization.recording.run import RecordingHeader, Run, pose_ticks, poses_at
@@ -71,6 +72,7 @@ def _make_branch(header: RecordingHeader, run: Run, entry: LegendEntry) -> Branc
         pushes=[push for push in header.pushes if run.axis is None or push.axis == run.axis],
         pose_ticks=ticks,
         ball=enclosing_ball(plant, qpos),
+        falls_from=fall_start(run.trajectory["time_s"], run.trajectory["x1_rad"], fell=run.outcome.kind == "fell"),
         radius=enclosing_ball(plant, np.empty((0, plant.model.nq))).radius,
     )
 

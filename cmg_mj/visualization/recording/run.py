@@ -11,7 +11,7 @@ import numpy as np
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.disturbances import Push
+from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.visualization.plots.readability import Summary, figures_by_observer, observers_to_draw, section
 
@@ -31,6 +31,7 @@ class RecordingHeader:
         plant: The plant of all runs.
         title: The experiment's title.
         pushes: Torques from outside, the same in all runs.
+        swings: Sinusoidal torques from outside, the same in all runs.
         settings: The settle band.
         rate_limit_rad_s: Largest gimbal rate; None to leave its bounds away [rad/s].
         scenario_toml: The resolved scenario.
@@ -39,6 +40,7 @@ class RecordingHeader:
     plant: Plant
     title: str = ""
     pushes: Sequence[Push] = ()
+    swings: Sequence[Swing] = ()
     settings: MetricsSettings = field(default_factory=MetricsSettings)
     rate_limit_rad_s: float | None = None
     scenario_toml: str = ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,7 +13,7 @@ from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, Colour
+from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, BOUND_COLOURS, Colour
 from cmg_mj.visualization.plots.thinning import thinned
 from cmg_mj.visualization.recording.legend import LegendEntry
 from cmg_mj.visualization.recording.run import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Run, phases
@@ -20,7 +21,6 @@ from cmg_mj.visualization.recording.run import BALANCING, ENDINGS, PUSH, RECOVER
 TIMELINE = "sim_time"
 """Simulated time from the start of the run."""
 
-LIMIT: Colour = (120, 120, 120)
 CONTROLLER: Colour = (200, 200, 200)
 MODULES: tuple[Colour, ...] = ((225, 205, 165), (125, 150, 185), (160, 120, 90), (110, 160, 140))
 """Colours of the modules: pale, because strong colours are those of observers."""
@@ -71,12 +71,14 @@ class Lines:
         label: Shortened name of the run or log.
         series: Path below the group -> series.
         timeline: Name of the timeline.
+        falls_from: Time from which the run only fell; what follows takes no room on an axis [s].
     """
 
     path: str
     label: str
     series: dict[str, Series]
     timeline: str = TIMELINE
+    falls_from: float = math.inf
 
 
 def instant(seconds: float) -> np.timedelta64:
@@ -133,7 +135,8 @@ def _series(
     yield Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), true, 2.5)
     yield _bounds("tilt/settle_band", "settle band", time, settings.settle_band_deg)
     yield Series("rate/true", "true", time, t["x2_rad_s"], true, 3.0)
-    yield Series("rate/gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0, whole=False)
+    # the viewer draws in the order of the paths: the thin line of the gyro over the wide one that it follows
+    yield Series("rate/true_by_gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0, whole=False)
     for observer in observers:
         yield from _estimates(run, observer)
     yield Series("command/u", "command", time, t["u_rad_s"], CONTROLLER)
@@ -228,7 +231,7 @@ def log_phases(rec: rr.RecordingStream, branch: str, steps: Sequence[tuple[float
 def _bounds(path: str, name: str, time: np.ndarray, bound: float) -> Series:
     """Make two horizontal lines at +-bound."""
     ends = _ends(time)
-    return Series(path, name, ends, np.tile([bound, -bound], (len(ends), 1)), LIMIT, 1.0, whole=False)
+    return Series(path, name, ends, np.tile([bound, -bound], (len(ends), 1)), BOUND_COLOURS[name], 1.0, whole=False)
 
 
 def _ends(time: np.ndarray) -> np.ndarray:

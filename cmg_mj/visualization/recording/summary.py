@@ -9,7 +9,7 @@ import rerun as rr
 from cmg_mj.results import markdown
 from cmg_mj.results.error_bounds import NOISE_ALONE
 from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, format_figure, heading
-from cmg_mj.scenario.disturbances import Push
+from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.visualization.plots.readability import FEW
 from cmg_mj.visualization.recording.branch import Branch
@@ -60,7 +60,9 @@ def summary_page(header: RecordingHeader, branches: Sequence[Branch]) -> str:
     band = f"Settled: the tilt stays within ±{header.settings.settle_band_deg:g}° to the end."
     runs = [branch.run for branch in branches]
     reasons = [f"**{run.name}**: {run.outcome.reason}" for run in runs if run.outcome.reason]
-    return _paragraphs(f"# {header.title or 'Run'}", *tables, _pushes(header.pushes), band, *reasons, NOTES)
+    return _paragraphs(
+        f"# {header.title or 'Run'}", *tables, _pushes(header.pushes), *_swings(header.swings), band, *reasons, NOTES
+    )
 
 
 def observers_page(branches: Sequence[Branch]) -> str:
@@ -127,6 +129,15 @@ def _pushes(pushes: Sequence[Push]) -> str:
         for p in pushes
     )
     return "Pushes: " + "; ".join(texts) + "."
+
+
+def _swings(swings: Sequence[Swing]) -> list[str]:
+    texts = (
+        f"{s.amplitude_n_m:g} N m{f' about {s.axis}' if s.axis else ''} at {s.frequency_hz:g} Hz from {s.start_s:g} s "
+        f"{'to the end' if s.duration_s is None else f'for {s.duration_s:g} s'}"
+        for s in swings
+    )
+    return ["Swings: " + "; ".join(texts) + "."] if swings else []
 
 
 def _paragraphs(*parts: str) -> str:

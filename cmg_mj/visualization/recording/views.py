@@ -11,13 +11,20 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from cmg_mj.visualization.plots.colours import Colour
-from cmg_mj.visualization.plots.readability import axis_range, free_corner
+from cmg_mj.visualization.plots.readability import (
+    axis_range,
+    error_range,
+    free_corner,
+    is_seen,
+    stretched,
+    with_scale,
+)
 from cmg_mj.visualization.recording.branch import Branch
 from cmg_mj.visualization.recording.run import ENDINGS
 from cmg_mj.visualization.recording.signals import Lines, Series
 
 RATE, RATE_ERROR = "rate/true", "rate_error/"
-"""An error is drawn to the scale of the rate: it must not look small because its axis is large."""
+"""Errors are drawn to the scale of the rate: a small axis would make a small error look large."""
 
 Override = rr.SeriesLines | rrb.EntityBehavior
 PlayState = Literal["paused", "playing", "following"]
@@ -32,12 +39,14 @@ class Plot:
         entities: Paths below the run's branch, folders with their slash.
         height: Share of the column's height.
         least: Least span of the axis, in the unit of the title.
+        points: Height of the plot in a window of common size, without its title and time axis [points].
     """
 
     title: str
     entities: tuple[str, ...]
     height: float = 1.0
     least: float = 0.0
+    points: float = 200.0
 
 
 @dataclass(frozen=True)
@@ -75,17 +84,20 @@ def plot_view(plot: Plot, branch: Lines, observers: Choice) -> rrb.View:
     """Lay out a plot of one run or log, with all its observers, some of them switched off."""
     rows = [row for path, row in branch.series.items() if path.startswith(plot.entities)]
     visible = [row for row in rows if not row.observer or row.observer in observers.names]
-    required = [row.values for row in visible if row.whole]
+    ranges = _Ranges()
+    for row in visible:
+        ranges.add(row, branch.falls_from)
     if RATE_ERROR in plot.entities:
-        required.append(branch.series[RATE].values)
-    return _series_view(
-        plot,
-        branch.path,
-        [f"{branch.path}/{entity}**" for entity in plot.entities],
-        {f"{branch.path}/{row.path}": observers.visibility(row.observer) for row in rows if row not in visible},
-        axis_range(required, [row.values for row in visible if not row.whole]),
-        visible,
-    )
+        ranges.add_rate(branch.series[RATE], branch.falls_from)
+    axis = ranges.axis(plot)
+    overrides: dict[str, list[Override]] = {}
+    for row in rows:
+        if row not in visible:
+            overrides[f"{branch.path}/{row.path}"] = observers.visibility(row.observer)
+        elif len(row.time) and not is_seen(row.values, axis):  # the legend would name a line that is not there
+            overrides[f"{branch.path}/{row.path}"] = [rrb.EntityBehavior(visible=False)]
+    contents = [f"{branch.path}/{entity}**" for entity in plot.entities]
+    return _series_view(plot, branch.path, contents, overrides, axis, visible)
 
 
 def overlay_view(plot: Plot, branches: Sequence[Branch], module: str, runs: Choice) -> rrb.View:
@@ -102,21 +114,53 @@ def overlay_view(plot: Plot, branches: Sequence[Branch], module: str, runs: Choi
     """
     part = rr.escape_entity_path_part(module)
     overrides: dict[str, list[Override]] = {}
-    required: list[np.ndarray] = []
-    optional: list[np.ndarray] = []
     visible = []
+    stands = any(branch.run.name in runs.names and branch.run.outcome.kind not in ENDINGS for branch in branches)
+    ranges = _Ranges()
     for branch in branches:
         name = branch.run.name
         row = _row(branch, plot.entities[0].format(module=part))
         overrides[f"{branch.path}/{row.path}"] = runs.style_line(name, branch.entry.color, branch.label)
-        is_standing = branch.run.outcome.kind not in ENDINGS
         if name in runs.names:
             visible.append(row)
-            (required if row.whole and is_standing else optional).append(row.values)
-            if RATE_ERROR in plot.entities and is_standing:
-                required.append(branch.series[RATE].values)
+            is_optional = stands and branch.run.outcome.kind in ENDINGS
+            ranges.add(replace(row, whole=row.whole and not is_optional), branch.falls_from)
+            if RATE_ERROR in plot.entities and not is_optional:
+                ranges.add_rate(branch.series[RATE], branch.falls_from)
     plot = replace(plot, title=plot.title.format(module=module))
-    return _series_view(plot, "/", list(overrides), overrides, axis_range(required, optional), visible)
+    return _series_view(plot, "/", list(overrides), overrides, ranges.axis(plot), visible)
+
+
+class _Ranges:
+    """The values that decide about the axis of a plot: those that it must show, those that it may cut off, falls."""
+
+    def __init__(self) -> None:
+        self._required: list[np.ndarray] = []
+        self._optional: list[np.ndarray] = []
+        self._falls: list[np.ndarray] = []
+        self._rates: list[np.ndarray] = []
+
+    def add(self, row: Series, falls_from: float) -> None:
+        """Add a series of a run that only fell from some time on [s]."""
+        before = row.time <= falls_from
+        (self._required if row.whole else self._optional).append(row.values[before])
+        if row.whole:
+            self._falls.append(row.values[~before])
+
+    def add_rate(self, row: Series, falls_from: float) -> None:
+        """Add a true rate, to whose scale errors are drawn."""
+        self._rates.append(row.values[row.time <= falls_from])
+
+    def axis(self, plot: Plot) -> tuple[float, float] | None:
+        """Choose the range of the axis."""
+        if self._rates:
+            axis = error_range(self._rates, [*self._required, *self._optional])
+        else:
+            axis = stretched(axis_range(self._required, self._optional), self._falls)
+        if axis is None:
+            return None
+        more = max(0.0, plot.least - (axis[1] - axis[0])) / 2.0
+        return with_scale((axis[0] - more, axis[1] + more), plot.points)
 
 
 def _row(branch: Branch, entity: str) -> Series:
@@ -133,9 +177,6 @@ def _series_view(
     axis: tuple[float, float] | None,
     visible: Sequence[Series],
 ) -> rrb.View:
-    if axis is not None:
-        more = max(0.0, plot.least - (axis[1] - axis[0])) / 2.0
-        axis = (axis[0] - more, axis[1] + more)
     corner = "".join(word.capitalize() for word in free_corner([(row.time, row.values) for row in visible], axis))
     return rrb.TimeSeriesView(
         origin=origin,

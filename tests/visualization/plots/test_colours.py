@@ -8,6 +8,7 @@ import pytest
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.visualization.plots.colours import (
     BASELINE_COLOURS,
+    BOUND_COLOURS,
     COLOURS,
     USER_COLOURS,
     Colour,
@@ -15,6 +16,7 @@ from cmg_mj.visualization.plots.colours import (
     colours,
     hexadecimal,
 )
+from cmg_mj.visualization.recording.signals import CONTROLLER
 
 SIGHT = {
     "all three cones": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -87,3 +89,9 @@ def test_users_own_differ_from_each_other() -> None:
 
 def test_as_matplotlib_takes_it() -> None:
     assert hexadecimal((6, 109, 61)) == "#066d3d"
+
+
+@pytest.mark.parametrize("sight", SIGHT)
+def test_bounds_are_not_taken_for_what_they_bound(sight: str) -> None:
+    assert least_distance([BOUND_COLOURS["settle band"], BASELINE_COLOURS["true"]], sight) > 0.1
+    assert least_distance([BOUND_COLOURS["rate limit"], CONTROLLER], sight) > 0.1

@@ -13,9 +13,16 @@ from cmg_mj.visualization.plots.readability import (
     REACH,
     SummaryValue,
     axis_range,
+    error_range,
+    fall_start,
     free_corner,
+    is_seen,
+    labelled_step,
+    labelled_ticks,
     observers_to_draw,
     short_names,
+    stretched,
+    with_scale,
 )
 
 TRUE = 0.5 * np.sin(np.linspace(0.0, 20.0, 2001))
@@ -135,3 +142,54 @@ def test_names_are_shortened_where_they_stay_apart() -> None:
     names = ["linear", "mine:Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
     assert list(short_names(names).values()) == ["linear", "Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
     assert list(short_names(["mine:linear", "linear"]).values()) == ["mine:linear", "linear"]
+
+
+@pytest.mark.parametrize(
+    "axis", [(-0.64, 0.7), (0.01, 0.09), (-13.0, -12.9), (-1.2e-3, 0.4e-3), (0.0, 1.9), (5.0, 95.0)]
+)
+@pytest.mark.parametrize("height", [120.0, 250.0])
+def test_an_axis_has_two_labelled_ticks(axis: tuple[float, float], height: float) -> None:
+    low, high = with_scale(axis, height)
+    assert low <= axis[0]
+    assert axis[1] <= high
+    assert len(labelled_ticks((low, high), height)) >= 2
+    assert high - low <= 2.5 * max(axis[1] - axis[0], 0.4 * labelled_step(axis, height))
+
+
+def test_an_axis_with_a_scale_stays() -> None:
+    """Steps of 0.1, 22 points apart, are labelled; 20 points apart they are not."""
+    assert with_scale((-0.45, 0.65), 242.0) == (-0.45, 0.65)
+    assert labelled_ticks((-0.45, 0.65), 220.0) == [0.0]
+    assert with_scale((-0.45, 0.65), 220.0) == pytest.approx((-0.45, 1.03))
+
+
+def test_a_fall_begins_where_the_tilt_only_rises() -> None:
+    time = np.arange(8.0)
+    tilt = np.array([1.0, 0.5, -0.5, -0.2, -0.1, -0.4, -2.0, -9.0])
+    assert fall_start(time, tilt, fell=True) == 4.0
+    assert fall_start(time, tilt, fell=False) == math.inf
+    assert fall_start(time[:1], tilt[:1], fell=True) == 0.0
+
+
+def test_a_fall_stretches_an_axis_by_its_span_at_most() -> None:
+    assert stretched((-1.0, 1.0), [np.array([0.0, 50.0])]) == (-1.0, 3.0)
+    assert stretched((-1.0, 1.0), [np.array([1.5, math.nan])]) == (-1.0, 1.5)
+    assert stretched(None, [np.array([0.0, 1.0])]) == pytest.approx((-0.05, 1.05))
+
+
+def test_errors_get_at_least_the_span_of_the_rate() -> None:
+    rate = np.array([-0.4, 0.6])
+    low, high = error_range([rate], [np.array([-0.5, 0.1])]) or (0.0, 0.0)
+    assert (low + high) / 2.0 == pytest.approx(-0.2)
+    assert high - low == pytest.approx(1.1)
+    low, high = error_range([rate], [np.linspace(0.5, 900.0, 10_000)]) or (0.0, 0.0)
+    assert low <= 0.0
+    assert 3.6 < high < 4.2
+
+
+def test_bounds_on_both_sides_of_an_axis_are_not_seen() -> None:
+    bounds = np.tile([4.7, -4.7], (2, 1))
+    assert not is_seen(bounds, (-1.0, 1.0))
+    assert is_seen(bounds, (-1.0, 5.0))
+    assert is_seen(bounds, None)
+    assert not is_seen(np.array([math.nan]), None)

@@ -12,13 +12,16 @@ import pytest
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
-from cmg_mj.visualization.plots.colours import colour, hexadecimal
+from cmg_mj.visualization.plots.colours import BOUND_COLOURS, colour, hexadecimal
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.visualization.plots.readability import fall_start
 from cmg_mj.visualization.plots.run_plot import PAGE, draw, plot_run
 
 BAND, LIMIT = 1.0, 4.7
+PUSHES = [Push(0.2, 0.1)]
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +47,10 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[matplotlib.figure.Figure]:
     return saved_figures
 
 
-def plot(path: Path, trajectory: Trajectory, summary: dict[str, Any], figures: list[Any]) -> Any:
-    plot_run(path / "plot.png", trajectory, "A title", summary, settle_band_deg=BAND, rate_limit_rad_s=LIMIT)
+def plot(path: Path, trajectory: Trajectory, summary: dict[str, Any], figures: list[Any], **events: Any) -> Any:
+    events = {"pushes": PUSHES, **events}
+    bounds = {"settle_band_deg": BAND, "rate_limit_rad_s": LIMIT}
+    plot_run(path / "plot.png", trajectory, "A title", summary, **bounds, **events)
     assert (path / "plot.png").read_bytes().startswith(b"\x89PNG")
     return figures[-1]
 
@@ -68,6 +73,7 @@ def test_eleven_lines_on_one_page(
     assert min(axes.get_position().height * height for axes in figure.axes) > 0.7
     assert "settle band" in labels(tilt)
     assert "push" in labels(tilt)
+    assert "swing" not in labels(tilt)
     assert "rate limit" in labels(command)
     assert [line.get_ydata()[0] for line in command.lines[-2:]] == [LIMIT, -LIMIT]
     assert len(error.lines) == 1 + 3
@@ -106,6 +112,71 @@ def test_an_estimate_that_goes_astray_takes_no_axis(
         assert low <= true.min()
         assert true.max() <= high
         assert high - low < 8.0 * np.ptp(true)
+
+
+@pytest.fixture
+def few(all_observers: tuple[Trajectory, dict[str, Any]], monkeypatch: pytest.MonkeyPatch) -> Trajectory:
+    """The run with its first three observers; the figures are not laid out, which takes as long as drawing."""
+    trajectory, _ = all_observers
+    monkeypatch.setattr(matplotlib.figure.Figure, "get_layout_engine", lambda figure: None)
+    extra = trajectory.layout.extra_signals[:3]
+    layout = replace(trajectory.layout, observers=trajectory.observers[:3], extra_signals=extra)
+    return replace(trajectory, layout=layout)
+
+
+def test_a_swing_is_not_called_a_push(few: Trajectory, tmp_path: Path, figures: list[matplotlib.figure.Figure]) -> None:
+    """The column of torques has both: the whole run would be a push."""
+    columns = {**few.columns, "push_n_m": np.ones(len(few))}
+    swings = [Swing(1.0), Swing(2.0, start_s=0.1, duration_s=0.1)]
+    tilt = plot(tmp_path, replace(few, columns=columns), {}, figures, pushes=[], swings=swings).axes[0]
+    assert [text for text in labels(tilt) if text in ("push", "swing")] == ["swing"]
+    strips = [patch for patch in tilt.patches if patch.get_height() < 0.1]
+    end = few["time_s"][-1]
+    spans = [(strip.get_x(), strip.get_x() + strip.get_width()) for strip in strips]
+    np.testing.assert_allclose(spans, [(0.0, end), (0.1, 0.2)])
+    assert len(tilt.patches) == 2
+
+
+def test_the_legend_names_only_lines_that_are_there(
+    few: Trajectory, tmp_path: Path, figures: list[matplotlib.figure.Figure]
+) -> None:
+    """A command of a tenth of the limit leaves the limit out of the panel; an estimate has no finite value."""
+    name = few.observers[1]
+    lost = np.full(len(few), np.nan)
+    columns = {**few.columns, "u_rad_s": 0.01 * few["u_rad_s"], f"estimate/{name}/x2_rad_s": lost}
+    _, rate, error, _, command = plot(tmp_path, replace(few, columns=columns), {}, figures).axes
+    assert command.get_ylim()[1] < LIMIT
+    assert "rate limit" not in labels(command)
+    assert not any(text.startswith(name) for text in [*labels(rate), *labels(error)])
+    assert any(text.startswith(few.observers[2]) for text in labels(rate))
+
+
+def test_a_fall_does_not_flatten_what_went_before(
+    few: Trajectory, tmp_path: Path, figures: list[matplotlib.figure.Figure]
+) -> None:
+    time, start = few["time_s"], 0.3
+    fall = np.where(time > start, np.expm1(20.0 * (time - start)), 0.0)
+    columns = {**few.columns, "x1_rad": few["x1_rad"] + fall, "x2_rad_s": few["x2_rad_s"] + 20.0 * fall}
+    fallen = replace(few, columns=columns)
+    before = time <= fall_start(time, fallen["x1_rad"], fell=True)
+    assert 0.2 < time[before][-1] <= start + 0.02
+    for column, unit, panel in (("x1_rad", 180.0 / np.pi, 0), ("x2_rad_s", 1.0, 1)):
+        heights = {}
+        for fell in (True, False):
+            low, high = plot(tmp_path, fallen, {"fell": fell}, figures).axes[panel].get_ylim()
+            heights[fell] = unit * np.ptp(fallen[column][before]) / (high - low)
+        assert heights[True] > 0.08
+        assert heights[True] > 3.0 * heights[False]
+
+
+def test_bounds_differ_from_what_they_bound(
+    few: Trajectory, tmp_path: Path, figures: list[matplotlib.figure.Figure]
+) -> None:
+    tilt, *_, command = plot(tmp_path, few, {}, figures).axes
+    for axes, bound, signal in ((tilt, "settle band", "true"), (command, "rate limit", "command")):
+        lines = {line.get_label().split(" $")[0]: line for line in axes.lines}
+        assert lines[bound].get_color() == hexadecimal(BOUND_COLOURS[bound])
+        assert (lines[bound].get_linestyle(), lines[signal].get_linestyle()) == ("--", "-")
 
 
 def test_long_names_do_not_narrow_the_panels(

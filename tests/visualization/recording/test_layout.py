@@ -17,17 +17,20 @@ from rerun.chunk import RrdReader
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Outcome
+from cmg_mj.scenario.disturbances import Swing
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.compare.comparison import prepare_comparison
 from cmg_mj.studies.save import report_run
+from cmg_mj.visualization.plots.readability import fall_start, labelled_ticks
 from cmg_mj.visualization.recording import RecordingHeader, Run, write_recording
+from cmg_mj.visualization.recording.blueprint import ACTUATOR_PLOTS, COLUMN, TILT_PLOTS, _sized
 from cmg_mj.visualization.recording.branch import make_branches
 from cmg_mj.visualization.recording.camera import FARTHEST, enclosing_ball
 from cmg_mj.visualization.recording.legend import legend, numbered_parts
 from cmg_mj.visualization.recording.run import best_observers
 from cmg_mj.visualization.recording.summary import ROW_TABLES, summary_page
-from cmg_mj.visualization.recording.views import EYE
+from cmg_mj.visualization.recording.views import EYE, Choice, plot_view
 
 SHORT = ("duration_s=0.6", "push.0.start_s=0.2")
 FIELD_OF_VIEW = math.radians(55.0)
@@ -204,6 +207,68 @@ def test_a_fall_takes_no_axis_from_those_that_stand(comparison: tuple[Experiment
     (view,) = select(views(write(tmp_path / "it.rrd", experiment, two)), "Tilt, true [deg]")
     assert view.axis is not None
     assert view.axis[1] < np.degrees(0.3)
+
+
+def test_a_fall_does_not_flatten_what_went_before(comparison: tuple[Experiment, list[Run]], tmp_path: Path) -> None:
+    """The run falls from 0.5 s on; alone it has the axis, by what was before."""
+    experiment, runs = comparison
+    run = runs[0]
+    time, true = run.trajectory["time_s"], run.trajectory["x1_rad"]
+    fall = np.where(time > 0.5, np.expm1(50.0 * (time - 0.5)), 0.0)
+    columns = {**run.trajectory.columns, "x1_rad": true + fall}
+    fallen = replace(run, trajectory=replace(run.trajectory, columns=columns), outcome=Outcome("fell", 0.6))
+    (view,) = select(views(write(tmp_path / "it.rrd", experiment, [fallen])), "Tilt [deg]")
+    assert view.axis is not None
+    start = fall_start(time, true + fall, fell=True)
+    assert start < 0.55
+    before = np.degrees(true[time <= start])
+    assert view.axis[0] < before.min()
+    assert before.max() < view.axis[1] < before.max() + 3.0 * np.ptp(before) + 1.0
+    assert np.degrees(fall[-1]) > 100.0
+
+
+@pytest.mark.parametrize(("name", "overrides"), [("push_recovery", SHORT), ("two_axes", ("duration_s=0.6", "push=[]"))])
+def test_every_axis_has_a_scale(name: str, overrides: tuple[str, ...]) -> None:
+    """At least two ticks that the viewer labels, in a window of 900 points, whatever the range of the data."""
+    experiment = prepare(load_scenario(name, overrides))
+    result = experiment.run()
+    header = RecordingHeader(experiment.plant, pushes=experiment.scenario.push, rate_limit_rad_s=4.7)
+    (branch, *_) = make_branches(header, report_run(experiment, result).runs)
+    for column, height in ((TILT_PLOTS, 778.0), (ACTUATOR_PLOTS, COLUMN)):
+        for plot in _sized(column, height):
+            shown = plot_view(plot, branch, Choice(best_observers(branch.run)))
+            low, high = shown.properties["ScalarAxis"].range.as_arrow_array().to_pylist()[0]
+            assert len(labelled_ticks((low, high), plot.points)) >= 2, plot.title
+
+
+def test_bounds_out_of_sight_leave_the_legend(all_observers: tuple[Experiment, Run], tmp_path: Path) -> None:
+    experiment, run = all_observers
+    command = 0.01 * run.trajectory["u_rad_s"]
+    columns = {**run.trajectory.columns, "u_rad_s": command}
+    still = replace(run, trajectory=replace(run.trajectory, columns=columns))
+    for shown, hidden in ((run, set()), (still, {"/homogeneous/command/limit"})):
+        (view,) = select(views(write(tmp_path / "it.rrd", experiment, [shown])), "Command, gimbal rate [rad/s]")
+        assert view.hidden == hidden
+
+
+def test_errors_are_drawn_to_the_scale_of_the_rate(all_observers: tuple[Experiment, Run], tmp_path: Path) -> None:
+    experiment, run = all_observers
+    layout = views(write(tmp_path / "it.rrd", experiment, [run]))
+    errors = select(layout, "Estimation error of the tilt rate [rad/s]")
+    assert len(errors) == 2
+    for view in errors:
+        assert view.axis is not None
+        assert view.axis[0] < 0.0 < view.axis[1]
+        assert view.axis[1] - view.axis[0] >= np.ptp(run.trajectory["x2_rad_s"])
+
+
+def test_swings_are_summarised_as_swings(all_observers: tuple[Experiment, Run]) -> None:
+    experiment, run = all_observers
+    swings = [Swing(1.5, 0.3), Swing(2.0, 0.1, start_s=1.0, duration_s=2.0)]
+    header = RecordingHeader(experiment.plant, swings=swings)
+    text = summary_page(header, make_branches(header, [run]))
+    assert "No push." in text
+    assert "Swings: 0.3 N m at 1.5 Hz from 0 s to the end; 0.1 N m at 2 Hz from 1 s for 2 s." in text
 
 
 def test_numbers_put_paths_into_the_order_given() -> None:

@@ -114,7 +114,7 @@ def rerun(home: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str
 
 def test_everything_promised_is_there(path: Path, experiment: Experiment) -> None:
     branch_entities = {
-        *("phase", "tilt/true", "tilt/measured", "tilt/settle_band", "rate/true", "rate/gyro"),
+        *("phase", "tilt/true", "tilt/measured", "tilt/settle_band", "rate/true", "rate/true_by_gyro"),
         *(f"{kind}/{name}" for kind in ("rate_estimate", "rate_error") for name in ("1_homogeneous", "2_linear")),
         *("command/u", "command/limit", "integrator/x_e", "rig/frame/push"),
         *(f"{kind}/{module}" for kind in ("gimbal", "flywheel") for module in ("cube1", "cube2")),
@@ -136,7 +136,7 @@ def test_values_equal_the_trajectory(path: Path, run: Run, experiment: Experimen
         "tilt/true": np.degrees(t["x1_rad"]),
         "tilt/measured": np.degrees(t["y1_rad"]),
         "rate/true": t["x2_rad_s"],
-        "rate/gyro": t["fog_rad_s"],
+        "rate/true_by_gyro": t["fog_rad_s"],
         "rate_estimate/1_homogeneous": t["estimate/homogeneous/x2_rad_s"],
         "rate_estimate/2_linear": t["estimate/linear/x2_rad_s"],
         "rate_error/2_linear": t["estimate/linear/x2_rad_s"] - t["x2_rad_s"],
