@@ -3,8 +3,6 @@
 # pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 # (python-control has no types)
 
-from __future__ import annotations
-
 import sys
 
 import control
@@ -31,20 +29,11 @@ tilt, gimbal = np.degrees(answer.outputs[:, 0])
 print(f"tilt: at most {np.abs(tilt).max():.2f} deg, {tilt[-1]:+.2f} deg in the end; gimbals {gimbal[-1]:+.2f} deg")
 
 if len(sys.argv) > 1:
-    figure, (gain, phase, step) = plt.subplots(3, 1, figsize=(7, 9), layout="constrained")
-    w = np.logspace(-1, 2, 400)
-    for name, system, style in (("without delay", loop, "--"), ("with 2.5 ms of delay", loop * delay, "-")):
-        values = system(1j * w)
-        gain.loglog(w, np.abs(values), style, label=name)
-        phase.semilogx(w, np.degrees(np.unwrap(np.angle(values))), style, label=name)
-    gain.axhline(1.0, color="0.5", linewidth=0.8)
-    phase.axhline(180.0, color="0.5", linewidth=0.8)
-    gain.set(title="Open loop, cut at the command: gain", xlabel="frequency [rad/s]", ylabel="gain [-]")
-    phase.set(title="Open loop: phase", xlabel="frequency [rad/s]", ylabel="phase [deg]")
-    step.plot(answer.time, tilt, label="tilt")
-    step.plot(answer.time, gimbal, label="gimbals")
-    step.set(title="Closed loop: answer to a steady torque of 0.1 N m", xlabel="time [s]", ylabel="angle [deg]")
-    for axes in (gain, phase, step):
-        axes.grid(alpha=0.3)
-        axes.legend()
+    figure, axes = plt.subplots(3, 1, figsize=(7, 9), layout="constrained")
+    control.bode_plot([loop, loop * delay], np.logspace(-1, 2, 400), ax=axes[:2, None], label=["loop", "with 2.5 ms"])
+    axes[0].set(title="Open loop, cut at the command", ylabel="gain [-]")
+    axes[1].set(xlabel="frequency [rad/s]", ylabel="phase [deg]")
+    axes[2].plot(answer.time, tilt, answer.time, gimbal)
+    axes[2].set(title="Closed loop: answer to a torque of 0.1 N m", xlabel="time [s]", ylabel="angle [deg]")
+    axes[2].legend(["tilt", "gimbals"])
     figure.savefig(sys.argv[1])
