@@ -1,7 +1,6 @@
 """A Bode plot of the loop and its answer to a steady torque, with python-control. An argument: a file to draw to."""
 
 # pyright: reportArgumentType=false, reportAttributeAccessIssue=false
-# (python-control has no types)
 
 import sys
 
@@ -20,7 +19,6 @@ delay = control.tf(*control.pade(0.5 * 0.005, 3))
 for name, system in (("without delay", loop), ("with 2.5 ms", loop * delay)):
     _, phase, _, _, crossing, _ = control.stability_margins(system)
     print(f"{name}: phase margin {phase:.1f} deg at {crossing:.1f} rad/s")
-
 # A torque of 0.1 N m about the tilt axis, as wind would be: the integrator leaves none of it in the gimbals' angle.
 torque = np.array([[0.0], [0.1 / (model.gimbals * model.J1)], [0.0], [0.0]])
 closed = control.ss(model.A_e - model.B_e @ K, torque, np.eye(4)[[0, 2]], 0.0)
@@ -30,10 +28,10 @@ print(f"tilt: at most {np.abs(tilt).max():.2f} deg, {tilt[-1]:+.2f} deg in the e
 
 if len(sys.argv) > 1:
     figure, axes = plt.subplots(3, 1, figsize=(7, 9), layout="constrained")
-    control.bode_plot([loop, loop * delay], np.logspace(-1, 2, 400), ax=axes[:2, None], label=["loop", "with 2.5 ms"])
-    axes[0].set(title="Open loop, cut at the command", ylabel="gain [-]")
+    control.bode_plot(loop * delay, np.logspace(-1, 2, 400), ax=np.array([[axes[0]], [axes[1]]]), title="")
+    axes[0].set(title="Open loop, cut at the command, with 2.5 ms of delay", ylabel="gain [-]")
     axes[1].set(xlabel="frequency [rad/s]", ylabel="phase [deg]")
     axes[2].plot(answer.time, tilt, answer.time, gimbal)
-    axes[2].set(title="Closed loop: answer to a torque of 0.1 N m", xlabel="time [s]", ylabel="angle [deg]")
     axes[2].legend(["tilt", "gimbals"])
+    axes[2].set(title="Closed loop: answer to a torque of 0.1 N m", xlabel="time [s]", ylabel="angle [deg]")
     figure.savefig(sys.argv[1])

@@ -23,8 +23,8 @@ from cmg_mj.visualization.plots.colours import colour, hexadecimal
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "torso.xml"
 SIZE = 1200
-"""Side of the robot's drawing [pixels]."""
-SHOWN_S = 8.0, 14.0
+"""Of the robot, drawn [pixels]."""
+SHOWN_S = 7.0, 16.0
 GREY = "#404040"
 
 
@@ -77,9 +77,11 @@ def main() -> None:
     seen.imshow(robot(made.spec, run.qpos()[at]))
     seen.axis("off")
     tilt = figure.add_subplot(grid[0, 1])
-    tilt.plot(time[shown], np.degrees(run["y1_rad"][shown]), color="#9ab3d5", linewidth=0.8, label="measured")
+    tilt.plot(time[shown], np.degrees(run["y1_rad"][shown]), color="#c9d6ea", linewidth=0.6, label="measured")
     tilt.plot(time[shown], np.degrees(run["x1_rad"][shown]), color=GREY, linewidth=1.8, label="true")
     tilt.set_ylabel("tilt [deg]")
+    most = np.degrees(np.abs(run["x1_rad"][shown]).max())
+    tilt.set_title(f"gyro_free in the loop: the true tilt stays within {most:.2f} deg", loc="left", fontsize=11)
     rate = figure.add_subplot(grid[1, 1], sharex=tilt)
     rate.plot(time[shown], run["x2_rad_s"][shown], color=GREY, linewidth=1.8, label="true")
     estimate = run["estimate/gyro_free/x2_rad_s"][shown]

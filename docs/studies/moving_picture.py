@@ -16,6 +16,7 @@ from PIL import Image
 
 mpl.use("agg")
 import matplotlib.pyplot as plt
+from matplotlib.colors import to_rgb
 
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.trajectory import Trajectory
@@ -115,7 +116,7 @@ class Scene:
         direction /= np.linalg.norm(direction)
         scene = self.renderer.scene
         geom = scene.geoms[scene.ngeom]
-        rgba = np.array([*mpl.colors.to_rgb(PUSH), 1.0], dtype=np.float32)
+        rgba = np.array([*to_rgb(PUSH), 1.0], dtype=np.float32)
         mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_ARROW, np.zeros(3), np.zeros(3), np.zeros(9), rgba)
         length = 0.7 * self.model.stat.extent
         mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, 0.035 * length, top - length * direction, top)

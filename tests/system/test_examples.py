@@ -108,3 +108,20 @@ def test_the_viewers_loop_at_a_viewer(monkeypatch: pytest.MonkeyPatch, capsys: p
     assert time.monotonic() - start > 0.9
     assert "pushed at 0.50 s; at 1.00 s the tilt is" in capsys.readouterr().out
     assert viewers[-1].synced == pytest.approx(1.0 / cmg_mj.load_plant(model="scissored_pair.xml").timestep, abs=1)
+
+
+@pytest.mark.slow
+def test_bode_and_step_labels_its_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib.pyplot as plt
+
+    plt.switch_backend("agg")
+    plt.close("all")
+    path = ROOT / "examples" / "bode_and_step.py"
+    monkeypatch.setattr(sys, "argv", [str(path), str(tmp_path / "bode.png")])
+    runpy.run_path(str(path))
+    gain, phase, step = plt.gcf().axes
+    assert (gain.get_ylabel(), phase.get_ylabel(), step.get_ylabel()) == ("gain [-]", "phase [deg]", "angle [deg]")
+    assert (phase.get_xlabel(), step.get_xlabel()) == ("frequency [rad/s]", "time [s]")
+    assert gain.get_title()
+    assert step.get_title()
+    plt.close("all")

@@ -202,12 +202,16 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
             x_scale=scale_of(trials, across, x),
             y_scale=scale_of(trials, up, y),
         )
-        ticked = {"x_ticks": ticks_of(x), "y_ticks": ticks_of(y)}
-        best_of = panel(title=f"Best observer, by colour; thin lines: its {value}", **ticked, map=cells)
-        few = {"x_ticks": ticks_of(x, FEW_TICKS), "y_ticks": ticks_of(y, FEW_TICKS)}
+        best_of = panel(
+            title=f"Best observer, by colour; thin lines: its {value}",
+            x_ticks=ticks_of(x),
+            y_ticks=ticks_of(y),
+            map=cells,
+        )
+        panel = partial(panel, x_ticks=ticks_of(x, FEW_TICKS), y_ticks=ticks_of(y, FEW_TICKS))
         surfaces = _surfaces(x, y, alone, label, (0.5,) if key == "fell" else None)
         titles = short_names(list(surfaces))
-        each = [panel(title=titles[name], **few, surface=surface) for name, surface in surfaces.items()]
+        each = [panel(title=titles[name], surface=surface) for name, surface in surfaces.items()]
         pictures.append(
             Picture(
                 name,

@@ -14,6 +14,7 @@ from cmg_mj.visualization.plots.readability import short_names
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
     from matplotlib.contour import QuadContourSet
 
 EMPTY = (232, 232, 232)
@@ -22,6 +23,7 @@ BOUNDARY, DASH = 2.4, 2.5
 """Width of a boundary [points], and of its dashes [line widths]."""
 AHEAD = 3.2
 """Width of the dotted line within which something that is no candidate is ahead [points]."""
+COLOURS_OF_VALUES = "viridis"
 NUMBERED = 6
 """Most cells along an axis of a surface whose cells have room for numbers."""
 CASING = "white"
@@ -84,7 +86,8 @@ def _labelled(axes: Axes, lines: QuadContourSet) -> None:
     """Label every level, in the middle of its longest piece: matplotlib leaves short lines without a label."""
     places = []
     for paths in lines.get_paths():
-        pieces = [piece for piece in paths.to_polygons(closed_only=False) if len(piece) > 1]
+        polygons = map(np.asarray, paths.to_polygons(closed_only=False))
+        pieces = [piece for piece in polygons if len(piece) > 1]
         if pieces:
             longest = max(pieces, key=len)
             places.append(longest[len(longest) // 2])
@@ -96,17 +99,17 @@ def _labelled(axes: Axes, lines: QuadContourSet) -> None:
 
 def draw_surface(axes: Axes, spec: Surface) -> None:
     """Draw one candidate's figure on axes whose scales are set: its value by colour, and as numbers or contours."""
-    scale = mappable(spec)
+    norm = _norm(spec)
     x = edges(spec.x, log=axes.get_xscale() == "log")
     y = edges(spec.y, log=axes.get_yscale() == "log")
     axes.set_facecolor(hexadecimal(EMPTY))
-    axes.pcolormesh(x, y, np.ma.masked_invalid(spec.values), cmap=scale.cmap, norm=scale.norm)
+    axes.pcolormesh(x, y, np.ma.masked_invalid(spec.values), cmap=COLOURS_OF_VALUES, norm=norm)
     if max(spec.values.shape) <= NUMBERED:
         for (row, column), value in np.ndenumerate(spec.values):
             if np.isfinite(value):
-                ink = "white" if scale.norm(value) < 0.6 else "black"
-                place = {"ha": "center", "va": "center", "fontsize": "x-small", "color": ink}
-                axes.text(spec.x[column], spec.y[row], f"{value:.3g}", **place)
+                ink = "white" if float(norm(value)) < 0.6 else "black"
+                text = axes.text(float(spec.x[column]), float(spec.y[row]), f"{value:.3g}", color=ink)
+                text.set(horizontalalignment="center", verticalalignment="center", fontsize="x-small")
     elif len(spec.levels) and np.isfinite(spec.values).any():
         across, up = np.meshgrid(spec.x, spec.y)
         lines = axes.contour(across, up, np.ma.masked_invalid(spec.values), spec.levels, colors=CASING, linewidths=0.9)
@@ -118,10 +121,14 @@ def draw_surface(axes: Axes, spec: Surface) -> None:
 def mappable(spec: Surface) -> ScalarMappable:
     """Make the scale of colours of a figure's surfaces."""
     from matplotlib.cm import ScalarMappable
+
+    return ScalarMappable(_norm(spec), COLOURS_OF_VALUES)
+
+
+def _norm(spec: Surface) -> Normalize:
     from matplotlib.colors import LogNorm, Normalize
 
-    norm = LogNorm if spec.scale == "log" else Normalize
-    return ScalarMappable(norm(*spec.limits), "viridis")
+    return (LogNorm if spec.scale == "log" else Normalize)(*spec.limits)
 
 
 def _boundaries(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Sequence[str]) -> None:

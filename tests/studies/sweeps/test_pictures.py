@@ -6,13 +6,14 @@ import math
 from pathlib import Path
 from typing import Any
 
+import matplotlib.figure
 import numpy as np
 import pytest
 
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
-from cmg_mj.studies.sweeps.pictures import is_logarithmic, pictures_of, round_values
+from cmg_mj.studies.sweeps.pictures import in_words, is_logarithmic, pictures_of, round_values
 from cmg_mj.studies.sweeps.report import PICTURES
-from cmg_mj.visualization.plots.figure_spec import Map, Picture
+from cmg_mj.visualization.plots.figure_spec import Map, Panel, Picture, Surface
 from cmg_mj.visualization.plots.map_plot import edges
 from cmg_mj.visualization.plots.run_plot import draw
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, RATE, make_trials
@@ -60,6 +61,58 @@ def test_a_map_has_the_best_of_every_cell() -> None:
     assert not fall_map.sure.any()  # none of 4 beside 3 of 4
     assert (velocity.panels[0].x_scale, velocity.panels[0].y_scale) == ("linear", "log")
     assert {f"{picture.name}.png" for picture in (velocity, fall_picture)} <= set(PICTURES)
+
+
+def test_a_panel_an_observer_stands_below_the_map() -> None:
+    velocity, falls = pictures_of(make_grid_trials())
+    linear, ltv = (panel.surface for panel in velocity.panels[1:])
+    assert linear is not None
+    assert ltv is not None
+    np.testing.assert_allclose(linear.values[:, 0], [0.1, 0.2, 0.2])
+    np.testing.assert_allclose(ltv.values[:, 0], [0.2, 0.1999, 0.1999])
+    assert np.isnan(ltv.values[:, 1:]).all()  # it fell in some world
+    assert linear.limits == ltv.limits == pytest.approx((0.1, 0.2))
+    assert [panel.title for panel in velocity.panels[1:]] == list(OBSERVERS)
+    shares = falls.panels[2].surface
+    assert shares is not None
+    assert shares.values.tolist() == [[0.0, 0.75, 1.0]] * 3
+    assert {(panel.x_label, panel.y_label) for panel in (*velocity.panels, *falls.panels)} == {
+        ("equilibrium bias [deg]", "accelerometer noise density [ug/rtHz]")
+    }
+
+
+@pytest.mark.parametrize(
+    ("field", "words"),
+    [
+        ("push.0.torque_n_m", "push torque [N m]"),
+        ("push.1.start_s", "push 2 start [s]"),
+        ("observer.k1", "k1"),
+        ("axes.roll.plant.initial_tilt_deg", "roll initial tilt [deg]"),
+        ("duration_s", "duration [s]"),
+    ],
+)
+def test_a_field_in_words(field: str, words: str) -> None:
+    assert in_words(field) == words
+
+
+@pytest.mark.slow
+def test_every_level_is_labelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where its line is short: in the corner of a map of eight by eight cells."""
+    figures: list[matplotlib.figure.Figure] = []
+    save = matplotlib.figure.Figure.savefig
+    monkeypatch.setattr(
+        matplotlib.figure.Figure, "savefig", lambda self, *a, **k: (figures.append(self), save(self, *a, **k))[1]
+    )
+    places = np.linspace(0.0, 1.0, 8)
+    values = 1.0 - 0.05 * np.hypot(*np.meshgrid(places, places))
+    values[-1, -1] = 0.5
+    levels = (0.6, 0.95, 0.98)
+    cells = Map(places, places, ["linear"], np.zeros((8, 8), int), np.ones((8, 8), bool), values, levels)
+    surface = Surface(places, places, values, "error", (0.5, 1.0), levels=levels)
+    panels = [Panel("y", (), map=cells), Panel("y", (), surface=surface)]
+    draw(tmp_path / "it.png", Picture("it", "A title", panels, first_height=3.0))
+    for axes in figures[0].axes[:2]:
+        assert {text.get_text() for text in axes.texts} == {"0.6", "0.95", "0.98"}
 
 
 def test_a_stop_is_no_share_of_falls() -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 from cmg_mj.observers import OBSERVERS
@@ -237,7 +238,10 @@ def test_every_axis_has_a_scale(name: str, overrides: tuple[str, ...]) -> None:
     for column, height in ((TILT_PLOTS, 778.0), (ACTUATOR_PLOTS, COLUMN)):
         for plot in _sized(column, height):
             shown = plot_view(plot, branch, Choice(best_observers(branch.run)))
-            low, high = shown.properties["ScalarAxis"].range.as_arrow_array().to_pylist()[0]
+            axis = shown.properties["ScalarAxis"]
+            assert isinstance(axis, rrb.ScalarAxis)
+            assert axis.range is not None
+            low, high = axis.range.as_arrow_array().to_pylist()[0]
             assert len(labelled_ticks((low, high), plot.points)) >= 2, plot.title
 
 
