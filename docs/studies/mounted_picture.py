@@ -23,7 +23,7 @@ from cmg_mj.visualization.plots.colours import colour, hexadecimal
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "torso.xml"
 SIZE = 1200
-"""Of the robot, drawn [pixels]."""
+"""Side of the robot's drawing [pixels]."""
 SHOWN_S = 7.0, 16.0
 GREY = "#404040"
 
