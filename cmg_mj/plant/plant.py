@@ -284,7 +284,7 @@ class Plant:
         Args:
             observer: An observer, its name (or package.module:Class), or a section [observer] with its `kind` and
                 parameters, such as {"kind": "homogeneous", "k1": 20.0}.
-            law: The law; by default Table 2's gains at 200 Hz.
+            law: The law, an object; by default Table 2's gains at 200 Hz. `Experiment.law` is a scenario's.
             sensors: The sensors; by default those of the datasheets.
             **options: Options of `Controller`, such as seed and feedback.
 
@@ -292,11 +292,16 @@ class Plant:
             The controller.
 
         Raises:
-            InputError: The plant has several axes, the observer does not exist or refuses a parameter, or a rate does
-                not fit the physics step.
+            InputError: The plant has several axes, the observer does not exist or refuses a parameter, the law is a
+                name, or a rate does not fit the physics step.
         """
         if len(self.axes) > 1:
             raise InputError(f"{self.path}: tilts about several axes; use multi_axis_controller")
+        if isinstance(law, (str, Mapping)):
+            raise InputError(
+                f"law = {law!r}: must be a law, not its name. Give StateFeedback(dt=0.005, gains=...), or "
+                "prepare(scenario).law of a scenario with this [controller]"
+            )
         law, sensors = law or StateFeedback(dt=0.005), sensors or Sensors()
         if isinstance(observer, (str, Mapping)):
             settings = ObserverSettings(**({"kind": observer} if isinstance(observer, str) else observer))

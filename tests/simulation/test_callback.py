@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import mujoco
 import numpy as np
@@ -451,3 +451,8 @@ def test_an_option_that_no_controller_has_is_named_with_those_it_has() -> None:
         "controller: 'feedbck': no such option; did you mean 'feedback'? "
         "allowed: angle_source, axis, bias_trim_s, feedback, notch_hz, open_loop_observers, seed, worlds"
     )
+
+
+def test_the_name_of_a_law_is_refused_with_what_to_give() -> None:
+    with pytest.raises(InputError, match=r"law = 'lqg': must be a law, not its name\. Give StateFeedback"):
+        load_plant().controller("linear", law=cast(Any, "lqg"))
