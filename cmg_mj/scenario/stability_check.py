@@ -59,7 +59,7 @@ class Loop(NamedTuple):
     @property
     def hint(self) -> str | None:
         """The fault of the gains, if they have one."""
-        remedy = "[controller.lqr] solves for gains that suit"
+        remedy = 'controller.gains = "scaled" or [controller.lqr] finds gains that suit'
         if self.suited:
             other = f", or a notch above {self.notch_hz:g} Hz" if self.notch_hz else ""
             remedy = f"a higher rate or less latency{other} is needed"
