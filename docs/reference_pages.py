@@ -233,7 +233,8 @@ fields written out.
 
 One field changes on the command line with its section before its name: `--set plant.equilibrium_bias_deg=1.0`. Lists of
 sections have a number: `--set push.0.torque_n_m=1.5`. Quote values with brackets for the shell:
-`--set 'open_loop_observers=["ltv"]'`.
+`--set 'open_loop_observers=["ltv"]'`. A whole list replaces the file's:
+`--set 'push=[{start_s=2.0},{start_s=6.0,torque_n_m=0.5}]'`.
 
 How to read the tables:
 
@@ -453,7 +454,7 @@ def _descriptions(cls: type) -> dict[str, str]:
 
 def _defaults(cls: type) -> dict[str, Any]:
     infos = cls.__pydantic_fields__  # pyright: ignore[reportAttributeAccessIssue]
-    return {name: info.get_default(call_default_factory=True) for name, info in infos.items()}
+    return {name: info.get_default(call_default_factory=True, validated_data={}) for name, info in infos.items()}
 
 
 def _without_unit(text: str, name: str) -> tuple[str, str]:
