@@ -150,6 +150,7 @@ def test_the_legend_names_only_lines_that_are_there(
     assert any(text.startswith(few.observers[2]) for text in labels(rate))
 
 
+@pytest.mark.slow
 def test_a_fall_does_not_flatten_what_went_before(
     few: Trajectory, tmp_path: Path, figures: list[matplotlib.figure.Figure]
 ) -> None:
@@ -159,11 +160,10 @@ def test_a_fall_does_not_flatten_what_went_before(
     fallen = replace(few, columns=columns)
     before = time <= fall_start(time, fallen["x1_rad"], fell=True)
     assert 0.2 < time[before][-1] <= start + 0.02
+    panels = {fell: plot(tmp_path, fallen, {"fell": fell}, figures).axes for fell in (True, False)}
     for column, unit, panel in (("x1_rad", 180.0 / np.pi, 0), ("x2_rad_s", 1.0, 1)):
-        heights = {}
-        for fell in (True, False):
-            low, high = plot(tmp_path, fallen, {"fell": fell}, figures).axes[panel].get_ylim()
-            heights[fell] = unit * np.ptp(fallen[column][before]) / (high - low)
+        spans = {fell: np.ptp(axes[panel].get_ylim()) for fell, axes in panels.items()}
+        heights = {fell: unit * np.ptp(fallen[column][before]) / span for fell, span in spans.items()}
         assert heights[True] > 0.08
         assert heights[True] > 3.0 * heights[False]
 
