@@ -33,7 +33,7 @@ from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.frames import NamedColumns
 from cmg_mj.results.memory import release_free_memory
 from cmg_mj.results.stored_columns import LONG, ColumnStore, StoredColumns, shelved, stored
-from cmg_mj.results.trajectory import ESTIMATES, Trajectory
+from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.sensors.tilt import TiltNoise
 
 if TYPE_CHECKING:
@@ -87,9 +87,13 @@ class ReplayResult(NamedColumns):
     @cached_property
     def trajectory(self) -> Trajectory:
         """The log's signals and all estimates, evenly sampled, in SI units and radians."""
-        from cmg_mj.replay.save import signals
-
-        return signals(self)
+        known = [name for name in self.log.columns if np.isfinite(self.log[name]).any()]
+        columns = stored(self.log.columns).renamed({name: name for name in known})
+        for kind, signals in self.estimates.items():
+            columns = columns.joined(stored(signals).renamed({f"estimate/{kind}/{name}": name for name in signals}))
+        names = tuple(self.estimates)
+        extra = tuple(tuple(name for name in self.estimates[kind] if name not in ESTIMATES) for kind in names)
+        return Trajectory(columns if len(self.log) > LONG else dict(columns), {}, Layout(names, extra, ()))
 
     def _columns(self) -> Mapping[str, np.ndarray]:
         return self.trajectory.columns

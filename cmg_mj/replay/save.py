@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.plot import plot_replay
 from cmg_mj.replay.report import log_figures, replay_figures
 from cmg_mj.results.run_folder import RunFolder, claimed, write_text
-from cmg_mj.results.stored_columns import LONG, stored
 from cmg_mj.results.summary_keys import finite
-from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
+from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.differences import safe_name
 
 SETTINGS = "replay.toml"
@@ -77,14 +75,5 @@ def save_replay(
 
 
 def signals(replayed: ReplayResult) -> Trajectory:
-    """Return all signals and estimates of a log as one table, evenly sampled, in SI and radians."""
-    log = replayed.log
-    known = [name for name in log.columns if np.isfinite(log[name]).any()]
-    names = tuple(replayed.estimates)
-    extra = tuple(tuple(name for name in replayed.estimates[kind] if name not in ESTIMATES) for kind in names)
-    columns = stored(log.columns).renamed({name: name for name in known})
-    for kind in names:
-        estimates = stored(replayed.estimates[kind])
-        columns = columns.joined(estimates.renamed({f"estimate/{kind}/{name}": name for name in estimates}))
-    metadata = {"replay": finite(log_figures(replayed))}
-    return Trajectory(columns if len(log) > LONG else dict(columns), metadata, Layout(names, extra, ()))
+    """Return all signals and estimates of a log as one table, with the log's figures as metadata."""
+    return replace(replayed.trajectory, metadata={"replay": finite(log_figures(replayed))})
