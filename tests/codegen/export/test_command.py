@@ -52,7 +52,7 @@ def test_json_and_the_folder_it_takes_by_itself() -> None:
     figures = json.loads(outcome.out)
     assert (figures["observer"], figures["precision"], figures["trace_off_by"]) == ("linear", "single", 0.0)
     assert sorted(figures["files"]) == files("runs/export-linear-single") == FILES
-    assert "tau = 0.03  Time constant [s]" in Path("runs/export-linear-single/linear.h").read_text()
+    assert "tau = 0.03  Time constant of the filter [s]" in Path("runs/export-linear-single/linear.h").read_text()
 
 
 def test_parameters_gains_and_units_are_in_comments() -> None:
