@@ -12,9 +12,10 @@ import inspect
 import re
 import textwrap
 import tomllib
+import types
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 import click
 from pydantic import BaseModel
@@ -23,10 +24,9 @@ from pydantic_core import PydanticUndefined
 from cmg_mj.cli import HELP, cli
 from cmg_mj.codegen.export.header_comment import attribute_descriptions
 from cmg_mj.controllers.laws import LAW_CLASSES
-from cmg_mj.inputs.bundled import bundled, folder
-from cmg_mj.inputs.field_types import OnAllAxes, OnGrid, PerAxis
-from cmg_mj.inputs.marks import marked_fields
-from cmg_mj.inputs.messages import expected, fields_of
+from cmg_mj.inputs.files import bundled, folder
+from cmg_mj.inputs.messages import fields_of
+from cmg_mj.inputs.types import OnAllAxes, OnGrid, PerAxis, marked_fields
 from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.scenario.disturbances import Push, Swing
@@ -417,6 +417,75 @@ def parameter_rows(classes: UserClassKind, kind: str) -> Iterator[Row]:
         allowed = allowed_values(types[name]) if name in types else ""
         default = classes.takes(kind)[name].default
         yield Row(name, unit, _toml(default), allowed, "", meaning)
+
+
+def expected(annotation: Any) -> str:
+    """Say what a field takes, from its type: `a number greater than 0`.
+
+    Args:
+        annotation: The field's type, with its bounds.
+
+    Returns:
+        A noun phrase.
+    """
+    base, bounds = _unwrapped(annotation)
+    origin, arguments = get_origin(base), get_args(base)
+    if origin in (Union, types.UnionType):
+        return " or ".join(expected(part) for part in arguments if part is not types.NoneType)
+    if origin is Literal:
+        choices = ", ".join(repr(choice) for choice in arguments)
+        return choices if len(arguments) == 1 else f"one of {choices}"
+    if origin is list or arguments[1:] == (...,):
+        return f"a list of {_plural(expected(arguments[0]))}"
+    if origin is tuple:
+        return f"a list of {len(arguments)} {_plural(expected(arguments[0]))}"
+    if base is bool:
+        return "true or false"
+    if base is str:
+        return " ".join(["text in quotes", *_text_bounds(bounds)])
+    if base in (int, float):
+        kind = "a whole number" if base is int else "a number"
+        return " ".join([kind, " and ".join(_bounds(bounds))]).strip()
+    return "a section"
+
+
+def _unwrapped(annotation: Any) -> tuple[Any, list[Any]]:
+    """Return a type without `Annotated`, and all bounds on it."""
+    bounds: list[Any] = []
+    while get_origin(annotation) is Annotated:
+        annotation, *extra = get_args(annotation)
+        for item in extra:
+            bounds += getattr(item, "metadata", None) or [item]  # pydantic's FieldInfo keeps the bounds in a list
+    return annotation, bounds
+
+
+def _bounds(metadata: Iterable[Any]) -> list[str]:
+    names = (("gt", "greater than"), ("ge", "greater than or equal to"), ("lt", "less than"), ("le", "at most"))
+    return [
+        f"{words} {getattr(bound, name):g}"
+        for bound in metadata
+        for name, words in names
+        if getattr(bound, name, None) is not None
+    ]
+
+
+def _text_bounds(metadata: Iterable[Any]) -> list[str]:
+    longest = [f"of at most {bound.max_length} characters" for bound in metadata if hasattr(bound, "max_length")]
+    return [*longest, *(["without control characters"] if any(hasattr(bound, "pattern") for bound in metadata) else [])]
+
+
+def _plural(phrase: str) -> str:
+    """Turn `a number greater than 0` into `numbers greater than 0`."""
+    for one, many in (
+        ("a whole number", "whole numbers"),
+        ("a number", "numbers"),
+        ("a list", "lists"),
+        ("a section", "sections"),
+        ("text in quotes", "names in quotes"),
+    ):
+        if phrase.startswith(one):
+            return many + phrase[len(one) :]
+    return phrase
 
 
 def allowed_values(annotation: Any) -> str:

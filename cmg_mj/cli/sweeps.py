@@ -141,7 +141,7 @@ def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
 
 def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
-    from cmg_mj.inputs.bundled import find
+    from cmg_mj.inputs.files import find
     from cmg_mj.studies.sweeps.api import WORLDS
     from cmg_mj.studies.sweeps.axes import parse_axis
     from cmg_mj.studies.sweeps.study import SweepStudy, sampling

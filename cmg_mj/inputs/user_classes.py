@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from cmg_mj.errors import InputError, TomlValue, nearest, raised
-from cmg_mj.inputs.messages import complaint, fields_of, not_allowed
+from cmg_mj.inputs.messages import complaints, fields_of
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,9 @@ class UserClassKind:
         module_name, _, class_name = self.known.get(kind, kind).partition(":")
         try:
             cls = getattr(importlib.import_module(module_name), class_name)
-            fits = inspect.isclass(cls) and all(callable(getattr(cls, name, None)) for name in self.methods)
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # a user's module may fail in any way while it is imported
+        except (Exception, SystemExit) as error:
             raise InputError(f"{setting}: cannot be imported: {raised(error)}") from error
-        if not fits:
+        if not (inspect.isclass(cls) and all(callable(getattr(cls, name, None)) for name in self.methods)):
             methods = " and ".join(f"{name}({parameters})" for name, parameters in self.methods.items())
             raise InputError(f"{setting}: must be a class with the methods {methods}")
         return cls
@@ -74,15 +71,9 @@ class UserClassKind:
         """Return the parameters of the constructor, by name.
 
         Raises:
-            InputError: There is no such class, or it does not tell them.
+            InputError: There is no such class.
         """
-        cls = self.find(kind)
-        try:
-            return inspect.signature(cls).parameters
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # such as a __signature__ of the user's that is none
-            raise InputError(f"{self.what} {kind}: its parameters cannot be read: {raised(error)}") from error
+        return inspect.signature(self.find(kind)).parameters
 
     def may_take(self, kind: str, name: str) -> bool:
         """Say whether the constructor takes a parameter of this name."""
@@ -93,7 +84,7 @@ class UserClassKind:
         """List the parameters that are the user's choice."""
         return [name for name in self.takes(kind) if name not in self.bench_parameters]
 
-    def unknown(self, kind: str, names: Iterable[str], common: Iterable[str]) -> list[str]:
+    def unknown(self, kind: str, names: Iterable[str], common: Iterable[str] = ()) -> list[str]:
         """Find the fields of a section that are neither every class' nor this one's.
 
         Args:
@@ -106,27 +97,25 @@ class UserClassKind:
         """
         known = {*common, *self.own(kind)}
         wrong = [name for name in names if name not in known and not self.may_take(kind, name)]
-        return [f"{self.section}.{name}: no such field; {nearest(name, known)}" for name in wrong]
+        return [f"{self.section}.{name}: no such field of {kind}; {nearest(name, known)}" for name in wrong]
 
     def check_names(self, kind: str, names: Iterable[str]) -> None:
-        """Refuse the names of parameters that a class does not have.
+        """Check that a class has parameters of these names.
 
         Raises:
             InputError: Unknown class or parameter.
         """
-        allowed = self.own(kind)
-        for name in names:
-            if name not in allowed and not self.may_take(kind, name):
-                what = nearest(name, allowed) if allowed else "it has none"
-                raise InputError(f"{self.section}.{name}: {kind} has no such parameter; {what}")
+        if wrong := self.unknown(kind, names):
+            raise InputError(wrong[0])
 
     def check_types(self, kind: str, parameters: Mapping[str, TomlValue]) -> None:
-        """Refuse parameters of a wrong type, such as text for a number.
+        """Check the types of parameters, such as text for a number.
 
         Raises:
             InputError: A parameter has a wrong type, or is the bench's to give.
         """
-        types = fields_of(self.find(kind))
+        cls = self.find(kind)
+        types = fields_of(cls)
         for name, value in parameters.items():
             if name in self.bench_parameters:
                 raise InputError(f"{self.section}.{name}: set by the bench, which gives it to every {self.what}")
@@ -136,9 +125,8 @@ class UserClassKind:
             try:
                 adapter.validate_json(json.dumps(value, default=as_json))
             except ValidationError as error:
-                finite = all(detail["type"] != "finite_number" for detail in error.errors())
-                wrong = not_allowed(f"{self.section}.{name}", value, types[name], finite=finite)
-                raise InputError(f"{wrong} ({self.what} {kind})") from error
+                details = [{**detail, "loc": (name, *detail["loc"])} for detail in error.errors()]
+                raise self._refused(kind, complaints(cls, details, parameters)) from error
 
     def make(self, kind: str, bench_arguments: Mapping[str, Any], parameters: Mapping[str, Any]) -> Any:
         """Construct one.
@@ -161,12 +149,12 @@ class UserClassKind:
         try:
             return cls(**arguments, **parameters)
         except ValidationError as error:
-            clause = complaint(cls, error.errors()[0], {**arguments, **parameters})
-            raise InputError(f"{self.section}.{clause} ({self.what} {kind})") from error
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # a user's own class may refuse its parameters in its own way
+            raise self._refused(kind, complaints(cls, error.errors(), {**arguments, **parameters})) from error
+        except Exception as error:  # a user's own class may refuse its parameters in its own way
             raise InputError(f"{self.what} {kind}: {raised(error)}") from error
+
+    def _refused(self, kind: str, clauses: list[str]) -> InputError:
+        return InputError(f"{'; '.join(f'{self.section}.{clause}' for clause in clauses)} ({self.what} {kind})")
 
 
 def as_json(value: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import ClassVar
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.inputs.field_types import STRICT, Positive
+from cmg_mj.inputs.types import STRICT, Positive
 from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.observers.reduced_model import ReducedModel
 

@@ -9,7 +9,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, signed_powers, sqrt
-from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
+from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.model_copy import LARGEST_RATE, CopyState, follow, stages
 from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.observers.reduced_model import ReducedModel

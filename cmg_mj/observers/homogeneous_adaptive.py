@@ -9,7 +9,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.inputs.field_types import STRICT, Positive
+from cmg_mj.inputs.types import STRICT, Positive
 from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.observers.adaptive import State as AdaptiveState
 from cmg_mj.observers.homogeneous import Homogeneous

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import shown
-from cmg_mj.inputs.sanity import LARGEST
+from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.plant.effective_inertia import wheel_momentum
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, element_id

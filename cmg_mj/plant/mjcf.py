@@ -11,7 +11,7 @@ from typing import NamedTuple
 import mujoco
 
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.includes import check_files
+from cmg_mj.inputs.files import model_files
 from cmg_mj.plant.bend import bend_frame
 from cmg_mj.plant.checks import RigChecker, invalid_numbers
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
@@ -40,7 +40,7 @@ def parse(path: Path) -> mujoco.MjSpec:
 
 def _parse(path: Path) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
     """Read a model file; the names are those of the plugins that were removed."""
-    check_files(path)
+    model_files(path)
     stripped = strip_plugins(path)
     try:
         if stripped is None:

@@ -22,8 +22,8 @@ from cmg_mj.controllers.make_controller import make_controller
 from cmg_mj.controllers.multi_axis import MultiAxisController, YawCoupling
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, TomlValue, nearest
-from cmg_mj.inputs.bundled import find
-from cmg_mj.inputs.messages import complaint
+from cmg_mj.inputs.files import find
+from cmg_mj.inputs.messages import complaints
 from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
@@ -400,6 +400,7 @@ def load_plant(
         try:
             settings = PlantSettings(**fields)  # type: ignore[arg-type]
         except ValidationError as error:
-            raise InputError(f"plant.{complaint(PlantSettings, error.errors()[0], fields)}") from error
+            wrong = complaints(PlantSettings, error.errors(), fields)
+            raise InputError("; ".join(f"plant.{clause}" for clause in wrong)) from error
     with set_control_callback(None):  # compiling a model runs it
         return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside), grid, of_axes)

@@ -16,8 +16,7 @@ from typing import NamedTuple
 
 import mujoco
 
-from cmg_mj.inputs.includes import MODEL_FILE, model_files
-from cmg_mj.inputs.text_files import read_text
+from cmg_mj.inputs.files import MAX_MODEL_BYTES, model_files, read_text
 
 OWN = "cmg_mj."
 """Prefix of the names of this package's plugins."""
@@ -82,7 +81,7 @@ def strip_plugins(path: Path) -> Stripped | None:
     Returns:
         The model without them; None if it has none.
     """
-    if not any(OWN in _unescaped(read_text(file, str(file), MODEL_FILE)) for file in model_files(path)):
+    if not any(OWN in _unescaped(read_text(file, str(file), MAX_MODEL_BYTES)) for file in model_files(path)):
         return None
     stripper = _Stripper()
     main = Path(os.path.abspath(path))
@@ -110,7 +109,7 @@ class _Stripper:
         """
         if (file, model) in self._files or not file.is_file():
             return
-        text = read_text(file, str(file), MODEL_FILE)
+        text = read_text(file, str(file), MAX_MODEL_BYTES)
         elements = list(_elements(text))
         self._files[file, model] = text, elements
         for element in elements:

@@ -11,7 +11,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from cmg_mj.inputs.bundled import bundled
+from cmg_mj.inputs.files import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.results import markdown
 from cmg_mj.results.error_bounds import FLOOR_ACCELERATION, FLOORS, NO_ACCELERATION_FLOOR, NOISE_ALONE

@@ -11,7 +11,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.inputs.field_types import STRICT, Batched, Duration, GridDuration, GridInstant, Instant
+from cmg_mj.inputs.types import STRICT, Batched, Duration, GridDuration, GridInstant, Instant
 
 AFTER_PUSH_S = 1.0
 """Estimates are judged from a push's start until so long after its end [s]: at other times the rig hardly

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.inputs.field_types import STRICT, Batched, Duration, Instant
+from cmg_mj.inputs.types import STRICT, Batched, Duration, Instant
 
 MOST_M_S2 = 50.0
 """No pivot is accelerated by more [m/s^2]."""

@@ -11,10 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest, shown
-from cmg_mj.inputs.paths import require_file
-from cmg_mj.inputs.text_files import TextFormat, read_text
+from cmg_mj.inputs.files import read_text, require_file
 
-TRACK_FILE = TextFormat("track", 100_000_000, "utf-8-sig", "no CSV: not UTF-8 text")
+MAX_BYTES = 100_000_000
 MOST_RECORDED_M_S2 = 1000.0
 """A track with a larger acceleration is in another unit [m/s^2]."""
 
@@ -72,7 +71,7 @@ def read_track(file: str, column: str | None) -> Track:
 @functools.lru_cache(maxsize=16)
 def _read_track(path: Path, column: str | None, _changed_ns: int, _size: int) -> Track:
     """See `read_track`; a file that changes is read anew."""
-    rows = csv.reader(read_text(path, str(path), TRACK_FILE).splitlines())
+    rows = csv.reader(read_text(path, str(path), MAX_BYTES).splitlines())
     try:
         heading = [name.strip() for name in next(rows, [])]
         number = _column(path, heading, column)

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.inputs.field_types import STRICT, Batched, NonNegative, PerAxis, Positive
+from cmg_mj.inputs.types import STRICT, Batched, NonNegative, PerAxis, Positive
 
 FINEST_STEP_S = 1e-6
 """The smallest physics step [s]."""

@@ -13,9 +13,8 @@ import tomli_w
 
 from cmg_mj.controllers.laws import LAW_CLASSES
 from cmg_mj.errors import TomlValue
-from cmg_mj.inputs.bundled import folder
-from cmg_mj.inputs.field_types import NoEffect
-from cmg_mj.inputs.marks import marked_fields
+from cmg_mj.inputs.files import folder
+from cmg_mj.inputs.types import NoEffect, marked_fields
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_settings import PlantSettings

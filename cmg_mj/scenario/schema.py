@@ -15,7 +15,8 @@ from cmg_mj.controllers.controller import AngleSource, Feedback
 from cmg_mj.controllers.laws import LAWS, Law, lqr_gains, make_law, scaled_gains
 from cmg_mj.controllers.laws.registry import LAW_CLASSES
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.field_types import (
+from cmg_mj.inputs.messages import complaints, fields_of, out_of_size
+from cmg_mj.inputs.types import (
     STRICT,
     Batched,
     GridDuration,
@@ -29,10 +30,8 @@ from cmg_mj.inputs.field_types import (
     Positive,
     Rate,
     WhateverTheLaw,
+    marked_fields,
 )
-from cmg_mj.inputs.marks import marked_fields
-from cmg_mj.inputs.messages import complaint, fields_of
-from cmg_mj.inputs.sanity import out_of_size, unreadable
 from cmg_mj.inputs.user_classes import as_json
 from cmg_mj.observers import OBSERVERS, Observer, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
@@ -338,15 +337,12 @@ def parse_scenario(fields: Mapping[str, Any], source: str = "") -> Scenario:
     Raises:
         InputError: A field is unknown or not allowed. All wrong fields are named, on one line.
     """
-    wrong = list(unreadable(fields))
-    if wrong:
-        raise InputError(located(source, _clauses(wrong)))
     try:
         # By way of JSON, pydantic takes a list for a tuple and still no text or true for a number.
         scenario = Scenario.model_validate_json(json.dumps(fields, default=as_json), strict=True).with_source(source)
     except ValidationError as error:
-        complaints = [complaint(Scenario, detail, fields) for detail in error.errors()]
-        raise InputError(located(source, _clauses([*complaints, *_unknown_to_bench_law(fields)]))) from error
+        wrong = [*complaints(Scenario, error.errors(), fields), *_unknown_to_bench_law(fields)]
+        raise InputError(located(source, _clauses(wrong))) from error
     wrong = [*_unknown_to_bench_law(fields), *out_of_size(fields)]
     if wrong:
         raise InputError(located(source, _clauses(wrong)))

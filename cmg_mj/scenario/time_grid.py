@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.field_types import OnGrid
-from cmg_mj.inputs.marks import marked_values
+from cmg_mj.inputs.types import OnGrid, marked_values
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.timing import whole_steps
 

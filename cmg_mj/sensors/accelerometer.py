@@ -12,7 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar, clip, digitise
-from cmg_mj.inputs.field_types import STRICT, Batched, Instant, NonNegative, OnGrid, Positive, Rate
+from cmg_mj.inputs.types import STRICT, Batched, Instant, NonNegative, OnGrid, Positive, Rate
 from cmg_mj.sensors.ideal import Forces, IdealReading
 from cmg_mj.sensors.low_pass import low_pass, noise_gain
 

@@ -12,7 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import digitise
-from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
+from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker
 
 PIECE = 1000

@@ -14,7 +14,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.inputs.field_types import STRICT
+from cmg_mj.inputs.types import STRICT
 from cmg_mj.sensors.accelerometer import INSIDE_HZ, STANDARD_GRAVITY, Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker

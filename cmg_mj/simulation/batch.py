@@ -16,8 +16,7 @@ from cmg_mj.controllers.controller import PlantInterface
 from cmg_mj.controllers.laws import LAW_CLASSES, Law
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.inputs.field_types import Batched, NoEffect
-from cmg_mj.inputs.marks import marked_fields
+from cmg_mj.inputs.types import Batched, NoEffect, marked_fields
 from cmg_mj.observers import OBSERVER_CLASSES, Estimate, Measurement, Observer
 from cmg_mj.observers.protocol import State, extra_signals
 from cmg_mj.plant.plant import Plant

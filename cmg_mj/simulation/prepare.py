@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.plant.moving_pivot import pivot_directions
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.scenario.pivot_track import MOST_RECORDED_M_S2, read_track

@@ -16,7 +16,7 @@ from tabulate import tabulate
 
 import cmg_mj
 from cmg_mj.controllers.laws.state_feedback import StateFeedback
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.observers.scaling import scaled_parameters, scales_of
 from cmg_mj.scenario.stability_check import closed_loop
 

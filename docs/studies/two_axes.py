@@ -18,7 +18,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.markdown import table
 from cmg_mj.scenario.loading import load_scenario

@@ -18,7 +18,7 @@ from rich.table import Table
 
 from cmg_mj import load_scenario
 from cmg_mj.cli import cli
-from cmg_mj.inputs.bundled import bundled
+from cmg_mj.inputs.files import bundled
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.terminal_tables import columns_of, comparison_table

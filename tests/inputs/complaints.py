@@ -9,11 +9,6 @@ import pytest
 
 from tests.command import CommandOutcome, cmg_mj
 
-RATE = "must be a number greater than or equal to 0.1 and at most 1e+06"
-OVER_0, FROM_0 = "must be a number greater than 0", "must be a number greater than or equal to 0"
-WHOLE = "must be a whole number greater than or equal to 0"
-GRID = "not a whole number of physics steps of 0.001 s"
-
 
 def table(*rows: tuple) -> pytest.MarkDecorator:
     """Parametrise with rows (what, input, expected fragments...)."""

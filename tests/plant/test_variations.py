@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario

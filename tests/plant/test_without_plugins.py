@@ -8,7 +8,7 @@ import mujoco
 import pytest
 
 import cmg_mj
-from cmg_mj.inputs.bundled import find
+from cmg_mj.inputs.files import find
 from cmg_mj.plant.mjcf import compile_model, parse
 from cmg_mj.plant.without_plugins import strip_plugins
 

@@ -12,7 +12,7 @@ import pytest
 from cmg_mj import load_plant, load_scenario, prepare
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.controllers.notch import Notch
-from cmg_mj.inputs.bundled import bundled, folder
+from cmg_mj.inputs.files import bundled, folder
 from cmg_mj.scenario.stability_check import Loop, _hold, closed_loop
 from tests.command import cmg_mj
 

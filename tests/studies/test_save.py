@@ -18,7 +18,7 @@ import pytest
 
 from cmg_mj import Estimate, Measurement, load_scenario, parse_scenario, prepare
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory

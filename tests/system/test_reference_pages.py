@@ -16,7 +16,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.cli import cli
 from cmg_mj.controllers.laws import LAW_CLASSES, LAWS
-from cmg_mj.inputs.bundled import bundled
+from cmg_mj.inputs.files import bundled
 from cmg_mj.inputs.messages import fields_of
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS
 from cmg_mj.scenario.pivot import FIELDS_OF

@@ -33,7 +33,7 @@ from cmg_mj.codegen.engine_plugin.load import (
     read_manifest,
 )
 from cmg_mj.errors import InputError, nearest, shown
-from cmg_mj.inputs.paths import expanded
+from cmg_mj.inputs.files import expanded
 from cmg_mj.results.files import whole_file, write_bytes
 from cmg_mj.results.run_folder.lock import Busy, Lock
 

@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.controllers.laws.protocol import FeedbackState
 from cmg_mj.elementwise import Scalar, clip, where
-from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
+from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.kalman import COLUMNS, Kalman
 from cmg_mj.observers.protocol import Measurement
 from cmg_mj.observers.reduced_model import ReducedModel

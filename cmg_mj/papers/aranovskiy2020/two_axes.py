@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, lqr_gains
-from cmg_mj.inputs.bundled import find
+from cmg_mj.inputs.files import find
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_1
 from cmg_mj.papers.aranovskiy2020.rig import DT

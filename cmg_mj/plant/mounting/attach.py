@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.plant.mjcf import parse
 from cmg_mj.plant.parts import SENSORS, TILT_ELEMENT
 

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.mjcf import compile_model, parse
 from cmg_mj.plant.mounting.attach import add_sensors, attach_modules, module_names, site_names

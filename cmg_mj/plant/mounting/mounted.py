@@ -10,10 +10,8 @@ from pathlib import Path
 
 import mujoco
 
-from cmg_mj.errors import InputError, shown
-from cmg_mj.inputs.includes import check_files
-from cmg_mj.inputs.paths import expanded, not_text
-from cmg_mj.inputs.sanity import is_text
+from cmg_mj.errors import InputError
+from cmg_mj.inputs.files import expanded, model_files
 from cmg_mj.plant.mjcf import as_mjcf, check_rig
 from cmg_mj.plant.mounting.target import check_written_by_mount
 from cmg_mj.results.files import whole_file
@@ -79,15 +77,13 @@ def check_target(target: Path, robot: Path) -> None:
         InputError: The target is no .xml file, has no folder, or would replace a file of the robot's; or the scenario
             beside it would.
     """
-    if not is_text(str(target.absolute())):  # MuJoCo opens no such file, and a scenario names it in UTF-8
-        raise InputError(f"-o {shown(str(target))}: {not_text(target, target.absolute())}")
     if target.suffix != ".xml":
         raise InputError(
             f"-o {target}: must be a file that ends in .xml, such as balanced.xml; a .toml comes beside it"
         )
     if not target.parent.is_dir():
         raise InputError(f"-o {target}: cannot be written: there is no folder {target.parent}")
-    originals = check_files(robot) if robot.is_file() else []
+    originals = model_files(robot) if robot.is_file() else []
     for path in (target, target.with_suffix(".toml")):
         if path.is_dir():
             raise InputError(f"-o {target}: {path} is a folder")

@@ -10,8 +10,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.inputs.paths import expanded, require_file
-from cmg_mj.inputs.sanity import is_text
+from cmg_mj.inputs.files import expanded, require_file
 from cmg_mj.plant.checks import STEPS_S
 from cmg_mj.plant.mjcf import compile_model, parse
 from cmg_mj.plant.mounting.held_joints import joint_held, unused_name
@@ -140,7 +139,7 @@ def body_of(spec: mujoco.MjSpec, name: str, path: Path) -> mujoco.MjsBody:
     Raises:
         InputError: There is no such body, or it is the world.
     """
-    body = spec.body(name) if name != "world" and is_text(name) else None
+    body = spec.body(name) if name != "world" else None
     if body is None:
         names = [body.name for body in spec.bodies if body.name and body.name != "world"]
         raise InputError(f"--body {name}: {path} has no such body; {nearest(name, names, 'its bodies')}")

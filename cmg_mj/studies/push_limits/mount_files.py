@@ -15,7 +15,7 @@ import mujoco
 import tomli_w
 
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.paths import expanded
+from cmg_mj.inputs.files import expanded
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.observers.scaling import Number, scaled_names, scaled_parameters
 from cmg_mj.plant.mounting import MountedRobot

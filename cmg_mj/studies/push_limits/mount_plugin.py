@@ -12,7 +12,7 @@ from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE
 from cmg_mj.codegen.export.c_identifiers import RESERVED
 from cmg_mj.codegen.export.names import LONGEST
 from cmg_mj.errors import InputError, listed
-from cmg_mj.inputs.includes import check_files
+from cmg_mj.inputs.files import model_files
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, users_files
 from cmg_mj.simulation.experiment import Experiment
@@ -50,7 +50,7 @@ def claimed_plugin(target: Path, robot: Path, *, overwrite: bool) -> Iterator[Ru
         InputError: Another command writes there, or what is there may not be replaced.
     """
     folder, name = plugin_folder(target), plugin_name(target)
-    originals = check_files(robot) if robot.is_file() else []
+    originals = model_files(robot) if robot.is_file() else []
     if any(folder.resolve() in file.resolve().parents for file in originals):
         raise InputError(f"-o {target}: {folder} holds the robot's own file, or one that it names; give another name")
     try:

@@ -11,7 +11,7 @@ from typing import Protocol, TypeAlias, TypeGuard, runtime_checkable
 import numpy as np
 
 from cmg_mj.errors import InputError, shown
-from cmg_mj.inputs.sanity import LARGEST
+from cmg_mj.inputs.messages import LARGEST
 
 FieldValue: TypeAlias = "float | str | Sequence[FieldValue] | Mapping[str, FieldValue]"
 """A value of a scenario's field, as TOML has it."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.results.memory import release_free_memory
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.chunk import compute

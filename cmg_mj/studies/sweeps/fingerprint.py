@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import tomli_w
 
 from cmg_mj.errors import InputError, shown
-from cmg_mj.inputs.bundled import find
-from cmg_mj.inputs.includes import check_files
+from cmg_mj.inputs.files import find, model_files
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.sweeps.axes import FieldValue
 from cmg_mj.studies.sweeps.study import SweepStudy
@@ -110,7 +109,7 @@ def hash_of_models(study: SweepStudy) -> str:
     varied = [str(value) for axis in study.axes if "plant.model" in axis.fields for value in axis.values]
     digest = hashlib.sha256()
     for model in varied or [study.scenario.plant.model]:
-        for path in check_files(find("models", model, ".xml", "plant.model =")):
+        for path in model_files(find("models", model, ".xml", "plant.model =")):
             try:
                 content = path.read_bytes()
             except OSError as error:

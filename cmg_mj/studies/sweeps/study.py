@@ -14,7 +14,7 @@ import numpy as np
 from cmg_mj.controllers.laws import LAW_CLASSES
 from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.bundled import find
+from cmg_mj.inputs.files import find
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.results.baselines import RATES
 from cmg_mj.scenario.schema import ObserverSettings, Scenario, parse_scenario

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TypedDict, get_args
 
 from cmg_mj.errors import InputError, TomlValue, nearest
-from cmg_mj.inputs.bundled import bundled, find
+from cmg_mj.inputs.files import bundled, find
 from cmg_mj.inputs.overrides import override
 from cmg_mj.scenario.loading import find_model, find_tracks, load_scenario, parse_scenario
 from cmg_mj.scenario.schema import Scenario

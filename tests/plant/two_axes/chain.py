@@ -15,7 +15,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 
 N = 11
 SIDE = 0.095

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.plant.locking import remove_hinge
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.scenario.plant_settings import PlantSettings

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.plant import Plant, load_plant
 

@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.studies.sweeps.trials import FIGURES
 from tests.command import COMMAND, ROOT, cmg_mj
 

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.errors import RunStopped
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.studies.sweeps.axes import parse_axis

@@ -13,7 +13,7 @@ from mujoco.studio import (
 )
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.inputs.bundled import folder
+from cmg_mj.inputs.files import folder
 from cmg_mj.observers import OBSERVERS, Estimate
 from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, choosable_laws
