@@ -119,7 +119,7 @@ def model_files(path: Path, within: tuple[Path, ...] = ()) -> list[Path]:
         raise InputError(f"{within[0]}: contains itself: {' in '.join(file.name for file in (*within, path))}")
     within, files = (*within, path), [path]
     name = str(path) if len(within) == 1 else f"{within[0]}: {path.name}"
-    for name in _INCLUDED.findall(_COMMENT.sub("", read_text(path, name, MAX_MODEL_BYTES))):
-        places = (path.parent / name, within[0].parent / name)
+    for included in _INCLUDED.findall(_COMMENT.sub("", read_text(path, name, MAX_MODEL_BYTES))):
+        places = (path.parent / included, within[0].parent / included)
         files += next((model_files(place, within) for place in places if place.is_file()), [])
     return files
