@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-pytest_plugins = ["pytester", "tests.tiers", "tests.cpu_limit", "tests.footprint"]
+pytest_plugins = ["tests.tiers"]
 
 # BLAS reads these once, when NumPy loads it. pytest imports this file before it starts its workers, which inherit them,
 # as does every process that a test starts. As many threads as cores in each of them fight one another: a test of one

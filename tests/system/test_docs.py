@@ -13,7 +13,6 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from click.testing import CliRunner
 
 import cmg_mj
 from cmg_mj.observers import OBSERVERS
@@ -43,31 +42,10 @@ def test_what_the_reference_names_exists(dotted: str) -> None:
     assert hasattr(importlib.import_module(home), name) or importlib.util.find_spec(dotted)
 
 
-def test_the_reference_names_nothing_twice() -> None:
-    names = re.findall(r"^::: (.+)$", REFERENCE, flags=re.MULTILINE)
-    assert sorted(names) == sorted(set(names))
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(DOCS).as_posix())
 def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\((?!\w+:|#)([^)#]+)", page.read_text(encoding="utf-8")):
         assert (page.parent / target).exists(), target
-
-
-@pytest.mark.slow
-def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
-    pytest.importorskip("mkdocs", reason="the extra [docs] is not installed")
-    process = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", tmp_path / "site"],
-        cwd=ROOT,
-        env=environment(NO_MKDOCS_2_WARNING="1"),
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert process.returncode == 0, process.stderr
-    assert "WARNING" not in process.stderr
-    assert (tmp_path / "site" / "index.html").is_file()
 
 
 def module(name: str, code: str, folder: Path) -> ModuleType:
@@ -85,44 +63,6 @@ def module(name: str, code: str, folder: Path) -> ModuleType:
 def recipe(title: str) -> str:
     """A section of CONTRIBUTING."""
     return CONTRIBUTING.split(f"\n## {title}\n")[1].split("\n## ")[0]
-
-
-def defines(path: str, name: str) -> bool:
-    """Return whether a file defines a function, class or variable, `Class.method` by its method."""
-    text, last = (ROOT / path).read_text(encoding="utf-8"), name.rpartition(".")[2]
-    return bool(re.search(rf"^ *(?:(?:def|class) {last}\b|{last}(?::.*)? = )", text, flags=re.MULTILINE))
-
-
-def names_in_files() -> list[tuple[str, str]]:
-    """Names that CONTRIBUTING says a file has: `name` (`file`), and the first one in `file`: ... in (of) `name`."""
-    path = r"`(cmg_mj/[\w/]+\.py)`"
-    beside = re.findall(rf"`([\w.]+)`\s+\({path}\)", CONTRIBUTING)
-    after = re.findall(rf"{path}:(?:[^.]|\.\d|\. Here)*? (?:in|of) `([\w.]+)`", CONTRIBUTING)
-    return [(file, name) for name, file in beside] + after
-
-
-@pytest.mark.parametrize(("file", "name"), names_in_files())
-def test_a_name_of_contributing_is_in_its_file(file: str, name: str) -> None:
-    assert defines(file, name)
-
-
-def test_names_of_contributing_were_read() -> None:
-    files = {file.rpartition("/")[2] for file, _ in names_in_files()}
-    assert files >= {"design.py", "controller.py", "registry.py", "metrics.py", "summary_keys.py", "variations.py"}
-
-
-def test_the_options_of_contributing_are_there() -> None:
-    text = recipe("Add a command").split("`cmg_mj/cli/arguments.py`: ")[1].split("Output and Ctrl-C")[0]
-    names = set(re.findall(r"`(\w+)(?:\([.]*\))?`", text))
-    assert names >= {"json_option", "settings_option", "number_option", "run_options"}
-    assert [name for name in names if not defines("cmg_mj/cli/arguments.py", name)] == []
-
-
-def test_the_command_of_contributing_is_one(tmp_path: Path) -> None:
-    (code,) = re.findall(r" *```python\n(.*?)```", recipe("Add a command"), flags=re.DOTALL)
-    command = module("a_command_of_contributing", textwrap.dedent(code), tmp_path).poles
-    outcome = CliRunner().invoke(command, ["push_recovery"])
-    assert re.fullmatch(r"tilt: \d\.\d\d 1/s\n", outcome.output), outcome
 
 
 def test_the_observer_of_contributing_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import ast
-import runpy
 import subprocess
 import sys
-import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-import cmg_mj
 from tests.command import HANGS_AFTER_S, ROOT, environment
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
@@ -62,66 +57,3 @@ def test_runs(path: Path, tmp_path: Path) -> None:
     assert (process.returncode, process.stderr) == (0, "")
     assert OUTPUT[path.stem] in process.stdout
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_is_short_and_says_what_it_is(path: Path) -> None:
-    text = path.read_text(encoding="utf-8")
-    assert len(text.splitlines()) < 40
-    assert ast.get_docstring(ast.parse(text))
-    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
-    assert any(f"examples/{path.name}" in page.read_text(encoding="utf-8") for page in pages)
-
-
-class StandIn:
-    """A viewer that is closed after a second of simulated time; at half of it somebody presses space."""
-
-    def __init__(self, model: Any, data: Any, key_callback: Any) -> None:
-        self.data, self.key_callback, self.synced = data, key_callback, 0
-        viewers.append(self)
-
-    def __enter__(self) -> StandIn:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        pass
-
-    def is_running(self) -> bool:
-        return self.data.time < 1.0
-
-    def sync(self) -> None:
-        self.synced += 1
-        if abs(self.data.time - 0.5) < 1e-9:
-            self.key_callback(ord("x"))
-            self.key_callback(ord(" "))
-
-
-viewers: list[StandIn] = []
-
-
-def test_the_viewers_loop_at_a_viewer(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """In real time, with a push where the key was pressed."""
-    monkeypatch.setattr("mujoco.viewer.launch_passive", StandIn)
-    monkeypatch.setattr(sys, "argv", ["mujoco_viewer.py"])
-    start = time.monotonic()
-    runpy.run_path(str(ROOT / "examples" / "mujoco_viewer.py"))
-    assert time.monotonic() - start > 0.9
-    assert "pushed at 0.50 s; at 1.00 s the tilt is" in capsys.readouterr().out
-    assert viewers[-1].synced == pytest.approx(1.0 / cmg_mj.load_plant(model="scissored_pair.xml").timestep, abs=1)
-
-
-@pytest.mark.slow
-def test_bode_and_step_labels_its_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import matplotlib.pyplot as plt
-
-    plt.switch_backend("agg")
-    plt.close("all")
-    path = ROOT / "examples" / "bode_and_step.py"
-    monkeypatch.setattr(sys, "argv", [str(path), str(tmp_path / "bode.png")])
-    runpy.run_path(str(path))
-    gain, phase, step = plt.gcf().axes
-    assert (gain.get_ylabel(), phase.get_ylabel(), step.get_ylabel()) == ("gain [-]", "phase [deg]", "angle [deg]")
-    assert (phase.get_xlabel(), step.get_xlabel()) == ("frequency [rad/s]", "time [s]")
-    assert gain.get_title()
-    assert step.get_title()
-    plt.close("all")

@@ -1,4 +1,4 @@
-"""The README is short and true: its snippets and commands run, its figures are those of the pages behind it."""
+"""The README is short and true: its snippets and commands run."""
 
 from __future__ import annotations
 
@@ -11,21 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from cmg_mj.observers import OBSERVERS
-from cmg_mj.papers import PAPERS
-from cmg_mj.results.baselines import REFERENCES
 from tests.command import HANGS_AFTER_S, ROOT, cmg_mj, environment
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-GUIDE = (
-    (ROOT / "docs" / "which_observer.md")
-    .read_text(encoding="utf-8")
-    .split("\n## Every observer\n")[1]
-    .split("\n## ")[0]
-)
-"""The whole table, of which README has eight rows."""
-REPRODUCED = (ROOT / "docs" / "reproduced.md").read_text(encoding="utf-8")
-
 MOST_WORDS = 900
 WIDTH = 100
 SNIPPETS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
@@ -40,12 +28,6 @@ CHEAPER = {
     "mount": "--quick",
 }
 """Command -> what is appended here, so that it takes a second or two."""
-
-
-def tables(text: str) -> dict[str, list[str]]:
-    """Return the observer at the beginning of a table's row -> the row's other cells."""
-    rows = re.findall(r"^\| `(\w+)` \|(.*)\|$", text, flags=re.MULTILINE)
-    return {name: [cell.strip() for cell in rest.split("|")] for name, rest in rows}
 
 
 def test_is_one_page() -> None:
@@ -72,51 +54,6 @@ def test_a_command_runs(line: str) -> None:
 
 def test_commands_were_read() -> None:
     assert {line.split()[1] for line in COMMANDS} == set(CHEAPER)
-
-
-def test_every_shell_takes_the_commands() -> None:
-    """What zsh would take for a pattern, or bash for a list, is in quotes."""
-    for block in BLOCKS:
-        bare = re.sub(r"'[^']*'|\"[^\"]*\"", "", block)
-        assert not re.search(r"[][*?{}<>~$!;]", bare), block
-
-
-def test_the_first_run_is_where_it_says() -> None:
-    """The name of the recording is that of a run's folder, which tests/studies/test_save.py looks into."""
-    assert COMMANDS[0] == "cmg-mj run push_recovery"
-    assert "\nrerun runs/push_recovery-homogeneous-0/recording.rrd\n" in README
-
-
-def test_the_table_is_that_of_the_guide_rounded() -> None:
-    rows, guide = tables(README), tables(GUIDE)
-    assert len(rows) == 8
-    for name, (error, at_push, instructions, _) in rows.items():
-        assert [error, at_push] == [f"{float(cell.split()[0]):.3f}" for cell in guide[name][:2]], name
-        assert instructions in guide[name], name
-
-
-def test_the_guide_has_every_observer() -> None:
-    assert set(tables(GUIDE)) >= {*OBSERVERS, *REFERENCES}
-
-
-def test_the_result_is_that_of_the_table() -> None:
-    """The papers' observers are all that do not use the acceleration."""
-    guide = tables(GUIDE)
-    error = {name: float(guide[name][0].split()[0]) for name in OBSERVERS if guide[name][0] != "-"}
-    others = [value for name, value in error.items() if name not in ("gyro_free", "free_pivot")]
-    text = " ".join(README.split())
-    assert f"`gyro_free` is wrong by {error['gyro_free']:.3f} rad/s" in text
-    assert f"the best observer of the four papers behind this bench by {min(others):.3f} rad/s" in text
-    assert f"fused with the measured tilt, is wrong by {float(guide['mems_fused'][0].split()[0]):.3f} rad/s" in text
-
-
-def test_the_claims_are_those_of_the_report() -> None:
-    counts = re.search(r"(\d+) claims of the papers: .*? (\d+) not reproduced", REPRODUCED, flags=re.DOTALL)
-    assert counts
-    words = " ".join(README.split())
-    assert f"{counts[1]} claims of four papers" in words
-    assert f"{counts[2]} of them could not be reproduced" in words
-    assert all(f"## {paper}:" in REPRODUCED for paper in PAPERS)
 
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md", "SECURITY.md"])
