@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.controllers.laws.protocol import Law, feedback_state
+from cmg_mj.core.runners import read_only
+from cmg_mj.core.types import Law, extra_signals, feedback_state
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, listed, raised, shown
 from cmg_mj.inputs.users_line import in_users_line
 from cmg_mj.observers import Measurement, Observer
-from cmg_mj.observers.protocol import extra_signals
-from cmg_mj.observers.runner import read_only
 
 TILTS = (0.01, 0.011)
 """The tilts of the two samples [rad]."""

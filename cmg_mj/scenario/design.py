@@ -7,23 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmg_mj.controllers.controller import Controller, PlantInterface
 from cmg_mj.controllers.dry_run import dry_run_law, dry_run_observer
-from cmg_mj.controllers.integrator_trim import integrator_trim
 from cmg_mj.controllers.laws import LAWS, Law
-from cmg_mj.controllers.laws.protocol import NEEDS, needs
 from cmg_mj.controllers.laws.registry import LAW_CLASSES
 from cmg_mj.controllers.make_controller import make_controller
 from cmg_mj.controllers.processor import Processor
+from cmg_mj.core.controller import Controller, PlantInterface
+from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Observer, make_observer
-from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.observers.registry import OBSERVER_CLASSES
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.tilt import TiltNoise
+from cmg_mj.stages.trim import integrator_trim
 
 
 @dataclass(frozen=True)
@@ -172,7 +171,7 @@ def _check(scenario: Scenario) -> None:
     if gains and not LAW_CLASSES.may_take(kind, "gains"):
         raise InputError(f"controller.{gains}: {kind} takes no gains; leave it out")
     try:
-        unused = () if needs(law) == NEEDS else ("feedback", "angle_source")
+        unused = () if law_needs(law) == LAW_NEEDS else ("feedback", "angle_source")
     except InputError as error:
         raise InputError(f"controller.kind = {kind!r}: {error}") from error
     for name in unused:

@@ -11,10 +11,10 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.types import Forces, IdealReading
 from cmg_mj.elementwise import Scalar, clip, digitise
 from cmg_mj.inputs.field_types import STRICT, Batched, Instant, NonNegative, OnGrid, Positive, Rate
-from cmg_mj.sensors.ideal import Forces, IdealReading
-from cmg_mj.sensors.low_pass import low_pass, noise_gain
+from cmg_mj.stages.low_pass import low_pass, noise_gain
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
 INSIDE_HZ = 1000.0

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.types import IdealReading
 from cmg_mj.elementwise import Scalar, digitise
 from cmg_mj.inputs.field_types import STRICT, Instant, NonNegative, Rate
-from cmg_mj.sensors.ideal import IdealReading
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -8,9 +8,9 @@ from typing import Annotated
 
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.types import IdealReading
 from cmg_mj.elementwise import Scalar, clip, radians
 from cmg_mj.inputs.field_types import STRICT, Batched, Instant, NonNegative, Positive, Rate
-from cmg_mj.sensors.ideal import IdealReading
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -11,9 +11,9 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.noise import CORNERS_HZ, Flicker
 from cmg_mj.elementwise import digitise
 from cmg_mj.inputs.field_types import STRICT, NonNegative, Positive
-from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker
 
 PIECE = 1000
 """Samples before the run that are made together, whatever the rate."""

@@ -13,17 +13,16 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.noise import CORNERS_HZ, Flicker, NoiseStream, normals
+from cmg_mj.core.sensor import steps_until, whole_steps
+from cmg_mj.core.types import Forces, IdealReading
 from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.field_types import STRICT
 from cmg_mj.sensors.accelerometer import INSIDE_HZ, STANDARD_GRAVITY, Accelerometer
 from cmg_mj.sensors.encoder import Encoder
-from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker
 from cmg_mj.sensors.fog import Fog
-from cmg_mj.sensors.ideal import Forces, IdealReading
 from cmg_mj.sensors.mems_gyro import MemsGyro
-from cmg_mj.sensors.noise_streams import NoiseStream, normals
-from cmg_mj.sensors.timing import steps_until, whole_steps
-from cmg_mj.sensors.vibration import BroadbandVibration, WheelTones, vibration
+from cmg_mj.stages.vibration import BroadbandVibration, WheelTones, vibration
 
 Reading = TypeVar("Reading")
 """A sensor's reading: a number, a number for each gimbal, or the forces of the accelerometers."""

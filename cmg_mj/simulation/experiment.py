@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 import numpy as np
 import tomli_w
 
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law
-from cmg_mj.controllers.make_controller import AnyController
-from cmg_mj.controllers.multi_axis import MultiAxisController
 from cmg_mj.controllers.processor import Processor
+from cmg_mj.core.axes import AnyController, MultiAxisController
+from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
@@ -26,7 +25,6 @@ from cmg_mj.results.rerun_head import rerun_head
 from cmg_mj.results.result import Driver, Result
 from cmg_mj.results.wire import WireSettings
 from cmg_mj.scenario.design import Design, design
-from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.linear_loop import linear_closed_loop, require_model, require_rigid
 from cmg_mj.scenario.linear_rig import reduced_rig
 from cmg_mj.scenario.loading import base_of
@@ -49,6 +47,7 @@ from cmg_mj.simulation.batch import (
 )
 from cmg_mj.simulation.prepare import check_scenario, plant_on_grid
 from cmg_mj.simulation.simulate import SimulationOptions, simulate
+from cmg_mj.stages.push import Push
 
 if TYPE_CHECKING:
     import control

@@ -12,8 +12,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.controllers.controller import TAKEOVER_TICKS, Controller, PlantInterface
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, lqr_gains
+from cmg_mj.core.controller import TAKEOVER_TICKS, Controller, PlantInterface
+from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.types import IdealReading
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.results.trajectory import Trajectory
@@ -21,10 +23,7 @@ from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.fog import Fog
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
 from tests.observers.reference import DT, GRAVITY_TORQUE, J1, J2, PAPER
 from tests.plant import paper_model as paper

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import cmg_mj
+from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.observers import Measurement, needs
-from cmg_mj.sensors.tilt import RadialTilt
 
 G = 9.81
 

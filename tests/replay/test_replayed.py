@@ -14,8 +14,9 @@ import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
 from cmg_mj.cli.logs import replay
+from cmg_mj.core.tilt import RadialTilt, TiltNoise
+from cmg_mj.core.types import needs
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement, make_observer
-from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import NO_MODEL, replay_log
 from cmg_mj.replay.logs import Log, ReadOptions, read_log
 from cmg_mj.replay.observer_inputs import observer_inputs, replay_prepared
@@ -23,7 +24,6 @@ from cmg_mj.replay.parameter_options import parameters_of
 from cmg_mj.replay.user_noise import noise_numbers, noise_of
 from cmg_mj.replay.user_pendulum import model_of
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 from cmg_mj.studies.save import report_run, save_run
 from cmg_mj.studies.tuning import tune_on_logs
 from tests.observers.reference import PAPER

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.tilt import RadialTilt
 from tests.plant.full_model import states
 
 N_STATES = 1_000

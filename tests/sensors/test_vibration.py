@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.types import IdealReading
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY, Accelerometer
-from cmg_mj.sensors.ideal import IdealReading
-from cmg_mj.sensors.noise_streams import NoiseStream, normals
 from cmg_mj.sensors.sampled import Sensors, sampled_sensors
-from cmg_mj.sensors.vibration import BroadbandVibration, WheelTones
 from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.stages.vibration import BroadbandVibration, WheelTones
 
 MG = 1e-3 * STANDARD_GRAVITY
 SILENT = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}

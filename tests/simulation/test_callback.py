@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from mujoco import rollout
 
-from cmg_mj.controllers.controller import Controller
+from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement
 from cmg_mj.observers.reduced_model import ReducedModel

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.results.error_bounds import acceleration_floor
-from cmg_mj.sensors.tilt import TiltNoise
 from cmg_mj.studies.sweeps.study import SweepStudy
 from cmg_mj.studies.sweeps.study_file import axes_of, design_of, scenario_of, study_file
 from tests.command import cmg_mj

@@ -9,13 +9,12 @@ from typing import NamedTuple, TypedDict
 
 import numpy as np
 
+from cmg_mj.core.noise import CORNERS_HZ, NoiseStream, spread_of
+from cmg_mj.core.sensor import steps_until, whole_steps
 from cmg_mj.sensors.accelerometer import INSIDE_HZ, STANDARD_GRAVITY, Accelerometer
 from cmg_mj.sensors.encoder import Encoder
-from cmg_mj.sensors.flicker_noise import CORNERS_HZ, spread_of
 from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.mems_gyro import PIECE, MemsGyro
-from cmg_mj.sensors.noise_streams import NoiseStream
-from cmg_mj.sensors.timing import steps_until, whole_steps
 
 
 def steps_of(duration: float, timestep: float) -> int:

@@ -18,11 +18,11 @@ from cmg_mj.codegen.export.names import export_files, name_of
 from cmg_mj.codegen.export.refusals import refuse_unexported
 from cmg_mj.codegen.export.source_location import LawNotExportable
 from cmg_mj.codegen.export.trace import trace
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.dry_run import dry_run_law, dry_run_observer
 from cmg_mj.controllers.laws import Law
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.types import Observer
 from cmg_mj.errors import InputError, raised
-from cmg_mj.observers.protocol import Observer
 from cmg_mj.results.run_folder.folder import write_text
 
 Part = TypeVar("Part", Observer, Law)

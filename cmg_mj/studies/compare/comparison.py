@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cmg_mj.observers.protocol import BIAS, extra_signals
+from cmg_mj.core.types import BIAS, extra_signals
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.intervals import finite_values
 from cmg_mj.results.result import Outcome, Result

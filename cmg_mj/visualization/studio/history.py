@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.make_controller import AnyController
+from cmg_mj.core.axes import AnyController
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.visualization.studio.settings import law_settings
 

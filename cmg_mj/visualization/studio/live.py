@@ -12,7 +12,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.make_controller import AnyController
+from cmg_mj.core.axes import AnyController
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.plant.moving_pivot import pivot_directions
 from cmg_mj.plant.mujoco_state import set_control_callback

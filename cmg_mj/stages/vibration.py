@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from cmg_mj.core.types import Forces, IdealReading
 from cmg_mj.elementwise import Scalar, atan2, cos, sin
-from cmg_mj.sensors.ideal import Forces, IdealReading
 
 AXES = 4
 """Axes that vibrate: x and z of the inner and of the outer accelerometer."""

@@ -6,20 +6,16 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, TypedDict
 
-from cmg_mj.controllers.backlash import Backlash
-from cmg_mj.controllers.integrator_trim import integrator_trim
-from cmg_mj.controllers.law_runner import LawRunner, Laws, LawTakeover
-from cmg_mj.controllers.laws.protocol import Law, feedback_state
-from cmg_mj.controllers.notch import Notch
+from cmg_mj.core.runners import LawRunner, Laws, LawTakeover, ObserverRunner, Observers, ObserverTakeover, read_only
+from cmg_mj.core.sensor import steps_until, whole_steps
+from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, feedback_state
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError
-from cmg_mj.observers.protocol import Measurement, Observer
-from cmg_mj.observers.runner import ObserverRunner, Observers, ObserverTakeover, read_only
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.ideal import Forces, IdealReading
 from cmg_mj.sensors.sampled import Sensors, sampled_sensors
-from cmg_mj.sensors.tilt import RadialTilt
-from cmg_mj.sensors.timing import steps_until, whole_steps
+from cmg_mj.stages.backlash import Backlash
+from cmg_mj.stages.notch import Notch
+from cmg_mj.stages.trim import integrator_trim
 
 Feedback = Literal["observer", "fog", "truth"]
 AngleSource = Literal["measured", "estimated"]
