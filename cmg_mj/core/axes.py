@@ -10,7 +10,6 @@ import numpy as np
 
 from cmg_mj.core.controller import Controller, Feedback, Tick
 from cmg_mj.core.noise import NoiseStream, normals
-from cmg_mj.core.runners import read_only
 from cmg_mj.core.types import IdealReading, MultiAxisReading
 from cmg_mj.elementwise import Scalar, clip, cos, dot, sin, where
 from cmg_mj.errors import InputError
@@ -143,9 +142,7 @@ class MultiAxisController:
             limit = part.law.rate_limit
             total = clip(tick.u + added, -limit, limit)
             u = where(tick.u + added == total, tick.u, total - added)  # the law's, as far as it was not limited
-            part.coriolis = none = w * dot(k, rates)
-            if type(u) is not float:
-                read_only(u, none)  # as in `Controller.decide`
+            part.coriolis = w * dot(k, rates)
             part.tick = tick._replace(u=u)
             part.command_rate(total)
 

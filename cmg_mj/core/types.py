@@ -1,16 +1,15 @@
-"""The protocol of an observer: a frozen value with `init` and `step`, discrete in time, elementwise in the worlds."""
+"""Perfect readings, measurements, estimates; the protocols of an observer and a law: frozen values, elementwise."""
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, nearest, raised, shortened
+from cmg_mj.errors import InputError
 
 
 class _Angles(NamedTuple):
@@ -94,70 +93,27 @@ BIAS = "bias_rad"
 TORQUE = "torque_n_m"
 """The extra signal of an observer that estimates a tilting torque on the whole rig [N m]."""
 
-RESERVED = ("x1_rad", "x2_rad_s", "x3_rad")
+STATE_SIGNALS = ("x1_rad", "x2_rad_s", "x3_rad")
 
 
 def needs(observer: Observer | type) -> tuple[str, ...]:
     """Return the `NEEDS` of an observer, or of its class: its required inputs beside y1.
 
     One that does not say counts as needing the model and the gimbals, as the papers' observers do.
-
-    Raises:
-        InputError: It names something else.
     """
-    return names_out_of(NEEDS, declared("needs", lambda: getattr(observer, "needs", ("model", "gimbals"))))
-
-
-def names_out_of(allowed: Collection[str], names: Collection[str]) -> tuple[str, ...]:
-    """Return what a user's class declares in `needs`.
-
-    Raises:
-        InputError: It is no collection of names out of those allowed.
-    """
-    if not isinstance(names, (tuple, list, set, frozenset)):
-        raise InputError(f"needs must be a tuple of names, not {shortened(repr(names))}; {nearest('', allowed)}")
-    for name in names:
-        if not isinstance(name, str) or name not in allowed:
-            where = f"needs = {shortened(repr(names))}: there is no {shortened(repr(name))}"
-            raise InputError(f"{where}; {nearest(str(name), allowed)}")
-    return tuple(names)
-
-
-def declared(attribute: str, read: Callable[[], Collection[str]]) -> Collection[str]:
-    """Read an attribute of a user's class, which may be a property that raises anything.
-
-    Raises:
-        InputError: It raised.
-    """
-    try:
-        return read()
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        raise InputError(f"{attribute} cannot be read: {raised(error)}") from error
+    return getattr(observer, "needs", ("model", "gimbals"))
 
 
 def extra_signals(observer: Observer) -> tuple[str, ...]:
-    """Names of what an observer estimates beyond x.
-
-    Args:
-        observer: Any observer.
-
-    Returns:
-        Its `extra_signals`; none if it has no such attribute.
+    """Return the names of what an observer estimates beyond x, none if it has no `extra_signals`.
 
     Raises:
-        ValueError: They are not distinct lower-case names.
+        InputError: A name is there twice.
     """
-    names = declared("extra_signals", lambda: getattr(observer, "extra_signals", ()))
-    fits = isinstance(names, (tuple, list)) and all(
-        isinstance(name, str) and re.fullmatch("[a-z][a-z0-9_]*", name) and name not in RESERVED for name in names
-    )
-    if not fits or len(set(names)) < len(names):
-        raise ValueError(
-            f"extra_signals must be a tuple of names like ('bias_rad',), each once, not {shortened(repr(names))}"
-        )
-    return tuple(names)
+    names = tuple(getattr(observer, "extra_signals", ()))
+    if len({*STATE_SIGNALS, *names}) < len(STATE_SIGNALS) + len(names):
+        raise InputError(f"observer {type(observer).__name__}: extra_signals = {names}: each name once, none of x's")
+    return names
 
 
 class FeedbackState(Estimate):
@@ -230,12 +186,8 @@ LAW_NEEDS = ("estimate",)
 
 
 def law_needs(law: Law | type[Law]) -> tuple[str, ...]:
-    """Return the `LAW_NEEDS` of a law, or of its class: its inputs beside y. A law without the attribute takes all.
-
-    Raises:
-        InputError: It names something else.
-    """
-    return names_out_of(LAW_NEEDS, declared("needs", lambda: getattr(law, "needs", LAW_NEEDS)))
+    """Return the `LAW_NEEDS` of a law, or of its class; a law that does not say takes all."""
+    return getattr(law, "needs", LAW_NEEDS)
 
 
 Forces = Sequence[Scalar] | np.ndarray

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmg_mj.controllers.dry_run import dry_run_observer
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import extra_signals, needs
 from cmg_mj.errors import InputError, raised
@@ -223,11 +222,6 @@ def _ready(
                 raise
             left_out[name] = f"refused: {error}"
             continue
-        try:
-            with np.errstate(all="ignore"):
-                dry_run_observer(observer, None)
-        except InputError as error:
-            raise InputError(f"observer {name!r}: {error}") from error
         ready[name] = observer
     if not ready:
         reasons = "; ".join(f"{name} {reason}" for name, reason in left_out.items())

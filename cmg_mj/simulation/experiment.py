@@ -340,11 +340,6 @@ class Experiment:
             return hints(self.scenario, self.design, self.plant.parameters)
         return [f"{part.plant.axis.name}: {hint}" for part in self.axes for hint in part.hints]
 
-    def dry_run(self, worlds: int | None = None) -> None:
-        """Try every observer once, on floats or on arrays of so many worlds: see `Design.dry_run`."""
-        for part in self.parts:
-            part.design.dry_run(worlds)
-
     def resolved(self) -> dict[str, Any]:
         """Return the scenario with every default written out, and the versions it ran with, as TOML can hold it."""
         return resolved(self.scenario, {part.plant.axis.name: part.design for part in self.parts})
@@ -380,7 +375,7 @@ class Experiment:
 
 
 def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None = None) -> Experiment:
-    """Load the plant, construct everything and try the observers once, so that what does not fit is found before a run.
+    """Load the plant and construct everything, so that what does not fit is found before a run.
 
     Args:
         scenario: The scenario.

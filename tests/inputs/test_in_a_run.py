@@ -15,7 +15,7 @@ from cmg_mj.studies import save as runs
 from cmg_mj.visualization import recording
 from tests.command import cmg_mj
 from tests.inputs.complaints import assert_in_order, table
-from tests.inputs.test_users_observer import Mine
+from tests.inputs.test_users_code import Mine
 from tests.run_folders import FILES, assert_whole, names
 
 

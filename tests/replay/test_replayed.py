@@ -155,16 +155,6 @@ def test_one_that_is_lost_is_said_and_the_others_go_on(tmp_path: Path) -> None:
     assert re.fullmatch(r"raised ZeroDivisionError: .* \(test_replayed\.py, line \d+\).*", reason)
 
 
-def test_one_that_cannot_begin_is_named_with_its_line(tmp_path: Path) -> None:
-    """Also by `tune-log`, which replays the log before it tunes."""
-    name = "tests.replay.test_replayed:RaisesAtOnce"
-    expected = rf"^observer '{name}': step\(state, y, u\) raised ValueError: x \(test_replayed\.py, line \d+\)$"
-    with pytest.raises(InputError, match=expected):
-        replay_log(log(tmp_path), ["linear", name])
-    with pytest.raises(InputError, match=expected):
-        tune_on_logs([log(tmp_path)], name)
-
-
 class Loses:
     needs = ()
 
