@@ -441,7 +441,9 @@ def allowed_values(annotation: Any) -> str:
 
 def _descriptions(cls: type) -> dict[str, str]:
     """Read what a class says of its fields: under `Attributes:`, or below each field."""
-    texts = attribute_descriptions(cls.__doc__ or "")
+    texts: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        texts |= attribute_descriptions(base.__doc__ or "")
     if issubclass(cls, BaseModel):
         body = ast.parse(textwrap.dedent(inspect.getsource(cls))).body[0]
         assert isinstance(body, ast.ClassDef)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple, TypedDict
+from typing import Literal, NamedTuple, Protocol, TypedDict
 
 from cmg_mj.core.runners import LawRunner, ObserverRunner
-from cmg_mj.core.sensor import steps_until, whole_steps
+from cmg_mj.core.sensor import SampledSensor, steps_until, whole_steps
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, feedback_state
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError
-from cmg_mj.sensors.sampled import Sensors, sampled_sensors
 from cmg_mj.stages.backlash import Backlash
 from cmg_mj.stages.notch import Notch
 from cmg_mj.stages.trim import integrator_trim
@@ -35,6 +34,16 @@ class Tick(NamedTuple):
     x_e: Scalar
     estimates: Sequence[Sequence[Scalar]]
     """The observer's estimate (x1, x2, x3, its extra signals), then those of the open-loop observers."""
+
+
+class Sensors(Protocol):
+    """The sensors between the ideal readings and a controller."""
+
+    def at_work(
+        self, timestep: float, seed: int, worlds: int | Sequence[int], axis: int
+    ) -> tuple[SampledSensor[Forces], SampledSensor[Sequence[Scalar]], SampledSensor[Scalar]]:
+        """Start the accelerometers, the encoders and the gyro of an axis."""
+        ...
 
 
 class PlantInterface(NamedTuple):
@@ -150,7 +159,7 @@ class Controller:
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
-        self._sampled = sampled_sensors(self.sensors, self.timestep, self.seed, self.worlds, self.axis)
+        self._sampled = self.sensors.at_work(self.timestep, self.seed, self.worlds, self.axis)
         self.tick: Tick | None = None
         self._integrator: Scalar | None = None
         self.gimbal_rate: Scalar = None

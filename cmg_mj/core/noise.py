@@ -84,7 +84,7 @@ def spread_of(floor: float) -> float:
     return k * math.sqrt(math.log(CORNERS_HZ[1] / CORNERS_HZ[0]))
 
 
-class Flicker:
+class FlickerNoise:
     """1/f noise at work, as if it had been on for ever.
 
     Args:

@@ -190,6 +190,8 @@ def law_needs(law: Law | type[Law]) -> tuple[str, ...]:
     return getattr(law, "needs", LAW_NEEDS)
 
 
+STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
+
 Forces = Sequence[Scalar] | np.ndarray
 """Specific force: inner x, inner z, outer x, outer z [m/s^2]; floats, or one array (4, n_worlds)."""
 

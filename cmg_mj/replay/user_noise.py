@@ -7,11 +7,12 @@ import math
 from collections.abc import Mapping
 
 from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.errors import InputError
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.white_noise import LogNoise, WhiteNoise
 from cmg_mj.replay.parameter_options import numbers
-from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY, Accelerometer
+from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 
 TILT_NOISE_DEG = 0.1

@@ -15,8 +15,8 @@ from cmg_mj.observers.zero_order_hold import hold_matrices
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.linear_rig import LinearRig
 from cmg_mj.scenario.rest_slopes import Slopes, law_slopes, needed_states, observer_slopes
-from cmg_mj.sensors.accelerometer import INSIDE_HZ
 from cmg_mj.sensors.sampled import Sensors
+from cmg_mj.stages.low_pass import INSIDE_HZ
 from cmg_mj.stages.notch import Notch
 
 if TYPE_CHECKING:
