@@ -12,15 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cmg_mj.codegen.export import export as export
-    from cmg_mj.controllers.controller import Controller as Controller
-    from cmg_mj.controllers.controller import Tick as Tick
     from cmg_mj.controllers.laws import LAWS as LAWS
     from cmg_mj.controllers.laws import FeedbackState as FeedbackState
     from cmg_mj.controllers.laws import Law as Law
     from cmg_mj.controllers.laws import StateFeedback as StateFeedback
     from cmg_mj.controllers.laws import lqr_gains as lqr_gains
     from cmg_mj.controllers.laws import make_law as make_law
-    from cmg_mj.controllers.multi_axis import MultiAxisController as MultiAxisController
+    from cmg_mj.core.axes import MultiAxisController as MultiAxisController
+    from cmg_mj.core.controller import Controller as Controller
+    from cmg_mj.core.controller import Tick as Tick
+    from cmg_mj.core.tilt import RadialTilt as RadialTilt
+    from cmg_mj.core.tilt import TiltNoise as TiltNoise
     from cmg_mj.errors import InputError as InputError
     from cmg_mj.errors import RunStopped as RunStopped
     from cmg_mj.observers import OBSERVERS as OBSERVERS
@@ -42,8 +44,6 @@ if TYPE_CHECKING:
     from cmg_mj.results.result import Outcome as Outcome
     from cmg_mj.results.result import Result as Result
     from cmg_mj.results.trajectory import Trajectory as Trajectory
-    from cmg_mj.scenario.disturbances import Push as Push
-    from cmg_mj.scenario.disturbances import Swing as Swing
     from cmg_mj.scenario.loading import load_scenario as load_scenario
     from cmg_mj.scenario.loading import parse_scenario as parse_scenario
     from cmg_mj.scenario.pivot import Pivot as Pivot
@@ -58,13 +58,13 @@ if TYPE_CHECKING:
     from cmg_mj.sensors.fog import Fog as Fog
     from cmg_mj.sensors.mems_gyro import MemsGyro as MemsGyro
     from cmg_mj.sensors.sampled import Sensors as Sensors
-    from cmg_mj.sensors.tilt import RadialTilt as RadialTilt
-    from cmg_mj.sensors.tilt import TiltNoise as TiltNoise
     from cmg_mj.simulation.callback import control as control
     from cmg_mj.simulation.callback import control_callback as control_callback
     from cmg_mj.simulation.experiment import Experiment as Experiment
     from cmg_mj.simulation.experiment import prepare as prepare
     from cmg_mj.simulation.plugin import plugin as plugin
+    from cmg_mj.stages.push import Push as Push
+    from cmg_mj.stages.push import Swing as Swing
     from cmg_mj.studies.compare.api import Comparison as Comparison
     from cmg_mj.studies.compare.api import compare as compare
     from cmg_mj.studies.compare.comparison import ComparedObserver as ComparedObserver

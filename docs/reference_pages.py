@@ -29,7 +29,6 @@ from cmg_mj.inputs.messages import fields_of
 from cmg_mj.inputs.types import OnAllAxes, OnGrid, PerAxis, marked_fields
 from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.observers import OBSERVER_CLASSES
-from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.pivot import FIELDS_OF, Pivot
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.scenario.schema import CompareSettings, ControllerSettings, LqrSettings, MetricsSettings, Scenario
@@ -37,6 +36,7 @@ from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.mems_gyro import MemsGyro
+from cmg_mj.stages.push import Push, Swing
 
 DOCS = Path(__file__).resolve().parent
 WRITTEN = "<!-- Written by `python docs/reference_pages.py`; edit that file or the docstrings it reads. -->"
@@ -510,7 +510,9 @@ def allowed_values(annotation: Any) -> str:
 
 def _descriptions(cls: type) -> dict[str, str]:
     """Read what a class says of its fields: under `Attributes:`, or below each field."""
-    texts = attribute_descriptions(cls.__doc__ or "")
+    texts: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        texts |= attribute_descriptions(base.__doc__ or "")
     if issubclass(cls, BaseModel):
         body = ast.parse(textwrap.dedent(inspect.getsource(cls))).body[0]
         assert isinstance(body, ast.ClassDef)

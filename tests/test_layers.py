@@ -186,7 +186,7 @@ def test_every_observer_works_without_mujoco() -> None:
 import sys
 from cmg_mj.observers import OBSERVERS, Measurement, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.sensors.tilt import TiltNoise
+from cmg_mj.core.tilt import TiltNoise
 model = {PAPER!r}
 for kind in OBSERVERS:
     observer = make_observer(kind, 0.005, model, TiltNoise(0.006, 0.4, 0.9))

@@ -160,7 +160,7 @@ def compare(
       recording.rrd   rerun recording of every observer's world 0
       scenario.toml   reruns the comparison: cmg-mj compare FOLDER/scenario.toml
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.controllers.laws.protocol import needs
+    from cmg_mj.core.types import law_needs
     from cmg_mj.results import terminal_tables as report
     from cmg_mj.scenario.differences import describe_differences
     from cmg_mj.scenario.schema import CompareSettings
@@ -182,7 +182,7 @@ def compare(
     experiments = comparison.prepare_comparison(scenario, names)
     rerun = comparison.rerunnable(scenario, experiments, worlds)
     note_hints(rerun.hints)
-    if not needs(rerun.law):
+    if not law_needs(rerun.law):
         note(f"{scenario.controller.kind} takes nothing of the observer: every loop is the same, the estimates differ")
     files = runs.files_of_comparison(names, plot=plot)
     folder = arguments.folder("compare", files, rerun)

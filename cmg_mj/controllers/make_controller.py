@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from typing import Unpack
 
-from cmg_mj.controllers.controller import Controller, ControllerOptions, PlantInterface
-from cmg_mj.controllers.laws.protocol import Law
-from cmg_mj.controllers.multi_axis import MultiAxisController
 from cmg_mj.controllers.processor import Processor, ProcessorController
+from cmg_mj.core.controller import Controller, ControllerOptions, PlantInterface
+from cmg_mj.core.types import Law, Observer
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.observers.protocol import Observer
 from cmg_mj.sensors.sampled import Sensors
-
-AnyController = Controller | MultiAxisController
 
 
 def make_controller(

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol, Unpack
 
-from cmg_mj.controllers.controller import Controller, ControllerOptions, PlantInterface, Tick
-from cmg_mj.controllers.laws.protocol import Law
+from cmg_mj.core.controller import Controller, ControllerOptions, PlantInterface, Tick
+from cmg_mj.core.runners import as_estimate
+from cmg_mj.core.types import Forces, Law, Measurement, Observer
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.observers.protocol import Measurement, Observer
-from cmg_mj.observers.runner import as_estimate
-from cmg_mj.sensors.ideal import Forces
 from cmg_mj.sensors.sampled import Sensors
 
 

@@ -54,6 +54,8 @@ class NoEffect:
 
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
+NoiseSize = Annotated[float, Field(ge=0.0, le=1e6)]
+"""No part is noisier than 1 g/rtHz [ug/rtHz], or shaken by more than 1000 g [mg]."""
 
 LONGEST_S = 1e6
 """No time in a scenario is longer: eleven days [s]."""

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.types import Estimate, Measurement
 from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.types import STRICT, Positive
-from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.observers.reduced_model import ReducedModel
 
 

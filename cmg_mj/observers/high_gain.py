@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.types import Estimate, Measurement
 from cmg_mj.elementwise import Scalar, clip, exp, signed_power
 from cmg_mj.inputs.types import STRICT, Positive
 from cmg_mj.observers.model_copy import follow, require_stable_step, stages
-from cmg_mj.observers.protocol import Estimate, Measurement
 from cmg_mj.observers.reduced_model import ReducedModel, Terms
 
 GIMBAL_RATE = 0.4

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.types import Measurement
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError
-from cmg_mj.observers.protocol import Measurement
 from cmg_mj.observers.reduced_model import ReducedModel, Terms
 
 LARGEST_RATE = 2.5

@@ -11,6 +11,8 @@ from operator import itemgetter
 import mujoco
 import numpy as np
 
+from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.types import IdealReading
 from cmg_mj.elementwise import Scalar
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.effective_inertia import inertia_about
@@ -18,8 +20,6 @@ from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_at_site, line_of_joint
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.ideal import IdealReading
-from cmg_mj.sensors.tilt import RadialTilt
 
 _new = tuple.__new__  # a named tuple's own takes twice as long
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.multi_axis import YawCoupling
+from cmg_mj.core.axes import YawCoupling
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.effective_inertia import wheel_momentum
 from cmg_mj.plant.mujoco_state import at_keyframe

@@ -15,11 +15,12 @@ import mujoco
 import numpy as np
 from pydantic import ValidationError
 
-from cmg_mj.controllers.backlash import ARCMIN_A_DEGREE
-from cmg_mj.controllers.controller import Controller, ControllerOptions, PlantInterface
 from cmg_mj.controllers.laws import Law, StateFeedback
 from cmg_mj.controllers.make_controller import make_controller
-from cmg_mj.controllers.multi_axis import MultiAxisController, YawCoupling
+from cmg_mj.core.axes import MultiAxisController, YawCoupling
+from cmg_mj.core.controller import Controller, ControllerOptions, PlantInterface
+from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.types import MultiAxisReading
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, TomlValue, nearest
 from cmg_mj.inputs.files import find
@@ -42,10 +43,8 @@ from cmg_mj.scenario.plant_settings import COMPILED_FIELDS, FINEST_STEP_S, Plant
 from cmg_mj.scenario.schema import ObserverSettings
 from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.ideal import MultiAxisReading
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.stages.backlash import ARCMIN_A_DEGREE
 
 
 class Plant:

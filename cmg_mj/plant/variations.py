@@ -10,6 +10,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.errors import InputError
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.bend import step_for_bend
@@ -17,7 +18,6 @@ from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
-from cmg_mj.sensors.tilt import RadialTilt
 
 _INTEGRATORS = {
     "RK4": int(mujoco.mjtIntegrator.mjINT_RK4),

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmg_mj.controllers.dry_run import dry_run_observer
+from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.types import extra_signals, needs
 from cmg_mj.errors import InputError, raised
 from cmg_mj.inputs.users_line import in_users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
-from cmg_mj.observers.protocol import extra_signals, needs
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay.alignment import Alignment
 from cmg_mj.replay.logs import Log
@@ -34,7 +34,6 @@ from cmg_mj.results.frames import NamedColumns
 from cmg_mj.results.memory import release_free_memory
 from cmg_mj.results.stored_columns import LONG, ColumnStore, StoredColumns, shelved, stored
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
-from cmg_mj.sensors.tilt import TiltNoise
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -223,11 +222,6 @@ def _ready(
                 raise
             left_out[name] = f"refused: {error}"
             continue
-        try:
-            with np.errstate(all="ignore"):
-                dry_run_observer(observer, None)
-        except InputError as error:
-            raise InputError(f"observer {name!r}: {error}") from error
         ready[name] = observer
     if not ready:
         reasons = "; ".join(f"{name} {reason}" for name, reason in left_out.items())

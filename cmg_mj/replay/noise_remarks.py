@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
+from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.white_noise import WhiteNoise
 from cmg_mj.replay.user_noise import density_of, noise_in
 from cmg_mj.results.summary_keys import SummaryValue
-from cmg_mj.sensors.tilt import TiltNoise
 
 APART = 1.5
 """Ratio of the noise that is used and the noise that the log shows, from which it is reported."""

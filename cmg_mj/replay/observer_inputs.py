@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.errors import InputError
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay.log_replay import SETTLE_S, OnShare, ReplayResult, replay_log
@@ -16,7 +17,6 @@ from cmg_mj.scenario.design import design
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.sensors.tilt import TiltNoise
 
 
 class ObserverInputs(NamedTuple):

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from cmg_mj.core.types import extra_signals
 from cmg_mj.elementwise import Scalar
 from cmg_mj.observers import Estimate, Measurement, Observer
-from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.results.trajectory import ESTIMATES, Trajectory
 
 

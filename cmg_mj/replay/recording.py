@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cmg_mj.observers.protocol import BIAS
+from cmg_mj.core.types import BIAS
 from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import replay_markdown, shown_first

@@ -11,8 +11,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from cmg_mj.core.types import needs
 from cmg_mj.observers import OBSERVER_CLASSES
-from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import ReplayResult, describe_log
 from cmg_mj.replay.model_check import model_remark
 from cmg_mj.replay.noise_remarks import noise_figures, noise_remarks

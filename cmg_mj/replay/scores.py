@@ -12,7 +12,7 @@ from cmg_mj.replay.lag import lag
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.results.stored_columns import LONG, stretches
-from cmg_mj.scenario.disturbances import inside
+from cmg_mj.stages.push import inside
 
 RECONSTRUCTED_S = 1.0
 """Length of the stretches over which the estimated rate is integrated [s]."""

@@ -6,13 +6,14 @@ import dataclasses
 import math
 from collections.abc import Mapping
 
+from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.errors import InputError
 from cmg_mj.replay.logs import Log
 from cmg_mj.replay.logs.white_noise import LogNoise, WhiteNoise
 from cmg_mj.replay.parameter_options import numbers
-from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY, Accelerometer
+from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
-from cmg_mj.sensors.tilt import TiltNoise
 
 TILT_NOISE_DEG = 0.1
 """Assumed noise of a tilt from an unknown sensor: standard deviation of one sample [deg]."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.results.error_bounds import FLOORS
 from cmg_mj.results.fused_gyro import FusedGyro
 from cmg_mj.sensors.mems_gyro import MemsGyro
-from cmg_mj.sensors.noise_streams import NoiseStream, normals
 
 ZERO = "zero"
 MEMS_AS_BOUGHT, MEMS_GYRO, MEMS_FUSED = "mems_as_bought", "mems_gyro", "mems_fused"

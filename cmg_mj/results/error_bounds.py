@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from cmg_mj.sensors.tilt import TiltNoise
+from cmg_mj.core.tilt import TiltNoise
 
 FLOOR_Y1, FLOOR_ACCELERATION = "floor_y1", "floor_accel"
 FLOORS = (FLOOR_Y1, FLOOR_ACCELERATION)

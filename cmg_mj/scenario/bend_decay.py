@@ -8,15 +8,14 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.controller import Controller, PlantInterface
 from cmg_mj.controllers.make_controller import make_controller
+from cmg_mj.core.controller import Controller, PlantInterface
+from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.types import IdealReading
 from cmg_mj.elementwise import Scalar
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.linear_plant import BendModel
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.tilt import RadialTilt
 
 STARTS_RAD_S = (0.01, 0.05)
 """Tilt rates from which the motion has to decay: observers that are not linear answer to sizes."""

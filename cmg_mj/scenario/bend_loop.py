@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.laws.protocol import feedback_state
-from cmg_mj.controllers.notch import Notch
+from cmg_mj.core.types import Measurement, feedback_state
 from cmg_mj.elementwise import Scalar
-from cmg_mj.observers.protocol import Measurement
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.linear_plant import BendModel, Response
+from cmg_mj.stages.notch import Notch
 
 AMPLITUDE_RAD_S = 0.05
 """Amplitude of the tilt rate at the sensors: observers that are not linear answer to sizes."""

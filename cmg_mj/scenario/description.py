@@ -6,11 +6,10 @@ import shlex
 from collections.abc import Iterable, Iterator, Mapping
 
 from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
-from cmg_mj.controllers.laws.protocol import needs
+from cmg_mj.core.types import law_needs
 from cmg_mj.errors import TomlValue
 from cmg_mj.scenario.bend_cures import NEAR, Trial, cure_among, trials, try_loop
 from cmg_mj.scenario.design import Design
-from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.linear_plant import rk4_energy_loss
 from cmg_mj.scenario.omissions import omissions
 from cmg_mj.scenario.pivot_track import read_track
@@ -20,6 +19,7 @@ from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.scenario.sliding_pivot import IN_THE_MODEL, NOT_IN_THE_MODEL, sliding_words
 from cmg_mj.scenario.stability_check import bend_hint, closed_loop, hints, plant_hints
+from cmg_mj.stages.push import Push, Swing
 
 BEYOND: dict[BendBeyond, str] = {
     "sensors": "with the sensors; the modules, whose tilt and rate count as true, are before it",
@@ -156,7 +156,7 @@ def _law_rows(
     parameters = {name: value for name, value in fields.items() if name not in ControllerSettings.model_fields}
     if parameters:
         yield "", assignments(parameters)
-    yield "", inputs if needs(law) else "takes nothing of the observer, which is judged only"
+    yield "", inputs if law_needs(law) else "takes nothing of the observer, which is judged only"
     if notch:
         yield "", notch
     if controller.kind not in LAWS:

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.notch import Notch
+from cmg_mj.core.sensor import steps_until, whole_steps
+from cmg_mj.core.types import extra_signals
 from cmg_mj.errors import InputError, nearest, shortened
-from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.zero_order_hold import hold_matrices
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.linear_rig import LinearRig
 from cmg_mj.scenario.rest_slopes import Slopes, law_slopes, needed_states, observer_slopes
-from cmg_mj.sensors.accelerometer import INSIDE_HZ
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.timing import steps_until, whole_steps
+from cmg_mj.stages.low_pass import INSIDE_HZ
+from cmg_mj.stages.notch import Notch
 
 if TYPE_CHECKING:
     import control

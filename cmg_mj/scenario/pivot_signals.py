@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.elementwise import Scalar
 from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.pivot_track import read_track
-from cmg_mj.sensors.noise_streams import NoiseStream, normals
 
 POINTS_A_PERIOD = 40
 """Points of the noise in a period of its corner, between which it runs straight: its own grid, no sensor's."""

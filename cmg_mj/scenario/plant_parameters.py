@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from cmg_mj.core.tilt import RadialTilt, TiltNoise
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.scenario.linear_plant import BendModel, LinearPlant
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 
 
 class PlantParameters(NamedTuple):

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
-from cmg_mj.controllers.notch import Notch
 from cmg_mj.errors import InputError, shown
 from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
 from cmg_mj.scenario.bend_cures import Trial, try_loop
@@ -17,6 +16,7 @@ from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.sliding_pivot import sliding_hint
+from cmg_mj.stages.notch import Notch
 
 POOR_DAMPING = 0.4
 """A mode with a smaller damping ratio overshoots by more than a quarter."""

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
+from cmg_mj.core.sensor import whole_steps
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.types import OnGrid, marked_values
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.sensors.timing import whole_steps
 
 FINEST_S = 1e-4
 """A scenario whose rates and times leave only a smaller step than this must name the step itself [s]."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.elementwise import Scalar, digitise
+from cmg_mj.core.sensor import SampledSensor, Shown, Site
+from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.types import STRICT, Instant, NonNegative, Rate
-from cmg_mj.sensors.ideal import IdealReading
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -26,16 +26,13 @@ class Encoder:
     counts_per_revolution: NonNegative = 4096.0
     latency_s: Instant = 0.0
 
-    channels = 0
-
     @property
     def sample_sigma(self) -> float:
         """Standard deviation of one reading from the angle, by the resolution [rad]."""
         return 2.0 * math.pi / self.counts_per_revolution / math.sqrt(12.0) if self.counts_per_revolution else 0.0
 
-    def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Sequence[Scalar]]:
-        """Return a function (ideal reading, nothing) -> gimbal angles [rad]."""
-        if not self.counts_per_revolution:
-            return lambda ideal, normal: ideal.gimbals
-        step = 2.0 * math.pi / self.counts_per_revolution
-        return lambda ideal, normal: [digitise(angle, math.inf, step) for angle in ideal.gimbals]
+    def at_work(self, site: Site) -> SampledSensor[Sequence[Scalar]]:
+        """Start the encoders."""
+        step = 2.0 * math.pi / self.counts_per_revolution if self.counts_per_revolution else 0.0
+        stages = [Shown(math.inf, step)] if step else []
+        return SampledSensor(self.rate_hz, self.latency_s, site, lambda ideal: ideal.gimbals, stages)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from typing import Annotated
 
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.noise import NoiseStream
+from cmg_mj.core.sensor import SampledSensor, Site
+from cmg_mj.core.types import IdealReading
 from cmg_mj.elementwise import Scalar, clip, radians
 from cmg_mj.inputs.types import STRICT, Batched, Instant, NonNegative, Positive, Rate
-from cmg_mj.sensors.ideal import IdealReading
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -36,25 +37,31 @@ class Fog:
     range_deg_s: Positive = 490.0
     latency_s: Instant = 0.0
 
-    channels = 1
-
     @property
     def white_noise_sigma(self) -> float:
         """Standard deviation of one sample [rad/s]."""
         return radians(self.angle_random_walk_deg_rth) / 60.0 * math.sqrt(self.rate_hz)
 
-    def make_reading_function(self) -> Callable[[IdealReading, Sequence[Scalar]], Scalar]:
-        """Return a function (ideal reading, standard normals) -> tilt rate [rad/s]. It remembers its low-pass."""
-        sigma = self.white_noise_sigma
-        bias = math.radians(self.bias_deg_h) / 3600.0
-        limit = math.radians(self.range_deg_s)
+    def at_work(self, site: Site) -> SampledSensor[Scalar]:
+        """Start the gyro."""
+        return SampledSensor(self.rate_hz, self.latency_s, site, lambda ideal: ideal.gyro, [_FogSignal(self, site)])
+
+
+class _FogSignal:
+    """The gyro's low-pass, noise, offset and range."""
+
+    def __init__(self, part: Fog, site: Site) -> None:
+        self._noise = site.noise(NoiseStream.FOG, 1)
+        self._sigma = part.white_noise_sigma
+        self._bias = math.radians(part.bias_deg_h) / 3600.0
+        self._limit = math.radians(part.range_deg_s)
         # The share of a step that a first-order low-pass has taken after one sample period.
-        share = 1.0 - math.exp(-2.0 * math.pi * self.bandwidth_hz / self.rate_hz) if self.bandwidth_hz else 1.0
-        passed: Scalar = None
+        self._share = 1.0 - math.exp(-2.0 * math.pi * part.bandwidth_hz / part.rate_hz) if part.bandwidth_hz else 1.0
+        self._passed: Scalar = None
 
-        def measure(ideal: IdealReading, normal: Sequence[Scalar]) -> Scalar:
-            nonlocal passed
-            passed = ideal.gyro if passed is None else passed + share * (ideal.gyro - passed)
-            return clip(passed + bias + sigma * normal[0], -limit, limit)
-
-        return measure
+    def __call__(self, rate: Scalar, ideal: IdealReading) -> Scalar:
+        """Read a rate [rad/s]."""
+        before = self._passed
+        self._passed = passed = rate if before is None else before + self._share * (rate - before)
+        (normal,) = next(self._noise)
+        return clip(passed + self._bias + self._sigma * normal, -self._limit, self._limit)

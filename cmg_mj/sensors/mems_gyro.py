@@ -11,9 +11,9 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise
 from cmg_mj.elementwise import digitise
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
-from cmg_mj.sensors.flicker_noise import CORNERS_HZ, Flicker
 
 PIECE = 1000
 """Samples before the run that are made together, whatever the rate."""
@@ -137,7 +137,7 @@ class MemsGyro:
                 return np.fromiter(chain.from_iterable(samples), float).reshape(n, self.channels, 1)
             return np.array(samples)
 
-        flicker = Flicker(self.flicker_floor, dt, drawn(1)[0, 1:])
+        flicker = FlickerNoise(self.flicker_floor, dt, drawn(1)[0, 1:])
 
         def errors(n: int) -> np.ndarray:
             """Return the errors of the next n samples, (n, n_worlds) [rad/s]."""

@@ -9,7 +9,7 @@ from typing import NamedTuple, Unpack
 
 import numpy as np
 
-from cmg_mj.observers.protocol import extra_signals
+from cmg_mj.core.types import extra_signals
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.batch import BatchedObservers, BatchKey, PlantStructure, once, plant_structure

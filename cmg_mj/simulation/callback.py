@@ -9,11 +9,11 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.make_controller import AnyController
+from cmg_mj.core.axes import AnyController
+from cmg_mj.core.loop import ControlLoop
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.plant.plant import Plant
-from cmg_mj.simulation.control_loop import ControlLoop
 
 
 def control(plant: Plant, controller: AnyController, data: mujoco.MjData) -> bool:

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 import numpy as np
 import tomli_w
 
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law
-from cmg_mj.controllers.make_controller import AnyController
-from cmg_mj.controllers.multi_axis import MultiAxisController
 from cmg_mj.controllers.processor import Processor
+from cmg_mj.core.axes import AnyController, MultiAxisController
+from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import Observer
@@ -26,7 +25,6 @@ from cmg_mj.results.rerun_head import rerun_head
 from cmg_mj.results.result import Driver, Result
 from cmg_mj.results.wire import WireSettings
 from cmg_mj.scenario.design import Design, design
-from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.linear_loop import linear_closed_loop, require_model, require_rigid
 from cmg_mj.scenario.linear_rig import reduced_rig
 from cmg_mj.scenario.loading import base_of
@@ -49,6 +47,7 @@ from cmg_mj.simulation.batch import (
 )
 from cmg_mj.simulation.prepare import check_scenario, plant_on_grid
 from cmg_mj.simulation.simulate import SimulationOptions, simulate
+from cmg_mj.stages.push import Push
 
 if TYPE_CHECKING:
     import control
@@ -341,11 +340,6 @@ class Experiment:
             return hints(self.scenario, self.design, self.plant.parameters)
         return [f"{part.plant.axis.name}: {hint}" for part in self.axes for hint in part.hints]
 
-    def dry_run(self, worlds: int | None = None) -> None:
-        """Try every observer once, on floats or on arrays of so many worlds: see `Design.dry_run`."""
-        for part in self.parts:
-            part.design.dry_run(worlds)
-
     def resolved(self) -> dict[str, Any]:
         """Return the scenario with every default written out, and the versions it ran with, as TOML can hold it."""
         return resolved(self.scenario, {part.plant.axis.name: part.design for part in self.parts})
@@ -381,7 +375,7 @@ class Experiment:
 
 
 def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None = None) -> Experiment:
-    """Load the plant, construct everything and try the observers once, so that what does not fit is found before a run.
+    """Load the plant and construct everything, so that what does not fit is found before a run.
 
     Args:
         scenario: The scenario.

@@ -13,6 +13,11 @@ from typing import Any, Literal
 import mujoco
 import numpy as np
 
+from cmg_mj.core.loop import ControlLoop
+from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.outside import sampling_instants, with_moving_pivot, with_swing_torques
+from cmg_mj.core.sensor import whole_steps
+from cmg_mj.core.types import IdealReading
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.plant.moving_pivot import pivot_directions, with_own_model
 from cmg_mj.plant.mujoco_state import quiet
@@ -20,13 +25,8 @@ from cmg_mj.results.baselines import MEMS_GYRO
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.pivot_signals import PivotSignals
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.sensors.ideal import IdealReading
-from cmg_mj.sensors.noise_streams import NoiseStream, normals
-from cmg_mj.sensors.timing import whole_steps
-from cmg_mj.simulation.control_loop import ControlLoop
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.physics import OneWorld
-from cmg_mj.simulation.schedule import sampling_instants, with_moving_pivot, with_swing_torques
 
 try:
     import gymnasium

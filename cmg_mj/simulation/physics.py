@@ -11,11 +11,11 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from cmg_mj.controllers.controller import Tick
+from cmg_mj.core.controller import Tick
+from cmg_mj.core.types import IdealReading, MultiAxisReading
 from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.tilt_line import apply_torques
-from cmg_mj.sensors.ideal import IdealReading, MultiAxisReading
 
 Joints = Sequence[Scalar] | np.ndarray
 """Joint angles or rates: a list of floats, or an array (n, n_worlds)."""

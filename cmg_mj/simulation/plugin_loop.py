@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import mujoco
 
-from cmg_mj.controllers.controller import Controller
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.loop import ControlLoop
+from cmg_mj.core.runners import as_estimate
 from cmg_mj.errors import RunStopped
-from cmg_mj.observers.runner import as_estimate
 from cmg_mj.plant.plugin_model import INSTANCE
 from cmg_mj.plant.plugin_state import FAILED, STATUS, instance_states
-from cmg_mj.simulation.control_loop import ControlLoop
 from cmg_mj.simulation.physics import OneWorld
 
 

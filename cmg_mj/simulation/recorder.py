@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cmg_mj.controllers.controller import Controller, Tick
+from cmg_mj.core.controller import Controller, Tick
 from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import References

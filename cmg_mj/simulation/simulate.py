@@ -10,10 +10,13 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.make_controller import AnyController
+from cmg_mj.core.axes import AnyController
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.loop import ControlLoop, Ending
+from cmg_mj.core.outside import sampling_instants, with_moving_pivot, with_swing_torques
+from cmg_mj.core.sensor import whole_steps
+from cmg_mj.core.types import BIAS
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.observers.protocol import BIAS
 from cmg_mj.plant.moving_pivot import pivot_directions, refuse_other_forces, with_own_model
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.plant import Plant
@@ -22,18 +25,15 @@ from cmg_mj.results.error_bounds import Floors
 from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.result import Driver, Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
-from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.pivot_signals import PivotSignals
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.sensors.timing import whole_steps
 from cmg_mj.simulation.batch_values import split_values
 from cmg_mj.simulation.callback import CallbackLoop, control_callback
-from cmg_mj.simulation.control_loop import ControlLoop, Ending
 from cmg_mj.simulation.physics import ManyWorlds, OneWorld
 from cmg_mj.simulation.plugin_loop import PluginLoop
 from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
-from cmg_mj.simulation.schedule import sampling_instants, with_moving_pivot, with_swing_torques
+from cmg_mj.stages.push import Push, Swing
 
 DIVERGED_TILT = 2.0 * math.pi
 """No plant that stood at one instant lies a whole turn farther at the next one: it has diverged [rad]."""

@@ -35,9 +35,9 @@ from cmg_mj.results.error_bounds import TiltFloor
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
-from cmg_mj.scenario.disturbances import inside, push_windows
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.stages.push import inside, push_windows
 
 SEED, TUNING_SEED, TUNING_WORLDS = 70_000, 71_000, 10
 OBSERVERS = tuple(name for name in BUNDLED if name != "free_pivot")

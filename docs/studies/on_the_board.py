@@ -17,8 +17,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmg_mj.codegen.board import Board, on_a_board
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.processor import Decision
+from cmg_mj.core.controller import Controller
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.intervals import format_interval, in_line, known_interval
 from cmg_mj.results.markdown import table

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmg_mj.core.types import needs
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS
-from cmg_mj.observers.protocol import needs
 from cmg_mj.results.summary_keys import open_loop_figures
 from tests.acceptance.cases import GROUP, closed_loop, open_loop_run
 

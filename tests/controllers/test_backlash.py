@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from cmg_mj.controllers.backlash import Backlash
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.stages.backlash import Backlash
 
 DT = 0.005
 

@@ -12,8 +12,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.controllers.controller import TAKEOVER_TICKS, Controller, PlantInterface
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, lqr_gains
+from cmg_mj.core.controller import Controller, PlantInterface
+from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.types import IdealReading
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.results.trajectory import Trajectory
@@ -21,10 +23,7 @@ from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.fog import Fog
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
 from tests.observers.reference import DT, GRAVITY_TORQUE, J1, J2, PAPER
 from tests.plant import paper_model as paper
@@ -367,24 +366,11 @@ def test_extra_signals_follow_the_state() -> None:
     ]
 
 
-def test_signals_that_are_not_declared_are_left_out() -> None:
-    result = ticks(controller(Script(lambda k: (0.1, 0.2, 0.3, 0.4))))
-    assert [tuple(tick.estimates[0]) for tick in result[1:]] == [(0.1, 0.2, 0.3)] * 3
-
-
 def test_a_declared_signal_that_is_missing_or_nan_stops_the_run() -> None:
-    with pytest.raises(RunStopped, match="has 4 parts, not 5"):
+    with pytest.raises(RunStopped, match="bias_rad"):
         ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4))))
     with pytest.raises(RunStopped, match="returned nan for bias_rad"):
         ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, math.nan))))
-
-
-@pytest.mark.parametrize("names", ["bias_rad", ("x1_rad",), ("a", "a"), ("Bias",), (3,), ("a/b",)])
-def test_names_of_signals_are_checked(names: Any) -> None:
-    observer: Any = Script(ESTIMATES.__getitem__)
-    observer.extra_signals = names
-    with pytest.raises(ValueError, match="extra_signals must be a tuple of names"):
-        controller(observer)
 
 
 def test_trim_holds_the_integrator_where_the_bias_asks_for_it() -> None:
@@ -453,17 +439,9 @@ def test_an_observer_that_raises_stops_the_run_by_name() -> None:
     def fail(k: int) -> Estimate:
         raise ZeroDivisionError("no gain")
 
-    with pytest.raises(RunStopped, match=r"observer Script raised ZeroDivisionError: no gain at t = 0\.005 s") as info:
+    with pytest.raises(RunStopped, match=r"observer Script .*0\.005 s(.|\n)*ZeroDivisionError: no gain") as info:
         ticks(controller(Script(fail)))
     assert isinstance(info.value.__cause__, ZeroDivisionError)
-
-
-@pytest.mark.parametrize(
-    "estimate", [(0.0, np.float64(0.1), 0.0), np.array([0.0, 0.1, 0.0]), (0, 0.1, 0), (0.0, 0.1, 0.0, "more")]
-)
-def test_a_users_estimate_may_be_anything_with_three_numbers(estimate: Any) -> None:
-    tick = ticks(controller(Script(lambda k: estimate)))[1]
-    assert tick.u == pytest.approx(-(35.0 * 0.02 + 4.0 * 0.1 - 0.1), rel=1e-9)
 
 
 # --- in the loop ---------------------------------------------------------------------------------------------
@@ -520,83 +498,14 @@ def test_gimbals_move_oppositely_at_the_commanded_rate() -> None:
     np.testing.assert_allclose(first[100:], setpoint[100:], atol=2e-2)
 
 
-# --- something else while it runs --------------------------------------------------------------------------
-
-
-def test_another_observer_is_open_loop_first_and_takes_over() -> None:
-    """The command is the one's until the other takes over, which began with the next sample and knows its held u."""
-    one, other = Script(lambda k: Estimate(0.0, 1.0, 0.0)), Script(lambda k: Estimate(0.0, -1.0, 0.0))
-    loop = controller(one)
-    rates = []
-    for k in range(3 + TAKEOVER_TICKS + 5):
-        if k == 3:
-            loop.swap_components(observer=other)
-        loop.update(5 * k, READINGS[k % 4])
-        assert loop.tick is not None
-        rates.append(loop.tick.estimates[0][1])
-    assert rates == [0.0, *[1.0] * (2 + TAKEOVER_TICKS), *[-1.0] * 5]
-    assert len(one.calls) == 2 + TAKEOVER_TICKS
-    assert len(other.calls) == TAKEOVER_TICKS + 4
-    assert other.calls == [*one.calls[3:], *other.calls[TAKEOVER_TICKS - 1 :]]
-
-
-def test_it_takes_over_at_once_from_one_that_fails() -> None:
-    def fail_later(k: int) -> Estimate:
-        if k > 4:
-            raise KeyError("gone")
-        return Estimate(0.0, 1.0, 0.0)
-
-    loop = controller(Script(fail_later))
-    rates = []
-    for k in range(9):
-        if k == 3:
-            loop.swap_components(observer=Script(lambda k: Estimate(0.0, -1.0, 0.0)))
-        loop.update(5 * k, READINGS[0])
-        assert loop.tick is not None
-        rates.append(loop.tick.estimates[0][1])
-    assert rates == [0.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
-
-
-def test_before_the_first_tick_an_observer_is_exchanged_at_once() -> None:
-    loop = controller(Script(lambda k: Estimate(0.0, 1.0, 0.0)))
-    loop.swap_components(observer=Script(ESTIMATES.__getitem__))
-    assert [tick.estimates[0] for tick in ticks(loop)][1:] == ESTIMATES[1:]
-
-
-def test_law_and_feedback_change_with_the_integrator_as_it_was() -> None:
-    loop = controller(Script(ESTIMATES.__getitem__))
-    loop.update(0, READINGS[0])
-    loop.update(5, READINGS[1])
-    other = StateFeedback(DT, (30.0, 3.0, -0.5, 0.1))
-    loop.swap_components(law=other, feedback="truth")
+def test_it_goes_on_with_the_integrator_and_the_command_of_another() -> None:
+    before = controller(Script(ESTIMATES.__getitem__))
+    ticks(before, READINGS[:2])
+    assert before.tick is not None
+    law = StateFeedback(DT, (30.0, 3.0, -0.5, 0.1))
+    loop = controller(Script(ESTIMATES.__getitem__), law, feedback="truth")
+    loop.continue_from(before)
+    assert loop.gimbal_rate == before.gimbal_rate
     loop.update(10, READINGS[2])
     assert loop.tick is not None
-    assert loop.tick.x_e == pytest.approx(-DT * 0.1)
-    assert loop.tick.u == other(loop.tick.y1, 0.7, loop.tick.y2, loop.tick.x_e)[0]
-
-
-def test_sensors_start_afresh_between_their_samples_too() -> None:
-    """Other sensors have something to show at the next tick, though none of theirs is due."""
-    slow = Sensors(
-        Accelerometer(rate_hz=50.0, noise_density_ug_rthz=0.0, counts_per_g=0.0),
-        IDEAL_SENSORS.encoder,
-        IDEAL_SENSORS.fog,
-    )
-    loop = controller(Script(lambda k: Estimate(0.0, 0.0, 0.0)))
-    loop.sensors = slow
-    loop.reset()
-    loop.update(0, READINGS[0])
-    loop.update(5, READINGS[1])
-    assert loop.tick is not None
-    assert loop.tick.y1 == pytest.approx(0.01)
-    loop.swap_components(sensors=Sensors(Accelerometer(rate_hz=50.0, bias_mg=(1.0, 1.0)), slow.encoder, slow.fog))
-    loop.update(10, READINGS[2])
-    assert loop.tick.y1 != pytest.approx(0.01, abs=0.005)
-
-
-def test_rates_stay_while_it_runs() -> None:
-    loop = controller(Script(ESTIMATES.__getitem__))
-    with pytest.raises(InputError, match=r"controller.rate_hz: stays 200 Hz"):
-        loop.swap_components(law=StateFeedback(0.01))
-    with pytest.raises(InputError, match="sensors: their rates stay"):
-        loop.swap_components(sensors=Sensors(Accelerometer(rate_hz=1000.0)))
+    assert loop.tick.x_e == pytest.approx(before.tick.x_e - DT * before.tick.y2)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, load_scenario, prepare
-from cmg_mj.controllers.notch import DEPTH_DAMPING, WIDTH_DAMPING, Notch
+from cmg_mj.stages.notch import DEPTH_DAMPING, WIDTH_DAMPING, Notch
 
 DT = 0.005
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import cmg_mj
+from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.observers.free_pivot import FreePivot, State
-from cmg_mj.sensors.tilt import TiltNoise
 from tests.observers.double_integrator import integrator_rows
 from tests.observers.reference import DT, NOISE, PAPER
 from tests.observers.test_gyro_free import gyro_free, motion

@@ -10,8 +10,8 @@ import pytest
 
 from cmg_mj.controllers.laws import scaled_gains
 from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS
+from cmg_mj.core.types import extra_signals
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
-from cmg_mj.observers.protocol import extra_signals
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.observers.scaling import PURE, TORQUE, UNITS, Owner, Scales, Unit, scale_value, scaled_parameters, scales_of
 from tests.observers.reference import DT, HEAVY, NOISE, PAPER, rough_signals

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj.controllers.backlash import Backlash
 from cmg_mj.papers.sokolov2019 import backlash
 from cmg_mj.papers.sokolov2019.cycles import cycles
 from cmg_mj.papers.sokolov2019.gap_prediction import describing_function
 from cmg_mj.papers.sokolov2019.rig import experiment
+from cmg_mj.stages.backlash import Backlash
 
 
 @pytest.mark.parametrize("c", [-0.9, -0.3, 0.0, 0.6])

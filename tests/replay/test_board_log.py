@@ -14,10 +14,10 @@ import pytest
 from cmg_mj.codegen.board.frames import Frame
 from cmg_mj.codegen.board.identity import Identity
 from cmg_mj.codegen.board.log_file import read_board_log
+from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.errors import InputError
 from cmg_mj.replay.logs import ReadOptions, table
 from cmg_mj.replay.logs.reading import read_log
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from tests.command import cmg_mj
 
 PAIR = GimbalAngle((1.0, -1.0), (1.5, 1.5))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
+from cmg_mj.core.tilt import RadialTilt, TiltNoise
 from cmg_mj.replay.log_replay import replay_log
 from cmg_mj.replay.logs import Log, ReadOptions, read_log
 from cmg_mj.replay.logs.columns import ACCELEROMETERS
@@ -20,7 +21,6 @@ from cmg_mj.replay.observer_inputs import replay_prepared
 from cmg_mj.replay.report import table_note
 from cmg_mj.replay.user_noise import noise_in, noise_of
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 from cmg_mj.studies.tuning import figures_of_logs, tune_on_logs
 from tests.command import cmg_mj
 from tests.replay.logs.motion import COLUMNS, DT, N, sine, write_csv

@@ -14,8 +14,9 @@ import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
 from cmg_mj.cli.logs import replay
+from cmg_mj.core.tilt import RadialTilt, TiltNoise
+from cmg_mj.core.types import needs
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement, make_observer
-from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import NO_MODEL, replay_log
 from cmg_mj.replay.logs import Log, ReadOptions, read_log
 from cmg_mj.replay.observer_inputs import observer_inputs, replay_prepared
@@ -23,7 +24,6 @@ from cmg_mj.replay.parameter_options import parameters_of
 from cmg_mj.replay.user_noise import noise_numbers, noise_of
 from cmg_mj.replay.user_pendulum import model_of
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 from cmg_mj.studies.save import report_run, save_run
 from cmg_mj.studies.tuning import tune_on_logs
 from tests.observers.reference import PAPER
@@ -153,16 +153,6 @@ def test_one_that_is_lost_is_said_and_the_others_go_on(tmp_path: Path) -> None:
     assert "x2_rad_s is not finite from 0.05 s on" in result.left_out["tests.replay.test_replayed:Loses"]
     reason = result.left_out["tests.replay.test_replayed:Raises"]
     assert re.fullmatch(r"raised ZeroDivisionError: .* \(test_replayed\.py, line \d+\).*", reason)
-
-
-def test_one_that_cannot_begin_is_named_with_its_line(tmp_path: Path) -> None:
-    """Also by `tune-log`, which replays the log before it tunes."""
-    name = "tests.replay.test_replayed:RaisesAtOnce"
-    expected = rf"^observer '{name}': step\(state, y, u\) raised ValueError: x \(test_replayed\.py, line \d+\)$"
-    with pytest.raises(InputError, match=expected):
-        replay_log(log(tmp_path), ["linear", name])
-    with pytest.raises(InputError, match=expected):
-        tune_on_logs([log(tmp_path)], name)
 
 
 class Loses:

@@ -10,9 +10,9 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 from scipy.signal import lfilter
 
+from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.results.error_bounds import ROWS_A_TAP, TiltFloor, acceleration_floor
-from cmg_mj.sensors.tilt import TiltNoise
 from tests.observers.reference import DT, NOISE, PAPER
 
 WHOLE = 2000

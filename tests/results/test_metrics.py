@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.results.metrics import Metrics, TickBlock
-from cmg_mj.scenario.disturbances import Push, push_windows
 from cmg_mj.scenario.schema import MetricsSettings
+from cmg_mj.stages.push import Push, push_windows
 
 DT = 0.01
 DEG = math.radians(1.0)

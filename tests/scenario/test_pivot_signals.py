@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cmg_mj.core.noise import NoiseStream
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.pivot_signals import BandLimitedNoise, PivotSignals, pivot_signal
 from cmg_mj.scenario.pivot_track import read_track
-from cmg_mj.sensors.noise_streams import NoiseStream
 
 H = 0.005
 STREAM = NoiseStream.PIVOT

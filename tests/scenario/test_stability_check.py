@@ -11,9 +11,9 @@ import pytest
 
 from cmg_mj import load_plant, load_scenario, prepare
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, closed_loop_poles
-from cmg_mj.controllers.notch import Notch
 from cmg_mj.inputs.files import bundled, folder
 from cmg_mj.scenario.stability_check import Loop, _hold, closed_loop
+from cmg_mj.stages.notch import Notch
 from tests.command import cmg_mj
 
 pytestmark = pytest.mark.usefixtures("elsewhere")

@@ -15,18 +15,18 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, welch
 
-from cmg_mj.controllers.controller import Controller
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.noise import NoiseStream
+from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.types import IdealReading
 from cmg_mj.errors import InputError
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.ideal import IdealReading
-from cmg_mj.sensors.low_pass import noise_gain
-from cmg_mj.sensors.noise_streams import NoiseStream
-from cmg_mj.sensors.sampled import Sensors, sampled_sensors
-from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.simulation.experiment import prepare
-from tests.sensors.test_sampled import G, assert_sigma
+from cmg_mj.stages.low_pass import noise_gain
+from tests.sensors.test_sampled import G, assert_sigma, measuring
 
 QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
 TILT = RadialTilt(0.06717514421272202, 0.20152543263816603)
@@ -40,7 +40,7 @@ def ideal(forces: Any) -> IdealReading:
 
 def read_forces(forces: Any, **errors: Any) -> np.ndarray:
     """Read specific forces, (4,), with parts without noise."""
-    return np.array(Accelerometer(**QUIET, **errors).make_reading_function()(ideal(forces), (0.0,) * 4))
+    return np.array(measuring(Accelerometer(**QUIET, **errors))(ideal(forces)))
 
 
 def deliver(
@@ -51,7 +51,7 @@ def deliver(
     worlds: int | list[int] = 0,
 ) -> np.ndarray:
     """The first n samples that a pair delivers of forces over time, as the controller has it work, (n, 4, ...)."""
-    pair = sampled_sensors(Sensors(accelerometer=sensor), timestep, 7, worlds)[0]
+    pair = Sensors(accelerometer=sensor).at_work(timestep, 7, worlds)[0]
     result = []
     for step in range(0, n * pair.period, pair.steps_per_sample):
         pair.sample(step, ideal(forces(step * timestep)))

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from cmg_mj.core.noise import normals
+from cmg_mj.core.sensor import Site
+from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.types import IdealReading
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.fog import Fog
-from cmg_mj.sensors.ideal import IdealReading
-from cmg_mj.sensors.noise_streams import normals
-from cmg_mj.sensors.sampled import SampledSensor
-from cmg_mj.sensors.tilt import RadialTilt
 from cmg_mj.simulation.experiment import prepare
 
 G = 9.80665
@@ -30,10 +30,22 @@ QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
 N = 20_000
 
 
+def measuring(part: Any, noise: Any = lambda stream, channels: itertools.repeat((0.0,) * channels)) -> Any:
+    """A part that takes a sample whenever it is called with an ideal reading; by default without noise."""
+    sensor, steps = part.at_work(Site("sensors", 1.0 / part.rate_hz, noise)), itertools.count()
+
+    def measure(ideal: IdealReading) -> Any:
+        step = next(steps)
+        sensor.sample(step, ideal)
+        return sensor.read(step)
+
+    return measure
+
+
 def readings(sensor: Any, n: int, seed: int = 0, world: int = 0, ideal: IdealReading = READING_AT_REST) -> np.ndarray:
     """n samples of one world, (n, channels)."""
-    measure, noise = sensor.make_reading_function(), normals(seed, world, 0, sensor.channels)
-    return np.array([np.atleast_1d(measure(ideal, next(noise))) for _ in range(n)])
+    measure = measuring(sensor, lambda stream, channels: normals(seed, world, 0, channels))
+    return np.array([np.atleast_1d(measure(ideal)) for _ in range(n)])
 
 
 def assert_sigma(values: np.ndarray, sigma: float) -> None:
@@ -131,19 +143,16 @@ def test_accelerometer_bias_and_equilibrium_bias_move_the_loop_alike() -> None:
 def test_encoder_shows_the_nearest_count(encoder: Encoder, counts: int) -> None:
     """12 bits (AS5045), and another resolution."""
     step = 2.0 * math.pi / counts
-    measure = encoder.make_reading_function()
+    measure = measuring(encoder)
     for angle in np.linspace(-2.0, 2.0, 1001).tolist():
-        readings = measure(IdealReading((), [angle, 0.5 * angle], 0.0, 0.0), ())
+        readings = measure(IdealReading((), [angle, 0.5 * angle], 0.0, 0.0))
         for ideal, reading in zip((angle, 0.5 * angle), readings, strict=True):
             assert abs(reading - ideal) <= step / 2.0 * (1.0 + 1e-9)
             assert reading / step == pytest.approx(round(reading / step), abs=1e-9)
 
 
 def test_encoder_without_resolution_is_ideal() -> None:
-    assert Encoder(counts_per_revolution=0.0).make_reading_function()(IdealReading((), [0.1, 0.2], 0.0, 0.0), ()) == [
-        0.1,
-        0.2,
-    ]
+    assert measuring(Encoder(counts_per_revolution=0.0))(IdealReading((), [0.1, 0.2], 0.0, 0.0)) == [0.1, 0.2]
 
 
 # --- fibre-optic gyro --------------------------------------------------------------------------------------
@@ -187,16 +196,16 @@ def test_fog_bias_and_range() -> None:
 )
 def test_fog_step_response(arguments: dict[str, Any], bandwidth_hz: float, rate_hz: float) -> None:
     """A first-order low-pass: 1 - exp(-2 pi f t), the step coming right after the sample at t = 0."""
-    measure = Fog(angle_random_walk_deg_rth=0.0, **arguments).make_reading_function()
-    reading = [measure(IdealReading((), [], 0.0 if k == 0 else 1.0, 0.0), (0.0,)) for k in range(30)]
+    measure = measuring(Fog(angle_random_walk_deg_rth=0.0, **arguments))
+    reading = [measure(IdealReading((), [], 0.0 if k == 0 else 1.0, 0.0)) for k in range(30)]
     t = np.arange(30) / rate_hz
     np.testing.assert_allclose(reading, 1.0 - np.exp(-2.0 * math.pi * bandwidth_hz * t), rtol=1e-12, atol=1e-14)
 
 
 def test_fog_without_bandwidth_shows_the_step_at_once_and_starts_settled() -> None:
-    quick = Fog(bandwidth_hz=0.0, angle_random_walk_deg_rth=0.0).make_reading_function()
-    assert [quick(IdealReading((), [], rate, rate), (0.0,)) for rate in (0.3, -0.2)] == [0.3, -0.2]
-    assert Fog(angle_random_walk_deg_rth=0.0).make_reading_function()(IdealReading((), [], 0.3, 0.3), (0.0,)) == 0.3
+    quick = measuring(Fog(bandwidth_hz=0.0, angle_random_walk_deg_rth=0.0))
+    assert [quick(IdealReading((), [], rate, rate)) for rate in (0.3, -0.2)] == [0.3, -0.2]
+    assert measuring(Fog(angle_random_walk_deg_rth=0.0))(IdealReading((), [], 0.3, 0.3)) == 0.3
 
 
 # --- rates and latency -------------------------------------------------------------------------------------
@@ -204,7 +213,9 @@ def test_fog_without_bandwidth_shows_the_step_at_once_and_starts_settled() -> No
 
 def read_gyro(sensor: Fog, timestep: float, steps: int, read_every: int) -> list[float]:
     """Readings of a gyro, at control ticks, of a rate that is the number of the physics step."""
-    sampled_gyro = SampledSensor(sensor, timestep, normals(0, 0, 2, 1), "sensors.fog", sensor.make_reading_function())
+    sampled_gyro = sensor.at_work(
+        Site("sensors.fog", timestep, lambda stream, channels: normals(0, 0, stream, channels))
+    )
     reading = []
     for step in range(steps):
         if step % sampled_gyro.period == 0:

@@ -9,10 +9,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.tilt import RadialTilt
 from tests.plant.full_model import states
+from tests.sensors.test_sampled import measuring
 
 N_STATES = 1_000
 
@@ -103,6 +104,6 @@ def test_apparent_bias_is_what_the_tilt_at_rest_lacks(errors: dict[str, Any]) ->
     accelerometer = Accelerometer(noise_density_ug_rthz=0.0, counts_per_g=0.0, **errors)
     data = plant.new_data()
     ideal = plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist())
-    reading = plant.radial_tilt(*accelerometer.make_reading_function()(ideal, (0.0, 0.0, 0.0, 0.0)))
+    reading = plant.radial_tilt(*measuring(accelerometer)(ideal))
 
     assert plant.apparent_bias(accelerometer) == pytest.approx(-reading, abs=1e-9)

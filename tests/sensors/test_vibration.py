@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.types import STANDARD_GRAVITY, IdealReading
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY, Accelerometer
-from cmg_mj.sensors.ideal import IdealReading
-from cmg_mj.sensors.noise_streams import NoiseStream, normals
-from cmg_mj.sensors.sampled import Sensors, sampled_sensors
-from cmg_mj.sensors.vibration import BroadbandVibration, WheelTones
+from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.stages.vibration import BroadbandVibration, WheelTones
 
 MG = 1e-3 * STANDARD_GRAVITY
 SILENT = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
@@ -31,7 +31,7 @@ def readings(
     n: int, worlds: int | Sequence[int] = 0, rates: Sequence[float] = (), h: float = 0.005, **fields: object
 ) -> np.ndarray:
     """n samples of accelerometers at rest, weightless and otherwise perfect."""
-    pair, _, _ = sampled_sensors(Sensors(Accelerometer(**{**SILENT, **fields})), h, 0, worlds)
+    pair, _, _ = Sensors(Accelerometer(**{**SILENT, **fields})).at_work(h, 0, worlds)
     forces = (0.0,) * 4 if isinstance(worlds, int) else np.zeros((4, len(worlds)))
     wheels = [rate if isinstance(worlds, int) else np.full(len(worlds), rate) for rate in rates]
     taken = []

@@ -165,4 +165,4 @@ def test_an_observer_that_raises_stops_its_own_run_alone() -> None:
         ["stopped"] * 2,
         ["done"] * 2,
     ]
-    assert "raised ValueError: enough" in actual[1].outcomes[0].reason
+    assert "ValueError: enough" in actual[1].outcomes[0].reason

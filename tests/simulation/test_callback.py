@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from mujoco import rollout
 
-from cmg_mj.controllers.controller import Controller
+from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement
 from cmg_mj.observers.reduced_model import ReducedModel
@@ -356,7 +356,7 @@ def test_a_rig_loads_while_a_callback_is_installed() -> None:
 def test_an_exception_comes_out_of_mj_step_and_takes_the_callback_out() -> None:
     setup, controller, calls = count_steps("observer.fail_at=7")
     plant, data = setup.plant, setup.plant.new_data()
-    message = r"Counted raised KeyError: 'lost' at t = 0\.035 s"
+    message = r"Counted .*0\.035 s(.|\n)*KeyError: 'lost'"
     with other_callback_function():
         with pytest.raises(RunStopped, match=message) as info, control_callback(plant, controller):
             mujoco.mj_step(plant.model, data, 400)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from cmg_mj.controllers.controller import Tick
+from cmg_mj.core.controller import Tick
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare

@@ -9,17 +9,17 @@ import mujoco
 import numpy as np
 import pytest
 
+from cmg_mj.core.outside import sampling_instants, with_moving_pivot
+from cmg_mj.core.types import IdealReading
 from cmg_mj.errors import InputError
 from cmg_mj.plant.moving_pivot import pivot_directions, with_own_model
 from cmg_mj.results.summary_keys import section
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.pivot_signals import PivotSignals
-from cmg_mj.sensors.ideal import IdealReading
 from cmg_mj.simulation.callback import control
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.physics import OneWorld
-from cmg_mj.simulation.schedule import sampling_instants, with_moving_pivot
 from tests.command import cmg_mj
 from tests.simulation.driven_base import DrivenBase
 

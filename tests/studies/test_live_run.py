@@ -23,9 +23,9 @@ from rerun.chunk import RrdReader
 from cmg_mj.cli.live import factor_of
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.stages.push import Push
 from cmg_mj.studies.live_run import LiveRun, RealTimeClock, shown_before
 from cmg_mj.studies.save import report_run, save_run
 from cmg_mj.visualization.recording import viewer

@@ -13,8 +13,8 @@ from cmg_mj.codegen.board.deploy import temporary_export
 from cmg_mj.codegen.board.image import build, flash_of
 from cmg_mj.codegen.board.qemu import Board, Cost
 from cmg_mj.codegen.board.tools import require
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.processor import Processor
+from cmg_mj.core.controller import Controller
 from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import load_scenario

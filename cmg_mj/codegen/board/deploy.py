@@ -14,7 +14,7 @@ from cmg_mj.codegen.board.qemu import Board
 from cmg_mj.codegen.board.tools import require
 from cmg_mj.codegen.export import export
 from cmg_mj.codegen.export.names import name_of
-from cmg_mj.controllers.controller import Controller
+from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError
 
 

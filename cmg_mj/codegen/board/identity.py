@@ -8,9 +8,9 @@ import zlib
 from dataclasses import dataclass
 
 from cmg_mj.codegen.board.frames import LONGEST, Frame
-from cmg_mj.controllers.controller import Controller
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.errors import InputError, shortened, shown
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
 
 FIRMWARE_NAME = "cmg_mj"
 FIRMWARE_VERSION = 2

@@ -6,7 +6,7 @@ from cmg_mj.codegen.board.identity import identity_of
 from cmg_mj.codegen.board.image import FIRMWARE, FLAGS, MACHINES, macros_of
 from cmg_mj.codegen.board.ports import BAUD
 from cmg_mj.codegen.board.tools import COMPILER, EMULATOR
-from cmg_mj.controllers.controller import Controller
+from cmg_mj.core.controller import Controller
 
 EMULATED_PORT = 5555
 """TCP port of the emulated board that `make emulate` starts."""

@@ -23,8 +23,8 @@ from cmg_mj.codegen.board.serial_line import Closed
 from cmg_mj.codegen.export import generate_code
 from cmg_mj.codegen.export.names import name_of
 from cmg_mj.codegen.export.refusals import refuse_unexported
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.processor import Decision, Processor
+from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import Summary

@@ -10,7 +10,7 @@ from cmg_mj.codegen.engine_plugin.build import COMMON_SOURCES, common_files
 from cmg_mj.codegen.engine_plugin.rig import PluginRig
 from cmg_mj.codegen.engine_plugin.tables import format_controller, format_rig
 from cmg_mj.codegen.export import generate_code
-from cmg_mj.controllers.controller import Controller
+from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError
 
 NAMES_IN_USE = frozenset(

@@ -9,13 +9,14 @@ from typing import NamedTuple, TypedDict
 
 import numpy as np
 
-from cmg_mj.sensors.accelerometer import INSIDE_HZ, STANDARD_GRAVITY, Accelerometer
+from cmg_mj.core.noise import CORNERS_HZ, NoiseStream, spread_of
+from cmg_mj.core.sensor import steps_until, whole_steps
+from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
-from cmg_mj.sensors.flicker_noise import CORNERS_HZ, spread_of
 from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.mems_gyro import PIECE, MemsGyro
-from cmg_mj.sensors.noise_streams import NoiseStream
-from cmg_mj.sensors.timing import steps_until, whole_steps
+from cmg_mj.stages.low_pass import INSIDE_HZ
 
 
 def steps_of(duration: float, timestep: float) -> int:
@@ -156,12 +157,7 @@ def describe_pair(sensor: Accelerometer, axis: int, clock: Clock) -> Pair:
 
 def _weights(sensor: Accelerometer) -> tuple[list[float], list[float], list[float]]:
     """Compute each channel's weights of its own and the other axis, and its offset: see `constant_errors`."""
-    same, other = [], []
-    parts = zip(sensor.scale_error, sensor.misalignment_deg, sensor.cross_axis, strict=True)
-    for scale, misalignment, cross in parts:
-        c, s = math.cos(math.radians(misalignment)), math.sin(math.radians(misalignment))
-        same += [(1.0 + scale) * (c + cross * s), (1.0 + scale) * (c - cross * s)]
-        other += [(1.0 + scale) * (cross * c - s), (1.0 + scale) * (cross * c + s)]
+    same, other = sensor.mounting_weights()
     inner, outer = sensor.bias
     return same, other, [inner, 0.0, outer, 0.0]
 

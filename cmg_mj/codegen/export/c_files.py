@@ -15,7 +15,7 @@ from cmg_mj.codegen.export.header_comment import class_path, format_header_comme
 from cmg_mj.codegen.export.law_code import LawPrinter, function_head
 from cmg_mj.codegen.export.names import estimate_places
 from cmg_mj.codegen.export.trace import Traced
-from cmg_mj.controllers.controller import Controller
+from cmg_mj.core.controller import Controller
 
 TYPES = {"double": "double", "single": "float"}
 

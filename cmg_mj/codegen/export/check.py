@@ -20,8 +20,8 @@ from cmg_mj.codegen.export.constants import Constants
 from cmg_mj.codegen.export.source_location import LawNotExportable
 from cmg_mj.codegen.export.trace import Traced
 from cmg_mj.codegen.export.traced_law import law_arguments
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import StateFeedback
+from cmg_mj.core.controller import Controller
 from cmg_mj.elementwise import clip
 from cmg_mj.errors import InputError, RunStopped
 

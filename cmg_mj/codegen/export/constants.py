@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law, StateFeedback
+from cmg_mj.core.controller import Controller
 
 
 class Constant(NamedTuple):

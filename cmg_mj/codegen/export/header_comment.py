@@ -10,11 +10,11 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from cmg_mj.codegen.export.c_code import Precision
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import LAW_CLASSES, Law, StateFeedback
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.types import Observer
 from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.observers import OBSERVER_CLASSES
-from cmg_mj.observers.protocol import Observer
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from cmg_mj.codegen.export.c_identifiers import RESERVED, identifiers, spell_in_c
+from cmg_mj.core.types import Observer
 from cmg_mj.errors import InputError, shown
-from cmg_mj.observers.protocol import Observer
 from cmg_mj.observers.registry import OBSERVERS
 
 MACROS = ("H", "ENCODERS", "ESTIMATES", "TEST_VECTOR_H", "TICKS", "OK", "INPUT_NOT_FINITE", "RESULT_NOT_FINITE")

@@ -18,11 +18,10 @@ from cmg_mj.codegen.export.names import export_files, name_of
 from cmg_mj.codegen.export.refusals import refuse_unexported
 from cmg_mj.codegen.export.source_location import LawNotExportable
 from cmg_mj.codegen.export.trace import trace
-from cmg_mj.controllers.controller import Controller
-from cmg_mj.controllers.dry_run import dry_run_law, dry_run_observer
 from cmg_mj.controllers.laws import Law
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.types import Observer
 from cmg_mj.errors import InputError, raised
-from cmg_mj.observers.protocol import Observer
 from cmg_mj.results.run_folder.folder import write_text
 
 Part = TypeVar("Part", Observer, Law)
@@ -78,13 +77,7 @@ def _copied(part: Part, refusal: type[InputError]) -> Part:
 
 
 def _generate(controller: Controller, precision: Precision, name: str) -> Code:
-    for_dry_run, for_trace = (_copied(controller.observer, InputError) for _ in range(2))
-    law_for_dry_run, law_for_trace = (_copied(controller.law, LawNotExportable) for _ in range(2))
-    dry_run_observer(for_dry_run, None)
-    try:
-        dry_run_law(law_for_dry_run, len(controller.extra_signals[0]), None)
-    except InputError as error:
-        raise LawNotExportable(str(error)) from error
+    for_trace, law_for_trace = _copied(controller.observer, InputError), _copied(controller.law, LawNotExportable)
     constants = constants_of(controller)
     traced = trace(for_trace, law_for_trace, constants)
     off = check.check_trace(controller, traced, constants, seeds=(1, 2, 3))

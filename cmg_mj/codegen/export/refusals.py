@@ -8,8 +8,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law, StateFeedback
+from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError, TomlValue, shown
 
 EXPORTED_OPTIONS = ("angle_source", "bias_trim_s")

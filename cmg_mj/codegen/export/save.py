@@ -10,7 +10,7 @@ from cmg_mj.errors import InputError, raised
 
 if TYPE_CHECKING:
     from cmg_mj.codegen.export.pipeline import Code
-    from cmg_mj.controllers.controller import Controller
+    from cmg_mj.core.controller import Controller
     from cmg_mj.results.run_folder import RunFolder
 
 

@@ -21,10 +21,8 @@ from cmg_mj.codegen.export.pytree import form, numbers, rebuild
 from cmg_mj.codegen.export.source_location import NotExportable
 from cmg_mj.codegen.export.symbol import expression
 from cmg_mj.codegen.export.traced_law import TracedLaw, trace_law
-from cmg_mj.controllers.laws.protocol import Law
-from cmg_mj.observers.protocol import Measurement, Observer, extra_signals
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.types import Law, Measurement, Observer, extra_signals
 
 
 class Traced(NamedTuple):

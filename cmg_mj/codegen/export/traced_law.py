@@ -20,9 +20,8 @@ from cmg_mj.codegen.export.formulas import (
 from cmg_mj.codegen.export.pytree import form, numbers, rebuild
 from cmg_mj.codegen.export.source_location import LawNotExportable, NotExportable
 from cmg_mj.codegen.export.symbol import Symbol, expression
-from cmg_mj.controllers.laws.protocol import Law, feedback_state
 from cmg_mj.controllers.laws.state_feedback import StateFeedback
-from cmg_mj.observers.protocol import Measurement
+from cmg_mj.core.types import Law, Measurement, feedback_state
 
 INTEGRATOR = ("x_e",)
 """Path of the integrator in a law's state."""

@@ -9,14 +9,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.controllers.laws.protocol import FeedbackState
+from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.types import FeedbackState, Measurement
 from cmg_mj.elementwise import Scalar, clip, where
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.kalman import COLUMNS, Kalman
-from cmg_mj.observers.protocol import Measurement
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.observers.zero_order_hold import hold_matrices
-from cmg_mj.sensors.tilt import TiltNoise
 
 LEAST_NOISE = 1e-6
 """Standard deviation that a measurement without noise counts with: the filter's gains need some [rad]."""

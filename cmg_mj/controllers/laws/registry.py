@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from cmg_mj.controllers.laws.protocol import Law
+from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.types import Law
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.sensors.tilt import TiltNoise
 
 LAWS = {
     "state_feedback": "cmg_mj.controllers.laws.state_feedback:StateFeedback",

@@ -9,10 +9,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.laws.protocol import FeedbackState, feedback_state
+from cmg_mj.core.types import FeedbackState, Measurement, feedback_state
 from cmg_mj.elementwise import Scalar, clip, where
 from cmg_mj.errors import InputError
-from cmg_mj.observers.protocol import Measurement
 from cmg_mj.observers.reduced_model import ReducedModel, is_hurwitz
 from cmg_mj.observers.scaling import PAPERS_GRAVITY
 

@@ -1,4 +1,4 @@
-"""The cycles that the backlash of the gimbal's servo makes (`cmg_mj.controllers.backlash`)."""
+"""The cycles that the backlash of the gimbal's servo makes (`cmg_mj.stages.backlash`)."""
 
 from __future__ import annotations
 

@@ -18,8 +18,8 @@ from cmg_mj.papers.words import plus_minus
 from cmg_mj.replay import replay
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.disturbances import Push
 from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.stages.push import Push
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED, WORLDS = 82_000, 20

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from cmg_mj.controllers.backlash import ARCMIN_A_DEGREE
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.lag import linearise
+from cmg_mj.stages.backlash import ARCMIN_A_DEGREE
 
 
 class PredictedCycle(NamedTuple):

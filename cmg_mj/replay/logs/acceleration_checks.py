@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.replay.logs.columns import Column
 from cmg_mj.replay.logs.units import in_si, unit_of_factor
-from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY
-from cmg_mj.sensors.tilt import RadialTilt
 
 NEAR = (0.7, 1.4)
 """A size is plausible if it is within these factors of the right one."""

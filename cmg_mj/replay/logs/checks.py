@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.errors import InputError
 from cmg_mj.replay.logs.columns import Column
 from cmg_mj.replay.logs.log import REFERENCE
-from cmg_mj.scenario.disturbances import Window, inside
-from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.stages.push import Window, inside
 
 LARGEST = 1e12
 """Largest value of a signal, times since 1970 included [rad, rad/s, m/s^2, s]."""

@@ -8,7 +8,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.replay.logs.log import REFERENCE, Log
 from cmg_mj.replay.logs.table import PARQUET, head_of
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.disturbances import Push, push_windows
+from cmg_mj.stages.push import Push, push_windows
 
 SAY_COLUMNS = "say which columns are what, --columns tilt=HEADING,rate=HEADING,..."
 

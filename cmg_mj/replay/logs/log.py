@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.errors import TomlValue
 from cmg_mj.replay.logs.white_noise import LogNoise
 from cmg_mj.results.stored_columns import number_of_rows, select_rows
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.disturbances import Window
-from cmg_mj.sensors.tilt import RadialTilt
+from cmg_mj.stages.push import Window
 
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""

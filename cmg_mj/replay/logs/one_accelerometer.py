@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.replay.logs.acceleration_checks import NEAR, cure_of_size
 from cmg_mj.replay.logs.columns import ONE_ACCELEROMETER, Column
 from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.logs.units import in_si
 from cmg_mj.results.stored_columns import number_of_rows, select_rows, stretches
-from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY
 
 RADIUS_M = 0.1
 """Distance from the pivot for which the error of the tilt is told [m]."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmg_mj.codegen.board.log_file import BoardLog
+from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.errors import InputError
 from cmg_mj.replay.logs.acceleration_checks import TiltMotion, implausible_acceleration
 from cmg_mj.replay.logs.checks import (
@@ -41,7 +42,6 @@ from cmg_mj.results.stored_columns import (
     shelved,
     stretches,
 )
-from cmg_mj.sensors.tilt import RadialTilt
 
 UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""

@@ -6,8 +6,8 @@ import math
 import re
 from typing import Literal
 
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY
 
 Quantity = Literal["angle", "rate", "angular acceleration", "acceleration", "time"]
 

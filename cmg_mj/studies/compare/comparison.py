@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cmg_mj.observers.protocol import BIAS, extra_signals
+from cmg_mj.core.types import BIAS, extra_signals
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.intervals import finite_values
 from cmg_mj.results.result import Outcome, Result
@@ -82,10 +82,7 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
         InputError: An observer does not exist, or something does not fit.
     """
     plant = load_scenario_plant(scenario)
-    experiments = [prepare(_untrimmed(scenario.with_observer(kind), plant), plant) for kind in observers]
-    for experiment in experiments:
-        experiment.dry_run(worlds=2)
-    return experiments
+    return [prepare(_untrimmed(scenario.with_observer(kind), plant), plant) for kind in observers]
 
 
 def _untrimmed(scenario: Scenario, plant: Plant) -> Scenario:

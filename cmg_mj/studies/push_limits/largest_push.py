@@ -9,15 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.controller import PlantInterface
+from cmg_mj.core.controller import PlantInterface
+from cmg_mj.core.loop import ControlLoop
+from cmg_mj.core.tilt import GimbalAngle
+from cmg_mj.core.types import IdealReading
 from cmg_mj.elementwise import Scalar
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import common_period
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.ideal import IdealReading
-from cmg_mj.simulation.control_loop import ControlLoop
 from cmg_mj.simulation.physics import Joints
 from cmg_mj.studies.push_limits.recoverable_states import ceiling
 

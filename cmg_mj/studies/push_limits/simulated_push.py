@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.loop import ControlLoop
+from cmg_mj.core.outside import sampling_instants
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.scenario.disturbances import Push
 from cmg_mj.simulation.batch_values import batch_values
-from cmg_mj.simulation.control_loop import ControlLoop
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.simulation.physics import ManyWorlds
-from cmg_mj.simulation.schedule import sampling_instants
+from cmg_mj.stages.push import Push
 from cmg_mj.studies.push_limits.largest_push import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS
 from cmg_mj.studies.push_limits.prospects import Prospects
 

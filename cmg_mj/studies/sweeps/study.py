@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from cmg_mj.controllers.laws import LAW_CLASSES
-from cmg_mj.controllers.laws.protocol import needs
+from cmg_mj.core.types import law_needs
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.files import find
 from cmg_mj.inputs.overrides import assign
@@ -218,7 +218,7 @@ class SweepStudy:
         if observer not in RATES:
             return alone.with_observer(observer)
         law = alone.controller.kind
-        if not needs(LAW_CLASSES.find(law)):
+        if not law_needs(LAW_CLASSES.find(law)):
             raise InputError(
                 f"{observer}: a baseline's trials have the true rate in the loop, and controller.kind = {law!r} takes "
                 f"none; leave {observer} out, or take another law"

@@ -10,11 +10,11 @@ import numpy as np
 from cmg_mj.errors import InputError
 from cmg_mj.replay.logs import Log
 from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, paired_verdict, ratio_interval
-from cmg_mj.scenario.disturbances import push_windows
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
 from cmg_mj.simulation.experiment import prepare
+from cmg_mj.stages.push import push_windows
 from cmg_mj.studies.tuning.parameters import ParameterValues, plain
 
 SCENARIO = "push_recovery"

@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
@@ -26,7 +27,6 @@ from cmg_mj.replay.reference import alignment_of, remarks_on
 from cmg_mj.results.intervals import PairedVerdict
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.sensors.tilt import TiltNoise
 from cmg_mj.studies.tuning.closed_loop import LoopComparison, compare_in_loop, judged
 from cmg_mj.studies.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, level_of
 from cmg_mj.studies.tuning.parameters import (

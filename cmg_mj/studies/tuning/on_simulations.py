@@ -9,17 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmg_mj.controllers.laws import LAW_CLASSES
-from cmg_mj.controllers.laws.protocol import needs
+from cmg_mj.core.types import law_needs
 from cmg_mj.errors import InputError
 from cmg_mj.observers import Observer
 from cmg_mj.replay import replay
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.disturbances import Window, inside, push_windows
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.scenario.time_grid import common_period
 from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.stages.push import Window, inside, push_windows
 
 WARM_UP_S = 2.0
 """Time before the window that is replayed as well, for the observer to settle [s]."""
@@ -105,7 +105,7 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     period = scenario.plant.timestep_s or common_period(scenario)
     duration = math.ceil(window_of(scenario)[1] / period - 1e-9) * period
     feedback = scenario.controller.feedback
-    if feedback == "observer" and needs(LAW_CLASSES.find(scenario.controller.kind)):
+    if feedback == "observer" and law_needs(LAW_CLASSES.find(scenario.controller.kind)):
         feedback = "fog"
     loop = {"feedback": feedback, "bias_trim_s": 0.0}
     return scenario.model_copy(

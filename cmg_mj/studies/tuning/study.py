@@ -95,7 +95,6 @@ def tune(
     kind = scenario.observer.kind
     experiment = prepare(scenario)
     experiment.require_single_axis("tuning")
-    experiment.dry_run(worlds=2)
     start_parameters = parameters_of(kind, experiment.design.observer(), scenario.observer.parameters)
     numbers = numbers_of(kind, start_parameters, _maker(experiment), parameters)
     numbers = narrowed(numbers, ranges or {}, "--range")

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.stored_columns import STRETCH
-from cmg_mj.scenario.disturbances import Push
+from cmg_mj.stages.push import Push
 from cmg_mj.visualization.plots.readability import fall_start
 from cmg_mj.visualization.recording.camera import POSES, Ball, enclosing_ball
 from cmg_mj.visualization.recording.legend import LegendEntry, legend

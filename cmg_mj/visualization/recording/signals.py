@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import rerun as rr
 
-from cmg_mj.observers.protocol import BIAS
+from cmg_mj.core.types import BIAS
 from cmg_mj.plant.plant import Plant
-from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.schema import MetricsSettings
+from cmg_mj.stages.push import Push
 from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, BOUND_COLOURS, Colour
 from cmg_mj.visualization.plots.thinning import thinned
 from cmg_mj.visualization.recording.legend import LegendEntry

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.make_controller import AnyController
+from cmg_mj.core.axes import AnyController
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.visualization.studio.settings import law_settings
 
 MOST_SAMPLES = 200_000
 """Largest number of stored samples, 1000 s at 200 Hz: 27 MB for the scissored pair."""
@@ -105,30 +104,18 @@ class ControllerHistory:
         plant = experiment.plant
         sensors = plant.model.nsensordata
         for entry, following in zip(since, [*since[1:], HistoryEntry(count, experiment, False)], strict=True):
-            adopt(controller, experiment, entry.experiment)
-            experiment = entry.experiment
+            if entry.experiment is not experiment:
+                previous, experiment = controller, entry.experiment
+                controller = continued(experiment, previous)
             for i in range(entry.count, following.count):
                 numbers = self._numbers[i * width : (i + 1) * width].tolist()
                 controller.update(self._steps[i], plant.ideal_readings(numbers[:sensors], numbers[sensors:]))
         return controller, experiment
 
 
-def adopt(controller: AnyController, was: Experiment, now: Experiment) -> None:
-    """Change a running controller from one experiment's to another's, axis by axis.
-
-    Args:
-        controller: The controller.
-        was: The experiment of the controller.
-        now: An experiment that differs in settings that may change during a session.
-
-    Raises:
-        InputError: The experiments differ in other settings.
-    """
-    for part, old, new in zip(controller.parts, was.parts, now.parts, strict=True):
-        before, after = old.scenario, new.scenario
-        part.swap_components(
-            observer=new.design.observer() if after.observer != before.observer else None,
-            law=new.design.fresh_law() if law_settings(after) != law_settings(before) else None,
-            sensors=after.sensors if after.sensors != before.sensors else None,
-            feedback=after.controller.feedback,
-        )
+def continued(experiment: Experiment, previous: AnyController) -> AnyController:
+    """Make a fresh controller that starts with the integrators and commands of a previous one."""
+    controller = experiment.controller()
+    for part, before in zip(controller.parts, previous.parts, strict=True):
+        part.continue_from(before)
+    return controller

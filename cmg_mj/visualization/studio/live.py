@@ -12,7 +12,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.make_controller import AnyController
+from cmg_mj.core.axes import AnyController
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.plant.moving_pivot import pivot_directions
 from cmg_mj.plant.mujoco_state import set_control_callback
@@ -21,7 +21,7 @@ from cmg_mj.scenario.pivot_signals import PivotSignals
 from cmg_mj.simulation.callback import control
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.visualization.studio.drawn_plant import copy_physics_numbers, drawn_plant
-from cmg_mj.visualization.studio.history import ControllerHistory, adopt
+from cmg_mj.visualization.studio.history import ControllerHistory, continued
 from cmg_mj.visualization.studio.settings import FieldValues, changed_fields
 from cmg_mj.visualization.studio.user_push import Pushes
 
@@ -227,8 +227,6 @@ class StudioSession:
             if self.now.scenario.plant.timestep_s is None:
                 fields["plant.timestep_s"] = self.timestep  # the one it runs with
             new = self.now.with_settings(fields)
-            if not self.stopped:
-                adopt(self.controller, self.now, new)
         except InputError as error:
             self.note = str(error)
             return
@@ -238,8 +236,10 @@ class StudioSession:
         self._apply_settings(new)
         if self.stopped:
             self.restart_controller(data)
-        elif self.history.whole:
-            self.history.add_change(new, afresh=False)
+            return
+        self.controller = continued(self.now, self.controller)
+        if self.history.whole:
+            self.history.add_change(self.now, afresh=False)
         assert step == self._next
 
     def _apply_settings(self, experiment: Experiment) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from cmg_mj.scenario.disturbances import Push, Swing, add_swing_torques
-from cmg_mj.sensors.timing import whole_steps
+from cmg_mj.core.sensor import whole_steps
+from cmg_mj.stages.push import Push, Swing, add_swing_torques
 
 PushSteps = tuple[int, int, float, int]
 """First step, step after the last, torque [N m], index of the axis; -1 for an axis that the plant lacks."""

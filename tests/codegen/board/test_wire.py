@@ -14,8 +14,8 @@ from cmg_mj.codegen.board.frames import Frame, FrameReader
 from cmg_mj.codegen.board.identity import Identity, identity_of, read_identity
 from cmg_mj.codegen.board.ports import require_fit
 from cmg_mj.codegen.board.wired_board import WiredBoard
+from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
 from tests.codegen.board.toy import short
 from tests.codegen.board.wire import TOY, PythonBoard
 

@@ -21,7 +21,7 @@ from cmg_mj.codegen.board.frames import Frame, FrameReader
 from cmg_mj.codegen.board.identity import Identity
 from cmg_mj.codegen.board.qemu import emulator_command
 from cmg_mj.codegen.board.serial_line import Closed
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
+from cmg_mj.core.tilt import GimbalAngle
 
 PAIR = GimbalAngle((1.0, -1.0), (1.5, 1.5))
 TOY = Identity("cmg_mj", "2", "toy", "single", 200.0, "0badc0de", (0.1, 0.2), PAIR)

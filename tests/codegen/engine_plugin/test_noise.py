@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import cmg_mj.codegen.engine_plugin as package
-from cmg_mj.sensors.noise_streams import NoiseStream, normals
+from cmg_mj.core.noise import NoiseStream, normals
 from tests.codegen.export.compiled import COMPILER, STRICT, needs_compiler
 
 pytestmark = needs_compiler

@@ -14,7 +14,7 @@ import pytest
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.codegen.export import export
-from cmg_mj.controllers.controller import Controller
+from cmg_mj.core.controller import Controller
 from cmg_mj.simulation.simulate import simulate
 
 pytest.importorskip("casadi", reason="casadi is not installed: the extra [export]")

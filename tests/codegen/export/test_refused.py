@@ -10,8 +10,8 @@ from typing import Any, cast
 import pytest
 
 from cmg_mj.codegen.export import export, pipeline, refusals
-from cmg_mj.controllers.controller import Controller
 from cmg_mj.controllers.laws import Law
+from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError
 from tests.codegen.export import own
 from tests.codegen.export.compiled import controller

@@ -14,10 +14,10 @@ from scipy.linalg import expm, solve_discrete_are
 from cmg_mj import load_scenario, prepare
 from cmg_mj.controllers.laws import make_law
 from cmg_mj.controllers.laws.lqg import Lqg
-from cmg_mj.controllers.laws.protocol import feedback_state
+from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.types import feedback_state
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.sensors.tilt import TiltNoise
 from tests.plant import paper_model as paper
 
 PAIR = ReducedModel(paper.J1, paper.J2, paper.J_d, paper.omega_d, paper.gravity_torque, 2)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cmg_mj import ReadOptions, load_scenario, prepare, read_log
+from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.replay.logs.acceleration_checks import SWAPPED, TiltMotion, interchanged
 from cmg_mj.replay.logs.columns import ACCELEROMETERS
-from cmg_mj.sensors.tilt import RadialTilt
 from tests.replay.logs.motion import DT, write_csv
 from tests.tiers import slow_but
 

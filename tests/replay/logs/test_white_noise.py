@@ -184,7 +184,7 @@ def test_of_a_long_log_a_bounded_part_is_read() -> None:
 
 
 def test_tilt_and_acceleration_of_the_same_sensors_are_correlated() -> None:
-    from cmg_mj.sensors.tilt import RadialTilt
+    from cmg_mj.core.tilt import RadialTilt
 
     geometry, random = RadialTilt(0.1, 0.3), np.random.default_rng(0)
     inner, outer = 0.05 * random.standard_normal((2, N))

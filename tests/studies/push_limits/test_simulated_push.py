@@ -12,15 +12,15 @@ import mujoco
 import numpy as np
 import pytest
 
+from cmg_mj.core.loop import ControlLoop
+from cmg_mj.core.outside import sampling_instants
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.simulation.control_loop import ControlLoop
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.physics import OneWorld
-from cmg_mj.simulation.schedule import sampling_instants
 from cmg_mj.studies.push_limits import mount_files, simulated_push
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS, PushMargin
 from cmg_mj.studies.push_limits.mount_files import PUSH_SHARE, write_scenario

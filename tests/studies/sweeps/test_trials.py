@@ -139,7 +139,7 @@ def test_an_observer_that_raises_costs_its_own_trials_alone() -> None:
         tilt = tilts["plant.initial_tilt_deg"].split(",")[number // 3]
         alone = all_trials(study({"plant.initial_tilt_deg": tilt}, (FAILS,), 3)).to_pylist()[number % 3]
         assert row == alone | {"point": number // 3}
-    assert all("raised ZeroDivisionError: too far at t = " in row["reason"] for row in rows[3:6])
+    assert all("ZeroDivisionError: too far" in row["reason"] for row in rows[3:6])
     assert all("not finite" in row["reason"] for row in rows[9:12])
 
 

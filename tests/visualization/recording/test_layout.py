@@ -18,9 +18,9 @@ from rerun.chunk import RrdReader
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Outcome
-from cmg_mj.scenario.disturbances import Swing
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.stages.push import Swing
 from cmg_mj.studies.compare.comparison import prepare_comparison
 from cmg_mj.studies.save import report_run
 from cmg_mj.visualization.plots.readability import fall_start, labelled_ticks

@@ -22,10 +22,10 @@ from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.summary_keys import KEYS, format_figure, heading
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.disturbances import Push
 from cmg_mj.scenario.loading import Scenario, load_scenario
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.stages.push import Push
 from cmg_mj.visualization.recording import RecordingHeader, Run, save, stream, write_recording
 from cmg_mj.visualization.recording.run import POSE_RATE_HZ, phases, torque_steps
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN

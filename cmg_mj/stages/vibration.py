@@ -4,15 +4,63 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from pydantic import Field, field_validator
+from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.noise import NoiseStream
+from cmg_mj.core.sensor import SensorStage, Site
+from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
 from cmg_mj.elementwise import Scalar, atan2, cos, sin
-from cmg_mj.sensors.ideal import Forces, IdealReading
+from cmg_mj.inputs.types import STRICT, Batched, NoiseSize, NonNegative
+
+if TYPE_CHECKING:
+    from cmg_mj.sensors.accelerometer import Accelerometer
+
+MOST_HARMONICS = 20
+"""No flywheel's tones beyond this multiple of its speed."""
+VibrationFrequency = Annotated[float, Field(ge=0.1, le=1e5)]
 
 AXES = 4
 """Axes that vibrate: x and z of the inner and of the outer accelerometer."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class VibrationSettings:
+    """Vibration of the accelerometers.
+
+    Attributes:
+        vibration_mg: RMS of broadband vibration, independent in each axis [mg].
+        vibration_band_hz: Half-power frequencies of the broadband vibration, lower and upper [Hz].
+        wheel_harmonics_mg: Amplitudes of tones at 1, 2, 3, ... times the speed of each flywheel, in each axis [mg].
+    """
+
+    vibration_mg: Annotated[NoiseSize, Batched()] = 0.0
+    vibration_band_hz: tuple[VibrationFrequency, VibrationFrequency] = (20.0, 500.0)
+    wheel_harmonics_mg: tuple[NonNegative, ...] = ()
+
+    @field_validator("vibration_band_hz")
+    @classmethod
+    def _rising(cls, band_hz: tuple[float, float]) -> tuple[float, float]:
+        low, high = band_hz
+        if not low < high:
+            raise ValueError(f"{low:g} Hz to {high:g} Hz: the lower end comes first")
+        return band_hz
+
+    @field_validator("wheel_harmonics_mg")
+    @classmethod
+    def _not_too_many(cls, amplitudes: tuple[float, ...]) -> tuple[float, ...]:
+        if len(amplitudes) > MOST_HARMONICS:
+            raise ValueError(f"{len(amplitudes)} amplitudes: at most {MOST_HARMONICS} harmonics")
+        return amplitudes
+
+    @property
+    def vibrates(self) -> bool:
+        """True if the accelerometers of one world vibrate."""
+        return bool(self.vibration_mg) or any(self.wheel_harmonics_mg)
 
 
 class BroadbandVibration:
@@ -95,31 +143,37 @@ class WheelTones:
         return total
 
 
-def vibration(
-    broadband: BroadbandVibration | None, rms: Scalar, tones: WheelTones | None
-) -> Callable[[IdealReading], Forces] | None:
-    """Make the function that adds vibration to each sample of the specific forces.
+class Vibration:
+    """Vibration of the accelerometers, added to the true specific forces.
 
     Args:
-        broadband: Vibration of RMS 1, if there is any.
-        rms: Its RMS, (n_worlds,) if it differs [m/s^2].
-        tones: Tones of the flywheels, if there are any.
-
-    Returns:
-        A function: the ideal reading -> inner x, z, outer x, z, as the reading has them; None without vibration.
+        part: The accelerometers.
+        site: Their place in the run.
     """
-    if broadband is None and tones is None:
-        return None
 
-    def with_vibration(ideal: IdealReading) -> Forces:
+    def __init__(self, part: Accelerometer, site: Site) -> None:
+        dt, milli_g = 1.0 / part.raw_rate_hz, 1e-3 * STANDARD_GRAVITY
+        self._rms = milli_g * part.vibration_mg
+        self._broadband = self._tones = None
+        if np.any(part.vibration_mg):
+            numbers = site.noise(NoiseStream.VIBRATION, BroadbandVibration.channels)
+            self._broadband = BroadbandVibration(part.vibration_band_hz, dt, numbers)
+        if any(part.wheel_harmonics_mg):
+            amplitudes = [milli_g * amplitude for amplitude in part.wheel_harmonics_mg]
+            self._tones = WheelTones(amplitudes, dt, site.noise(NoiseStream.WHEEL_TONES, 2))
+
+    def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
+        """Return the forces with the next sample of the vibration."""
         added: list[Scalar] = [0.0] * AXES
-        if broadband is not None:
-            added = [rms * part for part in broadband.advance()]
-        if tones is not None and ideal.wheels:
-            added = [part + tone for part, tone in zip(added, tones.advance(ideal.wheels), strict=True)]
-        forces = ideal.accelerations
+        if self._broadband is not None:
+            added = [self._rms * part for part in self._broadband.advance()]
+        if self._tones is not None and ideal.wheels:
+            added = [part + tone for part, tone in zip(added, self._tones.advance(ideal.wheels), strict=True)]
         if isinstance(forces, np.ndarray):
             return forces + np.array(added)
-        return tuple(force + part for force, part in zip(forces, added, strict=True))
+        return [force + part for force, part in zip(forces, added, strict=True)]
 
-    return with_vibration
+
+def vibration(part: Accelerometer, site: Site) -> SensorStage | None:
+    """Make the stage of accelerometers that vibrate in any world."""
+    return Vibration(part, site) if np.any(part.vibration_mg) or any(part.wheel_harmonics_mg) else None

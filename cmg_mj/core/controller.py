@@ -4,29 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple, TypedDict
+from typing import Literal, NamedTuple, Protocol, TypedDict
 
-from cmg_mj.controllers.backlash import Backlash
-from cmg_mj.controllers.integrator_trim import integrator_trim
-from cmg_mj.controllers.law_runner import LawRunner, Laws, LawTakeover
-from cmg_mj.controllers.laws.protocol import Law, feedback_state
-from cmg_mj.controllers.notch import Notch
+from cmg_mj.core.runners import LawRunner, ObserverRunner
+from cmg_mj.core.sensor import SampledSensor, steps_until, whole_steps
+from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, feedback_state
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError
-from cmg_mj.observers.protocol import Measurement, Observer
-from cmg_mj.observers.runner import ObserverRunner, Observers, ObserverTakeover, read_only
-from cmg_mj.sensors.gimbal_angle import GimbalAngle
-from cmg_mj.sensors.ideal import Forces, IdealReading
-from cmg_mj.sensors.sampled import Sensors, sampled_sensors
-from cmg_mj.sensors.tilt import RadialTilt
-from cmg_mj.sensors.timing import steps_until, whole_steps
+from cmg_mj.stages.backlash import Backlash
+from cmg_mj.stages.notch import Notch
+from cmg_mj.stages.trim import integrator_trim
 
 Feedback = Literal["observer", "fog", "truth"]
 AngleSource = Literal["measured", "estimated"]
-
-
-TAKEOVER_TICKS = 20
-"""Ticks that a new observer sees before it takes over from another: 0.1 s at 200 Hz."""
 
 
 _new = tuple.__new__  # a named tuple's own takes twice as long
@@ -43,6 +34,16 @@ class Tick(NamedTuple):
     x_e: Scalar
     estimates: Sequence[Sequence[Scalar]]
     """The observer's estimate (x1, x2, x3, its extra signals), then those of the open-loop observers."""
+
+
+class Sensors(Protocol):
+    """The sensors between the ideal readings and a controller."""
+
+    def at_work(
+        self, timestep: float, seed: int, worlds: int | Sequence[int], axis: int
+    ) -> tuple[SampledSensor[Forces], SampledSensor[Sequence[Scalar]], SampledSensor[Scalar]]:
+        """Start the accelerometers, the encoders and the gyro of an axis."""
+        ...
 
 
 class PlantInterface(NamedTuple):
@@ -137,9 +138,9 @@ class Controller:
         self._single = isinstance(worlds, int)
         timestep = plant.timestep
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
-        self._law: Laws = LawRunner(law, self._single, timestep)
+        self._law = LawRunner(law, self._single, timestep)
         observers = [observer, *self.open_loop_observers.values()]
-        self._observers: Observers = ObserverRunner(observers, self._single, timestep)
+        self._observers = ObserverRunner(observers, self._single, timestep)
         self.extra_signals = self._observers.extra_signals
         self.bias_trim_s = bias_trim_s
         self.trim_part, self.trim_gain = integrator_trim(bias_trim_s, law, self.extra_signals[0])
@@ -158,8 +159,9 @@ class Controller:
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
-        self._sampled = sampled_sensors(self.sensors, self.timestep, self.seed, self.worlds, self.axis)
+        self._sampled = self.sensors.at_work(self.timestep, self.seed, self.worlds, self.axis)
         self.tick: Tick | None = None
+        self._integrator: Scalar | None = None
         self.gimbal_rate: Scalar = None
         """The rate at which the gimbals are turned since the last tick: its u, behind the backlash [rad/s]."""
         self._backlash = (
@@ -176,47 +178,10 @@ class Controller:
         self.steps_per_sample = math.gcd(self.period, *(sensor.steps_per_sample for sensor in self._sampled))
         """Physics steps between the instants at which anything may be due."""
 
-    def swap_components(
-        self,
-        *,
-        observer: Observer | None = None,
-        law: Law | None = None,
-        sensors: Sensors | None = None,
-        feedback: Feedback | None = None,
-    ) -> None:
-        """Go on with something else from the next update on; an integrator and the command that is held stay.
-
-        An integrator that was trimmed until now goes free with another observer or law.
-
-        Args:
-            observer: Another one for the loop. It starts from the next tick's sample and takes over `TAKEOVER_TICKS`
-                ticks later; open-loop observers start again with it.
-            law: Another law of the same control period, which starts from the next tick's sample.
-            sensors: Others, of the same rates. All sensors start afresh, with their noise from its beginning.
-            feedback: Which rate the law uses.
-
-        Raises:
-            InputError: A rate does not fit.
-        """
-        if law is not None and law.dt != self.law.dt:
-            raise InputError(f"controller.rate_hz: stays {1.0 / self.law.dt:g} Hz while it runs")
-        if sensors is not None:
-            sampled = sampled_sensors(sensors, self.timestep, self.seed, self.worlds, self.axis)
-            if math.gcd(self.period, *(sensor.steps_per_sample for sensor in sampled)) != self.steps_per_sample:
-                raise InputError("sensors: their rates stay while it runs")
-            self._sampled, self.sensors = sampled, sensors
-            self.step = None  # all of them sample at the next update, due or not
-        if observer is not None:
-            runner = ObserverRunner([observer, *self.open_loop_observers.values()], self._single, self.timestep)
-            started = self.tick is not None
-            self._observers = ObserverTakeover(self._observers, TAKEOVER_TICKS, runner) if started else runner
-            self.observer, self.extra_signals = observer, runner.extra_signals
-        if law is not None:
-            self._law = LawTakeover(self._law, LawRunner(law, self._single, self.timestep))
-            self.law = law
-        if law is not None or observer is not None:
-            self.trimmed_until = 0
-        self.feedback = feedback or self.feedback
+    def continue_from(self, predecessor: Controller) -> None:
+        """Start with another controller's integrator, and hold its command until the first tick."""
+        self._integrator = getattr(predecessor._law.state, "x_e", None)
+        self.gimbal_rate = predecessor.gimbal_rate
 
     def update(self, step: int, ideal: IdealReading) -> bool:
         """Take the samples and the control decision that are due at a physics step.
@@ -287,30 +252,25 @@ class Controller:
             acceleration = acceleration - self.coriolis
         y = _new(Measurement, (y1, y2))
         y.acceleration = acceleration
-        if not self._single:
-            read_only(y1, y2, acceleration)  # observers and the law share them
         if self.tick is None:
             estimates, held = self._observers.start(y, step), 0.0 * y1
             self._law.start(y, step)
+            if self._integrator is not None and hasattr(self._law.state, "x_e"):
+                self._law.state = self._law.state._replace(x_e=self._integrator)
         else:
             held = self.tick.u
             estimates = self._observers.advance(y, held, step)
         estimate = estimates[0]
         if step < self.trimmed_until:
-            self._law.trim(self.trim_gain * estimate[self.trim_part])
+            self._law.state = self._law.state._replace(x_e=self.trim_gain * estimate[self.trim_part])
         x1, x2, x3 = (y1, estimate[1], y2) if self.angle_source == "measured" else estimate[:3]
         if self.feedback != "observer":
             x2 = fog if self.feedback == "fog" else rate
-        if not self._single:
-            x2 = x2.copy()
-            read_only(x2, *estimate)
         x = feedback_state(x1, x2, x3)
         if len(estimate) > 3:
             x.extra = estimate[3:]
         u, x_e = self._law.decide(y, x, held, step)
         if self._notch is not None:
             u = self._notch(u)
-        if not self._single:
-            read_only(u)  # observers get it at the next tick, the trajectory later
         self.tick = _new(Tick, (y1, y2, acceleration, fog, u, x_e, estimates))
         return self.tick

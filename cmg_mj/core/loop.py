@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from cmg_mj.controllers.make_controller import AnyController
+from cmg_mj.core.axes import AnyController
+from cmg_mj.core.outside import Instant
 from cmg_mj.elementwise import Scalar
 from cmg_mj.simulation.physics import Joints, Physics
-from cmg_mj.simulation.schedule import Instant
 
 _new = tuple.__new__  # a named tuple's own takes twice as long
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from cmg_mj.core.sensor import whole_steps
 from cmg_mj.elementwise import Scalar, where
-from cmg_mj.scenario.disturbances import Push, Swing, add_swing_torques
 from cmg_mj.scenario.pivot_signals import PivotSignals
-from cmg_mj.sensors.timing import whole_steps
+from cmg_mj.stages.push import Push, Swing, add_swing_torques
 
 Instant = tuple[int, int, Sequence[Scalar]]
 """Physics step, steps until the next instant, each axis' torque until then, one or a world's each [N m]."""

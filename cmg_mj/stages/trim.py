@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmg_mj.controllers.laws.protocol import Law
+from cmg_mj.core.types import BIAS, Law
 from cmg_mj.errors import InputError
-from cmg_mj.observers.protocol import BIAS
 
 
 def integrator_trim(bias_trim_s: float, law: Law, extra_signals: Sequence[str]) -> tuple[int, float]:

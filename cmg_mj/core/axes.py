@@ -8,13 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.controller import Controller, Feedback, Tick
+from cmg_mj.core.controller import Controller, Feedback, Tick
+from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.types import IdealReading, MultiAxisReading
 from cmg_mj.elementwise import Scalar, clip, cos, dot, sin, where
 from cmg_mj.errors import InputError
-from cmg_mj.observers.runner import read_only
-from cmg_mj.sensors.ideal import IdealReading, MultiAxisReading
 from cmg_mj.sensors.mems_gyro import MemsGyro
-from cmg_mj.sensors.noise_streams import NoiseStream, normals
 
 Matrix = Sequence[Sequence[float]]
 
@@ -143,9 +142,7 @@ class MultiAxisController:
             limit = part.law.rate_limit
             total = clip(tick.u + added, -limit, limit)
             u = where(tick.u + added == total, tick.u, total - added)  # the law's, as far as it was not limited
-            part.coriolis = none = w * dot(k, rates)
-            if type(u) is not float:
-                read_only(u, none)  # as in `Controller.decide`
+            part.coriolis = w * dot(k, rates)
             part.tick = tick._replace(u=u)
             part.command_rate(total)
 
@@ -153,3 +150,6 @@ class MultiAxisController:
 def _fed_back(feedback: Feedback, tick: Tick, ideal: IdealReading) -> Scalar:
     """Return the tilt rate of an axis that its law is given [rad/s]."""
     return tick.estimates[0][1] if feedback == "observer" else tick.fog if feedback == "fog" else ideal.rate
+
+
+AnyController = Controller | MultiAxisController

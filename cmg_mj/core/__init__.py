@@ -1,0 +1,1 @@
+"""Runs one control tick: samples, tilt, observer, law, command; NumPy alone."""

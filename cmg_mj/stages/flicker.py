@@ -1,0 +1,62 @@
+"""1/f noise of the accelerometers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream
+from cmg_mj.core.sensor import SensorStage, Site
+from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
+from cmg_mj.inputs.types import STRICT, NoiseSize
+
+if TYPE_CHECKING:
+    from cmg_mj.sensors.accelerometer import Accelerometer
+
+
+@dataclass(frozen=True, config=STRICT)
+class FlickerSettings:
+    """1/f noise of the accelerometers.
+
+    Attributes:
+        bias_instability_ug: Bias instability of each axis: the floor of its Allan deviation, made by 1/f noise [ug].
+    """
+
+    bias_instability_ug: NoiseSize = 0.0
+
+    @property
+    def flicker_floor(self) -> float:
+        """Floor of the Allan deviation of each axis' 1/f noise [m/s^2]."""
+        return self.bias_instability_ug * 1e-6 * STANDARD_GRAVITY
+
+
+class Flicker:
+    """Adds 1/f noise, independent in each axis.
+
+    Args:
+        part: The accelerometers.
+        site: Their place in the run.
+    """
+
+    def __init__(self, part: Accelerometer, site: Site) -> None:
+        self._channels = part.channels
+        self._noise = site.noise(NoiseStream.FLICKER, len(CORNERS_HZ) * part.channels)
+        self._wander = FlickerNoise(part.flicker_floor, 1.0 / part.raw_rate_hz, self._drawn())
+
+    def _drawn(self) -> np.ndarray:
+        numbers = np.asarray(next(self._noise))
+        return numbers.reshape(len(CORNERS_HZ), self._channels, *numbers.shape[1:])
+
+    def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
+        """Add the noise of the next sample."""
+        added = self._wander.advance(self._drawn()[None])[0]
+        if isinstance(forces, np.ndarray):
+            return forces + added
+        return [force + more for force, more in zip(forces, added.tolist(), strict=True)]
+
+
+def flicker(part: Accelerometer, site: Site) -> SensorStage | None:
+    """Make the stage of accelerometers whose bias wanders."""
+    return Flicker(part, site) if part.bias_instability_ug else None

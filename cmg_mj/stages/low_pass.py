@@ -1,0 +1,137 @@
+"""The low-pass inside a digital sensor: a second-order Butterworth filter at the part's own sampling rate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.core.sensor import SensorStage, Site, Timing
+from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
+from cmg_mj.elementwise import Scalar, clip
+from cmg_mj.inputs.types import STRICT
+
+if TYPE_CHECKING:
+    from cmg_mj.sensors.accelerometer import Accelerometer
+
+INSIDE_HZ = 1000.0
+"""The part's own sampling, at which its low-pass works (MPU-6050: the accelerometer's output rate)."""
+NARROWEST_HZ = 1.0
+"""No part has a narrower low-pass, and one needs as many samples to settle [Hz]."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class LowPassSettings:
+    """The low-pass inside the accelerometers.
+
+    Attributes:
+        bandwidth_hz: Bandwidth of the sensor's second-order low-pass, which runs at 1 kHz; 0 for no low-pass. The
+            MPU-6050 has 5, 10, 21, 44, 94 and 184 Hz.
+    """
+
+    bandwidth_hz: Annotated[float, Field(ge=0.0, lt=INSIDE_HZ / 2.0)] = 0.0
+
+    @field_validator("bandwidth_hz")
+    @classmethod
+    def _rate_divides(cls, bandwidth_hz: float, info: ValidationInfo) -> float:
+        if 0.0 < bandwidth_hz < NARROWEST_HZ:
+            raise ValueError(f"{bandwidth_hz:g} Hz: at least {NARROWEST_HZ:g} Hz, or 0 for no low-pass")
+        rate = info.data.get("rate_hz")
+        if bandwidth_hz and rate and abs(round(INSIDE_HZ / rate) * rate - INSIDE_HZ) > 1e-6:
+            raise ValueError(
+                f"a part with a low-pass samples at {INSIDE_HZ:g} Hz, which rate_hz = {rate:g} must divide"
+            )
+        return bandwidth_hz
+
+    @property
+    def inside_hz(self) -> float:
+        """Samples a second that the part takes; 0: as many as it delivers."""
+        return INSIDE_HZ if self.bandwidth_hz else 0.0
+
+    @property
+    def inside_text(self) -> str:
+        """The bandwidth and the rate inside, as messages show them."""
+        return f"{self.bandwidth_hz:g} Hz, sampled at {INSIDE_HZ:g} Hz inside the part"
+
+    @property
+    def noise_gain(self) -> float:
+        """The variance of white noise behind the low-pass, by that before it."""
+        return noise_gain(self.bandwidth_hz, INSIDE_HZ) if self.bandwidth_hz else 1.0
+
+
+class LowPass:
+    """Filters every channel, cut at the range before. It starts settled.
+
+    Args:
+        part: The accelerometers.
+        site: Their place in the run.
+    """
+
+    def __init__(self, part: Accelerometer, site: Site) -> None:
+        # So long a low-pass needs to forget its start, all but 1e-4 of it.
+        settle = math.ceil(2.0 * INSIDE_HZ / part.bandwidth_hz)
+        self.timing = Timing(inside=site.steps(1.0 / INSIDE_HZ, "bandwidth_hz", part.inside_text), settle=settle)
+        self._bandwidth_hz = part.bandwidth_hz
+        self._limit = part.range_g * STANDARD_GRAVITY
+        self._filters: list[Callable[[Scalar], Scalar]] = []
+
+    def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
+        """Return what the filters show."""
+        channels = [forces] if isinstance(forces, np.ndarray) else forces
+        cut = [clip(x, -self._limit, self._limit) for x in channels]
+        if not self._filters:
+            self._filters = [low_pass(self._bandwidth_hz, INSIDE_HZ, x) for x in cut]
+        passed = [pass_on(x) for pass_on, x in zip(self._filters, cut, strict=True)]
+        return passed[0] if isinstance(forces, np.ndarray) else passed
+
+
+def noise_gain(bandwidth_hz: float, rate_hz: float) -> float:
+    """Return the variance of white noise after the filter, by that before.
+
+    The bilinear transform makes |H|^2 = 1/(1 + (w/t)^4), w = tan(omega/2), t = tan(pi bandwidth/rate); its mean over
+    omega, by partial fractions.
+
+    Args:
+        bandwidth_hz: Where the filter has halved the power [Hz].
+        rate_hz: Of its samples [Hz].
+
+    Returns:
+        The ratio.
+    """
+    t = math.tan(math.pi * bandwidth_hz / rate_hz)
+    return (t**4 + (t - t**3) / math.sqrt(2.0)) / (1.0 + t**4)
+
+
+def low_pass(bandwidth_hz: float, rate_hz: float, start: Scalar) -> Callable[[Scalar], Scalar]:
+    """Return a filter at work, which has seen the same value for ever.
+
+    Args:
+        bandwidth_hz: Where it has halved the power [Hz].
+        rate_hz: Of its samples [Hz].
+        start: The value (a float, or an array).
+
+    Returns:
+        A function: the next sample -> what the filter shows.
+    """
+    from scipy.signal import butter  # 1 s of import, which only a part with a low-pass needs
+
+    (b0, b1, b2), (_, a1, a2) = np.array(butter(2, bandwidth_hz, fs=rate_hz)).tolist()
+    first, second = (1.0 - b0) * start, (b2 - a2) * start
+
+    def passed(x: Scalar) -> Scalar:
+        nonlocal first, second
+        y = b0 * x + first
+        first = b1 * x - a1 * y + second
+        second = b2 * x - a2 * y
+        return y
+
+    return passed
+
+
+def low_pass_stage(part: Accelerometer, site: Site) -> SensorStage | None:
+    """Make the stage of accelerometers with a low-pass."""
+    return LowPass(part, site) if part.bandwidth_hz else None

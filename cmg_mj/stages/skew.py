@@ -1,0 +1,68 @@
+"""Skew of the accelerometers: the outer one's sample is older than the inner one's."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from pydantic import ValidationInfo, field_validator
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.core.sensor import SensorStage, Site, Timing
+from cmg_mj.core.types import Forces, IdealReading
+from cmg_mj.inputs.types import STRICT, NonNegative, OnGrid
+
+if TYPE_CHECKING:
+    from cmg_mj.sensors.accelerometer import Accelerometer
+
+
+@dataclass(frozen=True, config=STRICT)
+class SkewSettings:
+    """Skew of the accelerometers.
+
+    Attributes:
+        skew_s: Age of the outer accelerometer's sample when the inner one is sampled, at most one sample period [s].
+    """
+
+    skew_s: Annotated[NonNegative, OnGrid("s")] = 0.0
+
+    @field_validator("skew_s")
+    @classmethod
+    def _within_a_period(cls, skew_s: float, info: ValidationInfo) -> float:
+        rate = info.data.get("rate_hz")
+        if rate and skew_s > (1.0 + 1e-9) / rate:
+            raise ValueError(f"{skew_s:g} s: at most one sample period, {1.0 / rate:g} s at rate_hz = {rate:g}")
+        return skew_s
+
+
+class Skew:
+    """Combines the inner accelerometer's sample with an older one of the outer, which it keeps.
+
+    Args:
+        steps: The age, in physics steps.
+    """
+
+    def __init__(self, steps: int) -> None:
+        self.timing = Timing(grid=steps)
+        self._steps = steps
+        self._outer: deque[tuple[int, Forces]] = deque()
+
+    def watch(self, step: int, period: int, ideal: IdealReading) -> None:
+        """Keep the sample of the outer one that is due, and drop those that are too old."""
+        if not self._outer or (step + self._steps) % period == 0:
+            self._outer.append((step, ideal.accelerations))
+        while len(self._outer) > 1 and self._outer[1][0] <= step - self._steps:
+            self._outer.popleft()
+
+    def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
+        """Return the inner one's forces and the outer one's of earlier."""
+        outer = self._outer[0][1]
+        if isinstance(forces, np.ndarray):
+            return np.concatenate([forces[:2], outer[2:]])
+        return (*forces[:2], *outer[2:])
+
+
+def skew(part: Accelerometer, site: Site) -> SensorStage | None:
+    """Make the stage of accelerometers that are not sampled at once."""
+    return Skew(site.steps(part.skew_s, "skew_s", f"{part.skew_s:g} s")) if part.skew_s else None

@@ -1,0 +1,309 @@
+"""Users' observers and laws: what the bench takes, and how one that fails ends its run."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from pydantic.dataclasses import dataclass
+
+from cmg_mj import Estimate, Experiment, FeedbackState, InputError, Measurement, load_scenario, prepare
+from cmg_mj.inputs.types import STRICT, Positive
+from tests.command import cmg_mj
+from tests.run_folders import assert_whole
+
+
+class Mine:
+    """A user's observer that works: what the others get wrong, they get wrong from it."""
+
+    def __init__(self, dt: float, model: object) -> None:
+        self.dt = dt
+
+    def init(self, y: Measurement) -> Any:
+        return (y.y1, 0)
+
+    def step(self, state: Any, y: Measurement, u: Any) -> Any:
+        y1, k = state
+        return (y.y1, k + 1), self.estimate(k + 1, y, 0.3 * (y.y1 - y1) / self.dt)
+
+    def estimate(self, k: int, y: Measurement, rate: Any) -> Any:
+        return Estimate(y.y1, rate, y.y2)
+
+
+class FailsAtFirst(Mine):
+    def init(self, y: Measurement) -> Any:
+        raise KeyError("gain")
+
+
+class ReturnsNothing(Mine):
+    def step(self, state: Any, y: Measurement, u: Any) -> Any:
+        return None
+
+
+class ReturnsTwo(Mine):
+    def estimate(self, k: int, y: Measurement, rate: Any) -> Any:
+        return y.y1, rate
+
+
+class ReturnsText(Mine):
+    def estimate(self, k: int, y: Measurement, rate: Any) -> Any:
+        return y.y1, rate, "0.0"
+
+
+class OwesASignal(Mine):
+    extra_signals = ("bias_rad",)
+
+
+class ForgetsWorlds(Mine):
+    def estimate(self, k: int, y: Measurement, rate: Any) -> Any:
+        return y.y1, 0.0, y.y2
+
+
+class FailsLater(Mine):
+    def estimate(self, k: int, y: Measurement, rate: Any) -> Any:
+        return 1 / 0 if k == 30 else Estimate(y.y1, rate, y.y2)
+
+
+class GivesNan(Mine):
+    def estimate(self, k: int, y: Measurement, rate: Any) -> Any:
+        return Estimate(y.y1, rate * (math.nan if k >= 30 else 1.0), y.y2)
+
+
+class NamesXTwice(Mine):
+    extra_signals = ("x1_rad",)
+
+
+class MyLaw:
+    """A user's law that works."""
+
+    def __init__(self, dt: float, rate_limit: float) -> None:
+        self.dt, self.rate_limit = dt, rate_limit
+
+    def init(self, y: Measurement) -> Any:
+        return 0
+
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
+        return state + 1, self.command(state, -35.0 * x.x1 - 4.0 * x.x2 + x.x3)
+
+    def command(self, k: int, demand: Any) -> Any:
+        return demand
+
+
+class LawReturnsNothing(MyLaw):
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
+        return None
+
+
+class LawReturnsAList(MyLaw):
+    def command(self, k: int, demand: Any) -> Any:
+        return [demand]
+
+
+class LawForgetsWorlds(MyLaw):
+    def command(self, k: int, demand: Any) -> Any:
+        return 0.0
+
+
+class LawFailsLater(MyLaw):
+    def command(self, k: int, demand: Any) -> Any:
+        return 1 / 0 if k == 30 else demand
+
+
+class LawGivesInfinity(MyLaw):
+    def command(self, k: int, demand: Any) -> Any:
+        return demand * 0.0 + (math.inf if k >= 30 else 0.0)
+
+
+class LawFailsInWorld1(MyLaw):
+    def command(self, k: int, demand: Any) -> Any:
+        error = np.zeros(np.shape(demand))
+        if k >= 30:
+            error[1] = math.nan
+        return demand + error
+
+
+class AsksForMuch(MyLaw):
+    """Far beyond the limit."""
+
+    commands: ClassVar[list] = []
+
+    def command(self, k: int, demand: Any) -> Any:
+        return 0.0 * demand + 1000.0
+
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
+        self.commands.append(u)
+        return super().step(state, y, x, u)
+
+
+class Remembers(MyLaw):
+    count = 0
+
+    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> Any:
+        self.count += 1
+        return state, 0.01 * self.count + 0.0 * y.y1
+
+
+@dataclass(frozen=True, config=STRICT)
+class Typed:
+    """A law whose parameters pydantic checks."""
+
+    dt: Positive
+    rate_limit: Positive
+    stiffness: Positive = 35.0
+    gains: tuple[float, float, float, float] | None = None
+
+    def init(self, y: Measurement) -> None:
+        return None
+
+    def step(self, state: None, y: Measurement, x: FeedbackState, u: Any) -> tuple[None, Any]:
+        return None, -self.stiffness * x.x1 - 4.0 * x.x2 + x.x3
+
+
+def field_of(part: type) -> str:
+    return "controller.kind" if "Law" in part.__name__ or part in (AsksForMuch, Remembers) else "observer.kind"
+
+
+def with_part(part: type, *settings: str, field: str = "") -> Experiment:
+    """A short run with an observer or a law of one's own."""
+    path = f"{__name__}:{part.__name__}"
+    setting = f"open_loop_observers=['{path}']" if field == "open loop" else f"{field or field_of(part)}={path}"
+    return prepare(load_scenario("push_recovery", ["push=[]", "duration_s=0.3", setting, *settings]))
+
+
+@pytest.mark.parametrize(
+    ("part", "worlds", "fragments"),
+    [
+        (FailsAtFirst, 1, ["observer FailsAtFirst", "in init", "KeyError: 'gain'"]),
+        (FailsAtFirst, 2, ["observer FailsAtFirst", "KeyError: 'gain'"]),
+        (ReturnsNothing, 1, ["observer ReturnsNothing", "TypeError"]),
+        (ReturnsTwo, 1, ["observer ReturnsTwo", "2", "x1, x2, x3"]),
+        (ReturnsText, 2, ["observer ReturnsText", "x3", "()"]),
+        (OwesASignal, 2, ["observer OwesASignal", "3", "bias_rad"]),
+        (ForgetsWorlds, 2, ["observer ForgetsWorlds", "x2", "()", "(2,)"]),
+        (LawReturnsNothing, 1, ["law LawReturnsNothing", "TypeError"]),
+        (LawReturnsAList, 1, ["law LawReturnsAList", "u", "(1,)", "()"]),
+        (LawForgetsWorlds, 2, ["law LawForgetsWorlds", "u", "()", "(2,)"]),
+    ],
+)
+def test_what_has_a_wrong_shape_ends_the_run_at_its_first_tick(part: type, worlds: int, fragments: list[str]) -> None:
+    """In the loop, and an observer in open loop too."""
+    for field in ["", "open loop"] if field_of(part) == "observer.kind" else [""]:
+        experiment = with_part(part, field=field)
+        result = experiment.run_many(worlds) if worlds > 1 else experiment.run()
+        assert {outcome.kind for outcome in result.outcomes} == {"stopped"}
+        reason = result.outcomes[0].reason
+        assert all(fragment in reason for fragment in fragments)
+        assert result.seconds <= 0.005
+
+
+@pytest.mark.parametrize(
+    ("part", "shown"),
+    [
+        (FailsLater, "ZeroDivisionError: division by zero"),
+        (GivesNan, "observer GivesNan returned nan for x2"),
+        (LawFailsLater, "ZeroDivisionError: division by zero"),
+        (LawGivesInfinity, "law LawGivesInfinity returned inf for u"),
+    ],
+)
+@pytest.mark.parametrize("driver", ["native", "callback"])
+def test_what_fails_in_a_run_is_shown_once_and_the_record_kept(part: type, shown: str, driver: str) -> None:
+    path = f"{__name__}:{part.__name__}"
+    outcome = cmg_mj(
+        "run", "push_recovery", "--set", f"{field_of(part)}={path}", "--driver", driver, "--out", "it", "--json"
+    )
+    assert outcome.status == 2
+    assert outcome.err.count(shown) == 1
+    assert "t = 0.15 s" in outcome.err
+    assert "runners.py" not in outcome.err
+    assert ("test_users_code.py" in outcome.err) == ("Zero" in shown)
+    assert len(assert_whole("it")) == 30
+
+
+def test_an_open_loop_observer_that_raises_ends_the_run() -> None:
+    result = with_part(FailsLater, field="open loop").run()
+    assert result.outcomes[0].kind == "stopped"
+    assert result.trajectory is not None
+    assert len(result.trajectory["time_s"]) == 30
+
+
+def test_an_open_loop_observer_that_gives_nan_harms_nobody() -> None:
+    assert with_part(GivesNan, field="open loop").run().outcomes[0].kind == "done"
+
+
+def test_an_observer_that_fails_among_others() -> None:
+    """The others are run, all is written, and the exit status tells."""
+    Path("quick.toml").write_text("duration_s = 0.3")
+    kind = f"{__name__}:GivesNan"
+    outcome = cmg_mj("compare", "quick.toml", "--observers", f"{kind},linear", "--worlds", 2)
+    assert outcome.status == 2
+    assert f"{kind}: 2 of 2 worlds stopped" in outcome.err
+    assert Path("runs/quick-compare-0/trajectory-linear.parquet").exists()
+
+
+def test_a_law_that_fails_in_one_world_of_many() -> None:
+    """Only that world stops."""
+    result = with_part(LawFailsInWorld1).run_many(3)
+    assert [outcome.kind for outcome in result.outcomes] == ["done", "stopped", "done"]
+
+
+def test_no_law_gets_beyond_the_limit() -> None:
+    """Its next sample tells the law what was commanded."""
+    experiment = with_part(AsksForMuch)
+    AsksForMuch.commands.clear()
+    trajectory = experiment.run().trajectory
+    assert trajectory is not None
+    np.testing.assert_array_equal(trajectory["u_rad_s"], 4.7)
+    assert AsksForMuch.commands == [0.0] + [4.7] * (len(trajectory) - 1)
+    many = experiment.run_many(2).trajectory
+    assert many is not None
+    np.testing.assert_array_equal(many["u_rad_s"], 4.7)
+
+
+def test_a_law_that_remembers_in_itself_is_fresh_in_every_run() -> None:
+    experiment = with_part(Remembers)
+    one, rerun = experiment.run().trajectory, experiment.run().trajectory
+    assert one is not None
+    assert rerun is not None
+    np.testing.assert_array_equal(one["u_rad_s"], rerun["u_rad_s"])
+    assert one["u_rad_s"][-1] == pytest.approx(0.01 * len(one))
+
+
+def test_extra_signals_are_none_of_x() -> None:
+    with pytest.raises(InputError, match=r"NamesXTwice.*extra_signals"):
+        with_part(NamesXTwice)
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        (["kind=lgq"], "did you mean 'lqg'"),
+        (["kind=nowhere:Law"], "nowhere"),
+        ([f"kind={__name__}:Nobody"], "Nobody"),
+        (["kind=3"], "controller.kind"),
+        (["kind=lqg", "torque_wlk=1.0"], "torque_walk"),
+        (["torque_walk=1.0"], "controller.torque_walk"),
+        (["kind=lqg", "torque_walk=-1"], "controller.torque_walk"),
+        (["kind=lqg", "state_cost=[1, 1]"], "controller.state_cost"),
+        (["kind=lqg", "state_cost=[1, 1, 1, 0]"], "state_cost"),
+        ([f"kind={__name__}:Typed", "dt=0.1"], "controller.dt"),
+        ([f"kind={__name__}:Typed", "stifness=1.0"], "'stiffness'"),
+        ([f"kind={__name__}:Typed", "stiffness='a'"], "controller.stiffness"),
+        (["kind=lqg", "gains=[1,2,3,4]"], "controller.gains"),
+        (["kind=lqg", "lqr.state_cost=[1,1,1,1]"], "controller.lqr"),
+        (["kind=lqg", "feedback=fog"], "controller.feedback"),
+        (["kind=lqg", "bias_trim_s=1.0"], "controller.bias_trim_s"),
+    ],
+)
+def test_fields_that_do_not_fit_the_law(settings: list[str], field: str) -> None:
+    with pytest.raises(InputError) as error:
+        prepare(load_scenario("push_recovery", [f"controller.{setting}" for setting in settings]))
+    assert field in str(error.value)
+
+
+def test_gains_reach_a_law_of_ones_own_that_takes_them() -> None:
+    settings = [f"controller.kind={__name__}:Typed", "controller.gains=[1,2,3,4]", "controller.stiffness=30"]
+    law = prepare(load_scenario("push_recovery", settings)).law
+    assert law == Typed(0.005, 4.7, 30.0, (1.0, 2.0, 3.0, 4.0))
