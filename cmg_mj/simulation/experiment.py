@@ -138,7 +138,7 @@ class Experiment:
                 return self.run_on(board, world, **options)
         plant = self.plant
         if driver == "plugin":
-            from cmg_mj.simulation.plugin_files import plant_with_plugin
+            from cmg_mj.simulation.make import plant_with_plugin
 
             plant = plant_with_plugin(self, int(world))
         return self.simulate(plant, self.controller(int(world)), driver=driver, **options)

@@ -34,7 +34,7 @@ def test_the_c_program() -> None:
     assert len(program.splitlines()) <= 25
     assert command(*names[0].split()[1:]).status == 0
     Path("balance.c").write_text(program, encoding="utf-8")
-    include = ["-isystem", str(find_mujoco().include)]
+    include = ["-isystem", str(find_mujoco().parent / "include")]
     subprocess.run([str(COMPILER), *WARNINGS, *include, "-c", "balance.c", "-o", "balance.o"], check=True, timeout=300)
     process = subprocess.run(
         ["bash", "-ec", block("sh")], env=environment(), capture_output=True, text=True, timeout=300, check=False

@@ -52,11 +52,3 @@ def test_command_that_makes_a_plugin(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert {"Makefile", "made_by_command.xml", "made_by_command_example.c", figures["library"]} <= {
         path.name for path in (tmp_path / "balance").iterdir()
     }
-
-
-def test_bench(capsys: pytest.CaptureFixture[str]) -> None:
-    """What it prints; how fast it is, docs/plugin_evidence.md says."""
-    main(["bench", "plugin", "--observers", "gyro_free", "--worlds", "4", "--json"])
-    (figures,) = json.loads(capsys.readouterr().out)
-    assert set(figures["over_bare"]) == {"one world, mj_step", "worlds, rollout", "worlds, Batch"}
-    assert all(0.9 < ratio < 2.0 for ratio in figures["over_bare"].values())
