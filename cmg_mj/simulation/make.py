@@ -192,7 +192,7 @@ def write_plugin(made: PluginTexts, out: Path | RunFolder) -> Plugin:
         InputError: The C does not compile, or there is no compiler: then all but the library is written.
     """
     name, library, compiler = made.name, library_name(made.name), _find_compiler()
-    writers: dict[str, Callable[[Path], object]] = {
+    writers: dict[str, Callable[[Path], None]] = {
         file: partial(write_text, text=text) for file, text in made.texts.items()
     }
     names = list(made.texts) if compiler is None else plugin_files(made)
@@ -202,7 +202,7 @@ def write_plugin(made: PluginTexts, out: Path | RunFolder) -> Plugin:
             for file in made.code.files:
                 writers[file](compiled.with_name(file))
             compile_plugin(compiled.parent, compiler, made.code.sources, library)
-            writers[library] = partial(shutil.copy, compiled)
+            writers[library] = partial(_copy, compiled)
         place = folder.write(writers, all_or_none=True)
     if compiler is None:
         raise InputError(
@@ -210,6 +210,10 @@ def write_plugin(made: PluginTexts, out: Path | RunFolder) -> Plugin:
             f"{place}: run `make` there where there is a compiler"
         )
     return Plugin(f"cmg_mj.{name}", place / library, place / f"{name}.xml", [place / file for file in names])
+
+
+def _copy(source: Path, target: Path) -> None:
+    shutil.copy(source, target)
 
 
 _numbers = itertools.count()
