@@ -66,7 +66,7 @@ def plugin(
     with claim_output(out, f"plugin-{made.name}", plugin_files(made)) as folder:
         result = write_plugin(made, folder)
     place, library = result.library.parent, result.library.name
-    figures = {"plugin": result.name, "library": library, "model": result.model.name, "build": made.code.build}
+    figures = {"plugin": result.name, "library": library, "model": result.model.name, "build": made.build}
     show(figures, "\n".join(f"{key:<8}{value}" for key, value in figures.items()), as_json)
     say_written(folder, place, f"Try it: {shell_command('python', place / f'{made.name}_example.py')}", as_json)
     if not as_json:

@@ -9,11 +9,11 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Unpack
 
 import mujoco
 
-from cmg_mj.codegen.engine_plugin.build import check_platform, compile_plugin, extra_files, library_name
+from cmg_mj.codegen.engine_plugin.build import check_platform, compile_plugin, library_name
 from cmg_mj.codegen.engine_plugin.sensors import PluginAxis, PluginRig
 from cmg_mj.codegen.engine_plugin.tables import PluginCode, generate_plugin
 from cmg_mj.codegen.export import check_installed
@@ -21,14 +21,15 @@ from cmg_mj.codegen.export.names import name_of
 from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mujoco_state import set_control_callback
-from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.plugin_model import plugin_mjcf
+from cmg_mj.results.result import Result
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.run_folder.folder import claimed, write_text
 from cmg_mj.scenario.omissions import IN_THE_MODEL, omissions
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.stability_check import require_stable_period
 from cmg_mj.simulation.experiment import Experiment, prepare
+from cmg_mj.simulation.simulate import SimulationOptions
 
 Start = Literal["keyframe", "spinning"]
 
@@ -47,20 +48,6 @@ class Plugin(NamedTuple):
     library: Path
     model: Path
     files: list[Path]
-
-
-class PluginTexts(NamedTuple):
-    """A plugin before it is compiled.
-
-    Attributes:
-        name: The plugin's name behind `cmg_mj.`.
-        code: Its C.
-        texts: All files but the library: name -> text.
-    """
-
-    name: str
-    code: PluginCode
-    texts: dict[str, str]
 
 
 def plugin(
@@ -149,14 +136,14 @@ def make_plugin(
     sensors: bool = True,
     start: Start = "keyframe",
     world: int = 0,
-) -> PluginTexts:
+) -> PluginCode:
     """Generate a plugin's C and its model: see `plugin`. Its noise is that of a world, unless the model says other."""
     name = name_of(experiment.parts[0].design.observer(), name)
     rig = describe_rig(experiment, name, world)
-    code = generate_plugin(rig, name)
-    texts = code.files | extra_files(name, code.files, code.sources, experiment.plant.axis_names[0])
-    texts[f"{name}.xml"] = plugin_mjcf(experiment.plant, rig.plugin, {"start": start, "build": code.build}, sensors)
-    return PluginTexts(name, code, texts)
+    made = generate_plugin(rig, name)
+    config = {"start": start, "build": made.build}
+    made.files[f"{name}.xml"] = plugin_mjcf(experiment.plant, rig.plugin, config, sensors)
+    return made
 
 
 def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig:
@@ -177,15 +164,15 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
         axes.append(PluginAxis(axis.prefix, modules, joint, tuple(axis.line.push[1]), controller))
     compensates = len(axes) > 1 and experiment.scenario.controller.compensate_turning
     turning = (experiment.plant.turning, experiment.scenario.sensors.mems_gyro) if compensates else None
-    return PluginRig(tuple(axes), f"cmg_mj.{name}", world, turning)
+    return PluginRig(axes, f"cmg_mj.{name}", world, turning)
 
 
-def plugin_files(made: PluginTexts) -> list[str]:
+def plugin_files(made: PluginCode) -> list[str]:
     """Name the files of a plugin."""
-    return [*made.texts, library_name(made.name)]
+    return [*made.files, library_name(made.name)]
 
 
-def write_plugin(made: PluginTexts, out: Path | RunFolder) -> Plugin:
+def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
     """Compile a plugin and write it to a folder: see `plugin`.
 
     Raises:
@@ -193,15 +180,15 @@ def write_plugin(made: PluginTexts, out: Path | RunFolder) -> Plugin:
     """
     name, library, compiler = made.name, library_name(made.name), _find_compiler()
     writers: dict[str, Callable[[Path], None]] = {
-        file: partial(write_text, text=text) for file, text in made.texts.items()
+        file: partial(write_text, text=text) for file, text in made.files.items()
     }
-    names = list(made.texts) if compiler is None else plugin_files(made)
+    names = list(made.files) if compiler is None else plugin_files(made)
     with tempfile.TemporaryDirectory() as temporary, claimed(out, names) as folder:
         if compiler is not None:
             compiled = Path(temporary, library)
-            for file in made.code.files:
-                writers[file](compiled.with_name(file))
-            compile_plugin(compiled.parent, compiler, made.code.sources, library)
+            for file, text in made.files.items():
+                write_text(compiled.with_name(file), text)
+            compile_plugin(compiled.parent, compiler, made.sources, library)
             writers[library] = partial(_copy, compiled)
         place = folder.write(writers, all_or_none=True)
     if compiler is None:
@@ -225,17 +212,17 @@ def unused_name() -> str:
     return f"run_{next(_numbers)}"
 
 
-def plant_with_plugin(experiment: Experiment, world: int = 0) -> Plant:
-    """Make the plant of an experiment with a plugin in its model, whose library is compiled and loaded.
+def run_with_plugin(experiment: Experiment, world: int, **options: Unpack[SimulationOptions]) -> Result:
+    """Run one world with a plugin in the model, whose library is compiled and loaded.
 
     Raises:
         InputError: Something in use cannot be exported, or there is no compiler.
     """
     find_tools()
     made = make_plugin(experiment, unused_name(), world=world)
+    plant = copy.copy(experiment.plant)
     with tempfile.TemporaryDirectory() as temporary, set_control_callback(None):
         written = write_plugin(made, Path(temporary))
         mujoco.mj_loadPluginLibrary(str(written.library))
-        plant = copy.copy(experiment.plant)
         plant.model = mujoco.MjModel.from_xml_path(str(written.model))
-    return plant
+    return experiment.simulate(plant, experiment.controller(world), driver="plugin", **options)

@@ -81,7 +81,7 @@ def simulate(
         pivots: Motions of the pivot; of many worlds a size may be an array (n_worlds,).
         settings: What counts as settled and fallen.
         driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only). `plugin`: the model
-            has a plugin that decides (likewise): see `plant_with_plugin`.
+            has a plugin that decides (likewise): see `run_with_plugin`.
         **options: See `SimulationOptions`.
 
     Returns:

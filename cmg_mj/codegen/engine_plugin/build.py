@@ -76,19 +76,19 @@ def library_name(name: str) -> str:
     return f"libcmg_mj_{name}.so"
 
 
-def extra_files(name: str, code: Collection[str], sources: Sequence[str], axis: str) -> dict[str, str]:
+def extra_files(name: str, code: Collection[str], sources: Sequence[str], prefix: str) -> dict[str, str]:
     """Print the Makefile and the examples.
 
     Args:
         name: The plugin's name behind `cmg_mj.`.
         code: The files of the C.
         sources: Those of them that are compiled.
-        axis: The first axis' name, or nothing.
+        prefix: What the first axis' sensors are named with: empty, or `AXIS/`.
 
     Returns:
         Name -> text.
     """
-    mujoco, tilt = find_mujoco(), "/".join(filter(None, ("balance", axis, "tilt")))
+    mujoco, tilt = find_mujoco(), f"balance/{prefix}tilt"
     words = {
         "NAME": name,
         "LIBRARY": library_name(name),

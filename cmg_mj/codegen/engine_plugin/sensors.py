@@ -59,7 +59,7 @@ class PluginRig(NamedTuple):
         turning: The coupling of the axes in a turn, and the gyro that shows it; None if turns are not compensated.
     """
 
-    axes: tuple[PluginAxis, ...]
+    axes: list[PluginAxis]
     plugin: str
     world: int
     turning: tuple[YawCoupling, MemsGyro] | None

@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from cmg_mj.codegen.engine_plugin.build import COMMON_SOURCES, c_text, common_files
+from cmg_mj.codegen.engine_plugin.build import COMMON_SOURCES, c_text, common_files, extra_files
 from cmg_mj.codegen.engine_plugin.sensors import (
     Clock,
     PluginAxis,
@@ -60,16 +60,18 @@ NAMES_IN_USE = frozenset(
 
 
 class PluginCode(NamedTuple):
-    """The C of a plugin.
+    """A plugin before it is compiled.
 
     Attributes:
-        files: Name -> text.
+        name: The plugin's name behind `cmg_mj.`.
+        files: Name -> text; of the C, then of all that stands beside it.
         sources: The files that are compiled.
-        build: Fingerprint of the code, by which a model knows its library.
+        build: Fingerprint of the C, by which a model knows its library.
     """
 
+    name: str
     files: dict[str, str]
-    sources: tuple[str, ...]
+    sources: list[str]
     build: str
 
 
@@ -101,7 +103,8 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
     files["rig.c"] = format_rig(rig, names, "")
     build = hashlib.sha256("".join(files.values()).encode()).hexdigest()[:16]
     files["rig.c"] = format_rig(rig, names, build)
-    return PluginCode(files, (*COMMON_SOURCES, *(f"{own}_controller.c" for own in names), "rig.c"), build)
+    sources = [*COMMON_SOURCES, *(f"{own}_controller.c" for own in names), "rig.c"]
+    return PluginCode(name, files | extra_files(name, files, sources, rig.axes[0].prefix), sources, build)
 
 
 def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: LawPrinter) -> str:
