@@ -56,9 +56,8 @@ def plugin(
       NAME_example.py, NAME_example.c, Makefile, and the C of the library
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.simulation.experiment import prepare
-    from cmg_mj.simulation.make import check_tools, make_plugin, plugin_files, require_stable_periods, write_plugin
+    from cmg_mj.simulation.make import make_plugin, plugin_files, require_stable_periods, write_plugin
 
-    check_tools()
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
     require_stable_periods(experiment)
     note_hints(experiment.hints)

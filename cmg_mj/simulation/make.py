@@ -76,36 +76,21 @@ def plugin(
             folder holds files of the user's that would be overwritten. Without a compiler, all but the library is
             written.
     """
-    check_tools()
     experiment = scenario if isinstance(scenario, Experiment) else prepare(scenario)
     require_stable_periods(experiment)
     return write_plugin(make_plugin(experiment, name, sensors=sensors, start=start), out)
 
 
-def check_tools() -> None:
-    """Check what a plugin's C is generated with, before anything is computed.
-
-    Raises:
-        InputError: CasADi is missing, or the platform is not supported.
-    """
-    check_platform()
-    check_installed()
-
-
-def find_tools() -> list[str]:
-    """Find what a plugin is made with, before anything is computed.
-
-    Returns:
-        Command of the compiler.
+def require_tools() -> None:
+    """Require what a plugin is made with, before anything is computed.
 
     Raises:
         InputError: CasADi or a compiler is missing, or the platform is not supported.
     """
-    check_tools()
-    compiler = _find_compiler()
-    if compiler is None:
+    check_platform()
+    check_installed()
+    if _find_compiler() is None:
         raise InputError("plugin: there is no C compiler: install gcc or clang, or name one in CC")
-    return compiler
 
 
 def _find_compiler() -> list[str] | None:
@@ -138,6 +123,7 @@ def make_plugin(
     world: int = 0,
 ) -> PluginCode:
     """Generate a plugin's C and its model: see `plugin`. Its noise is that of a world, unless the model says other."""
+    check_platform()
     name = name_of(experiment.parts[0].design.observer(), name)
     rig = describe_rig(experiment, name, world)
     made = generate_plugin(rig, name)
@@ -218,7 +204,7 @@ def run_with_plugin(experiment: Experiment, world: int, **options: Unpack[Simula
     Raises:
         InputError: Something in use cannot be exported, or there is no compiler.
     """
-    find_tools()
+    require_tools()
     made = make_plugin(experiment, unused_name(), world=world)
     plant = copy.copy(experiment.plant)
     with tempfile.TemporaryDirectory() as temporary, set_control_callback(None):
