@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from cmg_mj.simulation.callback import control_callback as control_callback
     from cmg_mj.simulation.experiment import Experiment as Experiment
     from cmg_mj.simulation.experiment import prepare as prepare
-    from cmg_mj.simulation.plugin import plugin as plugin
+    from cmg_mj.simulation.make import plugin as plugin
     from cmg_mj.stages.push import Push as Push
     from cmg_mj.stages.push import Swing as Swing
     from cmg_mj.studies.compare.api import Comparison as Comparison

@@ -771,9 +771,6 @@ COMMANDS: dict[str, Notes] = {
         "about three seconds for one observer.", ("cmg-mj bench board --observers gyro_free",), "board.md"
     ),
     "bench sweep": Notes("about a minute for one observer.", ("cmg-mj bench sweep --observers homogeneous",)),
-    "bench plugin": Notes(
-        "about half a minute for one observer.", ("cmg-mj bench plugin --observers gyro_free",), "plugin.md"
-    ),
 }
 """Command -> examples and durations."""
 NEEDS = {

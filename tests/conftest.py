@@ -18,9 +18,6 @@ pytest_plugins = ["tests.tiers"]
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"
 
-# Nor does any process load plugins that a user has installed.
-os.environ["CMG_MJ_PLUGINS"] = ""
-
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,8 +1,6 @@
-"""The commands that measure speed: of the closed loop, of an update on a board, of sweeps and of plugins."""
+"""The commands that measure speed: of the closed loop, of an update on a board, and of sweeps."""
 
 from __future__ import annotations
-
-import os
 
 import click
 
@@ -11,12 +9,10 @@ from cmg_mj.cli.terminal import progress, show, users_code
 from cmg_mj.errors import InputError
 
 
-@click.group(
-    short_help="Measure the speed of the closed loop, a board, sweeps or plugins.", invoke_without_command=True
-)
+@click.group(short_help="Measure the speed of the closed loop, a board or sweeps.", invoke_without_command=True)
 @click.pass_context
 def bench(context: click.Context) -> None:
-    """Measure the speed of the closed loop, of an observer's update on a board, of sweeps, or of plugins.
+    """Measure the speed of the closed loop, of an observer's update on a board, or of sweeps.
 
     \b
       cmg-mj bench loop --observers homogeneous,ltv
@@ -67,25 +63,3 @@ def sweep(observers: list[str], worlds: int, as_json: bool) -> None:
     with progress("Bench of sweeps", 1.0) as on_progress:
         figures = measure(observers, worlds, on_progress)
     show(figures, table(figures), as_json)
-
-
-@bench.command(short_help="Time MuJoCo with a plugin against the same model without.")
-@observers_option()
-@worlds_option("Worlds of rollout and Batch.", default=64)
-@json_option()
-@users_code()
-def plugin(observers: list[str], worlds: int, as_json: bool) -> None:
-    """Time MuJoCo with the controller as a plugin against the same model without: processor time, in pairs."""
-    from cmg_mj.scenario.loading import load_scenario
-    from cmg_mj.simulation.experiment import prepare
-    from cmg_mj.simulation.plugin_files import find_tools
-    from cmg_mj.studies.plugin_benchmark import measure, plugin_table
-
-    find_tools()
-    experiments = [prepare(load_scenario("push_recovery", ["open_loop_observers=[]"], name)) for name in observers]
-    with progress("Bench of plugins", 1.0 * len(observers)) as on_progress:
-        figures = [
-            measure(experiment, worlds, os.cpu_count() or 1, lambda share, i=i: on_progress(i + share))
-            for i, experiment in enumerate(experiments)
-        ]
-    show(figures, "\n\n".join(map(plugin_table, figures)), as_json)

@@ -16,13 +16,13 @@ from cmg_mj.plant.bend import bend_frame
 from cmg_mj.plant.checks import RigChecker, invalid_numbers
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
 from cmg_mj.plant.parts import REQUIRED_PARTS, axes_of, missing_parts
-from cmg_mj.plant.without_plugins import NAMES_OF_COPIES, OWN, strip_plugins
+from cmg_mj.plant.without_plugins import OWN, parse_without_plugins
 from cmg_mj.scenario.plant_settings import PlantSettings
 
 
 def _one_line(error: Exception) -> str:
     """MuJoCo's message without what tells a user nothing."""
-    text = NAMES_OF_COPIES.sub("", " ".join(str(error).split()).removeprefix("Error: "))
+    text = " ".join(str(error).split()).removeprefix("Error: ")
     syntax = re.match(r"XML parse error .*Line number=(\d+)", text)
     return (
         f"XML syntax error at line {syntax[1]}" if syntax else re.sub(r" The (static|visual) .* remain so\.", "", text)
@@ -38,14 +38,11 @@ def parse(path: Path) -> mujoco.MjSpec:
     return _parse(path)[0]
 
 
-def _parse(path: Path) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
-    """Read a model file; the names are those of the plugins that were removed."""
+def _parse(path: Path) -> tuple[mujoco.MjSpec, list[str]]:
+    """Read a model file; the names are those of the plugins that are left out."""
     model_files(path)
-    stripped = strip_plugins(path)
     try:
-        if stripped is None:
-            return mujoco.MjSpec.from_file(str(path)), ()
-        return stripped.parse(), stripped.plugins
+        return parse_without_plugins(path)
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise InputError(f"{path}: not a model MuJoCo can read: {_one_line(error)}") from error
 
@@ -56,9 +53,8 @@ def compile_model(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     Raises:
         InputError: MuJoCo's compiler refuses it, or it has a plugin of this package's.
     """
-    for plugin in spec.plugins:
-        if plugin.plugin_name.startswith(OWN):
-            raise InputError(f"{path}: the plugin {plugin.plugin_name} cannot be ignored; take it out of the file")
+    if any(plugin.plugin_name.startswith(OWN) for plugin in spec.plugins):
+        raise InputError(f"{path}: a file that it includes has a plugin of cmg_mj's; take the plugin out of that file")
     try:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")

@@ -26,7 +26,15 @@ Framed = (
     | mujoco.MjsLight
     | mujoco.MjsFrame
 )
-KINDS = {mujoco.MjsBody: "body", mujoco.MjsSite: "site", mujoco.MjsGeom: "geom", mujoco.MjsCamera: "cam"}
+PLACES = {
+    mujoco.MjsBody: ("body", "quat"),
+    mujoco.MjsSite: ("site", "quat"),
+    mujoco.MjsJoint: ("jnt", "axis"),
+    mujoco.MjsGeom: ("geom", "quat"),
+    mujoco.MjsCamera: ("cam", "quat"),
+    mujoco.MjsLight: ("light", "dir"),
+}
+"""An element -> prefix of its arrays in a compiled model, and what says where it points."""
 INSTANCE = "balance"
 """Name of the plugin's instance; of an attached rig the prefix stands before it."""
 START_KEY = "start"
@@ -75,8 +83,7 @@ def differences(plant: mujoco.MjModel, written: mujoco.MjModel) -> list[str]:
     """List the arrays of physics in which two models differ."""
     names = [name for name in dir(plant) if name.startswith(PHYSICS)]
     names = [name for name in names if not any(part in name for part in SEEN_OR_DERIVED)]
-    arrays = [(name, getattr(plant, name), getattr(written, name)) for name in names]
-    return [name for name, a, b in arrays if isinstance(a, np.ndarray) and not np.array_equal(a, b)]
+    return [name for name in names if not np.array_equal(getattr(plant, name), getattr(written, name))]
 
 
 @contextmanager
@@ -102,25 +109,17 @@ def _take_out_of_frames(spec: mujoco.MjSpec, drawn: mujoco.MjModel) -> None:
 
     A frame with a mesh in it stays, whose place MuJoCo takes otherwise.
     """
-    staying = [frame for geom in spec.geoms if _is_placed_otherwise(geom) for frame in _frames_around(geom)]
+    otherwise = [geom for geom in spec.geoms if geom.meshname or not np.isnan(geom.fromto[0])]
+    staying = [frame for geom in otherwise for frame in _frames_around(geom)]
     for frame in spec.frames:
         if not any(outer in staying for outer in (frame, *_frames_around(frame))):
             frame.pos, frame.quat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
     for element in (*spec.bodies, *spec.sites, *spec.joints, *spec.geoms, *spec.cameras, *spec.lights):
         frames = _frames_around(element)
-        if not frames or any(frame in staying for frame in frames):
-            continue
-        if isinstance(element, mujoco.MjsJoint):
-            element.pos, element.axis = drawn.jnt_pos[element.id], drawn.jnt_axis[element.id]
-        elif isinstance(element, mujoco.MjsLight):
-            element.pos, element.dir = drawn.light_pos[element.id], drawn.light_dir[element.id]
-        else:
-            kind = KINDS[type(element)]
-            element.pos, element.quat = (getattr(drawn, f"{kind}_{name}")[element.id] for name in ("pos", "quat"))
-
-
-def _is_placed_otherwise(geom: mujoco.MjsGeom) -> bool:
-    return bool(geom.meshname) or not np.isnan(geom.fromto[0])
+        if frames and not any(frame in staying for frame in frames):
+            kind, direction = PLACES[type(element)]
+            for name in ("pos", direction):
+                setattr(element, name, getattr(drawn, f"{kind}_{name}")[element.id])
 
 
 def _frames_around(element: Framed) -> list[mujoco.MjsFrame]:

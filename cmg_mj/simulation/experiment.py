@@ -135,12 +135,11 @@ class Experiment:
             self.require_single_axis("the board")
             with on_a_board(self.axis_controller()) as board:
                 return self.run_on(board, world, **options)
-        plant = self.plant
         if driver == "plugin":
-            from cmg_mj.simulation.plugin_files import plant_with_plugin
+            from cmg_mj.simulation.make import run_with_plugin
 
-            plant = plant_with_plugin(self, int(world))
-        return self.simulate(plant, self.controller(int(world)), driver=driver, **options)
+            return run_with_plugin(self, int(world), **options)
+        return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
 
     def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""

@@ -31,7 +31,6 @@ from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.simulation.batch_values import split_values
 from cmg_mj.simulation.callback import CallbackLoop, control_callback
 from cmg_mj.simulation.physics import ManyWorlds, OneWorld
-from cmg_mj.simulation.plugin_loop import PluginLoop
 from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
 from cmg_mj.stages.push import Push, Swing
 
@@ -82,7 +81,7 @@ def simulate(
         pivots: Motions of the pivot; of many worlds a size may be an array (n_worlds,).
         settings: What counts as settled and fallen.
         driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only). `plugin`: the model
-            has a plugin that decides (likewise): see `plant_with_plugin`.
+            has a plugin that decides (likewise): see `run_with_plugin`.
         **options: See `SimulationOptions`.
 
     Returns:
@@ -172,7 +171,9 @@ class _Simulation:
             pivot = PivotSignals(self.pivots, directions, self.controller.seed, self.controller.worlds)
             self.instants = with_moving_pivot(self.instants, pivot, physics.accelerate, self.timestep)
         called_back = driver == "callback"
-        loop_class = CallbackLoop if called_back else PluginLoop if driver == "plugin" else ControlLoop
+        loop_class = CallbackLoop if called_back else ControlLoop
+        if driver == "plugin":
+            from cmg_mj.simulation.driver import PluginLoop as loop_class
         loop = loop_class(physics, self.controller, self.instants, self.fall_angle)
         driving: AbstractContextManager = nullcontext()
         if called_back:

@@ -304,7 +304,7 @@ def test_bench(monkeypatch: pytest.MonkeyPatch) -> None:
     assert figures["closed_loop_share_of_batch"] == pytest.approx(share)
     assert figures["timestep_ms"] == 5.0
     assert "linear" in cmg_mj("bench", "loop", "--observers", "linear", "--worlds", 2).out
-    assert cmg_mj("bench").complaint == "bench: name what to time: loop, board, sweep, plugin"
+    assert cmg_mj("bench").complaint == "bench: name what to time: loop, board, sweep"
 
 
 @pytest.mark.slow

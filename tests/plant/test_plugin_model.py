@@ -9,11 +9,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from cmg_mj.plant.mjcf import compile_model, load_rig
+from cmg_mj.plant.mjcf import compile_model, load_rig, parse
 from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.plant.plugin_model import plugin_mjcf
-from cmg_mj.plant.without_plugins import strip_plugins
 
 IN_FRAMES = """
 <mujoco>
@@ -44,9 +43,7 @@ def test_what_stands_in_frames_is_where_it_was(tmp_path: Path) -> None:
     mounted = mount(mujoco.MjSpec.from_string(IN_FRAMES), "pole", axis="hinge")
     plant = load_plant(model=str(mounted.save(tmp_path / "robot.xml")))
     (tmp_path / "plugin.xml").write_text(plugin_mjcf(plant, "cmg_mj.mine", {}), encoding="utf-8")
-    stripped = strip_plugins(tmp_path / "plugin.xml")
-    assert stripped is not None
-    written, drawn = stripped.parse().compile(), compile_model(plant.drawn_spec(), plant.path)
+    written, drawn = parse(tmp_path / "plugin.xml").compile(), compile_model(plant.drawn_spec(), plant.path)
     for name in ("body_pos", "body_quat", "body_inertia", "site_pos", "jnt_axis", "cam_pos", "cam_quat"):
         np.testing.assert_array_equal(getattr(written, name), getattr(drawn, name), err_msg=name)
     solid = drawn.geom_type != int(mujoco.mjtGeom.mjGEOM_MESH)

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cmg_mj.codegen.engine_plugin.build import COMMON_HEADERS, COMMON_SOURCES
-from cmg_mj.codegen.engine_plugin.files import library_name
+from cmg_mj.codegen.engine_plugin.build import COMMON_HEADERS, COMMON_SOURCES, library_name
 from cmg_mj.codegen.export.names import export_files
 from cmg_mj.errors import InputError
 from cmg_mj.papers.report import REPORT_FILES

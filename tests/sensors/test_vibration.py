@@ -213,7 +213,7 @@ def test_what_does_not_vibrate_is_refused(setting: str, message: str) -> None:
 
 
 def test_the_plugin_refuses_it_by_name() -> None:
-    from cmg_mj.simulation.plugin_files import describe_rig
+    from cmg_mj.simulation.make import describe_rig
 
     for field in ("vibration_mg=4.0", "wheel_harmonics_mg=[2.0]"):
         with pytest.raises(InputError, match=rf"sensors\.accelerometer\.{field.partition('=')[0]}: the "):

@@ -314,7 +314,7 @@ def test_a_model_that_gravity_alone_does_not_pull_is_refused() -> None:
 
 
 def test_the_plugin_refuses_it_by_name() -> None:
-    from cmg_mj.simulation.plugin_files import describe_rig
+    from cmg_mj.simulation.make import describe_rig
 
     with pytest.raises(InputError, match="pivot: the pivot's acceleration"):
         describe_rig(experiment(NOISE), "plugin")

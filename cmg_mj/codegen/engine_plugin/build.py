@@ -1,16 +1,16 @@
-"""Compiles a plugin: the compiler, its flags, and MuJoCo's headers and library."""
+"""Compiles a plugin: the compiler, its flags, MuJoCo's headers and library; and what stands beside the C."""
 
 from __future__ import annotations
 
+import json
 import platform
 import shlex
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
 
 from cmg_mj.errors import InputError
 
@@ -18,36 +18,25 @@ COMMON_SOURCES = ("noise.c", "sensors.c", "gyros.c", "controller.c", "state.c", 
 COMMON_HEADERS = ("ziggurat.h", "noise.h", "sensors.h", "gyros.h", "controller.h", "rig.h", "state.h", "setup.h")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 TESTED_PLATFORM = ("Linux", "glibc")
+FOLDER = files("cmg_mj.codegen.engine_plugin")
 
 
-class MujocoFiles(NamedTuple):
-    """MuJoCo as its Python package brings it."""
-
-    include: Path
-    library: Path
-    version: str
-
-
-def find_mujoco() -> MujocoFiles:
-    """Find MuJoCo's headers and library, without importing it.
+def find_mujoco() -> Path:
+    """Find the library of MuJoCo's Python package, which has the folder `include` beside it, without importing it.
 
     Raises:
-        InputError: They are not where the wheel of this version has them.
+        InputError: It is not where the wheel of this version has it.
     """
-    spec = find_spec("mujoco")
-    number = version("mujoco")
-    folder = Path((spec and spec.origin) or "").parent
-    include, library = folder / "include", folder / f"libmujoco.so.{number}"
-    for path in (include / "mujoco" / "mujoco.h", library):
-        if not path.is_file():
-            raise InputError(f"plugin: {path} is missing: a plugin is made for the MuJoCo of the wheel {number}")
-    return MujocoFiles(include, library, number)
+    spec, number = find_spec("mujoco"), version("mujoco")
+    library = Path((spec and spec.origin) or "").with_name(f"libmujoco.so.{number}")
+    if not library.is_file():
+        raise InputError(f"plugin: {library} is missing: a plugin is made for the MuJoCo of the wheel {number}")
+    return library
 
 
 def common_files() -> dict[str, str]:
     """Read the C that all plugins have in common: name -> text."""
-    folder = files("cmg_mj.codegen.engine_plugin") / "c"
-    return {name: (folder / name).read_text(encoding="utf-8") for name in (*COMMON_HEADERS, *COMMON_SOURCES)}
+    return {name: (FOLDER / "c" / name).read_text(encoding="utf-8") for name in (*COMMON_HEADERS, *COMMON_SOURCES)}
 
 
 def check_platform() -> None:
@@ -61,29 +50,66 @@ def check_platform() -> None:
         raise InputError(f"plugin: made and tested on Linux with glibc, not on {' with '.join(filter(None, here))}")
 
 
-def compile_command(compiler: Sequence[str], sources: Sequence[str], library: str) -> list[str]:
-    """Make the command that compiles a plugin, to be run in its folder."""
-    mujoco = find_mujoco()
-    link = [f"-L{mujoco.library.parent}", f"-l:{mujoco.library.name}", f"-Wl,-rpath,{mujoco.library.parent}"]
-    return [*compiler, *FLAGS, "-isystem", str(mujoco.include), *sources, "-o", library, *link, "-lm"]
-
-
 def compile_plugin(folder: Path, compiler: Sequence[str], sources: Sequence[str], library: str) -> None:
     """Compile a plugin in its folder.
 
     Raises:
         InputError: The compiler cannot be run, or refuses.
     """
-    command = compile_command(compiler, sources, library)
+    mujoco = find_mujoco()
+    link = [f"-L{mujoco.parent}", f"-l:{mujoco.name}", f"-Wl,-rpath,{mujoco.parent}", "-lm"]
+    command = [*compiler, *FLAGS, "-isystem", str(mujoco.parent / "include"), *sources, "-o", library, *link]
     try:
         process = subprocess.run(
             command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=300, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"plugin: the C compiler {shlex.join(compiler)} cannot be run: {reason}") from error
+        raise InputError(f"plugin: the C compiler {shlex.join(compiler)} cannot be run: {error}") from error
     if process.returncode:
-        lines = process.stderr.splitlines()
-        status = f"it ended with status {process.returncode} and without a message"
-        first = next((line for line in lines if "error" in line), lines[0] if lines else status)
-        raise InputError(f"plugin: the C does not compile with {compiler[0]}: {first}")
+        lines = [line for line in process.stderr.splitlines() if "error" in line]
+        reason = lines[0] if lines else f"status {process.returncode}"
+        raise InputError(f"plugin: the C does not compile with {compiler[0]}: {reason}")
+
+
+def library_name(name: str) -> str:
+    """Name the library of a plugin."""
+    return f"libcmg_mj_{name}.so"
+
+
+def extra_files(name: str, code: Collection[str], sources: Sequence[str], prefix: str) -> dict[str, str]:
+    """Print the Makefile and the examples.
+
+    Args:
+        name: The plugin's name behind `cmg_mj.`.
+        code: The files of the C.
+        sources: Those of them that are compiled.
+        prefix: What the first axis' sensors are named with: empty, or `AXIS/`.
+
+    Returns:
+        Name -> text.
+    """
+    mujoco, tilt = find_mujoco(), f"balance/{prefix}tilt"
+    words = {
+        "NAME": name,
+        "LIBRARY": library_name(name),
+        "TILT_IN_C": c_text(tilt),
+        "TILT_IN_PYTHON": json.dumps(tilt, ensure_ascii=False),
+        "MUJOCO": str(mujoco.parent),
+        "LIBMUJOCO": mujoco.name,
+        "SOURCES": " ".join(sources),
+        "INCLUDED": " ".join(file for file in code if file not in sources),
+        "FLAGS": " ".join(FLAGS),
+    }
+    result = {}
+    for file, template in (("example.c", "example.c"), ("example.py", "example.py.txt"), ("Makefile", "Makefile")):
+        text = (FOLDER / "templates" / template).read_text(encoding="utf-8")
+        for word, value in words.items():
+            text = text.replace(f"@{word}@", value)
+        result[file if file == "Makefile" else f"{name}_{file}"] = text
+    return result
+
+
+def c_text(text: str) -> str:
+    """Print a text as C reads it; in octal whatever is no plain letter, and ?, which begins trigraphs."""
+    letters = (chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode())
+    return f'"{"".join(letters)}"'

@@ -1,34 +1,110 @@
-"""Prints a plugin's own C: rig.c with its numbers, and a file a controller that joins the exported code to it."""
+"""Generates a plugin's C: exported controllers, what joins them to the plugin, the rig's numbers, the common files."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+import copy
+import hashlib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
-from cmg_mj.codegen.engine_plugin.files import c_text
-from cmg_mj.codegen.engine_plugin.rig import PluginAxis, PluginRig
-from cmg_mj.codegen.engine_plugin.sensor_numbers import (
-    Delivery,
-    Encoders,
-    FogNumbers,
-    Pair,
-    Settings,
-    TurnGyro,
+from cmg_mj.codegen.engine_plugin.build import COMMON_SOURCES, c_text, common_files, extra_files
+from cmg_mj.codegen.engine_plugin.sensors import (
+    Clock,
+    PluginAxis,
+    PluginRig,
+    Struct,
+    Value,
+    clock_of,
     describe_encoders,
     describe_fog,
     describe_pair,
     describe_settings,
     describe_turn_gyro,
+    refuse_unsupported,
 )
+from cmg_mj.codegen.export import generate_code
+from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.codegen.export.law_code import LawPrinter
 
-Number = int | float
-Struct = Delivery | Pair | Encoders | FogNumbers | TurnGyro | Settings
-Value = Number | str | Sequence[Number]
+NAMES_IN_USE = frozenset(
+    {
+        "axis",
+        "controller",
+        "decision",
+        "delivery",
+        "encoder",
+        "fog",
+        "gyros",
+        "law",
+        "measure",
+        "module",
+        "noise",
+        "observer",
+        "pair",
+        "plugin",
+        "rig",
+        "sensor",
+        "sensors",
+        "setup",
+        "show",
+        "spin",
+        "state",
+        "turn_gyro",
+        "turning",
+        "ziggurat",
+    }
+)
+"""Names that would clash with the C that all plugins have in common."""
 
-FEEDBACK = {"observer": "FEEDBACK_OBSERVER", "fog": "FEEDBACK_FOG", "truth": "FEEDBACK_TRUTH"}
+
+class PluginCode(NamedTuple):
+    """A plugin before it is compiled.
+
+    Attributes:
+        name: The plugin's name behind `cmg_mj.`.
+        files: Name -> text; of the C, then of all that stands beside it.
+        sources: The files that are compiled.
+        build: Fingerprint of the C, by which a model knows its library.
+    """
+
+    name: str
+    files: dict[str, str]
+    sources: list[str]
+    build: str
+
+
+def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
+    """Generate a plugin's C.
+
+    Args:
+        rig: The rig with its controllers.
+        name: Prefix of the exported controllers in C; of several axes the axis' number follows.
+
+    Returns:
+        The code.
+
+    Raises:
+        InputError: Something in use cannot be exported, or the name is none for a plugin.
+    """
+    refuse_unsupported(rig)
+    if name in NAMES_IN_USE:
+        raise InputError(f"--name {name}: is a name in every plugin's C; take another, such as {name}_of_mine")
+    files, names = common_files(), []
+    for number, axis in enumerate(rig.axes):
+        suffix = f"_{number}" if len(rig.axes) > 1 else ""
+        own, controller = name + suffix, copy.copy(axis.controller)
+        controller.feedback = "observer"  # which the export takes; the plugin's own C chooses the rate
+        code = generate_code(controller, "double", name, suffix)
+        files |= {file: code.files[file] for file in (f"{own}.h", f"{own}.c")}
+        files[f"{own}_controller.c"] = format_controller(own, axis, code.figures["numbers_in_state"], code.law)
+        names.append(own)
+    files["rig.c"] = format_rig(rig, names, "")
+    build = hashlib.sha256("".join(files.values()).encode()).hexdigest()[:16]
+    files["rig.c"] = format_rig(rig, names, build)
+    sources = [*COMMON_SOURCES, *(f"{own}_controller.c" for own in names), "rig.c"]
+    return PluginCode(name, files | extra_files(name, files, sources, rig.axes[0].prefix), sources, build)
 
 
 def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: LawPrinter) -> str:
@@ -45,7 +121,6 @@ def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: L
     """
     controller = axis.controller
     n, gap, formulas = name, float(controller.backlash), law.law
-    whose = f", axis '{_comment(axis.prefix.removesuffix('/'))}'," if axis.prefix else ""
     trimmed = -(-controller.trimmed_until // controller.period)
     fields = {
         "estimates": 3 + len(controller.extra_signals[0]),
@@ -61,9 +136,7 @@ def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: L
         "half_gap": gap / 2.0,
         "period": controller.law.dt,
     }
-    numbers = "".join(f"    .{field} = {_value(value)},\n" for field, value in fields.items())
-    numbers += f"    .feedback = {FEEDBACK[controller.feedback]},\n"
-    return f"""/* {n}{whose} as the plugin calls it. The exported code is included: its functions are static. */
+    return f"""/* {n} as the plugin calls it. The exported code is included: its functions are static. */
 #include "{n}.c"
 
 #include "controller.h"
@@ -93,7 +166,8 @@ static void observer_step(double *memory, const double y[3], double u, double *e
 {_law_functions(law)}
 extern const controller_type {n}_controller_type;
 const controller_type {n}_controller_type = {{
-{numbers}    .measure = controller_measure,
+{_fields(fields)}    .feedback = FEEDBACK_{controller.feedback.upper()},
+    .measure = controller_measure,
     .observer_init = observer_init,
     .observer_step = observer_step,
     .law_init = law_init,
@@ -140,91 +214,74 @@ def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
     Returns:
         The text.
     """
-    clock, first = rig.clock, rig.axes[0].controller
-    axes = "".join(_axis(rig, i, name) for i, name in enumerate(names))
-    declarations = "".join(f"extern const controller_type {name}_controller_type;\n" for name in dict.fromkeys(names))
+    clock, first = clock_of(rig), rig.axes[0].controller
+    declarations = "".join(f"extern const controller_type {name}_controller_type;\n" for name in names)
+    axes = "".join(
+        f"static const axis_type axis_{i} = {{\n{_fields(_describe_axis(rig.axes[i], clock))}"
+        f"    .controller = &{name}_controller_type,\n}};\n\n"
+        for i, name in enumerate(names)
+    )
+    turning = ""
+    if rig.turning is not None:
+        coupling, gyro = rig.turning
+        matrices = {name: matrix.tolist() for name, matrix in coupling._asdict().items()}
+        described = {"gyro": describe_turn_gyro(gyro, first.law.dt), **matrices}
+        turning = f"static const turning_type turning = {{\n{_fields(described)}}};\n\n"
+    fields = {
+        "plugin": rig.plugin,
+        "build": build,
+        "seed": float(first.seed),
+        "world": float(rig.world),
+        "instant": clock.instant,
+        "period": clock.period // clock.steps,
+        "axes": len(rig.axes),
+    }
     return f"""/* The rig's numbers. */
 #include "rig.h"
 
 {declarations}
-{axes}{_turning(rig)}static const axis_type *const axes[] = {{{", ".join(f"&axis_{i}" for i in range(len(names)))}}};
+{axes}{turning}static const axis_type *const axes[] = {{{", ".join(f"&axis_{i}" for i in range(len(names)))}}};
 
 const rig_type rig = {{
-    .plugin = {_value(rig.plugin)},
-    .build = {_value(build)},
-    .seed = {_value(float(first.seed))},
-    .world = {_value(float(first.worlds if isinstance(first.worlds, int) else 0))},
-    .instant = {_value(rig.instant)},
-    .period = {clock.period // clock.steps},
-    .axes = {len(rig.axes)},
-    .axis = axes,
-    .turning = {"&turning" if rig.turning else "0"},
+{_fields(fields)}    .axis = axes,
+    .turning = {"&turning" if turning else "0"},
 }};
 """
 
 
-def _turning(rig: PluginRig) -> str:
-    """Print how the axes couple in a turn, if that is compensated."""
-    if rig.turning is None:
-        return ""
-    coupling, gyro = rig.turning
-    described = describe_turn_gyro(gyro, rig.axes[0].controller.law.dt)
-    matrices = "".join(
-        f"    .{name} = {{{', '.join(map(_value, matrix.tolist()))}}},\n" for name, matrix in coupling._asdict().items()
-    )
-    return f"static const turning_type turning = {{\n    .gyro = {_struct(described, 4)},\n{matrices}}};\n\n"
-
-
-def _axis(rig: PluginRig, number: int, name: str) -> str:
-    """Print the numbers of one axis."""
-    axis, clock = rig.axes[number], rig.clock
-    sensors = axis.controller.sensors
-    pair, encoder = sensors.accelerometer, sensors.encoder
-    modules = "".join(f"        {{{', '.join(map(_value, module))}}},\n" for module in axis.modules)
-    parts: dict[str, Struct] = {
-        "pair": describe_pair(pair, axis.controller.axis, clock),
+def _describe_axis(axis: PluginAxis, clock: Clock) -> Struct:
+    """Describe an axis but for its controller: `axis_type` in C."""
+    controller = axis.controller
+    pair, encoder, fog = controller.sensors.accelerometer, controller.sensors.encoder, controller.sensors.fog
+    has_fog = controller.feedback == "fog"
+    return {
+        "prefix": axis.prefix,
+        "gimbals": len(axis.modules),
+        "modules": axis.modules,
+        "pair": describe_pair(pair, controller.axis, clock),
         "encoder": describe_encoders(encoder, len(axis.modules), clock),
         "settings": describe_settings(pair, encoder),
+        **({"fog": describe_fog(fog, controller.axis, clock)} if has_fog else {}),
+        "raw_rate": pair.raw_rate_hz,
+        "joint": axis.joint,
+        "dofs": len(axis.shares),
+        "shares": axis.shares,
     }
-    if axis.controller.feedback == "fog":
-        parts["fog"] = describe_fog(sensors.fog, axis.controller.axis, clock)
-    structs = "".join(f"    .{field} = {_struct(value, 4)},\n" for field, value in parts.items())
-    return f"""static const axis_type axis_{number} = {{
-    .prefix = {_value(axis.prefix)},
-    .gimbals = {len(axis.modules)},
-    .modules = {{
-{modules}    }},
-{structs}    .raw_rate = {_value(pair.raw_rate_hz)},
-    .joint = {_value(axis.joint)},
-    .dofs = {len(axis.shares)},
-    .shares = {_value(axis.shares)},
-    .controller = &{name}_controller_type,
-}};
-
-"""
 
 
-def _struct(value: Struct, indent: int) -> str:
-    space = " " * indent
-    fields = vars(value).items()
-    lines = [
-        f"{space}    .{name} = {_struct(part, indent + 4) if isinstance(part, Delivery) else _value(part)},\n"
-        for name, part in fields
-    ]
-    return f"{{\n{''.join(lines)}{space}}}"
+def _fields(struct: Mapping[str, Value], indent: str = "    ") -> str:
+    """Print the fields of a struct, a line each."""
+    return "".join(f"{indent}.{name} = {_value(value, indent)},\n" for name, value in struct.items())
 
 
-def _value(value: Value) -> str:
-    """Print a number, a text or a row of numbers; every number as C reads it exactly."""
+def _value(value: Value, indent: str = "") -> str:
+    """Print a number, a text, a struct, or a row of numbers; every number as C reads it exactly."""
     if isinstance(value, str):
         return c_text(value)
     if isinstance(value, int):
         return str(int(value))
     if isinstance(value, float):
         return repr(float(value))
+    if isinstance(value, Mapping):
+        return f"{{\n{_fields(value, indent + '    ')}{indent}}}"
     return f"{{{', '.join(_value(part) for part in value)}}}"
-
-
-def _comment(text: str) -> str:
-    """Print a text within a comment in C, which neither ends nor begins one."""
-    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")

@@ -30,7 +30,7 @@ from cmg_mj.results.signed_text import signed
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.simulation.plugin_files import Plugin, find_tools
+from cmg_mj.simulation.make import Plugin, require_tools
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
 from cmg_mj.studies.push_limits.mount_plugin import check_plugin, claimed_plugin, write_mounted_plugin
 from cmg_mj.studies.push_limits.pair_demands import PairDemands, pair_demands
@@ -168,7 +168,7 @@ def mount_and_write(
     OBSERVER_CLASSES.find(observer)
     check_target(file, expanded(robot, "ROBOT"))
     if with_plugin:
-        find_tools()
+        require_tools()
     with (
         claimed_target(file, overwrite=overwrite),
         claimed_plugin(file, expanded(robot, "ROBOT"), overwrite=overwrite) if with_plugin else nullcontext() as folder,

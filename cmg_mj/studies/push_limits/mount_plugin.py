@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cmg_mj.codegen.engine_plugin.build import COMMON_HEADERS, COMMON_SOURCES
-from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE
+from cmg_mj.codegen.engine_plugin.tables import NAMES_IN_USE
 from cmg_mj.codegen.export.c_identifiers import RESERVED
 from cmg_mj.codegen.export.names import LONGEST
 from cmg_mj.errors import InputError, listed
@@ -16,7 +16,7 @@ from cmg_mj.inputs.files import model_files
 from cmg_mj.results.run_folder import RunFolder
 from cmg_mj.results.run_folder.manifest import HIDDEN, Manifest, users_files
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.simulation.plugin_files import Plugin, make_plugin, plugin_files, write_plugin
+from cmg_mj.simulation.make import Plugin, make_plugin, plugin_files, write_plugin
 
 LIBRARY = re.compile(r"libcmg_mj_\w+\.so", re.ASCII)
 

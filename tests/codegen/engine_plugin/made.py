@@ -17,12 +17,11 @@ import pytest
 from cmg_mj import load_scenario, prepare
 from cmg_mj.codegen.engine_plugin.build import FLAGS
 from cmg_mj.plant.plugin_model import plugin_mjcf
-from cmg_mj.plant.plugin_state import set_world
 from cmg_mj.plant.tilt_line import apply_torques
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.simulation.driver import set_world
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.simulation.plugin import plugin
-from cmg_mj.simulation.plugin_files import Plugin
+from cmg_mj.simulation.make import Plugin, plugin
 from tests.codegen.export.compiled import COMPILER
 
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")

@@ -13,8 +13,6 @@ import pytest
 import cmg_mj
 from cmg_mj import load_scenario, prepare
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.simulation.plugin import plugin
-from cmg_mj.simulation.plugin_files import make_plugin
 from tests.codegen.engine_plugin.made import needs_compiler
 
 pytestmark = [needs_compiler, pytest.mark.slow]
@@ -51,10 +49,7 @@ def two_axes(roll: str, pitch: str, folder: Path) -> Experiment:
     ("roll", "pitch"),
     [
         ("l", "l/x"),
-        ("l/x", "l"),
         ("a/b", "a_b"),
-        ("x", "x_controller"),
-        ("a b", "c-d"),
         ("größe", "controller"),
         ('"*/?\\', "<&'??/\U0001f600"),
     ],
@@ -66,17 +61,3 @@ def test_two_axes_of_some_names(roll: str, pitch: str, tmp_path: Path) -> None:
     assert other.trajectory is not None
     for name, values in native.trajectory.columns.items():
         np.testing.assert_array_equal(other.trajectory[name], values, err_msg=name)
-
-
-def test_the_longest_name(tmp_path: Path) -> None:
-    """Its axes' numbers make the names in C longer than anybody may give one."""
-    made = plugin(prepare(load_scenario("two_axes", [], "gyro_free")), tmp_path / "balance", name="a" * 40)
-    assert made.library.is_file()
-    names = {path.name for path in made.files}
-    assert {f"{'a' * 40}_{number}{end}" for number in range(2) for end in (".c", ".h", "_controller.c")} <= names
-
-
-def test_the_axes_own_names_stand_in_the_c(tmp_path: Path) -> None:
-    made = make_plugin(two_axes("a*/b", "größe", tmp_path), "mine")
-    assert "axis 'a* /b'" in made.texts["mine_0_controller.c"]
-    assert "axis 'größe'" in made.texts["mine_1_controller.c"]

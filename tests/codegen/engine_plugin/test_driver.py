@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -46,17 +48,15 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_command_that_makes_a_plugin(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    main(["plugin", "gyro_free", "--out", str(tmp_path / "balance"), "--name", "made_by_command", "--json"])
+    """And its examples, in Python and in C, show the rig that nobody pushes as a run does."""
+    folder = tmp_path / "balance"
+    main(["plugin", "gyro_free", "--out", str(folder), "--json"])
     figures = json.loads(capsys.readouterr().out)
-    assert figures["plugin"] == "cmg_mj.made_by_command"
-    assert {"Makefile", "made_by_command.xml", "made_by_command_example.c", figures["library"]} <= {
-        path.name for path in (tmp_path / "balance").iterdir()
-    }
-
-
-def test_bench(capsys: pytest.CaptureFixture[str]) -> None:
-    """What it prints; how fast it is, docs/plugin_evidence.md says."""
-    main(["bench", "plugin", "--observers", "gyro_free", "--worlds", "4", "--json"])
-    (figures,) = json.loads(capsys.readouterr().out)
-    assert set(figures["over_bare"]) == {"one world, mj_step", "worlds, rollout", "worlds, Batch"}
-    assert all(0.9 < ratio < 2.0 for ratio in figures["over_bare"].values())
+    assert (figures["plugin"], figures["library"]) == ("cmg_mj.gyro_free", "libcmg_mj_gyro_free.so")
+    subprocess.run(["make", "example"], cwd=folder, check=True, timeout=300, capture_output=True)
+    trajectory = prepare(load_scenario("push_recovery", ["push=[]"], "gyro_free")).run().trajectory
+    assert trajectory is not None
+    for program in ([sys.executable, "gyro_free_example.py"], ["./example"]):
+        output = subprocess.run(program, cwd=folder, check=True, timeout=300, capture_output=True, text=True).stdout
+        assert len(output.splitlines()) == 15
+        assert output.split()[-2:] == [f"{trajectory['y1_rad'][-1]:.4f}", "rad"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 import pickle
 import re
 from collections.abc import Callable, Iterator
@@ -15,17 +14,14 @@ from mujoco import rollout
 
 from cmg_mj import InputError, load_scenario, prepare
 from cmg_mj.codegen.engine_plugin.build import common_files
-from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE, generate_plugin
+from cmg_mj.codegen.engine_plugin.tables import NAMES_IN_USE, generate_plugin
 from cmg_mj.plant.mujoco_state import quiet
-from cmg_mj.plant.plugin_state import FAILED, initial_states, instance_states, set_world
-from cmg_mj.simulation.plugin_files import describe_rig
+from cmg_mj.simulation.driver import FAILED, STATUS, initial_states, instance_states, set_world
+from cmg_mj.simulation.make import describe_rig
 from tests.codegen.engine_plugin.made import check_against_runner, needs_compiler, quick, run
 
 pytestmark = needs_compiler
 
-SEED, WORLD, STATUS, STEPS, PER_INSTANT, TIMESTEP, IS_PENDING, STARTS_SPINNING, IS_SPINNING_UP, CHECK = range(10)
-CONSTANTS = range(CHECK, CHECK + 21)
-"""Places in the state, as state.h numbers them; the constants are where sensors and drives are, and the settings."""
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
@@ -33,6 +29,15 @@ STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 def _no_log() -> Iterator[None]:
     with quiet():
         yield
+
+
+@pytest.fixture
+def messages() -> Iterator[list[str]]:
+    """What MuJoCo warns of."""
+    result: list[str] = []
+    mujoco.set_mju_user_warning(result.append)
+    yield result
+    mujoco.set_mju_user_warning(None)
 
 
 def test_half_a_second_is_bit_for_bit() -> None:
@@ -105,9 +110,9 @@ def test_worlds_by_rollout_are_those_of_run_many() -> None:
     assert len(set(command[:, -1])) == 3
 
 
-@pytest.mark.parametrize(("seed", "world"), [(2**53 + 1, 0), (0, -1), (1.5, 0), (0, 0.5), (math.nan, 0)])
+@pytest.mark.parametrize(("seed", "world"), [(2**53 + 1, 0), (0, -1), (1.5, 0)])
 def test_numbers_that_no_state_holds(seed: int, world: int) -> None:
-    with pytest.raises(InputError, match=r"takes \w+ from 0 to 2\^53"):
+    with pytest.raises(InputError, match=r"^(seed|world) = "):
         set_world(quick().model, quick().start(), seed, world)
 
 
@@ -153,15 +158,14 @@ def test_noise_that_has_begun() -> None:
 
 
 WRONG_CONFIGS = {
-    "seed": ("-1", "1.5", "1 2", "one", "nan", "inf", "1e400", "9007199254740994", "0,5", "1;", "--1"),
-    "world": ("-1", "0.5", "x", "1e17", "nan", "1 0", "0x10", "1e3", "+1", " 1", "9007199254740993"),
-    "noise_density_ug_rthz": ("-400", "much", "nan", "inf", "4e2x", "1e10"),
-    "counts_per_g": ("-1", "0x10", "none", "nan", "-inf", "1e300"),
-    "counts_per_revolution": ("-4096", "12 bit", "nan", "1e300", "4096%"),
-    "start": ("rest", "Spinning", "keyframe ", "0"),
-    "build": ("0123456789abcdef", "?"),
+    "seed": ("-1", "1.5", "1 2", "9007199254740994"),
+    "world": ("x", "0x10", "nan", "+1"),
+    "noise_density_ug_rthz": ("-400", "4e2x", "inf"),
+    "counts_per_g": ("-1", "none", "1e300"),
+    "counts_per_revolution": ("-4096", "12 bit"),
+    "start": ("rest",),
+    "build": ("0123456789abcdef",),
     "sead": ("1",),
-    "seed ": ("1",),
 }
 WRONG_MODELS = {
     "another name": ("balance", "balanced", "must be named 'balance'"),
@@ -219,19 +223,7 @@ def test_a_wrong_config_does_not_compile(key: str) -> None:
             mujoco.MjModel.from_xml_string(
                 text.replace("</instance>", f'<config key="{key}" value="{value}"/></instance>')
             )
-        assert f"{made_name()}: " in str(error.value) or "unrecognized attribute" in str(error.value)
-
-
-def test_the_key_that_tells_copies_takes_no_value() -> None:
-    text = quick().plugin.model.read_text(encoding="utf-8")
-    match = re.search(r'<config key="build" value="(\w+)"/>', text)
-    assert match
-    with pytest.raises(ValueError, match=f'<config key="{match[1]}">: must have no value'):
-        mujoco.MjModel.from_xml_string(text.replace("</instance>", f'<config key="{match[1]}" value="1"/></instance>'))
-
-
-def made_name() -> str:
-    return quick().plugin.name
+        assert f"{quick().plugin.name}: " in str(error.value) or "unrecognized attribute" in str(error.value)
 
 
 @pytest.mark.parametrize("case", WRONG_MODELS)
@@ -272,7 +264,7 @@ def test_a_step_that_is_changed_stops_the_gimbals() -> None:
     assert data.sensor("balance/command").data != 0.0
 
 
-@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, -1.0, 1e300, 2.0**54 + 4.0])
+@pytest.mark.parametrize("number", [np.nan, -1.0, 1e300])
 def test_whatever_a_program_writes_into_the_state(number: float, messages: list[str]) -> None:
     """It stops with one warning, or takes the number for its memory; what it drives is never another actuator."""
     made = quick()
@@ -281,60 +273,16 @@ def test_whatever_a_program_writes_into_the_state(number: float, messages: list[
     state = np.empty(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, before, state, STATE)
     servos = [model.actuator(f"{module.name}/gimbal_servo").actadr[0] for module in made.experiment.plant.axis.modules]
-    stopped = []
     for place in range(model.npluginstate):
         messages.clear()
         mujoco.mj_setState(model, data, state, STATE)
         data.plugin_state[place] = number
         mujoco.mj_step(model, data, 8)
-        if data.plugin_state[STATUS] == FAILED:
-            stopped.append(place)
-            assert len(messages) == 1
-            assert re.fullmatch(rf"{re.escape(made.plugin.name)}: .*; u = 0 from now on", messages[0])
-            assert not data.sensor("balance/command").data.any()
-            assert not data.act_dot[servos].any()
-        else:
-            assert messages == []
-            assert np.isfinite(data.sensordata).all()
-            assert abs(data.sensor("balance/command").data) <= made.experiment.law.rate_limit
-    assert {SEED, WORLD, STATUS, STEPS, PER_INSTANT, TIMESTEP, STARTS_SPINNING, *CONSTANTS} <= set(stopped)
-    if not np.isfinite(number):  # but for what every step writes, such as the whole second half
-        assert model.npluginstate // 2 - len(stopped) < 20
-
-
-def test_whatever_a_program_writes_between_the_halves_of_a_step(messages: list[str]) -> None:
-    """What a decision has left for the step to count is looked at before it drives anything."""
-    made = quick()
-    model, data = copy.copy(made.model), mujoco.MjData(made.model)
-    model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    n_stopped = 0
-    for place in range(model.npluginstate):
-        messages.clear()
-        mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
-        mujoco.mj_step(model, data, 3)
-        mujoco.mj_step1(model, data)
-        data.plugin_state[place] = np.nan
-        mujoco.mj_step2(model, data)
-        mujoco.mj_step(model, data, 3)
-        n_stopped += data.plugin_state[STATUS] == FAILED
-        assert len(messages) == (data.plugin_state[STATUS] == FAILED), place
-        assert np.isfinite(data.sensordata).all(), place
-    assert model.npluginstate // 2 - n_stopped < 20
-
-
-def test_a_state_of_zeros_and_one_of_another_step(messages: list[str]) -> None:
-    """A program that sets a state without the plugin's, and one that resets at a step that does not fit."""
-    model, data = copy.copy(quick().model), quick().start()
-    data.plugin_state[:] = 0.0
-    mujoco.mj_step(model, data, 50)
-    assert [message.partition(": ")[2] for message in messages] == [
-        "a program has overwritten its state; u = 0 from now on"
-    ]
-    model.opt.timestep = 0.003
-    mujoco.mj_resetData(model, data)
-    mujoco.mj_step(model, data, 50)
-    assert len(messages) == 2
-    assert messages[1].endswith(": a physics step of 0.003 s: must divide 0.005 s; nothing is controlled")
+        has_stopped = data.plugin_state[STATUS] == FAILED
+        assert len(messages) == has_stopped
+        assert np.isfinite(data.sensordata).all()
+        assert abs(data.sensor("balance/command").data) <= (0.0 if has_stopped else made.experiment.law.rate_limit)
+        assert not (has_stopped and data.act_dot[servos].any())
 
 
 def test_other_sensors_of_a_model_are_those_without_a_plugin() -> None:
@@ -389,11 +337,27 @@ def test_two_rigs_in_one_model() -> None:
     assert single[0].sensor("balance/command").data != single[1].sensor("balance/command").data
 
 
-@pytest.mark.parametrize("name", sorted(NAMES_IN_USE))
-def test_a_name_that_the_c_has_already(name: str) -> None:
-    with pytest.raises(InputError, match=rf"--name {name}: is a name in every plugin's C"):
-        generate_plugin(describe_rig(quick().experiment, name), name)
+@pytest.mark.parametrize(
+    ("option", "value"), [("disableflags", int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)), ("disableactuator", 1)]
+)
+def test_drives_that_are_switched_off(option: str, value: int, messages: list[str]) -> None:
+    """For a pass that is no step nothing happens; after a step u is 0 until a reset, with one warning."""
+    model, data = copy.copy(quick().model), quick().start()
+    mujoco.mj_step(model, data, 20)
+    before = getattr(model.opt, option)
+    setattr(model.opt, option, before | value)
+    mujoco.mj_forward(model, data)
+    assert messages == []
+    mujoco.mj_step(model, data)
+    setattr(model.opt, option, before)
+    mujoco.mj_step(model, data, 20)
+    assert len(messages) == 1
+    assert data.sensor("balance/command").data == 0.0
+    assert instance_states(model, data)[0][STATUS] == FAILED
+    np.testing.assert_array_equal(data.act_dot, 0.0)
 
 
-def test_every_file_of_the_c_is_a_name_in_use() -> None:
+def test_every_name_that_the_c_has_is_refused() -> None:
     assert {name.partition(".")[0] for name in common_files()} | {"rig"} <= NAMES_IN_USE
+    with pytest.raises(InputError, match=r"^--name rig: "):
+        generate_plugin(describe_rig(quick().experiment, "rig"), "rig")

@@ -41,10 +41,10 @@ LEAKS_OF_OTHERS = "detect_leaks=0"
 
 def compile_strictly(made: Made, folder: Path, *flags: str) -> tuple[Path, Path]:
     """The plugin and the program, without a warning."""
-    mujoco_files = find_mujoco()
-    place = mujoco_files.library.parent
-    common = [str(COMPILER), *STRICT, *flags, "-isystem", str(mujoco_files.include)]
-    link = [f"-L{place}", f"-l:{mujoco_files.library.name}", f"-Wl,-rpath,{place}", "-lm"]
+    mujoco_library = find_mujoco()
+    place = mujoco_library.parent
+    common = [str(COMPILER), *STRICT, *flags, "-isystem", str(place / "include")]
+    link = [f"-L{place}", f"-l:{mujoco_library.name}", f"-Wl,-rpath,{place}", "-lm"]
     source = made.plugin.library.parent
     all_files = {path.name: path for path in source.glob("*.c") if not path.name.endswith("_example.c")}
     included = {name.replace("_controller.c", ".c") for name in all_files if name.endswith("_controller.c")}

@@ -8,7 +8,7 @@ import pytest
 from mujoco import rollout
 from mujoco.batch import Batch
 
-from cmg_mj.plant.plugin_state import initial_states
+from cmg_mj.simulation.driver import initial_states
 from tests.codegen.engine_plugin.made import ALL_IMPERFECTIONS, QUANTITIES, Made, make, needs_compiler
 
 pytestmark = [needs_compiler, pytest.mark.slow]
