@@ -95,7 +95,6 @@ def plugin(
     from cmg_mj.simulation.plugin_files import (
         check_tools,
         make_plugin,
-        plugin_files,
         require_stable_periods,
         write_plugin_or_sources,
     )
@@ -105,7 +104,7 @@ def plugin(
     require_stable_periods(experiment)
     note_hints(experiment.hints)
     made = make_plugin(experiment, name, sensors=not no_sensors, start=start)
-    with claim_output(out, f"plugin-{made.name}", plugin_files(made)) as folder:
+    with claim_output(out, f"plugin-{made.name}") as folder:
         result = write_plugin_or_sources(made, folder)
     figures = {
         "plugin": result.name,

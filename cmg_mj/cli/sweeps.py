@@ -87,7 +87,7 @@ def sweep(
     from cmg_mj.studies.sweeps.cells import COLUMNS, Trials
     from cmg_mj.studies.sweeps.chunk_store import Store
     from cmg_mj.studies.sweeps.plan import estimate_cost
-    from cmg_mj.studies.sweeps.report import FILES, save, summary, tables_of
+    from cmg_mj.studies.sweeps.report import save, summary, tables_of
     from cmg_mj.studies.sweeps.study import MOST_TRIALS, check_values, counted
 
     if cluster is not None:
@@ -106,7 +106,8 @@ def sweep(
             f"{MOST_TRIALS} give --yes (--dry-run prints the time and memory)"
         )
     with _runner(cluster) as run:
-        folder = claim_output(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}", FILES)
+        folder = claim_output(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
+        folder.path.mkdir(exist_ok=True)
         store = Store(folder.path, study)
         before = store.open(on_damage=note)
         if before:
@@ -120,9 +121,9 @@ def sweep(
                 kept = f"finished trials are kept in {folder.path}"
                 end_interrupted(f"interrupted; {kept}, and the same command resumes the sweep")
             tables = tables_of(Trials(study, store.tables(COLUMNS)))
-            written = save(folder, store, tables)
+            save(store, tables)
     show(_as_json(tables) if arguments.as_json else None, summary(tables), arguments.as_json)
-    say_written(folder, written, f"Read {written / 'report.md'}", arguments.as_json)
+    say_written(folder, folder.path, f"Read {folder.path / 'report.md'}", arguments.as_json)
 
 
 @contextmanager

@@ -23,8 +23,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.plugin_model import plugin_mjcf
-from cmg_mj.results.run_folder import RunFolder
-from cmg_mj.results.run_folder.folder import claimed, write_text
+from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.omissions import IN_THE_MODEL, omissions
 from cmg_mj.scenario.schema import Scenario
@@ -184,7 +183,7 @@ def write_plugin(made: PluginTexts, out: Path | RunFolder) -> Plugin:
     name, library = made.name, library_name(made.name)
     compiler = find_tools()
     writers = _writers(made)
-    with tempfile.TemporaryDirectory() as temporary, claimed(out, plugin_files(made)) as folder:
+    with tempfile.TemporaryDirectory() as temporary, claimed(out) as folder:
         compiled = Path(temporary) / library
         for file in made.code.files:
             writers[file](Path(temporary) / file)
@@ -203,7 +202,7 @@ def write_plugin_or_sources(made: PluginTexts, out: Path | RunFolder) -> Plugin:
     """
     if _find_compiler() is not None:
         return write_plugin(made, out)
-    with claimed(out, list(made.texts)) as folder:
+    with claimed(out) as folder:
         place = folder.write(_writers(made), all_or_none=True)
     raise InputError(
         f"plugin: {library_name(made.name)} is missing, for no C compiler was found (CC, cc, gcc, clang); the other "

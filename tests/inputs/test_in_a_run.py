@@ -44,11 +44,11 @@ class PutsInTheWay(Mine):
 def test_what_comes_in_the_way_of_a_file(quick: str) -> None:
     outcome = cmg_mj("run", quick, "--out", "it", "--json", "--plot", "--observer", f"{__name__}:PutsInTheWay")
     assert outcome.status == 0
-    assert outcome.err.startswith("Written to it/incomplete; the earlier files in it stay as they were. Open")
+    assert outcome.err.startswith("Written to it-2; what was in it stays as it was. Open")
     assert outcome.out.startswith("{")  # the summary is not lost
-    assert names("it") == ["incomplete", "plot.png"]
+    assert names("it") == ["plot.png"]
     assert names("it/plot.png") == ["mine"]
-    assert names("it/incomplete") == sorted([*FILES, "plot.png"])
+    assert names("it-2") == sorted([*FILES, "plot.png"])
 
 
 @pytest.mark.parametrize("name", FILES)

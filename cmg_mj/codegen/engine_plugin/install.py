@@ -9,7 +9,6 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib.metadata import entry_points, version
@@ -35,7 +34,6 @@ from cmg_mj.codegen.engine_plugin.load import (
 from cmg_mj.errors import InputError, nearest, shown
 from cmg_mj.inputs.paths import expanded
 from cmg_mj.results.files import whole_file, write_bytes
-from cmg_mj.results.run_folder.lock import Busy, Lock
 
 LONGEST_WAIT = 60.0  # for another install [s]
 LONGEST_TRIAL = 20.0  # for a library to load, which takes milliseconds [s]
@@ -211,24 +209,9 @@ def _own_folder() -> Iterator[Path]:
         with suppress(FileExistsError):
             folder.mkdir(mode=FOLDER_MODE)
         list_names(name)  # refuses a folder of others, before anything is written
-        lock = _wait_for_lock(folder)
-        try:
-            for partial in folder.glob(".*.partial"):
-                partial.unlink(missing_ok=True)
-            yield folder
-        finally:
-            lock.release()
-
-
-def _wait_for_lock(folder: Path) -> Lock:
-    end = time.monotonic() + LONGEST_WAIT
-    while True:
-        try:
-            return Lock(folder / ".lock")
-        except Busy:
-            if time.monotonic() > end:
-                raise InputError(f"plugin: another process is writing to {folder}") from None
-            time.sleep(0.05)
+        for partial in folder.glob(".*.partial"):
+            partial.unlink(missing_ok=True)
+        yield folder
 
 
 def _try(library: Path, copy: Path, name: str) -> str:

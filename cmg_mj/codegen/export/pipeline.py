@@ -23,7 +23,7 @@ from cmg_mj.controllers.dry_run import dry_run_law, dry_run_observer
 from cmg_mj.controllers.laws import Law
 from cmg_mj.errors import InputError, raised
 from cmg_mj.observers.protocol import Observer
-from cmg_mj.results.run_folder.folder import write_text
+from cmg_mj.results.folder import write_text
 
 Part = TypeVar("Part", Observer, Law)
 

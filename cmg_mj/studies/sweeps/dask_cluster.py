@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from cmg_mj.errors import InputError, RunStopped, raised
@@ -16,7 +17,6 @@ from cmg_mj.studies.sweeps import dask_worker as on_worker
 from cmg_mj.studies.sweeps.chunk import rows_of_failed_chunk
 from cmg_mj.studies.sweeps.chunk_store import GOES_ON, Store
 from cmg_mj.studies.sweeps.dask_worker import Part, compute_part, part_of
-from cmg_mj.studies.sweeps.scratch import scratch_folder
 from cmg_mj.studies.sweeps.trials import from_bytes, table_of
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def _started(workers: int) -> Iterator[Any]:
     from distributed import LocalCluster
 
     with (
-        scratch_folder() as scratch,
+        TemporaryDirectory(prefix="cmg-mj-", ignore_cleanup_errors=True) as scratch,
         config.set({"temporary-directory": scratch}),
         LocalCluster(
             n_workers=workers,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from cmg_mj.errors import InputError
-from cmg_mj.results.files import write_parquet
-from cmg_mj.results.run_folder import RunFolder, Writers, write_text
+from cmg_mj.results.files import whole_file, write_parquet
+from cmg_mj.results.folder import Writers, write_text
 from cmg_mj.studies.sweeps import report_sections as sections
 from cmg_mj.studies.sweeps.cells import Trials, cells_in_blocks, cells_schema
 from cmg_mj.studies.sweeps.chunk_store import GOES_ON, TRIALS, Store, merged
@@ -19,9 +19,6 @@ from cmg_mj.studies.sweeps.study import counted
 from cmg_mj.studies.sweeps.trials import write_tables
 from cmg_mj.visualization.plots.figure_spec import Picture
 from cmg_mj.visualization.plots.run_plot import draw
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 REPORT = "report.md"
 PICTURES = tuple(f"{name}.png" for name in (*MAPS.values(), CURVES))
@@ -53,7 +50,7 @@ def tables_of(trials: Trials) -> SweepTables:
     )
 
 
-def save(folder: RunFolder, store: Store, tables: SweepTables) -> Path:
+def save(store: Store, tables: SweepTables) -> None:
     """Write the tables, the pictures and the report of a finished sweep.
 
     Raises:
@@ -71,10 +68,13 @@ def save(folder: RunFolder, store: Store, tables: SweepTables) -> Path:
     if study.design == "sobol":
         files[INDICES] = lambda path: write_parquet(path, index_table(tables.indices), durable=True)
     files[REPORT] = lambda path: write_text(path, report(tables, pictures))
-    try:
-        return folder.write(files)
-    except InputError as error:
-        raise InputError(f"{error}; {GOES_ON}") from None
+    for name, write in files.items():
+        path = store.folder / name
+        try:
+            with whole_file(path, path.suffix) as temporary:
+                write(temporary)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}; {GOES_ON}") from error
 
 
 def report(tables: SweepTables, pictures: Sequence[Picture]) -> str:

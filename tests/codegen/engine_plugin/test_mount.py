@@ -18,9 +18,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.results.run_folder import RunFolder
-from cmg_mj.results.run_folder.folder import write_text
-from cmg_mj.studies.push_limits.mount_plugin import claimed_plugin, plugin_folder, plugin_name
+from cmg_mj.results.folder import RunFolder, write_text
+from cmg_mj.studies.push_limits.mount_plugin import check_plugin_folder, plugin_folder, plugin_name
 from tests.codegen.engine_plugin.made import needs_compiler
 from tests.command import HANGS_AFTER_S, ROOT, cmg_mj, environment
 from tests.plant.mounting.robots import gymnasium_asset
@@ -68,46 +67,28 @@ def test_what_is_there_already() -> None:
     target, robot = Path("b.xml"), Path("robot.xml")
     folder = plugin_folder(target)
 
-    def refused(*, overwrite: bool = True) -> str:
-        with pytest.raises(InputError) as error, claimed_plugin(target, robot, overwrite=overwrite):
-            pass
-        return str(error.value)
+    def refused(message: str, *, overwrite: bool = True) -> None:
+        with pytest.raises(InputError, match=message):
+            check_plugin_folder(target, robot, overwrite=overwrite)
 
-    def write(*names: str) -> None:
-        with RunFolder(folder) as claim:
-            claim.write({name: partial(write_text, text="1") for name in names})
-
-    with claimed_plugin(target, robot, overwrite=False):
-        assert refused() == f"-o b.xml: {folder}: another run is writing to it"
-    assert there() == []
-    folder.write_text("mine", encoding="utf-8")
-    assert f"{folder} is there, not as cmg-mj mount wrote it, and would be lost" in refused()
-    folder.unlink()
-    folder.symlink_to("elsewhere")
-    assert f"{folder} is there, not as cmg-mj mount wrote it" in refused()
-    folder.unlink()
-    (folder / ".cmg-mj").mkdir(parents=True)
-    with claimed_plugin(target, robot, overwrite=False):  # what a killed mount leaves
-        pass
-    write("summary.json")
-    assert f"{folder}/summary.json is there, not as cmg-mj mount wrote it" in refused()
-    shutil.rmtree(folder)
-    folder.mkdir()
+    check_plugin_folder(target, robot, overwrite=False)
+    with RunFolder(folder) as claim:
+        claim.write({"rig.c": partial(write_text, text="1")})
+    refused("exists; give another name, or --overwrite", overwrite=False)
+    check_plugin_folder(target, robot, overwrite=True)
     (folder / "notes").write_text("mine", encoding="utf-8")
-    assert refused(overwrite=False) == f"-o b.xml: {folder} exists; give another name, or --overwrite"
-    with claimed_plugin(target, robot, overwrite=True):
-        pass
-    (folder / "rig.c").write_text("mine", encoding="utf-8")
-    assert f"-o b.xml: {folder}: rig.c there is not as cmg-mj wrote it, and would be lost" in refused()
-    assert sorted(path.name for path in folder.iterdir()) == ["notes", "rig.c"]
+    refused("holds files that cmg-mj did not write")
     (folder / "robot.xml").write_text(PENDULUM, encoding="utf-8")
     robot = folder / "robot.xml"
-    assert refused() == f"-o b.xml: {folder} holds the robot's own file, or one that it names; give another name"
+    refused("holds the robot's own file")
+    shutil.rmtree(folder)
+    folder.symlink_to("elsewhere")
+    refused("holds files that cmg-mj did not write")
 
 
 def test_nothing_is_begun_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("robot.xml").write_text(PENDULUM, encoding="utf-8")
-    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files._mount_and_write", None)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files._mount", None)
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
     assert "there is no C compiler" in cmg_mj(*MOUNT).complaint
@@ -135,16 +116,12 @@ def test_a_mount_replaces_its_own_plugin_alone() -> None:
     written = contents("balanced_plugin")
     assert not [name for name, content in written.items() if b"partial" in content]
     assert "balanced.xml exists; give another name, or --overwrite" in cmg_mj(*MOUNT).complaint
-    Path("balanced_plugin", "notes").write_text("mine", encoding="utf-8")
     outcome = cmg_mj(*MOUNT, "--overwrite", "--scale", "1.1")
     assert "wrote balanced_plugin; try: python balanced_plugin/balanced_example.py" in outcome.err
-    assert contents("balanced_plugin")["notes"] == b"mine"
     assert contents("balanced_plugin")["rig.c"] != written["rig.c"]
-    with Path("balanced_plugin", "rig.c").open("a", encoding="utf-8") as file:
-        file.write("/* mine */\n")
+    Path("balanced_plugin", "notes").write_text("mine", encoding="utf-8")
     before = contents("."), contents("balanced_plugin")
-    complaint = cmg_mj(*MOUNT, "--overwrite").complaint
-    assert "balanced_plugin/rig.c is there, not as cmg-mj mount wrote it, and would be lost" in complaint
+    assert "balanced_plugin holds files that cmg-mj did not write" in cmg_mj(*MOUNT, "--overwrite").complaint
     assert (contents("."), contents("balanced_plugin")) == before
 
 

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.results import files
-from cmg_mj.results.run_folder import RunFolder
+from cmg_mj.results.folder import RunFolder
 from cmg_mj.studies.sweeps import chunk_store as store
 from tests.command import cmg_mj
 from tests.tiers import slow_but
