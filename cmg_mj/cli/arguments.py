@@ -217,12 +217,21 @@ def claim_output(out: str | None, default: str) -> RunFolder:
     """
     from cmg_mj.results.folder import RunFolder
 
+    folder = RunFolder(output_path(out, default), overwrite=overwrites())
+    click.get_current_context().call_on_close(folder.release)
+    return folder
+
+
+def output_path(out: str | None, default: str) -> Path:
+    """Return the folder that `--out` names, or by default one in runs/."""
     if out == "":
         raise InputError("--out '': name a folder")
-    context = click.get_current_context()
-    folder = RunFolder(Path("runs") / default if out is None else Path(out), overwrite=context.meta[OVERWRITE])
-    context.call_on_close(folder.release)
-    return folder
+    return Path("runs") / default if out is None else Path(out)
+
+
+def overwrites() -> bool:
+    """Return whether `--overwrite` is given."""
+    return click.get_current_context().meta[OVERWRITE]
 
 
 def names_in(text: str) -> list[str]:

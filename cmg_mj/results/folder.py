@@ -151,6 +151,8 @@ def claimed(folder: RunFolder | Path) -> Iterator[RunFolder]:
 def numbered(folder: Path) -> Iterator[Path]:
     """Yield NAME, NAME-2, NAME-3 and so on."""
     yield folder
+    if folder.name in ("", ".."):
+        folder = Path(os.path.abspath(folder))
     for number in itertools.count(2):
         yield folder.with_name(f"{folder.name}-{number}")
 
