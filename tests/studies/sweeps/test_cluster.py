@@ -20,6 +20,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.studies.sweeps.cluster import _compute_part, _part_of
 from cmg_mj.studies.sweeps.study import SweepStudy, parse_axis
 from tests.command import COMMAND, HANGS_AFTER_S, ROOT, CommandOutcome, cmg_mj, cmg_mj_process, environment
 
