@@ -72,8 +72,8 @@ if TYPE_CHECKING:
     from cmg_mj.studies.save import RunReport as RunReport
     from cmg_mj.studies.save import report_run as report_run
     from cmg_mj.studies.save import save_run as save_run
-    from cmg_mj.studies.sweeps.api import SweepResult as SweepResult
-    from cmg_mj.studies.sweeps.api import sweep as sweep
+    from cmg_mj.studies.sweeps import SweepResult as SweepResult
+    from cmg_mj.studies.sweeps import sweep as sweep
     from cmg_mj.studies.tuning import TuningResult as TuningResult
     from cmg_mj.studies.tuning import tune as tune
     from cmg_mj.visualization.recording.notebook import show_recording as show_recording

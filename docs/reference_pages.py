@@ -714,7 +714,7 @@ COMMANDS: dict[str, Notes] = {
             "cmg-mj run push_recovery",
             "cmg-mj run push_recovery --observer gyro_free --set plant.equilibrium_bias_deg=1.0 --plot",
         ),
-        "run_folders.md",
+        "python.md",
     ),
     "compare": Notes(
         "about 30 seconds for all observers in 20 worlds, about six seconds for two.",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rerun.chunk import RrdReader
 
-from cmg_mj.results.run_folder.manifest import HIDDEN
+from cmg_mj.results.folder import MARKER
 from cmg_mj.results.trajectory import Trajectory
 
 FILES = ["recording.rrd", "scenario.toml", "summary.json", "trajectory.parquet"]
@@ -22,8 +22,8 @@ def write(text: str, path: str = "my.toml") -> str:
 
 
 def names(place: str) -> list[str]:
-    """List the contents of a folder, but for cmg_mj's own list of it."""
-    return sorted(path.name for path in Path(place).iterdir() if path.name != HIDDEN)
+    """List the contents of a folder, but for the marker."""
+    return sorted(path.name for path in Path(place).iterdir() if path.name != MARKER)
 
 
 def assert_whole(place: str) -> Trajectory:

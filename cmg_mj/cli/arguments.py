@@ -17,9 +17,8 @@ import click
 from cmg_mj.errors import InputError, nearest
 
 if TYPE_CHECKING:
+    from cmg_mj.results.folder import RunFolder
     from cmg_mj.results.result import Driver
-    from cmg_mj.results.run_folder import RunFolder
-    from cmg_mj.results.wire import WireSettings
     from cmg_mj.scenario.schema import Scenario
     from cmg_mj.simulation.experiment import Experiment
 
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
 Command = Callable[..., None]
 Decorator = Callable[[Command], Command]
 
+OVERWRITE = "cmg_mj.overwrite"
 MOST_WORLDS = 10_000
 """Most worlds of a batch; one takes about 0.1 MB of memory."""
 
@@ -60,13 +60,11 @@ class RunArguments:
     def folder(
         self,
         label: str,
-        names: Sequence[str],
         experiment: Experiment,
         driver: Driver = "native",
         world: int = 0,
-        wire: WireSettings | None = None,
     ) -> RunFolder:
-        """Claim the folder for files: --out, or one in runs/ named for the scenario, the label and the settings."""
+        """Prepare the folder: --out, or one in runs/ named for the scenario, the label and the settings."""
         from cmg_mj.scenario.differences import folder_suffix, safe_name
 
         label = safe_name(label) + ("-board" if driver == "board" else "")
@@ -76,8 +74,7 @@ class RunArguments:
             str(experiment.scenario.seed),
             *([f"world{world}"] if world else []),
         )
-        name = "-".join(parts) + folder_suffix(experiment.differences)
-        return claim_output(self.out, name, names, request_toml=experiment.as_toml(driver, world, wire))
+        return claim_output(self.out, "-".join(parts) + folder_suffix(experiment.differences))
 
 
 def _as_utf8(argument: str) -> str:
@@ -181,8 +178,21 @@ def seed_option() -> Decorator:
 
 
 def out_option() -> Decorator:
-    """Make the option `--out`."""
-    return click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: a folder in runs/]")
+    """Make the options `--out` and `--overwrite`; `claim_output` reads the second one."""
+
+    def keep(context: click.Context, parameter: click.Parameter, overwrite: bool) -> None:
+        context.meta[OVERWRITE] = overwrite
+
+    return all_of(
+        click.option("--out", metavar="FOLDER", help="Folder to write to.  [default: a folder in runs/]"),
+        click.option(
+            "--overwrite",
+            is_flag=True,
+            expose_value=False,
+            callback=keep,
+            help="Replace another result there, if cmg-mj wrote all of it; otherwise FOLDER-2 is taken.",
+        ),
+    )
 
 
 def json_option() -> Decorator:
@@ -195,36 +205,33 @@ def markdown_option() -> Decorator:
     return click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 
 
-def claim_output(
-    out: str | None,
-    default: str,
-    names: Sequence[str],
-    *,
-    request_toml: str | None = None,
-    request_file: str = "scenario.toml",
-) -> RunFolder:
-    """Claim the folder that `--out` names, or by default one in runs/, until the command is done.
+def claim_output(out: str | None, default: str) -> RunFolder:
+    """Prepare the folder that `--out` names, or by default one in runs/.
 
     Args:
         out: `--out`.
         default: Name of the folder in runs/.
-        names: The files that the command may write.
-        request_toml: The request as TOML. With it a folder in runs/ that another request has written is not taken.
-        request_file: The file that holds the request.
 
     Returns:
-        The folder, to which no other command may write; a new one without files is removed in the end.
+        The folder; a new one without files is removed when the command ends.
     """
-    from cmg_mj.results.run_folder import RunFolder, unused_folder
+    from cmg_mj.results.folder import RunFolder
 
-    if out == "":
-        raise InputError("--out '': name a folder, . for the current one")
-    if out is None and request_toml is not None:
-        folder = unused_folder(Path("runs"), default, names, request_toml, request_file)
-    else:
-        folder = RunFolder(Path("runs") / default if out is None else Path(out), names)
+    folder = RunFolder(output_path(out, default), overwrite=overwrites())
     click.get_current_context().call_on_close(folder.release)
     return folder
+
+
+def output_path(out: str | None, default: str) -> Path:
+    """Return the folder that `--out` names, or by default one in runs/."""
+    if out == "":
+        raise InputError("--out '': name a folder")
+    return Path("runs") / default if out is None else Path(out)
+
+
+def overwrites() -> bool:
+    """Return whether `--overwrite` is given."""
+    return click.get_current_context().meta[OVERWRITE]
 
 
 def names_in(text: str) -> list[str]:

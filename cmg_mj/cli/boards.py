@@ -58,9 +58,9 @@ def export(
 
     The C code is compared with Python on random signals before it is written.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.codegen.board.project import NEVER_RUN, PORTS, project, project_files, then
+    from cmg_mj.codegen.board.project import NEVER_RUN, PORTS, project, then
     from cmg_mj.codegen.export import check_installed, generate_code, write_code
-    from cmg_mj.codegen.export.names import export_files, name_of
+    from cmg_mj.codegen.export.names import name_of
     from cmg_mj.codegen.export.pipeline import export_table
     from cmg_mj.controllers.laws import StateFeedback
     from cmg_mj.scenario.stability_check import require_stable_period
@@ -80,7 +80,7 @@ def export(
     controller = experiment.axis_controller()
     name = name_of(controller.observer, name)
     label = f"export-{name}-{firmware or precision}"
-    with claim_output(out, label, [*export_files(name), *(project_files(firmware) if firmware else [])]) as folder:
+    with claim_output(out, label) as folder:
         code = generate_code(controller, precision, name)
         run_it = ""
         if firmware is not None:

@@ -200,14 +200,11 @@ def replay(
     from cmg_mj.replay import report
     from cmg_mj.replay.log_replays import LogReplays
     from cmg_mj.replay.parameter_options import parameters_of
-    from cmg_mj.replay.save import SETTINGS
     from cmg_mj.replay.user_noise import noise_numbers
 
     options = replace(options, windows_s=tuple(span(text, "--window") for text in windows))
     replays = LogReplays(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)
-    folder = claim_output(
-        out, replays.folder_name, replays.files, request_toml=replays.as_toml(), request_file=SETTINGS
-    )
+    folder = claim_output(out, replays.folder_name)
     total = len(replays.logs)
     with CtrlC() as ctrl_c:
         try:

@@ -122,9 +122,7 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     "better on other worlds and withstand no smaller push.",
 )
 @json_option()
-@click.option(
-    "--overwrite", is_flag=True, help="Replace the files of an earlier mount, except files that have changed since."
-)
+@click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount.")
 @users_code()
 def mount(
     robot: str,

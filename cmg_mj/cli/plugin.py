@@ -56,13 +56,13 @@ def plugin(
       NAME_example.py, NAME_example.c, Makefile, and the C of the library
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.simulation.experiment import prepare
-    from cmg_mj.simulation.make import make_plugin, plugin_files, require_stable_periods, write_plugin
+    from cmg_mj.simulation.make import make_plugin, require_stable_periods, write_plugin
 
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
     require_stable_periods(experiment)
     note_hints(experiment.hints)
     made = make_plugin(experiment, name, sensors=not no_sensors, start=start)
-    with claim_output(out, f"plugin-{made.name}", plugin_files(made)) as folder:
+    with claim_output(out, f"plugin-{made.name}") as folder:
         result = write_plugin(made, folder)
     place, library = result.library.parent, result.library.name
     figures = {"plugin": result.name, "library": library, "model": result.model.name, "build": made.build}

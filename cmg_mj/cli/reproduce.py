@@ -32,14 +32,14 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.papers import BEYOND, PAPERS, check_installed
     from cmg_mj.papers import reproduce as reproduce_papers
-    from cmg_mj.papers.report import REPORT_FILES, figures_of, save_report, verdict_table
+    from cmg_mj.papers.report import figures_of, save_report, verdict_table
 
     names = (*PAPERS, *BEYOND, "all")
     if paper not in names:
         raise InputError(f"{paper!r}: no such paper; {nearest(paper, names)}")
     papers = list(PAPERS) if paper == "all" else [paper]
     check_installed(papers)  # before a folder is made
-    folder = claim_output(out, f"reproduce-{paper}", REPORT_FILES)
+    folder = claim_output(out, f"reproduce-{paper}")
     with CtrlC() as ctrl_c:
         with progress(f"reproduce {paper}", 1.0, ctrl_c) as on_progress:
             entries = reproduce_papers(papers, lambda now, done: on_progress(done, now))

@@ -100,16 +100,15 @@ def run(
         note("[compare] is for cmg-mj compare; this is one run")
     board = wire.connect(experiment)
     label = runs.file_name(scenario.observer.kind)
-    files = runs.files_of_run(experiment, plot=plot, wired=board is not None)
     settings = None if board is None else board.settings
-    folder = arguments.folder(label, files, experiment, driver, world, settings)
+    folder = arguments.folder(label, experiment, driver, world)
     live_view = live_run(experiment, live, connect, pace, driver, world, settings)
     with CtrlC() as ctrl_c, live_view or nullcontext():
         with progress(scenario.title or arguments.name, scenario.duration_s, ctrl_c) as on_progress:
             options: SimulationOptions = (
                 {"on_progress": on_progress} if live_view is None else live_view.options(on_progress)
             )
-            options["spool"] = folder.path
+            options["spool"] = folder.part
             if board is None:
                 result = experiment.run(driver=driver, world=world, **options)
             else:
@@ -184,8 +183,7 @@ def compare(
     note_hints(rerun.hints)
     if not law_needs(rerun.law):
         note(f"{scenario.controller.kind} takes nothing of the observer: every loop is the same, the estimates differ")
-    files = runs.files_of_comparison(names, plot=plot)
-    folder = arguments.folder("compare", files, rerun)
+    folder = arguments.folder("compare", rerun)
     with CtrlC() as ctrl_c:
         with progress(f"{scenario.title or arguments.name}, {len(names)} observers", 1.0, ctrl_c) as on_progress:
             compared = comparison.compare(experiments, worlds, on_progress)

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
-from cmg_mj.cli.arguments import RunArguments, claim_output, observers_option, run_options, worlds_option
+from cmg_mj.cli.arguments import RunArguments, observers_option, output_path, overwrites, run_options, worlds_option
 from cmg_mj.cli.progress_rate import ProgressRate, duration_text
 from cmg_mj.cli.terminal import (
     CtrlC,
     end_interrupted,
     note,
     progress,
-    say_written,
     show,
     users_code,
 )
@@ -24,7 +23,8 @@ from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.results.summary_keys import SummaryValue
-    from cmg_mj.studies.sweeps.report import SweepTables
+    from cmg_mj.studies.sweeps.cells import Trials
+    from cmg_mj.studies.sweeps.sobol import IndexRow
     from cmg_mj.studies.sweeps.study import SweepStudy
     from cmg_mj.studies.sweeps.study_file import SweepFields
 
@@ -37,7 +37,6 @@ class StudyOptions(TypedDict):
     worlds: int | None
     sample: int | None
     sobol: int | None
-    order: str | None
 
 
 @click.command(short_help="Run a scenario with varied fields, observers and noise.")
@@ -59,7 +58,6 @@ class StudyOptions(TypedDict):
 @click.option(
     "--sobol", type=click.IntRange(1), metavar="N", help="Run a design for Sobol indices; N is a power of two."
 )
-@click.option("--order", metavar="NAMES", help="Observers, best first; report how often this ranking holds.")
 @click.option("--dry-run", is_flag=True, help="Print the number of trials, time and memory, and run nothing.")
 @click.option(
     "--cluster",
@@ -85,13 +83,14 @@ def sweep(
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.scenario.differences import safe_name
     from cmg_mj.studies.sweeps.cells import COLUMNS, Trials
-    from cmg_mj.studies.sweeps.chunk_store import Store
-    from cmg_mj.studies.sweeps.plan import estimate_cost
-    from cmg_mj.studies.sweeps.report import FILES, save, summary, tables_of
+    from cmg_mj.studies.sweeps.chunk import estimate_cost
+    from cmg_mj.studies.sweeps.report import save, summary
+    from cmg_mj.studies.sweeps.sobol import index_rows
+    from cmg_mj.studies.sweeps.store import Store
     from cmg_mj.studies.sweeps.study import MOST_TRIALS, check_values, counted
 
     if cluster is not None:
-        from cmg_mj.studies.sweeps.dask_cluster import local_workers
+        from cmg_mj.studies.sweeps.cluster import local_workers
 
         local_workers(cluster)
     study = _study(arguments, options)
@@ -105,48 +104,50 @@ def sweep(
             f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; for more than "
             f"{MOST_TRIALS} give --yes (--dry-run prints the time and memory)"
         )
+    path = output_path(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
     with _runner(cluster) as run:
-        folder = claim_output(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}", FILES)
-        store = Store(folder.path, study)
-        before = store.open(on_damage=note)
+        store = Store.open(path, study, overwrite=overwrites())
+        left = store.left()
+        before = study.trials - sum(study.chunks.size(number) for number in left)
         if before:
             note(f"resuming: {before} of {study.trials} trials are done")
         with CtrlC() as ctrl_c:
             try:
                 pace = ProgressRate("trials", study.trials, before)
                 with progress(f"sweep {arguments.name}", study.trials, ctrl_c, pace) as on_progress:
-                    run(store, on_progress)
+                    run(store, left, on_progress)
             except KeyboardInterrupt:
-                kept = f"finished trials are kept in {folder.path}"
+                kept = f"finished trials are kept in {store.folder}"
                 end_interrupted(f"interrupted; {kept}, and the same command resumes the sweep")
-            tables = tables_of(Trials(study, store.tables(COLUMNS)))
-            written = save(folder, store, tables)
-    show(_as_json(tables) if arguments.as_json else None, summary(tables), arguments.as_json)
-    say_written(folder, written, f"Read {written / 'report.md'}", arguments.as_json)
+            trials = Trials(study, store.tables(COLUMNS))
+            indices = index_rows(trials) if study.design == "sobol" else []
+            save(store, trials, indices)
+    figures = _as_json(trials, indices) if arguments.as_json else None
+    show(figures, summary(trials, indices), arguments.as_json)
+    if not arguments.as_json or store.folder != path:
+        click.echo(f"Written to {store.folder}. Read {store.folder / 'report.md'}", err=True)
 
 
 @contextmanager
 def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
     """Provide the function that runs the chunks: in this process, or on a cluster."""
     if cluster is None:
-        from cmg_mj.studies.sweeps.chunk_store import run
+        from cmg_mj.studies.sweeps.store import run
 
         yield run
     else:
-        from cmg_mj.studies.sweeps.dask_cluster import on_cluster
+        from cmg_mj.studies.sweeps.cluster import on_cluster
 
-        with on_cluster(cluster, note) as connected:
-            yield connected.run
+        with on_cluster(cluster) as run:
+            yield run
 
 
 def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.inputs.files import find
-    from cmg_mj.studies.sweeps.api import WORLDS
-    from cmg_mj.studies.sweeps.axes import parse_axis
-    from cmg_mj.studies.sweeps.study import SweepStudy, sampling
-    from cmg_mj.studies.sweeps.study_file import axes_of, design_of, scenario_of, study_file
-    from cmg_mj.studies.sweeps.varied_tracks import locate_tracks
+    from cmg_mj.studies.sweeps import WORLDS
+    from cmg_mj.studies.sweeps.study import SweepStudy, parse_axis, sampling
+    from cmg_mj.studies.sweeps.study_file import axes_of, design_of, locate_tracks, scenario_of, study_file
 
     design = sampling(options["sample"], options["sobol"], prefix="--")
     axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in options["varied"]]
@@ -162,12 +163,10 @@ def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
         axes = axes or axes_of(arguments.name, fields)
     beside = find("scenarios", arguments.name, ".toml", "scenario").parent
     axes = [locate_tracks(axis, beside) for axis in axes]
-    order = options["order"]
     names = options["observers"] or settings.get("observers", [scenario.observer.kind])
-    expected = settings.get("order", []) if order is None else [name.strip() for name in order.split(",")]
     worlds_per_cell = options["worlds"] or settings.get("worlds", WORLDS)
     file_design = design_of(arguments.name, settings)  # refused if wrong, also where an option replaces it
-    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *(design or file_design), tuple(expected))
+    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *(design or file_design))
 
 
 def _split(setting: str) -> tuple[str, str]:
@@ -175,16 +174,13 @@ def _split(setting: str) -> tuple[str, str]:
     return field.strip(), values
 
 
-def _as_json(tables: SweepTables) -> SummaryValue:
+def _as_json(trials: Trials, indices: Sequence[IndexRow]) -> SummaryValue:
     from cmg_mj.studies.sweeps.cells import cells_of
-    from cmg_mj.studies.sweeps.order import order_rows
 
-    study = tables.trials.study
     return {
-        "trials": study.trials,
-        "cells": list(cells_of(tables.trials)),
-        **({"order": order_rows(study, tables.order)} if study.order else {}),
-        **({"indices": [row._asdict() for row in tables.indices]} if study.design == "sobol" else {}),
+        "trials": trials.study.trials,
+        "cells": list(cells_of(trials)),
+        **({"indices": [row._asdict() for row in indices]} if trials.study.design == "sobol" else {}),
     }
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from cmg_mj.cli.progress_rate import ProgressRate
-    from cmg_mj.results.run_folder import RunFolder
+    from cmg_mj.results.folder import RunFolder
 
     Handler = Callable[[int, FrameType | None], None] | signal.Handlers
 
@@ -128,7 +128,7 @@ def end_interrupted(message: str) -> NoReturn:
 
 def final_path(folder: RunFolder, place: Path) -> str:
     """Return the path of a result, with the reason if it is not the requested folder."""
-    return str(place) if place == folder.path else f"{place}; the earlier files in {folder.path} stay as they were"
+    return str(place) if place == folder.path else f"{place}; what was in {folder.path} stays as it was"
 
 
 def shell_command(*words: str | Path) -> str:

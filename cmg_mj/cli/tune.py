@@ -86,13 +86,13 @@ def tune(
     Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
     """
     from cmg_mj.studies.save import file_name
-    from cmg_mj.studies.tuning import figures_of, files_of_study, save_study, tuning_table
+    from cmg_mj.studies.tuning import figures_of, save_study, tuning_table
     from cmg_mj.studies.tuning import tune as fit
 
     scenario = arguments.scenario(observer)
     default = f"tune-{file_name(scenario.observer.kind)}-{scenario.seed}"
     densities = _densities(noise_levels)
-    folder = claim_output(arguments.out, default, files_of_study(densities))
+    folder = claim_output(arguments.out, default)
     with CtrlC() as ctrl_c:
         with progress(f"{scenario.title or arguments.name}: {scenario.observer.kind}", 1.0, ctrl_c) as on_progress:
             study = fit(
@@ -180,7 +180,6 @@ def tune_log(
     from cmg_mj.studies.save import file_name
     from cmg_mj.studies.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
     from cmg_mj.studies.tuning.closed_loop import loop_scenario
-    from cmg_mj.studies.tuning.save_on_logs import FILES
 
     for setting in settings:
         if not setting.startswith("observer."):
@@ -191,7 +190,7 @@ def tune_log(
     recordings = [read_log(path, options) for path in logs]
     pendulum = None if model is None else model_of(model)
     loop = loop_scenario(closed_loop, recordings[0])
-    folder = claim_output(out, f"tune-{file_name(observer)}-{safe_name(recordings[0].name)}", FILES)
+    folder = claim_output(out, f"tune-{file_name(observer)}-{safe_name(recordings[0].name)}")
     with CtrlC() as ctrl_c:
         with progress(f"{recordings[0].name}: {observer}", 1.0, ctrl_c) as on_progress:
             study = tune_on_logs(

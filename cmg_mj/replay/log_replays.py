@@ -14,9 +14,9 @@ from cmg_mj.replay.logs import Log, ReadOptions, read_log
 from cmg_mj.replay.logs.checks import check_distinct_logs
 from cmg_mj.replay.observer_inputs import replay_prepared
 from cmg_mj.replay.parameter_options import Parameters
-from cmg_mj.replay.save import distinct_names, files_of_replay, save_replay
+from cmg_mj.replay.save import distinct_names, save_replay
 from cmg_mj.replay.user_pendulum import model_of
-from cmg_mj.results.run_folder import RunFolder
+from cmg_mj.results.folder import RunFolder
 
 
 @dataclass
@@ -81,11 +81,6 @@ class LogReplays:
     def folder_name(self) -> str:
         """Name of the folder of the files by default."""
         return f"replay-{self.names[0]}" + (f"-and-{len(self.logs) - 1}-more" if len(self.logs) > 1 else "")
-
-    @property
-    def files(self) -> list[str]:
-        """Names of the files."""
-        return files_of_replay(self.names)
 
     def run(self, on_progress: Callable[[float, str], None]) -> None:
         """Replay the logs.

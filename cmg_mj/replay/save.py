@@ -10,7 +10,7 @@ from pathlib import Path
 from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.plot import plot_replay
 from cmg_mj.replay.report import log_figures, replay_figures
-from cmg_mj.results.run_folder import RunFolder, claimed, write_text
+from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.differences import safe_name

@@ -22,9 +22,8 @@ from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.plant.plugin_model import plugin_mjcf
+from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.result import Result
-from cmg_mj.results.run_folder import RunFolder
-from cmg_mj.results.run_folder.folder import claimed, write_text
 from cmg_mj.scenario.omissions import IN_THE_MODEL, omissions
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.stability_check import require_stable_period
@@ -153,11 +152,6 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
     return PluginRig(axes, f"cmg_mj.{name}", world, turning)
 
 
-def plugin_files(made: PluginCode) -> list[str]:
-    """Name the files of a plugin."""
-    return [*made.files, library_name(made.name)]
-
-
 def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
     """Compile a plugin and write it to a folder: see `plugin`.
 
@@ -168,8 +162,7 @@ def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
     writers: dict[str, Callable[[Path], None]] = {
         file: partial(write_text, text=text) for file, text in made.files.items()
     }
-    names = list(made.files) if compiler is None else plugin_files(made)
-    with tempfile.TemporaryDirectory() as temporary, claimed(out, names) as folder:
+    with tempfile.TemporaryDirectory() as temporary, claimed(out) as folder:
         if compiler is not None:
             compiled = Path(temporary, library)
             for file, text in made.files.items():
@@ -182,7 +175,7 @@ def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
             f"plugin: {library} is missing, for no C compiler was found (CC, cc, gcc, clang); the other files are in "
             f"{place}: run `make` there where there is a compiler"
         )
-    return Plugin(f"cmg_mj.{name}", place / library, place / f"{name}.xml", [place / file for file in names])
+    return Plugin(f"cmg_mj.{name}", place / library, place / f"{name}.xml", [place / file for file in writers])
 
 
 def _copy(source: Path, target: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.files import write_parquet
+from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.result import Driver, Outcome, Result
-from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
 from cmg_mj.results.terminal_tables import run_title
 from cmg_mj.results.trajectory import Trajectory
@@ -103,57 +103,37 @@ def report_run(experiment: Experiment, result: Result, *, several: bool = False)
     return RunReport(experiment, result.driver, world, outcome, summary, trajectory, runs, result.wire)
 
 
-def files_of_run(experiment: Experiment, *, plot: bool = False, wired: bool = False) -> list[str]:
-    """List the files that a run writes, on a real board its log too; for a plant of several axes a plot each."""
-    plots = [f"plot-{name}.png" for name in experiment.plant.axis_names] if len(experiment.axes) > 1 else ["plot.png"]
-    return [
-        "trajectory.parquet",
-        "summary.json",
-        "scenario.toml",
-        "recording.rrd",
-        *([BOARD_LOG] if wired else []),
-        *(plots if plot else []),
-    ]
-
-
 @quiet()
 def save_run(folder: RunFolder | Path, report: RunReport, *, plot: bool = False) -> Path:
     """Write scenario.toml, summary.json, trajectory.parquet and recording.rrd, all at once.
 
     Args:
-        folder: Where to. Files there that cmg_mj has not written stay.
+        folder: Where to. What cmg_mj has not written there stays, and the next number is taken.
         report: The run.
         plot: Write plot.png as well.
 
     Returns:
-        The folder, or one in it (see `RunFolder.write`).
+        The folder, or with a number behind its name (see `RunFolder.write`).
 
     Raises:
         InputError: The folder, or a file, cannot be written.
     """
     from cmg_mj.visualization.recording import write_recording
 
-    names = files_of_run(report.experiment, plot=plot, wired=report.wire is not None)
-    log, wire = (b"", None) if report.wire is None else (report.wire.log, report.wire.settings)
-    header = recording_header(report.experiment, report.driver, report.world, wire)
-    writers = (
-        report.trajectory.save,
-        lambda path: _write_json(path, report.summary),
-        lambda path: write_text(path, header.scenario_toml),
-        lambda path: write_recording(path, header, report.runs),
-        *([] if report.wire is None else [lambda path: path.write_bytes(log)]),
-        *(partial(_plot, run=run, experiment=report.experiment) for run in report.runs),
-    )
+    header = recording_header(report.experiment, report.driver, report.world, report.wire and report.wire.settings)
+    files: dict[str, Callable[[Path], object]] = {
+        "trajectory.parquet": report.trajectory.save,
+        "summary.json": lambda path: _write_json(path, report.summary),
+        "scenario.toml": lambda path: write_text(path, header.scenario_toml),
+        "recording.rrd": lambda path: write_recording(path, header, report.runs),
+    }
+    if report.wire is not None:
+        files[BOARD_LOG] = partial(Path.write_bytes, data=report.wire.log)
+    for run in report.runs if plot else ():
+        name = "plot" if run.axis is None else f"plot-{run.axis}"
+        files[f"{name}.png"] = partial(_plot, run=run, experiment=report.experiment)
     with claimed(folder) as place:
-        complete = report.outcome.kind in ("done", "fell")
-        return place.write(dict(zip(names, writers, strict=False)), complete=complete)
-
-
-def files_of_comparison(kinds: Sequence[str], *, plot: bool = False) -> list[str]:
-    """List the files that a comparison of these observers writes."""
-    trajectories = [f"trajectory-{name}.parquet" for name in file_names(kinds)]
-    common_files = ["summary.json", "worlds.parquet", "scenario.toml", "recording.rrd"]
-    return [*trajectories, *common_files, *(["plot.png"] if plot else [])]
+        return place.write(files, complete=report.outcome.kind in ("done", "fell"))
 
 
 @quiet()
@@ -168,14 +148,14 @@ def save_comparison(
     """Write summary.json, worlds.parquet, scenario.toml, and of world 0 a trajectory an observer and one recording.
 
     Args:
-        folder: Where to. Files there that cmg_mj has not written stay.
+        folder: Where to. What cmg_mj has not written there stays, and the next number is taken.
         experiment: The experiment whose scenario runs to the same comparison: `comparison.rerunnable`.
         observers: The observers with their runs.
         plot: Write plot.png as well: how every figure is distributed over the worlds.
         complete: Whether these are all observers that were to be compared.
 
     Returns:
-        The folder, or one in it (see `RunFolder.write`).
+        The folder, or with a number behind its name (see `RunFolder.write`).
 
     Raises:
         InputError: The folder, or a file, cannot be written.
@@ -185,17 +165,20 @@ def save_comparison(
 
     reports = [report_run(entry.experiment, entry.world_0, several=len(observers) > 1) for entry in observers]
     header = recording_header(reports[0].experiment, reports[0].driver, reports[0].world)
-    writers = (
-        *(report.trajectory.save for report in reports),
-        lambda path: _write_json(path, standings(observers)),
-        lambda path: write_parquet(path, worlds_table(observers), {"scenario": experiment.resolved()}),
-        experiment.save,
-        lambda path: write_recording(path, header, [run for report in reports for run in report.runs]),
-        lambda path: plot_worlds(path, observers, experiment.scenario.title),
-    )
-    names = files_of_comparison([entry.kind for entry in observers], plot=plot)
+    kinds = file_names([entry.kind for entry in observers])
+    files: dict[str, Callable[[Path], object]] = {
+        **{f"trajectory-{kind}.parquet": it.trajectory.save for kind, it in zip(kinds, reports, strict=True)},
+        "summary.json": lambda path: _write_json(path, standings(observers)),
+        "worlds.parquet": lambda path: write_parquet(
+            path, worlds_table(observers), {"scenario": experiment.resolved()}
+        ),
+        "scenario.toml": experiment.save,
+        "recording.rrd": lambda path: write_recording(path, header, [run for it in reports for run in it.runs]),
+    }
+    if plot:
+        files["plot.png"] = lambda path: plot_worlds(path, observers, experiment.scenario.title)
     with claimed(folder) as place:
-        return place.write(dict(zip(names, writers, strict=False)), complete=complete)
+        return place.write(files, complete=complete)
 
 
 def file_names(kinds: Sequence[str]) -> list[str]:

@@ -31,7 +31,7 @@ def replay(*arguments: object) -> CommandOutcome:
 
 
 def files(folder: Path | str) -> list[str]:
-    return sorted(name for name in os.listdir(folder) if name != ".cmg-mj")
+    return sorted(name for name in os.listdir(folder) if name != ".cmg_mj")
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from cmg_mj.cli.live import factor_of
-from cmg_mj.results.run_folder import RunFolder
+from cmg_mj.results.folder import RunFolder
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
@@ -139,7 +139,7 @@ def test_the_stream_is_the_recording(receiver: Viewer, scenario: str, settings: 
     with view:
         result = experiment.run(**view.options())
         view.ended(report_run(experiment, result))
-        save_run(RunFolder(Path("it"), []), report_run(experiment, result))
+        save_run(RunFolder(Path("it")), report_run(experiment, result))
     assert view.failure == ""
     assert_received(Path("received.rrd"))
 
@@ -177,7 +177,7 @@ def assert_alike_in_pieces(experiment: Experiment, ticks: int) -> None:
             growing.add(rec, rows(result.trajectory, first, first + ticks))
         growing.end(rec, report_run(experiment, result).runs)
         Path("streamed.rrd").write_bytes(memory.drain_as_bytes())
-    save_run(RunFolder(Path("it"), []), report_run(experiment, result))
+    save_run(RunFolder(Path("it")), report_run(experiment, result))
     assert_alike(Path("streamed.rrd"), Path("it/recording.rrd"))
 
 

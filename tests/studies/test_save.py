@@ -119,11 +119,12 @@ def test_a_run_folder() -> None:
     assert trajectory.metadata["scenario"] == tomllib.loads(Path("deep/er/scenario.toml").read_text())
 
 
-def test_a_folder_is_written_over() -> None:
-    for seed in (1, 2):
-        cmg_mj("run", write("duration_s = 0.1"), "--out", "it", "--seed", seed)
-    assert tomllib.loads(Path("it/scenario.toml").read_text())["seed"] == 2
-    assert_whole("it")
+def test_another_run_takes_the_next_number_or_overwrites() -> None:
+    for seed, options in ((1, ()), (2, ()), (2, ()), (3, ("--overwrite",))):
+        cmg_mj("run", write("duration_s = 0.1"), "--out", "it", "--seed", seed, *options)
+    for place, seed in (("it", 3), ("it-2", 2)):
+        assert tomllib.loads(Path(place, "scenario.toml").read_text())["seed"] == seed
+        assert_whole(place)
 
 
 def test_a_fall_is_a_result() -> None:

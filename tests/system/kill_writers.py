@@ -16,13 +16,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cmg_mj.results.run_folder import RunFolder, swap, written_names
-from cmg_mj.results.run_folder.manifest import HIDDEN
+from cmg_mj.results.folder import MARKER, RunFolder, is_complete, is_own
 
-EVENTS = {"open", "os.link", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.chmod", "os.utime"}
+EVENTS = {"open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "shutil.rmtree"}
 """Events that change files, as Python's audit hooks name them."""
-
-written_names.NAMES = (*written_names.NAMES, "[a-d]")  # as if cmg_mj wrote files of these names
 OLD, NEW = {"a": "old", "b": "old", "c": "old"}, {"b": "new", "c": "new", "d": "new"}
 
 
@@ -43,30 +40,22 @@ def wait_for(process: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
 
 
-def save(texts: dict[str, str], complete: bool = True) -> None:
+def save(texts: dict[str, str]) -> None:
     with RunFolder(Path("it")) as folder:
-        writers = {name: lambda path, text=text: path.write_text(text) and None for name, text in texts.items()}
-        folder.write(writers, complete=complete)
+        folder.write({name: lambda path, text=text: path.write_text(text) for name, text in texts.items()})
 
 
 def read_files() -> dict[str, str]:
     """Read the files as a plain reader does."""
-    return {file.name: file.read_text() for file in Path("it").iterdir() if file.is_file()}
+    return {file.name: file.read_text() for file in Path("it").glob("*") if file.name != MARKER}
 
 
-def kill_at_every_event(swap_folders: bool) -> None:
-    """Kill before every single change of a file; a result is never in parts, and the next run finds it tidy.
-
-    Args:
-        swap_folders: Folders change names; otherwise files are moved, and the next run finishes what is begun then.
-    """
-    if not swap_folders:
-        swap._swap_folders = lambda new, folder, lock: False
-    user_file = {"notes": "mine"}
-    finished, kills, times_new = False, 0, 0
+def kill_at_every_event() -> None:
+    """Kill before every single change of a file; a result is never in parts, and the next run finds it tidy."""
+    Path("notes").write_text("mine")
+    finished, kills, seen = False, 0, []
     while not finished:
         save(OLD)
-        Path("it/notes").write_text("mine")
 
         def save_and_die(n_events: int = kills) -> None:
             n_remaining = n_events
@@ -84,18 +73,16 @@ def kill_at_every_event(swap_folders: bool) -> None:
         status = wait_for(fork(save_and_die))
         assert status in (0, -signal.SIGKILL), status
         finished = status == 0
-        if swap_folders:
-            assert read_files() in (OLD | user_file, NEW | user_file), (kills, read_files())
-        times_new += read_files() == NEW | user_file
+        seen.append(read_files())
+        assert seen[-1] in (OLD, NEW, {}), (kills, seen[-1])
         with RunFolder(Path("it")):
             pass
-        assert read_files() in (OLD | user_file, NEW | user_file), (kills, read_files())
-        left = sorted(str(file) for file in Path().rglob("*"))
-        assert left == sorted(
-            ["it", f"it/{HIDDEN}", f"it/{HIDDEN}/files.json", *(f"it/{name}" for name in read_files())]
-        ), left
+        assert read_files() in (OLD, NEW), (kills, read_files())
+        assert is_own(Path("it"))
+        assert is_complete(Path("it"))
+        assert sorted(os.listdir()) == ["it", "notes"], (kills, os.listdir())
         kills += 1
-    assert kills - 1 > times_new > 1, "some kills came before the new result was there, and some after"
+    assert all(files in seen for files in (OLD, NEW, {})), "some kills came before, between and after the renames"
     print(f"{kills - 1} kills")
 
 
@@ -104,18 +91,21 @@ def kill_at_random(times: int) -> None:
     from cmg_mj import parse_scenario, prepare
     from cmg_mj.studies import save as runs
 
-    results = []
+    reports = []
     for seed in (1, 2):
         experiment = prepare(parse_scenario({"duration_s": 0.05, "seed": seed}))
-        results.append((experiment, experiment.run()))
-    runs.save_run(Path("it"), runs.report_run(*results[0]))
-    Path("it/notes").write_text("mine")
+        reports.append(runs.report_run(experiment, experiment.run()))
+
+    def save_run(number: int) -> None:
+        with RunFolder(Path("it"), overwrite=True) as folder:
+            runs.save_run(folder, reports[number])
 
     def save_for_ever() -> None:
         while True:
-            for experiment, result in results:
-                runs.save_run(Path("it"), runs.report_run(experiment, result))
+            save_run(0)
+            save_run(1)
 
+    save_run(0)
     chance = random.Random(8)
     seeds = []
     for _ in range(times):
@@ -123,12 +113,12 @@ def kill_at_random(times: int) -> None:
         time.sleep(chance.uniform(0.05, 0.4))
         os.kill(process, signal.SIGKILL)
         assert wait_for(process) == -signal.SIGKILL
+        with RunFolder(Path("it")):
+            pass
+        assert os.listdir() == ["it"], os.listdir()
+        assert is_complete(Path("it"))
         seeds.append(wait_for(fork(lambda: os._exit(10 + seed_of(Path("it"))))) - 10)
         assert seeds[-1] in (1, 2), seeds
-        assert (Path("it") / "notes").read_text() == "mine"
-    runs.save_run(Path("it"), runs.report_run(*results[0]))
-    assert os.listdir() == ["it"], os.listdir()
-    assert os.listdir(f"it/{HIDDEN}") == ["files.json"]
     print(f"{times} kills, seeds {seeds}")
 
 
@@ -147,8 +137,4 @@ def seed_of(folder: Path) -> int:
 
 
 if __name__ == "__main__":
-    {
-        "whole": lambda: kill_at_every_event(True),
-        "moved": lambda: kill_at_every_event(False),
-        "random": lambda: kill_at_random(20),
-    }[sys.argv[1]]()
+    {"every": kill_at_every_event, "random": lambda: kill_at_random(40)}[sys.argv[1]]()

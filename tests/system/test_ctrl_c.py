@@ -229,11 +229,10 @@ def test_leaves_the_complete_result_of_a_run_before() -> None:
     assert cmg_mj_process("run", write("duration_s = 0.1"), "--out", "it", cwd=Path()).status == 0
     outcome = cmg_mj_process("run", write(LONG), "--out", "it", cwd=Path())
     assert outcome.err.splitlines()[-1] == (
-        "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it/incomplete; "
-        "the earlier files in it stay as they were"
+        "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it-2; what was in it stays as it was"
     )
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 20
-    assert len(assert_whole("it/incomplete")) == 600
+    assert len(assert_whole("it-2")) == 600
 
 
 @pytest.mark.slow

@@ -12,11 +12,12 @@ from tests.command import HANGS_AFTER_S, environment
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "kills"),
-    [("whole", 30), ("moved", 25), ("random", 20)],
-    ids=["while folders change names", "while files are moved", "whole runs, at random moments"],
+    [
+        pytest.param("every", 15, id="before every change of a file"),
+        pytest.param("random", 40, id="whole runs, at random moments", marks=pytest.mark.slow),
+    ],
 )
 def test_kills(mode: str, kills: int) -> None:
     process = subprocess.run(

@@ -22,7 +22,7 @@ from cmg_mj.controllers.laws import Law
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.types import Observer
 from cmg_mj.errors import InputError, raised
-from cmg_mj.results.run_folder.folder import write_text
+from cmg_mj.results.folder import write_text
 
 Part = TypeVar("Part", Observer, Law)
 

@@ -11,7 +11,7 @@ from cmg_mj.errors import InputError, raised
 if TYPE_CHECKING:
     from cmg_mj.codegen.export.pipeline import Code
     from cmg_mj.core.controller import Controller
-    from cmg_mj.results.run_folder import RunFolder
+    from cmg_mj.results.folder import RunFolder
 
 
 def export(
@@ -34,8 +34,8 @@ def export(
         The files: NAME.h, NAME.c, NAME_example.c, NAME_test_vector.h.
 
     Raises:
-        InputError: The controller cannot be exported, the C differs from Python, CasADi is missing, or the folder holds
-            files of the user's that would be overwritten.
+        InputError: The controller cannot be exported, the C differs from Python, CasADi is missing, or the folder
+            cannot be written.
     """
     return write_code(out, generate_code(controller, precision, name))
 
@@ -55,9 +55,9 @@ def generate_code(
 
 def write_code(out: Path | RunFolder, code: Code) -> list[Path]:
     """Write the files of a generated code."""
-    from cmg_mj.results.run_folder.folder import claimed, write_text
+    from cmg_mj.results.folder import claimed, write_text
 
-    with claimed(out, code.files) as folder:
+    with claimed(out) as folder:
         place = folder.write(
             {name: lambda path, text=text: write_text(path, text) for name, text in code.files.items()},
             all_or_none=True,  # the example needs the code, and the code its test vector to be believed

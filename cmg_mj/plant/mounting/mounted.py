@@ -13,9 +13,8 @@ import mujoco
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.files import expanded, model_files
 from cmg_mj.plant.mjcf import as_mjcf, check_rig
-from cmg_mj.plant.mounting.target import check_written_by_mount
 from cmg_mj.results.files import whole_file
-from cmg_mj.results.signed_text import signed
+from cmg_mj.results.folder import is_signed, signed
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class MountedRobot:
     def save(self, path: str | Path) -> Path:
         """Write the robot as MJCF, which plain MuJoCo loads and `plant.model` takes; whole or not at all.
 
-        A file that a mount has written is replaced, as long as nobody has changed it since. No other file ever is.
+        A file that a mount has written is replaced. No other file ever is.
 
         Args:
             path: The file, in any folder. It refers to meshes and textures by relative paths; they are not copied.
@@ -47,7 +46,7 @@ class MountedRobot:
 
         Raises:
             InputError: The file cannot be written, is no .xml, or would replace the robot, a file that it names, or
-                one that is not as a mount wrote it.
+                one that no mount wrote.
         """
         target = expanded(path, "-o")
         check_target(target, self.path)
@@ -57,7 +56,8 @@ class MountedRobot:
             setattr(spec, field, _relative_assets(folder, spec.modelfiledir, getattr(spec, field)))
         spec.modelfiledir = f"{folder}{os.sep}"  # MuJoCo opens the meshes to write them
         try:
-            check_written_by_mount(target, [target] if os.path.lexists(target) else [])
+            if os.path.lexists(target):
+                require_signed(target)
             with whole_file(target, ".xml") as temporary:
                 temporary.write_bytes(signed(as_mjcf(spec, self.path), ".xml"))
                 check_rig(temporary, target)
@@ -89,6 +89,30 @@ def check_target(target: Path, robot: Path) -> None:
             raise InputError(f"-o {target}: {path} is a folder")
         if path.exists() and any(file.exists() and path.samefile(file) for file in originals):
             raise InputError(f"-o {target}: {path} is the robot's own file, or one that it names; give another name")
+
+
+def check_replaceable(target: Path, *, overwrite: bool) -> None:
+    """Refuse to replace what no mount has written, or anything without being asked to.
+
+    Args:
+        target: The model's file.
+        overwrite: Whether it and the scenario beside it may be replaced, if a mount has written them.
+
+    Raises:
+        InputError: One of the files is there and may not be replaced.
+        OSError: It cannot be read.
+    """
+    for file in (target, target.with_suffix(".toml")):
+        if os.path.lexists(file):
+            require_signed(file)
+            if not overwrite:
+                raise InputError(f"-o {target}: {file} exists; give another name, or --overwrite")
+
+
+def require_signed(file: Path) -> None:
+    """Refuse to replace a file that no mount has written."""
+    if not is_signed(file):
+        raise InputError(f"-o = {file}: is not a file of cmg-mj mount, and would be lost; give another name")
 
 
 @contextmanager

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Collection, Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -20,19 +19,17 @@ from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.observers.scaling import Number, scaled_names, scaled_parameters
 from cmg_mj.plant.mounting import MountedRobot
 from cmg_mj.plant.mounting.mount import mount_on_request
-from cmg_mj.plant.mounting.mounted import check_target, with_scenario
+from cmg_mj.plant.mounting.mounted import check_replaceable, check_target, with_scenario
 from cmg_mj.plant.mounting.request import MountRequest
-from cmg_mj.plant.mounting.target import check_replaceable, claimed_target
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
-from cmg_mj.results.run_folder import RunFolder
-from cmg_mj.results.signed_text import signed
+from cmg_mj.results.folder import signed
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.make import Plugin, require_tools
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
-from cmg_mj.studies.push_limits.mount_plugin import check_plugin, claimed_plugin, write_mounted_plugin
+from cmg_mj.studies.push_limits.mount_plugin import check_plugin, check_plugin_folder, write_mounted_plugin
 from cmg_mj.studies.push_limits.pair_demands import PairDemands, pair_demands
 from cmg_mj.studies.push_limits.prospects import (
     LOW_LIMIT_DEG,
@@ -167,33 +164,15 @@ def mount_and_write(
     robot, file = Path(robot), expanded(target, "-o")
     OBSERVER_CLASSES.find(observer)
     check_target(file, expanded(robot, "ROBOT"))
+    check_replaceable(file, overwrite=overwrite)
     if with_plugin:
         require_tools()
-    with (
-        claimed_target(file, overwrite=overwrite),
-        claimed_plugin(file, expanded(robot, "ROBOT"), overwrite=overwrite) if with_plugin else nullcontext() as folder,
-    ):
-        return _mount_and_write(
-            robot, request, file, observer, overwrite=overwrite, time_limit=time_limit, folder=folder
-        )
-
-
-def _mount_and_write(
-    robot: Path,
-    request: MountRequest,
-    file: Path,
-    observer: str,
-    *,
-    overwrite: bool,
-    time_limit: TimeLimit | None,
-    folder: RunFolder | None,
-) -> MountResult:
-    """See `mount_and_write`; the files are claimed."""
+        check_plugin_folder(file, expanded(robot, "ROBOT"), overwrite=overwrite)
     mounted = _mount(robot, request)
     with with_scenario(file) as model:
         mounted.save(model)
         experiment = write_scenario(model, mounted.path, observer, axis=request.name)
-        if folder:
+        if with_plugin:
             check_plugin(experiment, file)
         limits = prospects(experiment, request.name)
         simulated = sufficient = plugin = None
@@ -202,13 +181,13 @@ def _mount_and_write(
             if math.degrees(limits.limit.tilt) < LOW_LIMIT_DEG or simulated.falls:
                 trial = model.with_suffix(".trial.xml")
                 sufficient = _sufficient_scale(robot, request, trial, observer, time_limit)
-        pushed = write_scenario(model, mounted.path, observer, limits, request.name, simulated) if folder else None
+        pushed = write_scenario(model, mounted.path, observer, limits, request.name, simulated) if with_plugin else None
         rig = RigSettings(sliding_axes(experiment.plant), observer_parameters(observer, experiment))
         text = scenario_text(file.name, mounted.path, observer, limits, request.name, simulated, rig)
         model.with_suffix(".toml").write_bytes(signed(text, ".toml"))
         check_replaceable(file, overwrite=overwrite)  # also what has come meanwhile
-        if folder and pushed:
-            plugin = write_mounted_plugin(pushed, file, folder)
+        if pushed:
+            plugin = write_mounted_plugin(pushed, file)
     plant = experiment.plant.single_axis(request.name)
     demands = pair_demands(plant, experiment.law.rate_limit, request.scale)
     return MountResult(mounted, file, plant, observer, limits, simulated, demands, sufficient, plugin)

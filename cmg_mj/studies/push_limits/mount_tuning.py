@@ -13,7 +13,7 @@ import tomli_w
 from cmg_mj.errors import InputError
 from cmg_mj.replay.parameter_options import ParameterValue
 from cmg_mj.results.files import whole_file
-from cmg_mj.results.signed_text import is_as_written, signed
+from cmg_mj.results.folder import is_signed, signed
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.push_limits.largest_push import push_margin
@@ -115,13 +115,13 @@ def tune_mounted(
 
 
 def _write(path: Path, level: NoiseLevelResult) -> None:
-    """Replace the parameters in a mounted robot's scenario, if nobody has changed the file since.
+    """Replace the parameters in a mounted robot's scenario.
 
     Raises:
-        InputError: Somebody has.
+        InputError: No mount has written it.
     """
-    if not is_as_written(path):
-        raise InputError(f"{path}: has changed since it was mounted; the tuned parameters are not written")
+    if not is_signed(path):
+        raise InputError(f"{path}: is not a file of cmg-mj mount; the tuned parameters are not written")
     fields = tomllib.loads(path.read_text(encoding="utf-8"))
     fields["observer"] |= plain(level.parameters)
     with whole_file(path) as temporary:

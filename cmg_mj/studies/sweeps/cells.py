@@ -1,23 +1,63 @@
-"""The cells of a sweep: every point with every observer, over its worlds. `cells.parquet`."""
+"""The cells of a sweep: every point with every observer, over its worlds; who leads where. `cells.parquet`."""
 
 from __future__ import annotations
 
 import itertools
 import math
+import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
+import pyarrow as pa
 
+from cmg_mj.errors import shortened
 from cmg_mj.results.intervals import Interval, finite_mean, known_interval
 from cmg_mj.results.summary_keys import KEYS, Figures, Summary
-from cmg_mj.studies.sweeps.failure_reasons import Reasons
+from cmg_mj.studies.sweeps.chunk import as_table, point_columns
 from cmg_mj.studies.sweeps.study import SweepStudy
-from cmg_mj.studies.sweeps.trials import as_table, point_columns
 
-if TYPE_CHECKING:
-    import pyarrow as pa
+LONGEST = 240
+"""Most letters of a reason."""
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(\.\d+)?([eE][-+]?\d+)?(?![\w.]*\w)")
+
+
+class Reasons:
+    """Counts of the reasons why trials never ran to an end.
+
+    Reasons that differ in their numbers alone are of one kind, which the first of them stands for.
+
+    Args:
+        field: The last varied field: a refusal begins with the values of all, which are discarded.
+    """
+
+    def __init__(self, field: str) -> None:
+        self._field = field
+        self.counts: Counter[tuple[str, str]] = Counter()
+        self._first: dict[tuple[str, str], str] = {}
+        self._differ: set[tuple[str, str]] = set()
+
+    def add(self, ended: Iterable[tuple[str, str | None]]) -> None:
+        """Count trials that neither stood nor fell: outcome and reason of each."""
+        for (outcome, reason), n in Counter(ended).items():
+            text = " ".join((reason or "no reason is given").split())
+            if outcome == "refused" and f"{self._field}=" in text:
+                text = text.partition(f"{self._field}=")[2].partition(": ")[2] or text
+            text = shortened(text, LONGEST)
+            kind = (outcome, NUMBER.sub("#", text))
+            if self._first.setdefault(kind, text) != text:
+                self._differ.add(kind)
+            self.counts[kind] += n
+
+    def most(self, n: int) -> list[str]:
+        """List the most frequent kinds of reasons, with counts."""
+        return [
+            f"{count} {kind[0]}{', such as' if kind in self._differ else ''}: {self._first[kind]}"
+            for kind, count in self.counts.most_common(n)
+        ]
+
 
 COMPARED = [key for key, about in KEYS.items() if about.compared and about.better and not key.endswith("_fraction")]
 """Figures of which a cell has the mean, and the difference to the best observer's."""
@@ -42,8 +82,6 @@ class Trials:
     """
 
     def __init__(self, study: SweepStudy, tables: Iterable[pa.Table]) -> None:
-        import pyarrow as pa
-
         self.study = study
         shape = (len(study.points), len(study.observers), study.worlds)
         self.outcome = np.full(shape, "", dtype=object)
@@ -134,8 +172,6 @@ def _with_ends(key: str, values: np.ndarray, positive: bool = False) -> Figures:
 
 def cells_schema(study: SweepStudy) -> pa.Schema:
     """Declare the columns of `cells_of`."""
-    import pyarrow as pa
-
     counts = [(name, "int64") for name in ("trials", "stood", "fell", "stopped")]
     shares = [(name, "float64") for name in ("fell_share", "fell_low", "fell_high")]
     ends = ("", "_low", "_high")
@@ -155,3 +191,126 @@ def cells_in_blocks(trials: Trials) -> Iterator[pa.Table]:
     rows = cells_of(trials)
     while block := list(itertools.islice(rows, BLOCK)):
         yield as_table(block, cells_schema(trials.study))
+
+
+CLOSE = 1.2
+"""Factor on the leader's error up to which another observer is close to it."""
+
+
+class Count(NamedTuple):
+    """Numbers of points or worlds: those counted, and all that can tell."""
+
+    held: int
+    of: int
+
+    @property
+    def share(self) -> Interval | None:
+        """The share with Wilson's 95 % interval; None of nothing."""
+        return fell_interval(self.held, self.of) if self.of else None
+
+    @property
+    def words(self) -> str:
+        """Both numbers, as tables show them."""
+        return f"{self.held} of {self.of}"
+
+
+class LeadRow(NamedTuple):
+    """Numbers of points at which an observer leads, or a baseline is ahead of the leader.
+
+    Attributes:
+        name: The observer, or the baseline.
+        is_baseline: Whether it closes no loop.
+        leads: Points at which it leads; of a baseline, at which its error is less than the leader's.
+        surely: Points at which it does so beyond 95 % intervals.
+        close: Points at which it stood in every world, with at most `CLOSE` times the leader's error.
+    """
+
+    name: str
+    is_baseline: bool
+    leads: Count
+    surely: Count
+    close: Count
+
+
+def least_error(figure: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find the best mean among those that stood in every world, (..., n_observers, n_worlds) -> (...) each.
+
+    The best is sure if its mean difference to every other, world by world, is beyond its 95 % interval.
+
+    Args:
+        figure: The error of every trial; NaN where it did not stand.
+        places: The observers that are compared.
+
+    Returns:
+        Place of the best, -1 where there is none; whether it is sure; its mean.
+    """
+    means = np.full(figure.shape[:-1], np.nan)
+    means[..., places] = figure[..., places, :].mean(axis=-1)
+    best, least = smallest(means)
+    sure = np.zeros(best.shape, dtype=bool)
+    for at in zip(*np.nonzero(best >= 0), strict=True):
+        others = [i for i in np.nonzero(np.isfinite(means[at]))[0] if i != best[at]]
+        sure[at] = all(_is_less(figure[at][best[at]], figure[at][i]) for i in others)
+    return best, sure, least
+
+
+def _is_less(values: np.ndarray, others: np.ndarray) -> bool:
+    """Judge whether values are less than others beyond the 95 % interval of the mean difference, (n_worlds,) each."""
+    behind = known_interval(others - values)
+    return behind is not None and behind.low > 0.0
+
+
+def smallest(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the place of the smallest along the last axis, -1 where there is none, and its value."""
+    filled = np.where(np.isfinite(values), values, np.inf)
+    least = filled.min(axis=-1)
+    return np.where(np.isfinite(least), filled.argmin(axis=-1), -1), np.where(np.isfinite(least), least, np.nan)
+
+
+def baselines_ahead(study: SweepStudy, figure: np.ndarray, least: np.ndarray) -> dict[str, np.ndarray]:
+    """Compare baselines with the leader, (..., n_observers, n_worlds) and (...) -> baseline -> (...).
+
+    Returns:
+        Shares above one half where the baseline has the lesser error: the leader's by the sum of both. One where nobody
+        leads. NaN where the baseline has no error, because the true rate does not keep the rig up.
+    """
+    shares = {}
+    for name in study.references:
+        mean = figure[..., study.observers.index(name), :].mean(axis=-1)
+        shares[name] = np.where(np.isnan(least) & np.isfinite(mean), 1.0, least / (least + mean))
+    return shares
+
+
+def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
+    """Count the points at which each observer leads, and each baseline is ahead.
+
+    Args:
+        trials: The trials. In a design for indices the rows A and B count, whose points are independent.
+        key: The figure, less of which is better.
+
+    Returns:
+        A row an observer, then a row a baseline.
+    """
+    study = trials.study
+    figure = trials.figure(key)
+    if study.design == "sobol":
+        figure = figure[: 2 * study.n]
+    contenders = study.contenders
+    best, sure, least = least_error(figure, contenders)
+    ahead = baselines_ahead(study, figure, least)
+    rows = []
+    for place, name in enumerate(study.observers):
+        errors = figure[:, place]
+        is_baseline = name in ahead
+        if is_baseline:
+            leads = ahead[name] > 0.5
+            leaders = [figure[i, best[i]] for i in range(len(figure))]
+            pairs = zip(leads, best, errors, leaders, strict=True)
+            surely = np.array([bool(lead) and (b < 0 or _is_less(own, other)) for lead, b, own, other in pairs])
+        else:
+            leads = best == place
+            surely = leads & sure
+        close = errors.mean(axis=-1) <= CLOSE * least
+        counts = (Count(int(mask.sum()), len(figure)) for mask in (leads, surely, close))
+        rows.append(LeadRow(name, is_baseline, *counts))
+    return sorted(rows, key=lambda row: row.is_baseline)

@@ -12,9 +12,8 @@ from rich.table import Table
 
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies.benchmark import figures_table
-from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.chunk import compute
-from cmg_mj.studies.sweeps.study import SweepStudy
+from cmg_mj.studies.sweeps.study import SweepStudy, parse_axis
 
 SCENARIO, DURATION_S = "push_recovery", 15.0
 WORLDS_A_PLANT = 4

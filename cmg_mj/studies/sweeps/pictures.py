@@ -13,10 +13,8 @@ import numpy as np
 
 from cmg_mj.results.intervals import Interval, finite_mean, known_interval
 from cmg_mj.results.summary_keys import heading
-from cmg_mj.studies.sweeps.axes import is_number
-from cmg_mj.studies.sweeps.cells import Trials, fell_interval
-from cmg_mj.studies.sweeps.leads import baselines_ahead, least_error, smallest
-from cmg_mj.studies.sweeps.study import counted
+from cmg_mj.studies.sweeps.cells import Trials, baselines_ahead, fell_interval, least_error, smallest
+from cmg_mj.studies.sweeps.study import counted, is_number
 from cmg_mj.visualization.plots.figure_spec import Line, Map, Panel, Picture, Surface
 from cmg_mj.visualization.plots.readability import short_names
 

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import pyarrow as pa
 
 from cmg_mj.results.intervals import CONFIDENCE
 from cmg_mj.studies.sweeps.cells import COMPARED, Trials
-from cmg_mj.studies.sweeps.order import figures_of, log_ratio, pairs_of
-from cmg_mj.studies.sweeps.trials import as_table
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from cmg_mj.studies.sweeps.chunk import as_table
 
 RESAMPLES = 999
 FEWEST = 16
 """Rows of a design by whose intervals anything is called decisive: those of fewer are too narrow."""
-LOST, LOG_RATIO = "lost_share", "log_ratio_of_"
-"""Quantities that are decomposed besides the figures: the share of worlds that fell or stopped; before a figure's name,
-the logarithm of two observers' ratio."""
+LOST = "lost_share"
+"""Quantity that is decomposed besides the figures: the share of worlds that fell or stopped."""
 AT_ONCE = 2_000_000
 """Values of resamples held together."""
 
@@ -105,8 +101,6 @@ def _estimated(blocks: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.nda
 
 def index_table(rows: Sequence[IndexRow]) -> pa.Table:
     """Make the rows of `index_rows` into a table."""
-    import pyarrow as pa
-
     names = [(name, "string") for name in ("figure", "observer", "field")]
     figures = [(name, "float64") for name in Indices._fields]
     return as_table(
@@ -139,8 +133,7 @@ def index_rows(trials: Trials) -> list[IndexRow]:
 def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarray]]:
     """List what is decomposed: name, observer, values and outcomes, (n_points, n_worlds) each.
 
-    Quantities are every observer's figures, how often it did not stand, and the logarithms of the ratios of a named
-    order's errors.
+    Quantities are every observer's figures, and how often it did not stand.
     """
     observers = trials.study.observers
     for key in COMPARED:
@@ -151,11 +144,6 @@ def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarr
     for place, observer in enumerate(observers):
         lost = ~trials.stood[:, place]
         yield LOST, observer, lost.astype(float), np.full(lost.shape, "done", dtype=object)
-    for better, worse in pairs_of(trials.study.order):
-        both = [observers.index(better), observers.index(worse)]
-        outcome = np.where(trials.stood[:, both[0]], trials.outcome[:, both[1]], trials.outcome[:, both[0]])
-        for key in figures_of(trials):
-            yield f"{LOG_RATIO}{key}", f"{better} / {worse}", log_ratio(trials, key, better, worse), outcome
 
 
 def _refused(values: np.ndarray, outcome: np.ndarray, n: int) -> str | None:

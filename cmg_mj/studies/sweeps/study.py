@@ -4,26 +4,325 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import tomllib
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal, Protocol, TypeAlias, TypeGuard, runtime_checkable
 
 import numpy as np
 
 from cmg_mj.controllers.laws import LAW_CLASSES
 from cmg_mj.core.types import law_needs
-from cmg_mj.errors import InputError
+from cmg_mj.errors import InputError, nearest, shown
 from cmg_mj.inputs.files import find
 from cmg_mj.inputs.overrides import assign
+from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.baselines import RATES
 from cmg_mj.scenario.schema import ObserverSettings, Scenario, parse_scenario
-from cmg_mj.simulation.batch import can_vary_in_batch
+from cmg_mj.simulation.batch import UNUSED, can_vary_in_batch
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.simulation.prepare import load_scenario_plant
-from cmg_mj.studies.sweeps.axes import FieldValue, VariedField
-from cmg_mj.studies.sweeps.checks import check_axes, check_observers, check_order, check_points, check_worlds
-from cmg_mj.studies.sweeps.points import Points, sampled
+
+# --- varied fields
+
+FieldValue: TypeAlias = "float | str | Sequence[FieldValue] | Mapping[str, FieldValue]"
+"""A value of a scenario's field, as TOML has it."""
+
+
+@runtime_checkable
+class Array(Protocol):
+    """Numbers of numpy, pandas or the like."""
+
+    def tolist(self) -> FieldValue:
+        """Make plain numbers."""
+        ...
+
+
+Variation: TypeAlias = "FieldValue | Array"
+"""Values of a field: a list of them, a single one, or text as `--vary` takes it."""
+
+MOST_VALUES = 10_000
+"""Values of one field."""
+LOG = "log:"
+TOGETHER = "+"
+"""Between fields that take the same values."""
+DIGITS = 12
+"""Significant digits of a range's values: 0.3 is to be 0.3, in the table too."""
+
+
+@dataclass(frozen=True)
+class VariedField:
+    """One varied field, or several that take the same values together.
+
+    Attributes:
+        field: The field, as with `--set`; of several the first, which names the axis in tables and pictures.
+        values: The values of a list or of a range with a count; none for a range of which any value may be sampled.
+        low: Lower end of a range to be sampled.
+        high: Upper end of a range to be sampled.
+        log: Whether the range is sampled evenly in its logarithm.
+        also: Fields that take the same value at every point.
+    """
+
+    field: str
+    values: tuple[FieldValue, ...] = ()
+    low: float = math.nan
+    high: float = math.nan
+    log: bool = False
+    also: tuple[str, ...] = ()
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """All fields that take the value."""
+        return (self.field, *self.also)
+
+    @property
+    def option(self) -> str:
+        """The fields as `--vary` takes them."""
+        return TOGETHER.join(self.fields)
+
+    @property
+    def is_range(self) -> bool:
+        """Return whether the values are a range to be sampled."""
+        return not self.values
+
+    def at(self, shares: np.ndarray) -> list[FieldValue]:
+        """Choose values at shares of the range between 0 and 1, (n,); of a list each value has an equal part."""
+        if not self.is_range:
+            return [self.values[min(int(share * len(self.values)), len(self.values) - 1)] for share in shares]
+        if self.log:
+            values = np.exp(math.log(self.low) + shares * (math.log(self.high) - math.log(self.low)))
+        else:
+            values = self.low + shares * (self.high - self.low)
+        return [float(f"{value:.{DIGITS}g}") for value in values]
+
+    def as_field(self) -> FieldValue:
+        """Write the values as a study file has them: a list, or `low:high`."""
+        return list(self.values) if self.values else f"{LOG if self.log else ''}{self.low!r}:{self.high!r}"
+
+
+def parse_axis(field: str, variation: Variation, where: str) -> VariedField:
+    """Read the values of a varied field.
+
+    Args:
+        field: The field; several that take the same values with `+` between.
+        variation: A list of values, or a single one; or text: values with commas between, `first:last:count` for as
+            many evenly spaced, `low:high` for a range to be sampled, each also with `log:` before it.
+        where: The setting's name in an error.
+
+    Returns:
+        The axis.
+
+    Raises:
+        InputError: The field or its values are not written so.
+    """
+    field, *also = (part.strip() for part in field.split(TOGETHER))
+    if not field or "" in also:
+        raise InputError(f"{where}: write FIELD=VALUES, for example plant.equilibrium_bias_deg=-1.5:1.5:13")
+    if isinstance(variation, str) and ":" in variation and not variation.lstrip().startswith(("[", '"')):
+        return replace(_parse_range(field, variation.strip(), where), also=tuple(also))
+    values = _parse_list(variation, where) if isinstance(variation, str) else _as_list(variation, where)
+    if not values:
+        raise InputError(f"{where}: no values; write FIELD=VALUES, such as plant.equilibrium_bias_deg=0,0.5")
+    if len(values) > MOST_VALUES:
+        raise InputError(f"{where}: {len(values)} values; at most {MOST_VALUES}")
+    twice = next((value for i, value in enumerate(values) if value in values[:i]), None)
+    if twice is not None:
+        raise InputError(f"{where}: {twice} is there twice")
+    return VariedField(field, tuple(values), also=tuple(also))
+
+
+def _parse_range(field: str, text: str, where: str) -> VariedField:
+    log = text.startswith(LOG)
+    try:
+        first, last, *counts = text.removeprefix(LOG).split(":")
+        low, high = float(first), float(last)
+        (count,) = map(int, counts) if counts else (None,)
+    except ValueError:
+        raise InputError(
+            f"{where}: {text!r} is no range; write first:last:count, or low:high for --sample and --sobol, "
+            "with log: before it for a logarithmic one"
+        ) from None
+    if not math.isfinite(high - low) or low == high or (count is None and low > high):
+        raise InputError(f"{where}: an empty range; its ends must be two different numbers, the lower one first")
+    if log and min(low, high) <= 0.0:
+        raise InputError(f"{where}: a logarithmic range needs ends above 0")
+    axis = VariedField(field, (), low, high, log)
+    if count is None:
+        return axis
+    if not 2 <= count <= MOST_VALUES:
+        raise InputError(f"{where}: {count} values; a range has at least 2, at most {MOST_VALUES}")
+    return VariedField(field, tuple(axis.at(np.linspace(0.0, 1.0, count))))
+
+
+def _as_list(variation: Variation, where: str) -> list[FieldValue]:
+    """Make values that are no text into a list, with numpy's numbers as Python's."""
+    values = variation.tolist() if isinstance(variation, Array) else variation
+    if isinstance(values, (bool, int, float)):
+        return [values]
+    if isinstance(values, Mapping) or not isinstance(values, Iterable):
+        raise InputError(f"{where}: {shown(values)}: must be a list of values, or text such as '-1:1:5'")
+    return [value.tolist() if isinstance(value, Array) else value for value in values]
+
+
+def _parse_list(text: str, where: str) -> list[FieldValue]:
+    """Read values with commas between; a bare word is a string, as with `--set`."""
+    try:
+        return tomllib.loads(f"values = [{text}]")["values"]
+    except (ValueError, RecursionError):
+        words = [word.strip() for word in text.split(",")]
+        if "" in words or any(mark in text for mark in "[]{}\"'="):
+            raise InputError(f"{where}: {text!r} is no list; write values with commas between") from None
+        return [_word(word) for word in words]
+
+
+def _word(word: str) -> FieldValue:
+    try:
+        return tomllib.loads(f"value = {word}")["value"]
+    except ValueError:
+        return word
+
+
+def is_number(value: FieldValue) -> TypeGuard[float]:
+    """Tell a number from a truth value, a text and a list."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+# --- points
+
+Point = dict[str, FieldValue]
+"""Varied field -> its value."""
+
+
+class Points:
+    """Points by their numbers, each made when it is asked for.
+
+    Args:
+        axes: The varied fields.
+        shares: The place of a design's points in the axes' ranges, (n_points, n_axes); None for a grid: every
+            combination of values, of which the last field's change first.
+    """
+
+    def __init__(self, axes: Sequence[VariedField], shares: np.ndarray | None = None) -> None:
+        self._fields = [axis.fields for axis in axes]
+        self._values: list[Sequence[FieldValue]] = [axis.values for axis in axes]
+        self._is_grid = shares is None
+        if shares is not None:
+            self._values = [axis.at(share) for axis, share in zip(axes, shares.T, strict=True)]
+
+    def __len__(self) -> int:
+        return math.prod(map(len, self._values)) if self._is_grid else len(self._values[0])
+
+    def __iter__(self) -> Iterator[Point]:
+        return map(self.__getitem__, range(len(self)))
+
+    def __getitem__(self, number: int) -> Point:
+        if not 0 <= number < len(self):
+            raise IndexError(number)
+        row: list[FieldValue] = []
+        for values in reversed(self._values):
+            row.insert(0, values[number % len(values)])
+            if self._is_grid:
+                number //= len(values)
+        return {field: value for fields, value in zip(self._fields, row, strict=True) for field in fields}
+
+
+def sampled(dimensions: int, n: int, seed: int, *, indices: bool) -> np.ndarray:
+    """Spread points evenly in the unit cube, (n_points, dimensions).
+
+    For indices the points are those of Saltelli's scheme, as `scipy.stats.sobol_indices` wants them: A, B, then A with
+    each column in turn from B.
+    """
+    from scipy.stats import qmc  # half a second
+
+    # The argument is called `rng` since 1.15; all versions take this name.
+    generator: Any = {"seed": np.random.default_rng(seed)}
+    with warnings.catch_warnings():  # that n is no power of two
+        warnings.simplefilter("ignore", UserWarning)
+        drawn = qmc.Sobol(2 * dimensions if indices else dimensions, **generator).random(n)
+    if not indices:
+        return drawn
+    a, b = drawn[:, :dimensions], drawn[:, dimensions:]
+    crossed = [np.where(np.arange(dimensions) == i, b, a) for i in range(dimensions)]
+    return np.concatenate([a, b, *crossed])
+
+
+# --- checks
+
+NOT_VARIED = {
+    "seed": "worlds differ in it already: --worlds says how many, --seed which",
+    "observer": "--observers names them",
+    "observer.kind": "--observers names them",
+    "open_loop_observers": "a sweep runs without them; --observers puts each in the loop",
+    **dict.fromkeys(sorted(UNUSED), "no trial depends on it"),
+}
+"""Fields that a sweep does not vary, and why. Fields below them are not varied either, but for an observer's own."""
+
+
+def listed_names(names: Iterable[str], argument: str) -> tuple[str, ...]:
+    """Make a list of names that Python gave into a tuple.
+
+    Raises:
+        InputError: It is no list.
+    """
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise InputError(f"{argument} = {shown(names)}: must be a list of observers' names, such as ['linear', 'ltv']")
+    return tuple(names)
+
+
+def check_axes(axes: Sequence[VariedField], design: str) -> None:
+    """Check that something is varied, each field once, so that it makes a difference, and that a range is sampled."""
+    if not axes:
+        raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")
+    fields = [field for axis in axes for field in axis.fields]
+    for i, field in enumerate(fields):
+        if field in fields[:i]:
+            raise InputError(f"--vary {field}: given twice")
+        section = field.partition(".")[0]
+        why = NOT_VARIED.get(field) or (None if section == "observer" else NOT_VARIED.get(section))
+        if why is not None:
+            raise InputError(f"--vary {field}: is not varied: {why}")
+    for axis in axes:
+        if axis.is_range and design == "grid":
+            raise InputError(
+                f"--vary {axis.field}: a range without a count is for --sample and --sobol; write first:last:count"
+            )
+
+
+def check_points(design: str, n: int, axes: int) -> None:
+    """Check a design's number of points: for indices as many as Saltelli's scheme wants, none for a grid."""
+    if design == "grid" and n != 0:
+        raise InputError(f"n = {shown(n)}: is for the designs sample and sobol; a grid is every combination")
+    if design == "sample" and not _counts(n):
+        raise InputError(f"--sample, n = {shown(n)}: must be a whole number of points, 1 or more")
+    if design == "sobol" and (not _counts(n) or n < 2 or n & (n - 1)):
+        raise InputError(f"--sobol {shown(n)}: must be a power of two, such as 256")
+    if design == "sobol" and axes < 2:
+        raise InputError(
+            "--sobol: indices compare several fields; vary two or more (fields with + between count as one)"
+        )
+
+
+def check_observers(observers: Sequence[str]) -> None:
+    """Check that observers exist, as far as is known without importing them, and are there once."""
+    if not observers:
+        raise InputError("observers: there must be one at least")
+    for i, name in enumerate(observers):
+        if not isinstance(name, str):
+            raise InputError(f"observers: {shown(name)}: must be an observer's name")
+        if ":" not in name and name not in (*OBSERVERS, *RATES):
+            known = nearest(name, [*OBSERVERS, *RATES])
+            raise InputError(f"observers: {name!r}: no such observer; {known}, or your own as package.module:Class")
+        if name in observers[:i]:
+            raise InputError(f"observers: {name!r} is there twice")
+
+
+def _counts(number: float | str | None) -> bool:
+    return isinstance(number, (int, np.integer)) and not isinstance(number, bool) and number >= 1
+
+
+# --- the study
 
 SamplingDesign = Literal["grid", "sample", "sobol"]
 MOST_TRIALS = 1_000_000
@@ -94,9 +393,6 @@ class Chunks:
     def __len__(self) -> int:
         return self.count
 
-    def __iter__(self) -> Iterator[Chunk]:
-        return (self[number] for number in range(len(self)))
-
     def __getitem__(self, number: int) -> Chunk:
         if not 0 <= number < len(self):
             raise IndexError(number)
@@ -128,8 +424,6 @@ class SweepStudy:
         design: `grid`: every combination of values. `sample`: a quasi-random design of the ranges and lists.
             `sobol`: one for Sobol indices.
         n: Points of the design; a design for indices has as many for each axis, and for two more.
-        order: Observers, the best first, as someone expects them. The report counts how often the order holds; no
-            trial depends on it.
     """
 
     scenario: Scenario
@@ -138,7 +432,6 @@ class SweepStudy:
     worlds: int
     design: SamplingDesign = "grid"
     n: int = 0
-    order: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the study.
@@ -147,11 +440,10 @@ class SweepStudy:
             InputError: A number, a name or a field does not fit.
         """
         check_axes(self.axes, self.design)
-        check_worlds(self.worlds)
+        if not _counts(self.worlds):
+            raise InputError(f"worlds = {shown(self.worlds)}: must be a whole number, 1 or more")
         check_points(self.design, self.n, len(self.axes))
         check_observers(self.observers)
-        if self.order:
-            check_order(self.order, self.observers)
 
     @cached_property
     def points(self) -> Points:
@@ -242,8 +534,6 @@ class SweepStudy:
         }
         if self.design != "grid":
             design["n"] = self.n
-        if self.order:
-            design["order"] = list(self.order)
         return {
             "sweep": design,
             "vary": {axis.option: axis.as_field() for axis in self.axes},

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import copy
+import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import TypedDict, get_args
 
 from cmg_mj.errors import InputError, TomlValue, nearest
 from cmg_mj.inputs.files import bundled, find
 from cmg_mj.inputs.overrides import override
-from cmg_mj.scenario.loading import find_model, find_tracks, load_scenario, parse_scenario
+from cmg_mj.scenario.loading import find_model, find_track, find_tracks, load_scenario, parse_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.studies.sweeps.axes import FieldValue, VariedField, parse_axis
-from cmg_mj.studies.sweeps.study import SamplingDesign
+from cmg_mj.studies.sweeps.study import FieldValue, SamplingDesign, VariedField, parse_axis
 
 SECTIONS = ("sweep", "vary", "scenario")
-SWEEP_TYPES = {"observers": list, "worlds": int, "design": str, "n": int, "order": list}
+SWEEP_TYPES = {"observers": list, "worlds": int, "design": str, "n": int}
 """Types of the fields of [sweep]."""
 
 
@@ -27,7 +30,6 @@ class SweepFields(TypedDict, total=False):
     worlds: int
     design: str
     n: int
-    order: list[str]
 
 
 class StudyFile(TypedDict, total=False):
@@ -98,3 +100,43 @@ def design_of(name: str, fields: SweepFields) -> tuple[SamplingDesign, int]:
         if text == design:
             return design, fields.get("n", 0)
     raise InputError(f"{name}: sweep.design = {text!r}: must be one of {', '.join(designs)}")
+
+
+FILE = re.compile(r"pivot\.\d+\.file")
+PIVOT = re.compile(r"pivot(\.\d+)?")
+
+
+def locate_tracks(axis: VariedField, beside: Path) -> VariedField:
+    """Give the tracks that an axis varies whole paths.
+
+    Args:
+        axis: The axis; of other fields it stays.
+        beside: The folder of the study file or of the scenario, from which a path may start.
+    """
+    for field in axis.fields:
+        change = partial(_replace_tracks, field, change=lambda file: find_track(file, beside))
+        axis = replace(axis, values=tuple(change(value) for value in axis.values))
+    return axis
+
+
+def varied_tracks(axis: VariedField) -> list[str]:
+    """List the tracks that an axis varies."""
+    files: list[str] = []
+    for field in axis.fields:
+        for value in axis.values:
+            _replace_tracks(field, value, change=lambda file: files.append(file) or file)
+    return files
+
+
+def _replace_tracks(field: str, value: FieldValue, change: Callable[[str], str]) -> FieldValue:
+    """Change the paths of tracks in a value: of a file, of a motion, or of all motions."""
+    if FILE.fullmatch(field):
+        return change(str(value))
+    if not PIVOT.fullmatch(field) or isinstance(value, str):
+        return value
+    if isinstance(value, Mapping):
+        file = value.get("file")
+        return {**value, "file": change(file)} if isinstance(file, str) else value
+    if isinstance(value, Sequence):
+        return [_replace_tracks(field, motion, change) for motion in value]
+    return value

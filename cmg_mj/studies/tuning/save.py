@@ -10,9 +10,9 @@ from pathlib import Path
 from rich import box
 from rich.table import Table
 
+from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.intervals import Interval
 from cmg_mj.results.metrics import finite_or_none
-from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.studies.tuning.fit import NoiseLevelResult

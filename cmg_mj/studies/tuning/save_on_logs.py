@@ -11,8 +11,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.metrics import finite_or_none
-from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.studies.tuning.closed_loop import RELEVANT, LoopComparison
 from cmg_mj.studies.tuning.on_logs import SHORTEST_S, LogStudy

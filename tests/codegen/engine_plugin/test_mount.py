@@ -60,7 +60,7 @@ def test_a_plugin_is_named_after_the_models_file(file: str, name: str) -> None:
 
 def test_nothing_is_begun_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("robot.xml").write_text(PENDULUM, encoding="utf-8")
-    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files._mount_and_write", None)
+    monkeypatch.setattr("cmg_mj.studies.push_limits.mount_files._mount", None)
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
     assert "there is no C compiler" in cmg_mj(*MOUNT).complaint
@@ -88,10 +88,8 @@ def test_a_mount_replaces_its_own_plugin_alone() -> None:
     written = contents("balanced_plugin")
     assert not [name for name, content in written.items() if b"partial" in content]
     assert "balanced.xml exists; give another name, or --overwrite" in cmg_mj(*MOUNT).complaint
-    Path("balanced_plugin", "notes").write_text("mine", encoding="utf-8")
     outcome = cmg_mj(*MOUNT, "--overwrite", "--scale", "1.1")
     assert "wrote balanced_plugin; try: python balanced_plugin/balanced_example.py" in outcome.err
-    assert contents("balanced_plugin")["notes"] == b"mine"
     assert contents("balanced_plugin")["rig.c"] != written["rig.c"]
 
 

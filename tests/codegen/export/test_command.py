@@ -16,7 +16,7 @@ import pytest
 
 from cmg_mj.codegen.export import check_installed, export
 from cmg_mj.errors import InputError
-from cmg_mj.results.run_folder import folder
+from cmg_mj.results import folder
 from tests.codegen.export.compiled import compile_c, controller, needs_compiler
 from tests.command import cmg_mj
 
@@ -31,8 +31,8 @@ def few_signals(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.codegen.export.check.TICKS", 100)
 
 
-def files(folder: str) -> list[str]:
-    return sorted(path.name for path in Path(folder).iterdir() if path.name != ".cmg-mj")
+def files(place: str) -> list[str]:
+    return sorted(path.name for path in Path(place).iterdir() if path.name != folder.MARKER)
 
 
 @needs_compiler
@@ -158,7 +158,7 @@ def test_a_disk_that_is_full_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> 
     genuine = folder.write_text
 
     def full(path: Path, text: str) -> None:
-        if path.name == "linear_test_vector.h" and ".cmg-mj" in path.parts:
+        if path.name == "linear_test_vector.h" and path.parent.name.endswith(".part"):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         genuine(path, text)
 

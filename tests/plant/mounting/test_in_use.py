@@ -13,7 +13,7 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.gymnasium_env import ScissoredPairEnv
 from cmg_mj.studies.push_limits.mount_files import write_scenario
-from cmg_mj.studies.sweeps.api import sweep
+from cmg_mj.studies.sweeps import sweep
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import ROBOTS
 from tests.simulation.test_gymnasium_env import act

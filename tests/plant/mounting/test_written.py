@@ -11,7 +11,7 @@ import pytest
 
 from cmg_mj.errors import InputError
 from cmg_mj.plant.mounting import mount
-from cmg_mj.results.signed_text import signed
+from cmg_mj.results.folder import signed
 from cmg_mj.studies.push_limits.prospects import smallest_sufficient_scale
 from tests.command import cmg_mj
 from tests.plant.mounting.robots import EXAMPLES, ROBOTS
@@ -67,6 +67,24 @@ def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.Monke
     assert "a.xml: fails" in cmg_mj(*MOUNT, "-o", "a.xml", "--overwrite").complaint
     assert files() == ["a.toml", "a.xml"]
     assert [Path(name).read_bytes() for name in files()] == before
+
+
+@pytest.mark.parametrize("name", ["a.xml", "a.toml"])
+@pytest.mark.parametrize("options", [(), ("--overwrite",)])
+def test_what_no_mount_has_written_is_never_replaced(name: str, options: tuple[str, ...]) -> None:
+    Path(name).write_text("mine", encoding="utf-8")
+    assert f"{name}: is not a file of cmg-mj mount" in cmg_mj(*MOUNT, "-o", "a.xml", *options).complaint
+    assert (files(), Path(name).read_text(encoding="utf-8")) == ([name], "mine")
+
+
+def test_a_mounts_own_file_is_replaced_where_that_is_asked_for() -> None:
+    Path("a.xml").write_bytes(signed("<mujoco/>", ".xml"))
+    assert "a.xml exists" in cmg_mj(*MOUNT, "-o", "a.xml").complaint
+    mount(TORSO, "torso", axis="x", scale=1.3).save("a.xml")
+    assert mujoco.MjSpec.from_file("a.xml").body("torso") is not None
+    Path("link.xml").symlink_to("a.xml")
+    with pytest.raises(InputError, match=r"link\.xml: is not a file of cmg-mj mount"):
+        mount(TORSO, "torso", axis="x", scale=1.3).save("link.xml")
 
 
 def test_a_file_that_the_robot_includes_is_never_overwritten() -> None:

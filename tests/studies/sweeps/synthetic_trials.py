@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import pyarrow as pa
+
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.cells import Trials
-from cmg_mj.studies.sweeps.study import SweepStudy
-from cmg_mj.studies.sweeps.trials import table_of
+from cmg_mj.studies.sweeps.chunk import compute, table_of
+from cmg_mj.studies.sweeps.study import SweepStudy, parse_axis
 
 VELOCITY, PUSH = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
 BIAS, NOISE, RATE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz", "controller.rate_hz"
@@ -32,3 +33,8 @@ def make_trials(
                 row = {"point": number, **point, "observer": observer, "world": world, "seed": 0}
                 rows.append(row | {"outcome": "fell" if result is None else "done", VELOCITY: result})
     return Trials(study, [table_of(study, rows)])
+
+
+def all_trials(study: SweepStudy) -> pa.Table:
+    """Run a study in this process."""
+    return pa.concat_tables(table_of(study, compute(study, chunk)) for chunk in study.chunks)

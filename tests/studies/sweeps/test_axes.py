@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
-from cmg_mj.studies.sweeps.axes import VariedField, parse_axis
+from cmg_mj.studies.sweeps.study import VariedField, parse_axis
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_of_a_list_each_value_has_an_equal_part_of_the_shares() -> None:
         ("1:2:x", "is no range"),
         ("1:2:3:4", "is no range"),
         ("1:1:3", "an empty range"),
-        ("2:1", "an empty range: 2 is above 1"),
+        ("2:1", "an empty range"),
         ("nan:1", "an empty range"),
         ("log:0:1:3", "needs ends above 0"),
         ("0:1:1", "1 values; a range has at least 2"),

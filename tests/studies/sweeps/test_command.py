@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import time
 import tomllib
 from pathlib import Path
 
@@ -15,8 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.inputs.files import folder
-from cmg_mj.studies.sweeps.trials import FIGURES
-from tests.command import COMMAND, ROOT, cmg_mj
+from cmg_mj.studies.sweeps.chunk import FIGURES
+from tests.command import cmg_mj
 
 BIAS = "plant.equilibrium_bias_deg"
 SMALL = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--observers", "linear,gyro_free", "--worlds", "3"]
@@ -107,23 +103,14 @@ def test_a_row_reruns_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_report_of_a_map_with_an_order(tmp_path: Path) -> None:
-    """Another order is no other study, and none leaves none behind."""
+def test_the_report_of_a_map(tmp_path: Path) -> None:
     out = tmp_path / "out"
     rates = ["--vary", "sensors.accelerometer.noise_density_ug_rthz=100,400"]
-    outcome = cmg_mj(*SMALL, *rates, *SHORT, "--order", "gyro_free,linear", "--out", str(out))
-    assert outcome.status == 0
+    assert cmg_mj(*SMALL, *rates, *SHORT, "--out", str(out)).status == 0
     report = (out / "report.md").read_text(encoding="utf-8")
     assert "![Push recovery: velocity RMS error [rad/s], 3 worlds a cell](map_velocity_error.png)" in report
     assert (out / "map_velocity_error.png").read_bytes().startswith(b"\x89PNG")
     assert "No world fell." in report
-    assert "## The order gyro_free < linear" in report
-    assert [row["worlds"] for row in pq.read_table(out / "order.parquet").to_pylist()] == [3] * 8
-    assert 'order = [\n    "gyro_free",' in (out / "study.toml").read_text(encoding="utf-8")
-    rerun = cmg_mj(*SMALL, *rates, *SHORT, "--out", str(out))
-    assert "resuming: 24 of 24 trials are done" in rerun.err
-    assert not (out / "order.parquet").exists()
-    assert "order" not in (out / "study.toml").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
@@ -148,7 +135,7 @@ def test_a_design_for_indices(tmp_path: Path) -> None:
 
 
 def test_one_world_is_shown_without_an_interval(tmp_path: Path) -> None:
-    arguments = [*SMALL[:-1], "1", *SHORT, "--order", "gyro_free,linear"]
+    arguments = [*SMALL[:-1], "1", *SHORT]
     outcome = cmg_mj(*arguments, "--out", str(tmp_path / "out"))
     trials = pq.read_table(tmp_path / "out" / "trials.parquet").to_pylist()
     cells = pq.read_table(tmp_path / "out" / "cells.parquet").to_pylist()
@@ -158,7 +145,6 @@ def test_one_world_is_shown_without_an_interval(tmp_path: Path) -> None:
         assert cell["velocity_rms_error_rad_s"] == error
         assert (cell["velocity_rms_error_rad_s_low"], cell["velocity_rms_error_rad_s_high"]) == (None, None)
         assert f" {error:.4f} |" in outcome.out
-    assert "The order gyro_free < linear: by the velocity RMS error [rad/s] it holds at 2 of 2 points" in outcome.out
     report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "2 points, 2 observers, 1 world: 4 trials." in report
     assert cmg_mj(*arguments, "--dry-run").out.startswith(
@@ -208,7 +194,6 @@ def test_a_plan_runs_nothing(tmp_path: Path) -> None:
         ),
         (["--vary", f"{BIAS}=0:1", "--sobol", "200"], "--sobol 200: must be a power of two, such as 256"),
         (["--vary", f"{BIAS}=0:1", "--sobol", "2", "--sample", "3"], "--sample and --sobol: one of them"),
-        (["--vary", f"{BIAS}=0,1", "--order", "linear,ltv"], "--order linear,ltv: linear does not run here"),
         (["--vary", f"{BIAS}=0,1", "--observers", "linar"], "no such observer; did you mean 'linear'"),
     ],
 )
@@ -216,42 +201,3 @@ def test_what_is_refused(tmp_path: Path, arguments: list[str], complaint: str) -
     outcome = cmg_mj("sweep", "push_recovery", *arguments, "--out", str(tmp_path / "out"))
     assert complaint in outcome.complaint
     assert not (tmp_path / "out").exists()
-
-
-def test_another_study_is_refused_and_nothing_lost(tmp_path: Path) -> None:
-    out = str(tmp_path / "out")
-    cmg_mj(*SMALL, *SHORT, "--out", out)
-    before = (tmp_path / "out" / "trials.parquet").read_bytes()
-    outcome = cmg_mj(*SMALL, *SHORT, "--seed", "5", "--out", out)
-    assert "holds another study: scenario.seed = 0 there, 5 here; name another folder" in outcome.complaint
-    assert (tmp_path / "out" / "trials.parquet").read_bytes() == before
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
-def test_killed_at_random_moments(tmp_path: Path) -> None:
-    """The same command again and again, until it is done: the same trials as in one go."""
-    arguments = [*SMALL[:-1], "40", "--vary", "controller.rate_hz=100,200", "--set", "duration_s=4", "--set", "push=[]"]
-    uninterrupted, interrupted = tmp_path / "whole", tmp_path / "killed"
-    cmg_mj(*arguments, "--out", str(uninterrupted))
-    rng = np.random.default_rng(5)
-    kills = 0
-    while kills < int(os.environ.get("CMG_MJ_KILLS", "3")):
-        process = subprocess.Popen(
-            [*COMMAND, *arguments, "--out", str(interrupted)],
-            stderr=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            cwd=ROOT,
-        )
-        time.sleep(rng.uniform(0.5, 6.0))
-        if process.poll() is None:
-            process.send_signal(signal.SIGKILL)
-        process.wait()
-        kills += 1
-        chunks = interrupted / "chunks"
-        if chunks.exists() and kills % 3 == 0:  # all over again, now and then
-            for path in chunks.iterdir():
-                path.unlink()
-    assert cmg_mj(*arguments, "--out", str(interrupted)).status == 0
-    assert (interrupted / "trials.parquet").read_bytes() == (uninterrupted / "trials.parquet").read_bytes()
-    assert not list(interrupted.rglob("*.partial"))

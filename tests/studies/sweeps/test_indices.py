@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.studies.sweeps.points import sampled
-from cmg_mj.studies.sweeps.sobol import LOG_RATIO, LOST, IndexRow, Indices, index_rows, indices
-from cmg_mj.studies.sweeps.study import SweepStudy
+from cmg_mj.studies.sweeps.sobol import LOST, IndexRow, Indices, index_rows, indices
+from cmg_mj.studies.sweeps.study import SweepStudy, sampled
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, VELOCITY, make_trials
 
 
@@ -81,23 +80,6 @@ def test_what_is_decomposed_is_the_mean_over_the_worlds() -> None:
     assert (row_of["ltv", BIAS].decisive, row_of["ltv", NOISE].decisive) == (True, False)
 
 
-def test_the_logarithm_of_a_ratio() -> None:
-    """exp(a) by exp(0.02 b), a of 0 to 1 and b of 100 to 200: the logarithm is a - 0.02 b, variances 1/12 and 4/12."""
-    trials = make_trials(
-        {BIAS: "0:1", NOISE: "100:200"},
-        ("linear", "ltv"),
-        2,
-        lambda point, name, _: float(np.exp(point[BIAS] if name == "ltv" else 0.02 * point[NOISE])),
-        design="sobol",
-        n=256,
-        order=("ltv", "linear"),
-    )
-    rows = [row for row in index_rows(trials) if row.figure == f"{LOG_RATIO}{VELOCITY}"]
-    assert [(row.observer, row.field) for row in rows] == [("ltv / linear", BIAS), ("ltv / linear", NOISE)]
-    assert [row.total for row in rows] == pytest.approx([0.2, 0.8], abs=0.02)
-    assert [row.decisive for row in rows] == [False, True]
-
-
 def test_the_share_of_falls_has_indices() -> None:
     trials = make_trials(
         {BIAS: "0:1", NOISE: "100:200"},
@@ -123,12 +105,6 @@ def test_refused_with_counts_where_a_world_fell() -> None:
         else:
             assert row.refused is None
     assert 0 < n_fallen < 256
-
-
-def test_refused_with_counts_where_every_point_has_lost_one_of_its_worlds() -> None:
-    rows = sobol(lambda point, _, world: None if world else point[BIAS])
-    assert {row.observer for row in rows} == {"linear", "ltv"}
-    assert {row.refused for row in rows} == {"no value at 256 of 256 points: of 512 trials 256 fell"}
 
 
 def test_refused_where_only_points_of_the_crossed_blocks_differ() -> None:

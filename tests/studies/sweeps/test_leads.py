@@ -13,13 +13,11 @@ from cmg_mj.errors import InputError
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
-from cmg_mj.studies.sweeps.api import sweep
-from cmg_mj.studies.sweeps.axes import parse_axis
-from cmg_mj.studies.sweeps.cells import cells_of
-from cmg_mj.studies.sweeps.leads import lead_rows
+from cmg_mj.studies.sweeps import sweep
+from cmg_mj.studies.sweeps.cells import cells_of, lead_rows
 from cmg_mj.studies.sweeps.pictures import pictures_of
-from cmg_mj.studies.sweeps.report_sections import leads
-from cmg_mj.studies.sweeps.study import SweepStudy
+from cmg_mj.studies.sweeps.report import _leads as leads
+from cmg_mj.studies.sweeps.study import SweepStudy, parse_axis
 from cmg_mj.visualization.plots.colours import BASELINE_COLOURS
 from cmg_mj.visualization.plots.run_plot import draw
 from tests.command import cmg_mj
@@ -50,7 +48,7 @@ def test_leaders_are_counted_and_baselines_stand_apart() -> None:
     assert (linear.name, ltv.name, zero.name, zero.is_baseline) == ("linear", "ltv", "zero", True)
     assert (linear.leads.held, linear.surely.held, linear.close.held) == (3, 2, 3)
     assert (ltv.leads.held, ltv.surely.held, ltv.close.held) == (2, 2, 5)
-    assert (zero.leads.held, zero.leads.decided) == (4, 6)  # at 200 and 400, and where nobody stood
+    assert (zero.leads.held, zero.leads.of) == (4, 6)  # at 200 and 400, and where nobody stood
     assert zero.surely.held == 3  # the leader's worlds pull apart at 400
 
 

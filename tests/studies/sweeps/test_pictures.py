@@ -6,14 +6,13 @@ import math
 from pathlib import Path
 from typing import Any
 
-import matplotlib.figure
 import numpy as np
 import pytest
 
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
 from cmg_mj.studies.sweeps.pictures import in_words, is_logarithmic, pictures_of, round_values
-from cmg_mj.studies.sweeps.report import PICTURES
-from cmg_mj.visualization.plots.figure_spec import Map, Panel, Picture, Surface
+from cmg_mj.studies.sweeps.store import PICTURES
+from cmg_mj.visualization.plots.figure_spec import Map, Picture
 from cmg_mj.visualization.plots.map_plot import edges
 from cmg_mj.visualization.plots.run_plot import draw
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, RATE, make_trials
@@ -93,26 +92,6 @@ def test_a_panel_an_observer_stands_below_the_map() -> None:
 )
 def test_a_field_in_words(field: str, words: str) -> None:
     assert in_words(field) == words
-
-
-@pytest.mark.slow
-def test_every_level_is_labelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where its line is short: in the corner of a map of eight by eight cells."""
-    figures: list[matplotlib.figure.Figure] = []
-    save = matplotlib.figure.Figure.savefig
-    monkeypatch.setattr(
-        matplotlib.figure.Figure, "savefig", lambda self, *a, **k: (figures.append(self), save(self, *a, **k))[1]
-    )
-    places = np.linspace(0.0, 1.0, 8)
-    values = 1.0 - 0.05 * np.hypot(*np.meshgrid(places, places))
-    values[-1, -1] = 0.5
-    levels = (0.6, 0.95, 0.98)
-    cells = Map(places, places, ["linear"], np.zeros((8, 8), int), np.ones((8, 8), bool), values, levels)
-    surface = Surface(places, places, values, "error", (0.5, 1.0), levels=levels)
-    panels = [Panel("y", (), map=cells), Panel("y", (), surface=surface)]
-    draw(tmp_path / "it.png", Picture("it", "A title", panels, first_height=3.0))
-    for axes in figures[0].axes[:2]:
-        assert {text.get_text() for text in axes.texts} == {"0.6", "0.95", "0.98"}
 
 
 def test_a_stop_is_no_share_of_falls() -> None:

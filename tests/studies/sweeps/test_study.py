@@ -10,8 +10,7 @@ from scipy.stats import sobol_indices, uniform
 
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.studies.sweeps.axes import parse_axis
-from cmg_mj.studies.sweeps.study import CHUNK, SweepStudy, check_values
+from cmg_mj.studies.sweeps.study import CHUNK, SweepStudy, check_values, parse_axis
 
 BIAS, NOISE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz"
 

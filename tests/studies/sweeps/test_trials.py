@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 from typing import Unpack
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 
-from cmg_mj.errors import InputError
 from cmg_mj.observers import Estimate, Measurement
 from cmg_mj.results.per_world_table import ID_COLUMNS
 from cmg_mj.results.result import Result
@@ -19,11 +16,8 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 from cmg_mj.simulation.simulate import SimulationOptions
 from cmg_mj.studies.sweeps import chunk as work
-from cmg_mj.studies.sweeps import study as study_module
-from cmg_mj.studies.sweeps.api import all_trials
-from cmg_mj.studies.sweeps.axes import parse_axis
-from cmg_mj.studies.sweeps.chunk_store import Store, merged, run
-from cmg_mj.studies.sweeps.study import SweepStudy
+from cmg_mj.studies.sweeps.study import SweepStudy, parse_axis
+from tests.studies.sweeps.synthetic_trials import all_trials
 
 SETTINGS = ("duration_s=0.6", "push=[]")
 
@@ -69,41 +63,6 @@ def test_the_noise_of_a_world_is_the_same_in_every_cell() -> None:
     assert np.ptp(errors[0]) > 0.05 * errors[0].mean()
 
 
-@pytest.mark.slow
-def test_killed_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Finished trials are not computed again, and the whole is the same as in one go."""
-    monkeypatch.setattr(study_module, "CHUNK", 5)
-    store = Store(tmp_path, small())
-    assert store.open() == 0
-
-    def stop(n_trials: float) -> None:
-        if n_trials > 12:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run(store, stop)
-    chunk_times = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}
-    assert 1 <= len(chunk_times) < len(small().chunks)
-    rerun = Store(tmp_path, small())
-    assert rerun.open() == 5 * len(chunk_times)
-    run(rerun)
-    assert (
-        chunk_times.items() <= {path.name: path.stat().st_mtime_ns for path in (tmp_path / "chunks").iterdir()}.items()
-    )
-    merged(rerun, tmp_path / "trials.parquet")
-    assert pq.read_table(tmp_path / "trials.parquet").equals(trials())
-
-
-def test_another_study_in_the_same_folder_is_refused(tmp_path: Path) -> None:
-    Store(tmp_path, study({"plant.equilibrium_bias_deg": "0,1"})).open()
-    with pytest.raises(InputError, match=r"holds another study: sweep.worlds = 2 there, 3 here; name another folder"):
-        Store(tmp_path, study({"plant.equilibrium_bias_deg": "0,1"}, worlds=3)).open()
-    with pytest.raises(
-        InputError, match=r"another study: vary.plant.equilibrium_bias_deg = \[0, 1\] there, \[0, 2\] here;"
-    ):
-        Store(tmp_path, study({"plant.equilibrium_bias_deg": "0,2"})).open()
-
-
 def test_values_that_do_not_fit_are_rows_with_a_reason() -> None:
     rows = all_trials(study({"sensors.encoder.rate_hz": "200,333.7"}, ("linear",))).to_pylist()
     assert [row["outcome"] for row in rows] == ["done", "done", "refused", "refused"]
@@ -143,14 +102,6 @@ def test_an_observer_that_raises_costs_its_own_trials_alone() -> None:
     assert all("not finite" in row["reason"] for row in rows[9:12])
 
 
-def test_an_observer_that_raises_at_a_rig_that_lies_costs_nothing() -> None:
-    """It goes on being told of a world of its batch that has fallen."""
-    scenario = load_scenario("push_recovery", [*SETTINGS, "metrics.fall_angle_deg=3"])
-    tilt = "plant.initial_tilt_deg"
-    rows = all_trials(SweepStudy(scenario, (parse_axis(tilt, "0,5", tilt),), (FAILS,), 1)).to_pylist()
-    assert [row["outcome"] for row in rows] == ["done", "fell"]
-
-
 def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     batches = []
 
@@ -161,9 +112,8 @@ def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyP
         return run_batch(experiments, worlds, **options)
 
     monkeypatch.setattr(work, "run_batch", fail)
-    shares = []
     sweep = study({"plant.initial_tilt_deg": "0,5,1,2"}, ("linear",), 1)
-    rows = work.compute(sweep, sweep.chunks[0], shares.append)
+    rows = work.compute(sweep, sweep.chunks[0])
     assert [(row["outcome"], row["reason"] or "") for row in rows] == [
         ("done", ""),
         ("stopped", "MemoryError: not in there"),
@@ -171,8 +121,6 @@ def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyP
         ("done", ""),
     ]
     assert batches == [4, 2, 1, 1, 2]
-    assert shares == sorted(shares)  # what runs again is no step back
-    assert shares[-1] == pytest.approx(1.0)
 
 
 def test_columns_are_those_of_a_worlds_table() -> None:

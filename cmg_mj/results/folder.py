@@ -1,0 +1,278 @@
+"""The folder of a result: written to a hidden sibling and renamed into its place whole."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext, suppress
+from pathlib import Path
+
+from cmg_mj.errors import InputError, raised
+from cmg_mj.results.files import is_plain_file
+
+Writers = Mapping[str, Callable[[Path], object]]
+"""Name of a file -> function that writes it to the path given."""
+
+MARKER = ".cmg_mj"
+"""File in a result's folder: `complete` or `incomplete`, then the names of the files that cmg_mj wrote, a line each."""
+REQUESTS = ("scenario.toml", "replay.toml", "study.toml")
+"""Files that say what was asked for: another result is not replaced without being asked to."""
+
+
+class RunFolder:
+    """A place for one result.
+
+    Attributes:
+        path: The folder that was asked for. If something else is there, the result goes to `NAME-2` and so on.
+        part: The hidden folder beside it, in which the result is written.
+    """
+
+    def __init__(self, path: Path, *, overwrite: bool = False) -> None:
+        """Prepare a place, and finish or remove what killed runs have left there.
+
+        Args:
+            path: The folder.
+            overwrite: Whether the result of another request is replaced, if cmg_mj wrote all that is there.
+
+        Raises:
+            InputError: Nothing can be written there.
+        """
+        self.path = path
+        self._overwrite = overwrite
+        try:
+            self._folder = folder = Path(os.path.abspath(path))  # a user's code may change the current folder
+            self._made = [parent for parent in folder.parents if not parent.exists()]
+            if folder in (Path.cwd(), *Path.cwd().parents):
+                raise InputError(f"--out {path}: is the current folder, or holds it; name another folder")
+            if os.path.lexists(folder) and not folder.is_dir():
+                raise InputError(f"--out {path}: cannot be written: is no folder")
+            self.part = _hidden(folder, "part")
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            recover(folder)
+            self.part.mkdir()
+        except OSError as error:
+            raise InputError(f"--out {path}: cannot be written: {error.strerror}") from error
+
+    def write(self, files: Writers, *, complete: bool = True, all_or_none: bool = False) -> Path:
+        """Write a result: every file that can be written, and then complain of those that cannot.
+
+        Args:
+            files: The files.
+            complete: Whether the run came to its end. An incomplete result never replaces a complete one.
+            all_or_none: Whether nothing is kept when a file cannot be written.
+
+        Returns:
+            The result's folder.
+
+        Raises:
+            InputError: A file cannot be written. The others are, unless it is all or none.
+        """
+        wrong: dict[str, BaseException] = {}
+        for name, write in files.items():
+            try:
+                write(self.part / name)
+            except BaseException as error:  # such as a title that no file can hold
+                (self.part / name).unlink(missing_ok=True)
+                wrong[name] = error
+                if not isinstance(error, Exception):  # Ctrl-C, for the second time
+                    break
+        place = self.path
+        written = [name for name in files if name not in wrong and (self.part / name).exists()]
+        if written and not (wrong and all_or_none):
+            try:
+                write_marker(self.part, written, complete=complete and not wrong)
+                place = self._move_in()
+            except OSError as error:
+                raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
+        for error in wrong.values():
+            if not isinstance(error, Exception):
+                raise error
+        if wrong:
+            raise InputError("; ".join(_complaint(place / name, error) for name, error in wrong.items()))
+        return place
+
+    def _move_in(self) -> Path:
+        """Rename the written folder into the first place that it may take."""
+        for place in numbered(self._folder):
+            old = _hidden(place, "old")
+            if _is_empty(place):
+                place.rmdir()
+            elif os.path.lexists(place):
+                if not self._may_replace(place):
+                    continue
+                place.rename(old)
+            try:
+                self.part.rename(place)
+            except OSError:
+                if not os.path.lexists(place):
+                    if old.exists():
+                        old.rename(place)
+                    raise
+                continue  # another run has just come here
+            finally:
+                if old.exists():
+                    remove(old)
+            return self.path if place == self._folder else self.path.with_name(place.name)
+        raise AssertionError("numbered() does not end")
+
+    def _may_replace(self, place: Path) -> bool:
+        if not is_own(place):
+            return False
+        if is_complete(place) and not is_complete(self.part):
+            return False
+        return self._overwrite or all(_text(place / name) == _text(self.part / name) for name in REQUESTS)
+
+    def release(self) -> None:
+        """Remove what was made for nothing."""
+        shutil.rmtree(self.part, ignore_errors=True)
+        with suppress(OSError):  # what holds something stays
+            for parent in self._made:
+                parent.rmdir()
+
+    def __enter__(self) -> RunFolder:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.release()
+
+
+@contextmanager
+def claimed(folder: RunFolder | Path) -> Iterator[RunFolder]:
+    """Enter a folder that may have been prepared already."""
+    with nullcontext(folder) if isinstance(folder, RunFolder) else RunFolder(folder) as claim:
+        yield claim
+
+
+def numbered(folder: Path) -> Iterator[Path]:
+    """Yield NAME, NAME-2, NAME-3 and so on."""
+    yield folder
+    if folder.name in ("", ".."):
+        folder = Path(os.path.abspath(folder))
+    for number in itertools.count(2):
+        yield folder.with_name(f"{folder.name}-{number}")
+
+
+def write_marker(folder: Path, names: Iterable[str], *, complete: bool) -> None:
+    """Write the list of the files that cmg_mj writes into a folder; a name may begin with a folder in it."""
+    lines = ["complete" if complete else "incomplete", *names]
+    (folder / MARKER).write_text("\n".join(lines), encoding="utf-8", errors="surrogateescape")
+
+
+def _marker(folder: Path) -> tuple[str, set[Path]]:
+    """Read whether a folder's result is complete, and its files; an empty word where there is none of cmg_mj's."""
+    marker = folder / MARKER
+    state, *names = ((is_plain_file(marker) and _text(marker)) or "").split("\n")
+    return (state, {folder / name for name in names}) if state in ("complete", "incomplete") else ("", set())
+
+
+def is_complete(folder: Path) -> bool:
+    """Return whether a folder holds a complete result, and all of it still there."""
+    state, files = _marker(folder)
+    return state == "complete" and all(file.is_file() for file in files)
+
+
+def is_own(folder: Path) -> bool:
+    """Return whether cmg_mj wrote everything in a folder."""
+    if folder.is_symlink() or not folder.is_dir():
+        return False
+    state, files = _marker(folder)
+    files.add(folder / MARKER)
+    folders = {parent for file in files for parent in file.parents}
+    return state != "" and all(
+        path in files if is_plain_file(path) else path in folders and not path.is_symlink()
+        for path in folder.rglob("*")
+    )
+
+
+def remove(folder: Path) -> None:
+    """Remove what cmg_mj wrote in a folder, its marker last, and the folder unless something else is in it."""
+    _, files = _marker(folder)
+    with suppress(OSError):
+        for path in sorted(folder.rglob("*"), reverse=True):
+            if path in files and is_plain_file(path):
+                path.unlink()
+            elif path.is_dir():
+                path.rmdir()
+        if set(folder.iterdir()) <= {folder / MARKER}:
+            shutil.rmtree(folder)
+
+
+def recover(folder: Path) -> None:
+    """Put back what a killed process moved out of a folder's place, and remove what it left half written."""
+    for path in folder.parent.iterdir():
+        left = re.fullmatch(rf"\.({re.escape(folder.name)}(?:-\d+)?)\.(\d+)-\d+\.(part|old)", path.name)
+        if not left or path.is_symlink() or _is_alive(int(left[2])):
+            continue
+        place = folder.with_name(left[1])
+        if left[3] == "part":
+            shutil.rmtree(path, ignore_errors=True)
+            continue
+        whole = all(file.is_file() for file in _marker(path)[1])
+        if whole and not os.path.lexists(place):
+            path.rename(place)
+        elif not whole or is_own(place):
+            remove(path)
+
+
+def _hidden(folder: Path, ending: str) -> Path:
+    return folder.with_name(f".{folder.name}.{os.getpid()}-{time.time_ns()}.{ending}")
+
+
+def _is_alive(process: int) -> bool:
+    """Return whether a process of this number may be running; on Windows, a look would end it."""
+    if sys.platform == "win32":
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def _is_empty(folder: Path) -> bool:
+    return folder.is_dir() and not folder.is_symlink() and not any(folder.iterdir())
+
+
+def _text(path: Path) -> str | None:
+    """Read a text file; None where there is none."""
+    try:
+        return path.read_text(encoding="utf-8", errors="surrogateescape")
+    except OSError:
+        return None
+
+
+def _complaint(path: Path, error: BaseException) -> str:
+    return f"{path}: cannot be written: {getattr(error, 'strerror', None) or raised(error)}"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file that ends in one line's end."""
+    path.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
+
+
+SIGNATURES = {
+    ".xml": "<!-- Written by cmg-mj mount, which may replace this file -->\n",
+    ".toml": "# Written by cmg-mj mount, which may replace this file\n",
+}
+"""Ending of a file that stands alone -> its first line."""
+
+
+def signed(text: str, ending: str) -> bytes:
+    """Put the line above a text that says who wrote it."""
+    return (SIGNATURES[ending] + text).encode()
+
+
+def is_signed(path: Path) -> bool:
+    """Return whether a file begins with the line that `signed` puts there."""
+    if not is_plain_file(path):
+        return False
+    line = SIGNATURES[path.suffix].encode()
+    with path.open("rb") as file:
+        return file.read(len(line)) == line
