@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -13,10 +14,10 @@ from pydantic import TypeAdapter
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.results.files import METADATA_KEY, write_row_groups
-from cmg_mj.results.frames import NamedColumns, require_pandas
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
 STRETCH = 32768
 """Number of rows of a row group, and of what a recording takes at once."""
@@ -105,6 +106,55 @@ class Layout:
             for name in (*ESTIMATES, *more)
         ]
         return [*SIGNALS, *estimates]
+
+
+def require_pandas() -> Any:
+    """Import pandas.
+
+    Raises:
+        InputError: pandas is not installed.
+    """
+    try:
+        return importlib.import_module("pandas")
+    except ImportError as error:
+        raise InputError(
+            "to_pandas: pandas is not installed. Install it with `python -m pip install pandas`, or use the columns "
+            "without it: dict(...) has them as NumPy arrays"
+        ) from error
+
+
+def frame_of(table: pa.Table) -> pd.DataFrame:
+    """Convert a table to a pandas frame.
+
+    Raises:
+        InputError: pandas is not installed.
+    """
+    require_pandas()
+    return table.to_pandas()
+
+
+class NamedColumns:
+    """Columns by name, with the conventions of a pandas frame: iteration gives names, `len` counts rows."""
+
+    def _columns(self) -> Mapping[str, np.ndarray]:
+        """Return the columns, in order."""
+        raise NotImplementedError
+
+    def keys(self) -> list[str]:
+        """List the columns' names, in order; with it `dict(...)` takes all columns."""
+        return list(self._columns())
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns()
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._columns()[name]
+
+    def __len__(self) -> int:
+        return len(next(iter(self._columns().values())))
 
 
 @dataclass(frozen=True)
@@ -281,4 +331,3 @@ class Trajectory(NamedColumns):
                 f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"
             ) from error
         return Trajectory({name: table[name].to_numpy() for name in table.column_names}, stored, layout)
-

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.results.frames import NoArray, frame_of
+from cmg_mj.results.trajectory import frame_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.studies.sweeps.axes import Variation, parse_axis
@@ -29,7 +29,7 @@ WORLDS = 20
 
 
 @dataclass(frozen=True)
-class SweepResult(NoArray):
+class SweepResult:
     """The tables of a sweep, by name: `result["cells"]`, `dict(result)`.
 
     Attributes:

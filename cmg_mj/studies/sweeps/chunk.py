@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from cmg_mj.errors import InputError, raised
-from cmg_mj.results.per_world_table import ID_COLUMNS
-from cmg_mj.results.summary_keys import Summary
+from cmg_mj.results.summary_keys import ID_COLUMNS, Summary
 from cmg_mj.simulation.batch import BatchKey, PlantStructure, plant_structure
 from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 from cmg_mj.studies.sweeps.points import Point, Points

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmg_mj.results.per_world_table import ID_COLUMNS
-from cmg_mj.results.summary_keys import KEYS, SummaryValue
+from cmg_mj.results.summary_keys import ID_COLUMNS, KEYS, SummaryValue
 from cmg_mj.studies.sweeps.chunk import COLUMNS
 from cmg_mj.studies.sweeps.study import SweepStudy
 
