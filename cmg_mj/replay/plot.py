@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmg_mj.replay.log_replay import ReplayResult, describe_log
-from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.replay.log import REFERENCE
+from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.report import figure_text, shown_first
 from cmg_mj.replay.scores import Figures
-from cmg_mj.results.stored_columns import LONG, select_rows, stretches
 from cmg_mj.visualization.plots.colours import colours, hexadecimal
 from cmg_mj.visualization.plots.readability import short_names
 from cmg_mj.visualization.plots.run_plot import (
@@ -33,8 +31,6 @@ if TYPE_CHECKING:
 
 DETAIL_S = 2.0
 """Length of the detail [s]."""
-FEW_DRAWN = 1000
-"""Number of samples that are left of a stretch of a long log where its outline is enough."""
 
 
 def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
@@ -42,9 +38,8 @@ def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
     log = replayed.log
     length = max(2, round(DETAIL_S / log.dt))
     liveliest, where = -1.0, (log["time_s"][0], log["time_s"][-1])
-    for part in _overlapping(log.parts, length):
-        stretch = select_rows(log.columns, part)
-        time, tilt = stretch["time_s"], stretch["y1_rad"]
+    for part in log.parts:
+        time, tilt = log["time_s"][part], log["y1_rad"][part]
         rise = max(1, length // 20)
         bend = np.zeros(len(tilt))
         bend[rise:-rise] = (tilt[2 * rise :] - 2.0 * tilt[rise:-rise] + tilt[: -2 * rise]) ** 2
@@ -58,13 +53,6 @@ def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
             start = int(np.clip(start + middle - n / 2.0, 0, len(time) - n))
             where = float(time[start]), float(time[start + n - 1])
     return where
-
-
-def _overlapping(parts: Sequence[slice], length: int) -> Iterator[slice]:
-    """Divide long parts into stretches that share a span of so many samples, and its bends."""
-    for part in parts:
-        for rows in stretches(part.stop - part.start):
-            yield slice(part.start + rows.start, min(part.stop, part.start + rows.stop + 2 * length))
 
 
 def plot_replay(path: Path, replayed: ReplayResult) -> None:
@@ -94,22 +82,19 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         if referred:
             _line(axes, replayed, log[REFERENCE], detail, color=INK, linewidth=1.6, label="reference")
         for name in few:
-            rate = replayed.estimates[name]["x2_rad_s"]
-            _line(axes, replayed, rate, detail, color=palette[name], linewidth=0.8, label=labels[name].lstrip("_"))
-            del rate
+            rate, label = replayed.estimates[name]["x2_rad_s"], labels[name].lstrip("_")
+            _line(axes, replayed, rate, detail, color=palette[name], linewidth=0.8, label=label)
         axes.set_ylabel("tilt rate\n[rad/s]")
-        estimates = [_outline(replayed.estimates[name]["x2_rad_s"]) for name in few]
-        rates = fit(axes, [_outline(log[REFERENCE])] if referred else [], estimates)
+        estimates = [replayed.estimates[name]["x2_rad_s"] for name in few]
+        rates = fit(axes, [log[REFERENCE]] if referred else [], estimates)
     if referred:
+        errors = {name: replayed.estimates[name]["x2_rad_s"] - log[REFERENCE] for name in few}
         panels[2].plot([], [], " ", label="RMS:")
         for name in few:
             text = f"{labels[name].lstrip('_')} {_rms(replayed.summaries[name])}"
-            error = replayed.estimates[name]["x2_rad_s"] - log[REFERENCE]
-            _line(panels[2], replayed, error, None, color=palette[name], linewidth=0.6, label=text)
-            del error  # of a long log, a column takes much memory
+            _line(panels[2], replayed, errors[name], None, color=palette[name], linewidth=0.6, label=text)
         panels[2].set_ylabel("estimate less\nreference [rad/s]")
-        errors = [_outline(replayed.estimates[n]["x2_rad_s"] - log[REFERENCE]) for n in few]
-        fit(panels[2], [_outline(log[REFERENCE])], errors)
+        fit(panels[2], [log[REFERENCE]], list(errors.values()))
     panels[-1].set_xlim(start, end)
     for axes in panels[:-1]:
         axes.axvspan(start, end, color="0.5", alpha=0.15, linewidth=0, zorder=0)
@@ -124,7 +109,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=6, frameon=False, borderpad=0)
     panels[-1].set_xlabel(f"time [s], {DETAIL_S:g} s in detail" if end - start < log.duration_s else "time [s]")
     figure.align_ylabels(panels)
-    save_figure(path, figure, describe_log(log), dpi=110)
+    save_figure(path, figure, log.title, dpi=110)
 
 
 def _line(
@@ -136,24 +121,14 @@ def _line(
     linewidth: float,
     label: str | None = None,
 ) -> None:
-    """Draw a signal; of a long one, the outline, or all of it around the detail."""
-    log = replayed.log
-    if len(log) <= LONG:
-        x, y = log.broken(values)
-    elif detail is None:
-        pieces = [thinned(*log.broken(values[rows], rows), FEW_DRAWN) for rows in stretches(len(log))]
-        x, y = (np.concatenate(part) for part in zip(*pieces, strict=True))
+    """Draw the outline of a signal, or all of it around the detail."""
+    time, values = replayed.log.broken(values)
+    if detail is None:
+        time, values = thinned(time, values)
     else:
-        first, last = np.searchsorted(log["time_s"], (detail[0] - DETAIL_S, detail[1] + DETAIL_S)).tolist()
-        x, y = log.broken(values[first:last], slice(first, last))
-    axes.plot(x, y, color=color, linewidth=linewidth, label=label)
-
-
-def _outline(values: np.ndarray) -> np.ndarray:
-    """Return enough of a long signal to choose an axis by."""
-    if len(values) <= LONG:
-        return values
-    return np.concatenate([thinned(values[rows], values[rows], FEW_DRAWN)[1] for rows in stretches(len(values))])
+        rows = slice(*np.searchsorted(time, (detail[0] - DETAIL_S, detail[1] + DETAIL_S)))
+        time, values = time[rows], values[rows]
+    axes.plot(time, values, color=color, linewidth=linewidth, label=label)
 
 
 def _draw_small(

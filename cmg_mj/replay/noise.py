@@ -1,19 +1,25 @@
-"""White noise of a log's tilt and angular acceleration, from what is white in the file's own rows.
+"""White noise of a log's tilt and angular acceleration, and what observers assume of it.
 
-The rows' spectrum (Welch's, of rows less their motion) is compared from band to band below half the row rate. White
-noise has the same density in all; a filter, a fusion or a quantiser leaves no such floor.
+The spectrum of the file's own rows (Welch's, of rows less their motion) is compared from band to band below half the
+row rate. White noise has the same density in all; a filter, a fusion or a quantiser leaves no such floor.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from cmg_mj.replay.logs.resampling import EVEN
-from cmg_mj.replay.logs.sampling import Part
+from cmg_mj.errors import InputError
+from cmg_mj.replay.log import Log, LogNoise, WhiteNoise
+from cmg_mj.replay.parameter_options import numbers
+from cmg_mj.replay.sampling import EVEN, Part
+from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY, Accelerometer
+from cmg_mj.sensors.encoder import Encoder
+from cmg_mj.sensors.tilt import TiltNoise
 
 SEGMENT = 128
 """Rows of a segment of Welch's spectrum; segments overlap by half, under Hann's window."""
@@ -54,24 +60,16 @@ UNITS = {"y1_rad": (math.pi / 180.0, "deg"), "acceleration_rad_s2": (1.0, "rad/s
 GROUPS = 16
 """Groups of segments whose scatter shows the error of the estimate, if it is larger than that of Gaussian noise."""
 
-
-class WhiteNoise(NamedTuple):
-    """Standard deviation of the white noise of one row, with its 95 % interval."""
-
-    sigma: float
-    low: float
-    high: float
-
-
-class LogNoise(NamedTuple):
-    """White noise of one row of a file, or why it cannot be told."""
-
-    tilt: WhiteNoise | str
-    """Noise of the tilt [rad]."""
-    acceleration: WhiteNoise | str | None
-    """Noise of the angular acceleration [rad/s^2]; None without one."""
-    correlation: float
-    """Correlation of both; 0 where it cannot be told from 0."""
+TILT_NOISE_DEG = 0.1
+"""Assumed noise of a tilt from an unknown sensor: standard deviation of one sample [deg]."""
+ACCELERATION_NOISE_RAD_S2 = 1.0
+"""Assumed noise of an angular acceleration that does not come from two accelerometers [rad/s^2]."""
+NOISE_DENSITY_UG_RTHZ = 400.0
+"""Assumed noise density of two accelerometers, the bench's own [ug/sqrt(Hz)]."""
+NOISES = ("accelerometer", "tilt", "acceleration")
+"""Names of `--noise`."""
+APART = 1.5
+"""Ratio of the noise that is used and the noise that the log shows, from which it is reported."""
 
 
 def white_noise_of(parts: Sequence[Part], period: float) -> LogNoise:
@@ -127,7 +125,7 @@ def _blocks(parts: Sequence[Part], period: float) -> Iterator[tuple[np.ndarray, 
     for part, start in blocks if len(blocks) <= MOST_BLOCKS else [blocks[i] for i in few]:
         rows = slice(start, start + BLOCK)
         placed = part.placed[rows]
-        yield (placed - placed[0]) / period, {name: part.rows.read(name, rows) for name in part.rows}
+        yield (placed - placed[0]) / period, {name: values[rows] for name, values in part.rows.items()}
 
 
 def _smallest_step(values: np.ndarray) -> float:
@@ -258,3 +256,146 @@ def _correlation(spectra: np.ndarray) -> float:
     correlation = float(np.sum((a * b.conj()).real)) / math.sqrt(power)
     known = HANN * (1.0 - BANDS[first]) * int(steady.sum()) * SEGMENT / 2.0
     return correlation if abs(correlation) > 3.0 / math.sqrt(known) else 0.0
+
+
+def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> TiltNoise:
+    """Return the noise of a log's sensors that observers assume: the user's, else the log's own, else a default.
+
+    Args:
+        log: With two accelerometers, both noises follow from a given density, and the resolution is the bench's.
+        noises: Noises from `noise_numbers` that replace the log's.
+
+    Returns:
+        The noise of tilt and acceleration, and their correlation.
+
+    Raises:
+        InputError: A noise belongs to another sensor than the log's.
+    """
+    noises, estimate = noises or {}, noise_in(log)
+    if log.tilt is not None:
+        if {"tilt", "acceleration"} & noises.keys():
+            raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
+        gimbal = Encoder().sample_sigma
+        if isinstance(estimate.tilt, WhiteNoise) and not noises:
+            if isinstance(estimate.acceleration, WhiteNoise):
+                tilt, acceleration = estimate.tilt.sigma, estimate.acceleration.sigma
+                return TiltNoise(tilt, acceleration, estimate.correlation, gimbal)
+            sigma = estimate.tilt.sigma / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
+            return replace(log.tilt.noise(sigma, STANDARD_GRAVITY), gimbal=gimbal)
+        density = noises.get("accelerometer", NOISE_DENSITY_UG_RTHZ)
+        sensor = Accelerometer(rate_hz=_sampling_rate(log), noise_density_ug_rthz=density)
+        return replace(log.tilt.noise(sensor.sample_sigma, STANDARD_GRAVITY), gimbal=gimbal)
+    if "accelerometer" in noises:
+        raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
+    tilt = _told_or_estimated(math.radians(noises.get("tilt", TILT_NOISE_DEG)), "tilt" in noises, estimate.tilt)
+    acceleration = noises.get("acceleration", ACCELERATION_NOISE_RAD_S2)
+    acceleration = _told_or_estimated(acceleration, "acceleration" in noises, estimate.acceleration)
+    correlation = 0.0 if {"tilt", "acceleration"} <= noises.keys() else estimate.correlation
+    return TiltNoise(tilt, acceleration, correlation, Encoder().sample_sigma)
+
+
+def _told_or_estimated(value: float, is_told: bool, estimate: WhiteNoise | str | None) -> float:
+    return estimate.sigma if isinstance(estimate, WhiteNoise) and not is_told else value
+
+
+def noise_in(log: Log) -> LogNoise:
+    """Return the white noise of one sample of a log, as its rows show it.
+
+    Resampling to a quicker rate keeps the density at low frequencies: white noise of that density is larger, sample for
+    sample, than that of the rows. A spline at a slower rate lets all of a row's noise through.
+
+    Args:
+        log: The log. The recording of a run is not looked at: its sensors' noise is known.
+
+    Returns:
+        The noise, or why it cannot be told.
+    """
+    noise = log.white_noise
+    if noise is None:
+        return LogNoise("the sensors are known", None, 0.0)
+    factor = math.sqrt(max(1.0, (log.row_period_s or log.dt) / log.dt))
+
+    tilt, acceleration = (sigma and _scaled(sigma, factor.__mul__) for sigma in noise[:2])
+    return LogNoise(tilt, acceleration, noise.correlation)
+
+
+def noise_numbers(text: str) -> dict[str, float]:
+    """Parse `--noise tilt=0.05,acceleration=2` [ug/rtHz, deg, rad/s^2]."""
+    noises = numbers(text, "--noise", NOISES) if text.strip() else {}
+    for name, value in noises.items():
+        if not value > 0.0:
+            raise InputError(f"--noise {name}={value:g}: must be greater than 0")
+    return noises
+
+
+def density_of(log: Log, tilt: float) -> float:
+    """Return the density of two accelerometers that makes a noise of the tilt of one sample [ug/sqrt(Hz)].
+
+    Args:
+        log: A log of two accelerometers.
+        tilt: Standard deviation [rad].
+    """
+    assert log.tilt is not None
+    sigma = tilt / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
+    return sigma / (1e-6 * STANDARD_GRAVITY * math.sqrt(_sampling_rate(log) / 2.0))
+
+
+def _sampling_rate(log: Log) -> float:
+    """Return the rate whose white noise of a density is that of a sample: the rows' own if samples are slower [Hz]."""
+    period = log.row_period_s or log.dt
+    return 1.0 / period if log.dt > 1.000001 * period else 1.0 / log.dt
+
+
+def noise_remarks(log: Log, noise: TiltNoise) -> list[str]:
+    """Describe the noise that observers assume, and what the log shows.
+
+    Args:
+        log: The log.
+        noise: The noise of one sample that observers assume.
+
+    Returns:
+        A line for each noise; none for a run's recording, whose sensors are known.
+    """
+    if log.white_noise is None:
+        return []
+    shown, tilt_name, unit = noise_in(log), "tilt", "deg"
+    size = math.degrees
+    if log.tilt is not None:
+        tilt_name, unit = "accelerometer", "ug/rtHz"
+        size = lambda tilt: density_of(log, tilt)  # noqa: E731  (one of two units)
+    lines = [_remark(tilt_name, size(noise.tilt), _scaled(shown.tilt, size), unit)]
+    if shown.acceleration is not None and log.tilt is None:
+        lines.append(_remark("acceleration", noise.acceleration, shown.acceleration, "rad/s^2"))
+    return lines
+
+
+def _remark(name: str, used: float, estimate: WhiteNoise | str, unit: str) -> str:
+    """Describe one noise of `--noise`, in its unit."""
+    start = f"Noise of the {name}: {used:.3g} {unit} is used; the log"
+    if isinstance(estimate, str):
+        return f"{start} cannot tell: {estimate}."
+    remark = f"{start} shows {estimate.sigma:.3g} ({estimate.low:.3g} to {estimate.high:.3g})"
+    ratio = estimate.sigma / used
+    if max(ratio, 1.0 / ratio) < APART:
+        return f"{remark}."
+    return f"{remark}: give --noise {name}={estimate.sigma:.3g}, or no {name} for the log's own."
+
+
+def _scaled(noise: WhiteNoise | str, size: Callable[[float], float]) -> WhiteNoise | str:
+    return noise if isinstance(noise, str) else WhiteNoise(*map(size, noise))
+
+
+def noise_figures(log: Log, noise: TiltNoise) -> dict[str, SummaryValue]:
+    """Return the noise that a log shows as `--json` prints it; nothing for a run's recording."""
+    if log.white_noise is None:
+        return {}
+    shown, figures = noise_in(log), {}
+    pairs = {"tilt_rad": (shown.tilt, noise.tilt), "acceleration_rad_s2": (shown.acceleration, noise.acceleration)}
+    for key, (estimate, used) in pairs.items():
+        if isinstance(estimate, WhiteNoise):
+            figures[key] = {**estimate._asdict(), "used": math.isclose(used, estimate.sigma, rel_tol=1e-9)}
+        elif estimate is not None:
+            figures[key] = {"sigma": None, "reason": estimate, "used": False}
+    if shown.acceleration is not None:
+        figures["correlation"] = shown.correlation
+    return {"noise_by_the_log": figures}
