@@ -198,12 +198,12 @@ def replay(
     from cmg_mj.replay import report
     from cmg_mj.replay.noise import noise_numbers
     from cmg_mj.replay.parameter_options import parameters_of
-    from cmg_mj.replay.save import SETTINGS, LogReplays
+    from cmg_mj.replay.save import SETTINGS, LogReplays, files_of_replay
 
     options = replace(options, windows_s=tuple(span(text, "--window") for text in windows))
     replays = LogReplays(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)
     folder = claim_output(
-        out, replays.folder_name, replays.files, request_toml=replays.as_toml(), request_file=SETTINGS
+        out, replays.folder_name, files_of_replay(replays.names), request_toml=replays.as_toml(), request_file=SETTINGS
     )
     total = len(replays.logs)
     with CtrlC() as ctrl_c:

@@ -199,8 +199,7 @@ def _ready(
         lacks = [need for need in needs(cls) if need not in available]
         if lacks:
             OBSERVER_CLASSES.check_names(name, parameters.get(name, {}))
-            assumed = "" if hasattr(cls, "needs") else ", as a class does that does not say what it needs (needs = ())"
-            left_out[name] = "needs " + " and ".join(NEEDS_IN_WORDS[need] for need in lacks) + assumed
+            left_out[name] = "needs " + " and ".join(NEEDS_IN_WORDS[need] for need in lacks)
             continue
         try:
             ready[name] = make_observer(name, log.dt, model or NO_MODEL, noise, **parameters.get(name, {}))

@@ -315,8 +315,8 @@ def noise_in(log: Log) -> LogNoise:
         return LogNoise("the sensors are known", None, 0.0)
     factor = math.sqrt(max(1.0, (log.row_period_s or log.dt) / log.dt))
 
-    tilt, acceleration = (sigma and _scaled(sigma, factor.__mul__) for sigma in noise[:2])
-    return LogNoise(tilt, acceleration, noise.correlation)
+    acceleration = noise.acceleration and _scaled(noise.acceleration, factor.__mul__)
+    return LogNoise(_scaled(noise.tilt, factor.__mul__), acceleration, noise.correlation)
 
 
 def noise_numbers(text: str) -> dict[str, float]:
@@ -389,13 +389,15 @@ def noise_figures(log: Log, noise: TiltNoise) -> dict[str, SummaryValue]:
     """Return the noise that a log shows as `--json` prints it; nothing for a run's recording."""
     if log.white_noise is None:
         return {}
-    shown, figures = noise_in(log), {}
-    pairs = {"tilt_rad": (shown.tilt, noise.tilt), "acceleration_rad_s2": (shown.acceleration, noise.acceleration)}
-    for key, (estimate, used) in pairs.items():
-        if isinstance(estimate, WhiteNoise):
-            figures[key] = {**estimate._asdict(), "used": math.isclose(used, estimate.sigma, rel_tol=1e-9)}
-        elif estimate is not None:
-            figures[key] = {"sigma": None, "reason": estimate, "used": False}
+    shown = noise_in(log)
+    figures: dict[str, SummaryValue] = {"tilt_rad": _figures(shown.tilt, noise.tilt)}
     if shown.acceleration is not None:
+        figures["acceleration_rad_s2"] = _figures(shown.acceleration, noise.acceleration)
         figures["correlation"] = shown.correlation
     return {"noise_by_the_log": figures}
+
+
+def _figures(estimate: WhiteNoise | str, used: float) -> dict[str, SummaryValue]:
+    if isinstance(estimate, str):
+        return {"sigma": None, "reason": estimate, "used": False}
+    return {**estimate._asdict(), "used": math.isclose(used, estimate.sigma, rel_tol=1e-9)}

@@ -61,4 +61,4 @@ def _steps(observer: Observer, trajectory: Trajectory, n_names: int) -> Iterator
 def _rows(values: np.ndarray) -> Iterator[Scalar]:
     """Return ticks as the observers take them: floats (one world) or arrays (n_worlds,)."""
     contiguous = np.ascontiguousarray(values, dtype=float)
-    return iter(memoryview(contiguous) if values.ndim == 1 else contiguous)
+    return iter(contiguous.data if values.ndim == 1 else contiguous)

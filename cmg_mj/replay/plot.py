@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmg_mj.replay.log import REFERENCE
+from cmg_mj.replay.log import REFERENCE, Log
 from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.report import figure_text, shown_first
 from cmg_mj.replay.scores import Figures
@@ -33,26 +33,21 @@ DETAIL_S = 2.0
 """Length of the detail [s]."""
 
 
-def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
-    """Return the ends of the span in which the tilt accelerates most [s]."""
-    log = replayed.log
+def liveliest_span(log: Log) -> tuple[float, float]:
+    """Return the ends of the span of `DETAIL_S` in which the tilt accelerates most [s]."""
     length = max(2, round(DETAIL_S / log.dt))
-    liveliest, where = -1.0, (log["time_s"][0], log["time_s"][-1])
+    rise = max(1, length // 20)
+    best, span = -1.0, (0.0, 0.0)
     for part in log.parts:
         time, tilt = log["time_s"][part], log["y1_rad"][part]
-        rise = max(1, length // 20)
         bend = np.zeros(len(tilt))
         bend[rise:-rise] = (tilt[2 * rise :] - 2.0 * tilt[rise:-rise] + tilt[: -2 * rise]) ** 2
         sums = np.concatenate([[0.0], np.cumsum(bend)])
         n = min(length, len(tilt))
-        lively = sums[n:] - sums[:-n]
-        start = int(np.argmax(lively))
-        if lively[start] > liveliest:
-            liveliest = float(lively[start])
-            middle = np.average(np.arange(n), weights=bend[start : start + n] + 1e-300)
-            start = int(np.clip(start + middle - n / 2.0, 0, len(time) - n))
-            where = float(time[start]), float(time[start + n - 1])
-    return where
+        start = int(np.argmax(sums[n:] - sums[:-n]))
+        if sums[start + n] - sums[start] > best:
+            best, span = sums[start + n] - sums[start], (float(time[start]), float(time[start + n - 1]))
+    return span
 
 
 def plot_replay(path: Path, replayed: ReplayResult) -> None:
@@ -73,7 +68,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     figure = pyplot().figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
     grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
     panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
-    start, end = liveliest_span(replayed)
+    start, end = liveliest_span(log)
     _line(panels[0], replayed, np.degrees(log["y1_rad"]), None, color=MEASURED, linewidth=0.8, label="measured")
     panels[0].set_ylabel("tilt [deg]")
     rates = None

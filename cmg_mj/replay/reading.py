@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,10 +27,6 @@ FARTHEST_M = 10.0
 """Largest distance of an accelerometer from the pivot; millimetres taken as metres are larger [m]."""
 NEAR = (0.7, 1.4)
 """A size is plausible if it is within these factors of the right one."""
-RADIUS_M = 0.1
-"""Distance from the pivot for which the error of one accelerometer's tilt is told [m]."""
-SPAN_S = 0.05
-"""Time over which the gyro's increments give its angular acceleration [s]: the slope between samples is noise."""
 
 
 def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
@@ -79,7 +74,7 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     slices = [slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
     notes += gravity_remarks(columns, signals)
     if "ax" in signals:
-        notes.append(_about_one_accelerometer(joined, slices, dt))
+        notes.append("the tilt is atan2(-ax, az): an acceleration of the sensor by 0.1 g puts it off by 5.7 deg")
     present = {
         "gimbals": {"y2_rad", "u_rad_s"} <= measured.keys(),
         "acceleration": "acceleration_rad_s2" in measured,
@@ -95,10 +90,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
 
 def _read_run(path: Path, options: ReadOptions) -> Log:
     log = log_of_run(path)
-    for field in options.as_toml():
-        if field != "windows_s":
-            option = "--" + re.sub("_(hz|s|m)$", "", field).replace("_", "-")
-            raise InputError(f"{option}: {path} is a run's own recording; read it with --columns for that")
+    given = [field for field in options.as_toml() if field != "windows_s"]
+    if given:
+        raise InputError(f"{path}: {given[0]} is for other logs than a run's own recording; read it with --columns")
     if not options.windows_s:
         return log
     return replace(log, windows=_windows_inside(path, options.windows_s, log["time_s"]))
@@ -277,35 +271,3 @@ def _unit_of_size(unit: str, size: float) -> str | None:
     fits = {other: abs(math.log(units[unit] / other_size / size)) for other, other_size in units.items()}
     best = min(fits, key=lambda other: fits[other])
     return best if fits[best] < math.log(NEAR[1]) else None
-
-
-def _about_one_accelerometer(sampled: Mapping[str, np.ndarray], parts: Sequence[slice], dt: float) -> str:
-    """Say what motion does to the tilt of one accelerometer."""
-    errors = [motion_error(sampled["y1_rad"][part], sampled[REFERENCE][part], dt) for part in parts]
-    known = np.concatenate(errors)
-    known = known[np.isfinite(known)]
-    line = "the tilt is atan2(-ax, az) of one accelerometer: an acceleration of 0.1 g puts it off by 5.7 deg"
-    if not len(known):
-        return line
-    degrees = math.degrees(math.sqrt(float(np.sum(known**2)) / len(known)) * RADIUS_M)
-    return f"{line}; the reference's turning by {degrees:.2g} deg RMS at {RADIUS_M:g} m from the pivot, in proportion"
-
-
-def motion_error(tilt: np.ndarray, rate: np.ndarray, dt: float) -> np.ndarray:
-    """Return to first order how far turning about a pivot puts off the tilt, for each metre of distance.
-
-    At the radius r the specific force is (r y'' - g sin y, g cos y - r y'^2), and atan2(-ax, az) is y less
-    r (y'' cos y - y'^2 sin y)/g.
-
-    Args:
-        tilt: y, (n,) [rad].
-        rate: y', (n,) [rad/s].
-        dt: Sample period [s].
-
-    Returns:
-        Of the samples that have others on either side within `SPAN_S`, (n - 2 m,) [rad/m].
-    """
-    m = max(1, round(SPAN_S / 2.0 / dt))
-    acceleration = (rate[2 * m :] - rate[: -2 * m]) / (2 * m * dt)
-    y, w = tilt[m:-m], rate[m:-m]
-    return -(acceleration * np.cos(y) - w**2 * np.sin(y)) / STANDARD_GRAVITY

@@ -196,15 +196,7 @@ def alignment_of(log: Log) -> Alignment | None:
     return alignment(tilts, references, log.dt)
 
 
-class Judgement(NamedTuple):
-    """Judgement on a reference."""
-
-    remark: str
-    fault: str | None
-    """Why errors against the reference are not the estimates' own, in a clause; None if it agrees with the tilt."""
-
-
-def judge(log: Log, aligned: Alignment) -> Judgement:
+def judge(log: Log, aligned: Alignment) -> str:
     """Describe the reference's lag, scale and offset, with options that correct those that matter.
 
     Args:
@@ -213,60 +205,46 @@ def judge(log: Log, aligned: Alignment) -> Judgement:
     """
     lag, scale, offset, correlation = aligned[:4]
     if scale is None or offset is None or correlation is None:
-        remark = "The reference cannot be compared with the tilt: too little motion, or too short."
-        return Judgement(remark, "the reference cannot be compared with the tilt")
+        return "The reference cannot be compared with the tilt: too little motion, or too short."
     errors = (aligned.lag_error_s, aligned.scale_error, aligned.offset_error_rad_s)
     lag_error, scale_error, offset_error = (math.inf if error is None else CLEAR * error for error in errors)
-    noisy, set_options = _is_noise(log, aligned.residual_rad), log.options
-    if correlation <= -AGREES or (noisy and scale < -scale_error):
-        remark = (
-            f"The reference does not go with the tilt (correlation {correlation:.2f}): it counts the other way: "
-            f"--scale rate={-set_options.scale.get('rate', 1.0):g}."
-        )
-        return Judgement(remark, "the reference counts the other way than the tilt")
+    noisy, options = _is_noise(log, aligned.residual_rad), log.options
+    scale_set, offset_set = options.scale.get("rate", 1.0), options.offset.get("rate", 0.0)
     period = max(log.dt, log.row_period_s or 0.0)
-    known = log[REFERENCE][np.isfinite(log[REFERENCE])]
-    motion = math.sqrt(float(np.mean(known**2)))
+    motion = math.sqrt(float(np.nanmean(log[REFERENCE] ** 2)))
     near = lag is not None and abs(lag) <= LATE * period and abs(scale - 1.0) <= NEAR and abs(offset) <= NEAR * motion
+    not_alike = f"The reference does not go with the tilt (correlation {correlation:.2f})"
+    if correlation <= -AGREES or (noisy and scale < -scale_error):
+        return f"{not_alike}: it counts the other way: --scale rate={-scale_set:g}."
     if correlation < AGREES and not (noisy and scale > scale_error) and not near:
-        remark = (
-            f"The reference does not go with the tilt (correlation {correlation:.2f} at the best lag; below {AGREES:g} "
-            "neither delay nor scale is offered): is it the rate of this tilt, and do both move and not leap?"
-        )
-        return Judgement(remark, "the reference does not go with the tilt")
-    late = None if lag is None or abs(lag) <= max(LATE * period, lag_error) else lag
+        return f"{not_alike}: is it the rate of this tilt, and do both move and not leap? No delay or scale is offered."
+    late = lag is not None and abs(lag) > max(LATE * period, lag_error)
     resized = abs(scale - 1.0) > max(OFF, scale_error)
     shifted = abs(offset) > max(OFF * motion, offset_error)
     share = SURE / CLEAR
     fits = f"{_with_interval(scale, share * scale_error)} times the reference plus "
     fits += f"{_with_interval(offset, share * offset_error)} rad/s fits"
-    if late is None and not resized and not shifted:
-        return Judgement(f"Tilt and reference agree: {fits}.", None)
+    if not (late or resized or shifted):
+        return f"Tilt and reference agree: {fits}."
     decimals = max(0, math.ceil(-math.log10(FINE * period)))
-    cures, comes = [], ""
-    if late is not None:
-        comes = f"the reference comes {abs(late) * 1e3:.{max(2, decimals - 3)}f} ms "
-        comes += "behind the tilt" if late > 0.0 else "before the tilt"
-        cures.append(f"--delay {set_options.delay_s + late:.{decimals}f}")
+    comes, cures = "", []
+    if late and lag is not None:
+        where = "behind" if lag > 0.0 else "before"
+        comes = f"the reference comes {abs(lag) * 1e3:.{max(2, decimals - 3)}f} ms {where}; "
+        cures.append(f"--delay {options.delay_s + lag:.{decimals}f}")
     factor = scale if resized else 1.0
     if resized:
-        cures.append(f"--scale rate={factor * set_options.scale.get('rate', 1.0):.4g}")
-    offset_before = set_options.offset.get("rate", 0.0)
-    if shifted or (resized and offset_before):
-        unit_size = UNITS["rate"][set_options.units.get("rate", "rad_s")]
-        cures.append(f"--offset rate={factor * offset_before + (offset / unit_size if shifted else 0.0):.3g}")
-    clauses = [comes] if comes else []
-    faults = [comes] if comes else []
-    if resized or shifted:
-        faults.append("the reference has another scale or offset than the tilt's rate")
-    remark = "; ".join([*clauses, fits])
-    return Judgement(f"{remark[:1].upper()}{remark[1:]} (to take it out: {' '.join(cures)}).", " and ".join(faults))
+        cures.append(f"--scale rate={factor * scale_set:.4g}")
+    if shifted or (resized and offset_set):
+        unit_size = UNITS["rate"][options.units.get("rate", "rad_s")]
+        cures.append(f"--offset rate={factor * offset_set + (offset / unit_size if shifted else 0.0):.3g}")
+    return f"Beside the tilt {comes}{fits} (to take it out: {' '.join(cures)})."
 
 
 def remarks_on(log: Log, aligned: Alignment | None) -> list[str]:
     """Describe the changes to a log, and its reference, in sentences."""
     lines = [f"{note[:1].upper()}{note[1:]}." for note in log.notes]
-    return lines if aligned is None else [*lines, judge(log, aligned).remark]
+    return lines if aligned is None else [*lines, judge(log, aligned)]
 
 
 def _is_noise(log: Log, residual: float | None) -> bool:

@@ -8,11 +8,9 @@ from collections.abc import Mapping, Sequence
 from rich.console import Group
 from rich.text import Text
 
-from cmg_mj.observers import OBSERVER_CLASSES
-from cmg_mj.observers.protocol import needs
 from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.noise import noise_figures, noise_remarks
-from cmg_mj.replay.reference import judge, model_remark, remarks_on
+from cmg_mj.replay.reference import model_remark, remarks_on
 from cmg_mj.replay.scores import RECONSTRUCTED_S, ZERO_PHASE, Figures
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.intervals import Interval, format_interval, known_interval
@@ -185,34 +183,13 @@ def remarks(replayed: ReplayResult) -> list[str]:
     """Return the remarks on a log and its reference, and the observers left out."""
     lines = remarks_on(replayed.log, replayed.alignment) + noise_remarks(replayed.log, replayed.noise)
     if replayed.zero_phase is not None:
-        lines.append(replayed.zero_phase.remark(_doubt_of_price(replayed)))
+        lines.append(replayed.zero_phase.remark)
     if doubt := model_remark(replayed.misfit):
         lines.append(doubt)
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
         reasons.setdefault(reason, []).append(name)
     return [*lines, *(f"Without {', '.join(names)}: {reason}." for reason, names in reasons.items())]
-
-
-def _doubt_of_price(replayed: ReplayResult) -> str | None:
-    """Say why the distance from the smoother is not the price of causality; None where it is.
-
-    Observers that know more than the tilt may well be nearer to the reference.
-    """
-    fault = judge(replayed.log, replayed.alignment).fault if replayed.alignment else None
-    doubts = [fault] if fault else []
-    assert replayed.zero_phase is not None
-    error = replayed.zero_phase.figures["velocity_rms_error_rad_s"]
-    errors = {
-        name: other
-        for name, figures in replayed.summaries.items()
-        if (other := figures["velocity_rms_error_rad_s"]) is not None
-        and (name == ZERO or not needs(OBSERVER_CLASSES.find(name)))
-    }
-    best = min(errors, key=lambda name: errors[name], default=None)
-    if error is not None and best is not None and errors[best] < error:
-        doubts.append(f"{best}, which knows no more than the past, is nearer to the reference")
-    return "; ".join(doubts) or None
 
 
 def table_note(replays: Sequence[ReplayResult]) -> str:

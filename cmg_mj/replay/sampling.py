@@ -115,10 +115,6 @@ class Sampler:
     def _forward(self, time: np.ndarray, values: Values) -> tuple[np.ndarray, Values]:
         """Return the rows with growing times."""
         steps = np.diff(time)
-        if len(steps) and (steps <= 0.0).all() and (steps < 0.0).any():
-            self.notes.append("the time runs backward from the first row to the last: read from its end")
-            time, values = time[::-1], {name: column[::-1] for name, column in values.items()}
-            steps = np.diff(time)
         if (steps < 0.0).any():
             at = int(np.argmax(steps < 0.0))
             raise InputError(

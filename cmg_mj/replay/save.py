@@ -87,11 +87,6 @@ class LogReplays:
         """Name of the folder of the files by default."""
         return f"replay-{self.names[0]}" + (f"-and-{len(self.logs) - 1}-more" if len(self.logs) > 1 else "")
 
-    @property
-    def files(self) -> list[str]:
-        """Names of the files."""
-        return files_of_replay(self.names)
-
     def run(self, on_progress: Callable[[float, str], None]) -> None:
         """Replay the logs.
 
@@ -113,9 +108,30 @@ class LogReplays:
             )
 
     def save(self, folder: RunFolder | Path) -> Path:
-        """Write the files of the replays that are done, and return where they are."""
+        """Write summary.json, replay.toml, recording.rrd, and of every log that is done its signals and plot, at once.
+
+        Args:
+            folder: The folder. Files in it that cmg_mj did not write stay.
+
+        Returns:
+            The folder of the files: the given one, or one in it (see `RunFolder.write`).
+
+        Raises:
+            InputError: The folder, or a file, cannot be written.
+        """
+        from cmg_mj.replay.recording import write_replay  # 0.4 s of import, needed only here
+
         names = self.names[: len(self.results)]
-        return save_replay(folder, self.results, names, self.as_toml(), complete=self.complete)
+        writers: list[Callable[[Path], None]] = [
+            lambda path: write_text(path, json.dumps(finite(replay_figures(self.results)), indent=2)),
+            lambda path: write_text(path, self.as_toml()),
+            lambda path: write_replay(path, self.results, names, self.as_toml()),
+        ]
+        for replayed in self.results:
+            signals = replace(replayed.trajectory, metadata={"replay": finite(log_figures(replayed))})
+            writers += [signals.save, lambda path, replayed=replayed: plot_replay(path, replayed)]
+        with claimed(folder) as claim:
+            return claim.write(dict(zip(files_of_replay(names), writers, strict=True)), complete=self.complete)
 
 
 def distinct_names(names: Sequence[str]) -> list[str]:
@@ -136,40 +152,3 @@ def files_of_replay(names: Sequence[str]) -> list[str]:
     for suffix in [""] if len(names) == 1 else [f"-{name}" for name in names]:
         files += [f"signals{suffix}.parquet", f"plot{suffix}.png"]
     return files
-
-
-def save_replay(
-    folder: RunFolder | Path,
-    replays: Sequence[ReplayResult],
-    names: Sequence[str],
-    settings_toml: str,
-    *,
-    complete: bool = True,
-) -> Path:
-    """Write summary.json, replay.toml, recording.rrd, and of every log signals.parquet and plot.png, all at once.
-
-    Args:
-        folder: The folder. Files in it that cmg_mj did not write stay.
-        replays: The replays.
-        names: The logs' names, from `distinct_names`.
-        settings_toml: The request, as TOML.
-        complete: Whether these are all logs that were requested.
-
-    Returns:
-        The folder of the files: the given one, or one in it (see `RunFolder.write`).
-
-    Raises:
-        InputError: The folder, or a file, cannot be written.
-    """
-    from cmg_mj.replay.recording import write_replay  # 0.4 s of import, needed only here
-
-    writers: list[Callable[[Path], None]] = [
-        lambda path: write_text(path, json.dumps(finite(replay_figures(replays)), indent=2)),
-        lambda path: write_text(path, settings_toml),
-        lambda path: write_replay(path, replays, names, settings_toml),
-    ]
-    for replayed in replays:
-        signals = replace(replayed.trajectory, metadata={"replay": finite(log_figures(replayed))})
-        writers += [signals.save, lambda path, replayed=replayed: plot_replay(path, replayed)]
-    with claimed(folder) as claim:
-        return claim.write(dict(zip(files_of_replay(names), writers, strict=True)), complete=complete)

@@ -36,8 +36,6 @@ LOWEST_PERIODS = 2.0
 """The lowest cut-off has so many periods in the longest part."""
 BLOCK, BLOCKS = 32768, 4
 """The cut-off of a long log is chosen on so many blocks of so many samples, evenly spread."""
-AT_THE_END = 0.98
-"""Share of half the sampling rate above which a cut-off takes nothing away."""
 
 Figures = dict[str, float | None]
 """Name -> figure; None where it does not exist."""
@@ -320,31 +318,21 @@ class ZeroPhase:
         figures: Its figures, as those of an observer.
         best_cutoff_hz: The cut-off that fits the reference best [Hz].
         best_rms_error_rad_s: RMS error with that cut-off [rad/s].
-        smooths: Whether the tilt has a white noise that the smoother takes away.
     """
 
     cutoff_hz: float
     figures: Figures
     best_cutoff_hz: float
     best_rms_error_rad_s: float | None
-    smooths: bool
 
-    def remark(self, doubt: str | None = None) -> str:
-        """Say what the row is.
-
-        Args:
-            doubt: Why its distance from an observer is not the price of causality; None where it is.
-        """
-        how = f"smooths the tilt to both sides of each sample, below {self.cutoff_hz:.3g} Hz, chosen by the tilt alone"
-        if not self.smooths:
-            how += " (where no white noise could be told, so hardly at all)"
+    @property
+    def remark(self) -> str:
+        """What the row is."""
         best = "-" if self.best_rms_error_rad_s is None else f"{self.best_rms_error_rad_s:.4f}"
-        price = "What an observer of the tilt alone lacks to it is the price of causality."
-        if doubt is not None:
-            price = f"What causality costs cannot be read off it here: {doubt}."
         return (
-            f"{ZERO_PHASE} is no observer: it sees the future. It {how}; with {self.best_cutoff_hz:.3g} Hz, the best "
-            f"for the reference, its error is {best} rad/s. {price}"
+            f"{ZERO_PHASE} is no observer: it sees the future. It smooths the tilt to both sides of each sample, below "
+            f"{self.cutoff_hz:.3g} Hz, chosen by the tilt alone; with {self.best_cutoff_hz:.3g} Hz, the best for the "
+            f"reference, its error is {best} rad/s."
         )
 
 
@@ -369,7 +357,7 @@ def zero_phase(log: Log, scored: np.ndarray) -> ZeroPhase | None:
     error = figures["velocity_rms_error_rad_s"]
     if best != cutoff:
         error = scores(log, rate_of_log(log, best), scored)["velocity_rms_error_rad_s"]
-    return ZeroPhase(cutoff, figures, best, error, cutoff < AT_THE_END * 0.5 / log.dt)
+    return ZeroPhase(cutoff, figures, best, error)
 
 
 def smoothed_rate(tilt: np.ndarray, dt: float, cutoff_hz: float) -> np.ndarray:
