@@ -254,9 +254,8 @@ def _is_noise(log: Log, residual: float | None) -> bool:
 
 
 def _with_interval(value: float, error: float) -> str:
-    if not math.isfinite(error):
-        return f"{value:.4f}"
-    return f"{value:.4f} ({value - error:.4f} to {value + error:.4f})"
+    value, low, high = (round(number, 4) + 0.0 for number in (value, value - error, value + error))  # no -0.0000
+    return f"{value:.4f} ({low:.4f} to {high:.4f})" if math.isfinite(error) else f"{value:.4f}"
 
 
 def model_misfit(log: Log, model: ReducedModel) -> float | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.replay.alignment import alignment
+from cmg_mj.replay.reference import alignment
 from tests.command import cmg_mj
 from tests.inputs.complaints import assert_in_order, table
 from tests.inputs.test_model_file import check_edited

@@ -95,15 +95,6 @@ def test_the_columns_of_a_result() -> None:
     assert many()["in_loop_of"][0] is None
 
 
-@every
-def test_no_frame_is_made_in_silence(make: Callable[[], Any]) -> None:
-    pandas = pytest.importorskip("pandas")
-    name = type(make()).__name__
-    for convert in (pandas.DataFrame, np.asarray):
-        with pytest.raises(InputError, match=rf"^{name}: is no array and no pandas.DataFrame. Call its to_pandas\(\)"):
-            convert(make())
-
-
 def test_a_trajectory_as_a_frame() -> None:
     pandas = pytest.importorskip("pandas")
     one_world = trajectory(one())

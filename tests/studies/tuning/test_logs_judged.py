@@ -17,7 +17,7 @@ from cmg_mj.results.intervals import Interval
 from cmg_mj.studies.tuning import figures_of_logs, logs_table, tune_on_logs
 from cmg_mj.studies.tuning.closed_loop import LoopComparison, compare_in_loop, judged, loop_scenario
 from cmg_mj.studies.tuning.on_logs import LogStudy
-from tests.replay.logs.motion import COLUMNS, sine, write_csv
+from tests.replay.motion import COLUMNS, sine, write_csv
 
 
 @pytest.mark.parametrize(
