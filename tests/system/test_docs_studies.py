@@ -179,9 +179,6 @@ def test_a_cell_of_the_bending_frames_table(monkeypatch: pytest.MonkeyPatch) -> 
     settings = [*study.bend(10.0, "mast"), *study.RATES["gyro_free"]]
     assert study.cell((settings, 2)) == "2 fall"
     assert float(study.cell(([*settings, "controller.notch_hz=10"], 2))) < 0.6
-    heads = [head for head, _ in study.rows(1)]
-    page = (STUDIES.parent / "real_rigs_evidence.md").read_text(encoding="utf-8")
-    assert all(f"| {head} |" in page for head in heads if "off by" not in head)
 
 
 @pytest.mark.slow
