@@ -273,3 +273,10 @@ def test_a_runs_recording_has_windows(run: Path) -> None:
     assert read_log(run, ReadOptions(windows_s=[(0.4, 0.6)])).windows == ((0.4, 0.6),)
     with pytest.raises(InputError, match="--window 5:6"):
         read_log(run, ReadOptions(windows_s=[(5.0, 6.0)]))
+
+
+def test_a_replay_has_its_columns_and_a_frame(tmp_path: Path) -> None:
+    pytest.importorskip("pandas")
+    result = replay_log(log(tmp_path), ["linear"])
+    assert list(dict(result)) == result.keys()
+    np.testing.assert_array_equal(result.to_pandas()["estimate/linear/x2_rad_s"], result["estimate/linear/x2_rad_s"])
