@@ -24,7 +24,6 @@ from cmg_mj.visualization.plots.run_plot import (
     pyplot,
     save_figure,
 )
-from cmg_mj.visualization.plots.thinning import thinned
 
 if TYPE_CHECKING:
     from cmg_mj.visualization.plots.run_plot import Axes
@@ -51,100 +50,65 @@ def liveliest_span(log: Log) -> tuple[float, float]:
 
 
 def plot_replay(path: Path, replayed: ReplayResult) -> None:
-    """Draw one log on a page.
+    """Draw one log on a page: tilt, rates and their errors, the liveliest seconds, and each other observer in these.
 
     Args:
         path: The PNG to write.
         replayed: The replay.
     """
-    log, names = replayed.log, list(replayed.estimates)
-    few, referred = shown_first(replayed), "reference" in log.has
-    others = [name for name in names if name not in few]
-    palette = {name: hexadecimal(rgb) for name, rgb in colours(names).items()}
-    labels = short_names(names)
-    small = [others[i : i + SMALL_COLUMNS] for i in range(0, len(others), SMALL_COLUMNS)]
-    tall = 4 if referred else 3
-    heights = [PANEL_HEIGHT] * tall + [SMALL_HEIGHT] * len(small)
+    log, few = replayed.log, shown_first(replayed)
+    rates = {name: estimates["x2_rad_s"] for name, estimates in replayed.estimates.items()}
+    palette = {name: hexadecimal(rgb) for name, rgb in colours(list(rates)).items()}
+    labels = {name: label.lstrip("_") for name, label in short_names(list(rates)).items()}
+    scores = {name: _rms(replayed.summaries[name]) for name in rates}
+    reference = [log[REFERENCE]] if "reference" in log.has else []
+    others = [name for name in rates if name not in few]
+    tall, rows = 3 + len(reference), -(-len(others) // SMALL_COLUMNS)
+    heights = [PANEL_HEIGHT] * tall + [SMALL_HEIGHT] * rows
     figure = pyplot().figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
     grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
     panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
-    start, end = liveliest_span(log)
-    _line(panels[0], replayed, np.degrees(log["y1_rad"]), None, color=MEASURED, linewidth=0.8, label="measured")
+    span = liveliest_span(log)
+
+    def line(axes: Axes, values: np.ndarray, color: str, width: float, label: str = "") -> None:
+        axes.plot(*log.broken(values), color=color, linewidth=width, label=label or None)
+
+    line(panels[0], np.degrees(log["y1_rad"]), MEASURED, 0.8, "measured")
     panels[0].set_ylabel("tilt [deg]")
-    rates = None
     for axes in (panels[1], panels[-1]):
-        detail = (start, end) if axes is panels[-1] else None
-        if referred:
-            _line(axes, replayed, log[REFERENCE], detail, color=INK, linewidth=1.6, label="reference")
+        for values in reference:
+            line(axes, values, INK, 1.6, "reference")
         for name in few:
-            rate, label = replayed.estimates[name]["x2_rad_s"], labels[name].lstrip("_")
-            _line(axes, replayed, rate, detail, color=palette[name], linewidth=0.8, label=label)
+            line(axes, rates[name], palette[name], 0.8, labels[name])
         axes.set_ylabel("tilt rate\n[rad/s]")
-        estimates = [replayed.estimates[name]["x2_rad_s"] for name in few]
-        rates = fit(axes, [log[REFERENCE]] if referred else [], estimates)
-    if referred:
-        errors = {name: replayed.estimates[name]["x2_rad_s"] - log[REFERENCE] for name in few}
+        limits = fit(axes, reference, [rates[name] for name in few])
+    for true in reference:
         panels[2].plot([], [], " ", label="RMS:")
         for name in few:
-            text = f"{labels[name].lstrip('_')} {_rms(replayed.summaries[name])}"
-            _line(panels[2], replayed, errors[name], None, color=palette[name], linewidth=0.6, label=text)
+            line(panels[2], rates[name] - true, palette[name], 0.6, f"{labels[name]} {scores[name]}")
         panels[2].set_ylabel("estimate less\nreference [rad/s]")
-        fit(panels[2], [log[REFERENCE]], list(errors.values()))
-    panels[-1].set_xlim(start, end)
+        fit(panels[2], reference, [rates[name] - true for name in few])
     for axes in panels[:-1]:
-        axes.axvspan(start, end, color="0.5", alpha=0.15, linewidth=0, zorder=0)
+        axes.axvspan(*span, color="0.5", alpha=0.15, linewidth=0, zorder=0)
         axes.set_xlim(log["time_s"][0], log["time_s"][-1])
-    for i, row in enumerate(small, tall):
-        for j, name in enumerate(row):
-            axes = figure.add_subplot(grid[i, j])
-            _draw_small(axes, replayed, name, labels[name], palette[name], rates, (start, end))
-            axes.tick_params(labelleft=j == 0, labelsize="small")
+    small = [figure.add_subplot(grid[tall + i // SMALL_COLUMNS, i % SMALL_COLUMNS]) for i in range(len(others))]
+    for axes, name in zip(small, others, strict=True):
+        line(axes, rates[name], palette[name], 0.7)
+        for values in reference:
+            line(axes, values, INK, 0.8)
+        axes.set_title(f"{labels[name]} {scores[name]}", loc="left", fontsize="small", parse_math=False, pad=2.0)
+        axes.tick_params(labelsize="small")
+        if limits is not None:
+            axes.set_ylim(*limits)
+    for axes in (panels[-1], *small):
+        axes.set_xlim(*span)
     for axes in panels:
-        axes.grid(alpha=0.3)
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=6, frameon=False, borderpad=0)
-    panels[-1].set_xlabel(f"time [s], {DETAIL_S:g} s in detail" if end - start < log.duration_s else "time [s]")
+    for axes in (*panels, *small):
+        axes.grid(alpha=0.3)
+    panels[-1].set_xlabel(f"time [s], {DETAIL_S:g} s in detail")
     figure.align_ylabels(panels)
     save_figure(path, figure, log.title, dpi=110)
-
-
-def _line(
-    axes: Axes,
-    replayed: ReplayResult,
-    values: np.ndarray,
-    detail: tuple[float, float] | None,
-    color: str,
-    linewidth: float,
-    label: str | None = None,
-) -> None:
-    """Draw the outline of a signal, or all of it around the detail."""
-    time, values = replayed.log.broken(values)
-    if detail is None:
-        time, values = thinned(time, values)
-    else:
-        rows = slice(*np.searchsorted(time, (detail[0] - DETAIL_S, detail[1] + DETAIL_S)))
-        time, values = time[rows], values[rows]
-    axes.plot(time, values, color=color, linewidth=linewidth, label=label)
-
-
-def _draw_small(
-    axes: Axes,
-    replayed: ReplayResult,
-    name: str,
-    label: str,
-    color: str,
-    rates: tuple[float, float] | None,
-    span: tuple[float, float],
-) -> None:
-    """Draw another observer in detail, on the axis of the few."""
-    _line(axes, replayed, replayed.estimates[name]["x2_rad_s"], span, color=color, linewidth=0.7)
-    if "reference" in replayed.log.has:
-        _line(axes, replayed, replayed.log[REFERENCE], span, color=INK, linewidth=0.8)
-    text = f"{label} {_rms(replayed.summaries[name])}".strip()
-    axes.set_title(text, loc="left", fontsize="small", parse_math=False, pad=2.0)
-    axes.set_xlim(*span)
-    axes.grid(alpha=0.3)
-    if rates is not None:
-        axes.set_ylim(*rates)
 
 
 def _rms(figures: Figures) -> str:
