@@ -55,8 +55,6 @@ COARSE = 0.6
 half a step on, to which a twelfth of the step's square is added."""
 HARDLY = 1e-6
 """Noise below this share of the signal is rounding."""
-UNITS = {"y1_rad": (math.pi / 180.0, "deg"), "acceleration_rad_s2": (1.0, "rad/s^2")}
-"""Signal -> size and name of the unit in which it is printed."""
 GROUPS = 16
 """Groups of segments whose scatter shows the error of the estimate, if it is larger than that of Gaussian noise."""
 
@@ -85,37 +83,25 @@ def white_noise_of(parts: Sequence[Part], period: float) -> LogNoise:
     names = [name for name in ("y1_rad", "acceleration_rad_s2") if name in parts[0].rows]
     residuals: list[np.ndarray] = []
     steps, sizes = dict.fromkeys(names, math.inf), dict.fromkeys(names, 0.0)
-    n_all, lead = 0, 0
     for places, values in _blocks(parts, period):
-        n_all += len(places)
         for name in names:
             steps[name] = min(steps[name], _smallest_step(values[name]))
             sizes[name] = max(sizes[name], float(np.std(values[name])))
         if names[-1] == "acceleration_rad_s2" and "u_rad_s" in values:
-            n_before = len(places)
             places, values = _without_response(places, values)
-            lead = max(lead, n_before - len(places))
         if len(places) >= 2 * TAPS + SEGMENT:
             residuals.append(np.stack([_without_motion(places, values[name]) for name in names]))
     n_rows = sum(residual.shape[1] for residual in residuals)
     if n_rows < FEWEST:
-        short = (
-            f"it takes {FEWEST:,} rows, in parts of {2 * TAPS + SEGMENT + lead} or more, without the first "
-            f"{TAPS + lead} and the last {TAPS} of each; of {n_all:,} rows {n_rows:,} are such"
-        )
+        short = f"it takes {FEWEST:,} rows, without the first and the last {TAPS} of each part; there are {n_rows:,}"
         return LogNoise(short, short if len(names) > 1 else None, 0.0)
     spectra = np.concatenate([_spectra(residual) for residual in residuals], axis=1)
-    floors = [
-        _floor(np.abs(spectrum) ** 2, steps[name], sizes[name], UNITS[name])
-        for name, spectrum in zip(names, spectra, strict=True)
-    ]
-    tilt = floors[0]
-    if len(names) == 1:
-        return LogNoise(tilt, None, 0.0)
-    acceleration = floors[1]
-    if isinstance(tilt, str) or isinstance(acceleration, str):
-        return LogNoise(tilt, acceleration, 0.0)
-    return LogNoise(tilt, acceleration, _correlation(spectra))
+    tilt, *others = (
+        _floor(np.abs(one) ** 2, steps[name], sizes[name]) for name, one in zip(names, spectra, strict=True)
+    )
+    acceleration = others[0] if others else None
+    known = isinstance(tilt, WhiteNoise) and isinstance(acceleration, WhiteNoise)
+    return LogNoise(tilt, acceleration, _correlation(spectra) if known else 0.0)
 
 
 def _blocks(parts: Sequence[Part], period: float) -> Iterator[tuple[np.ndarray, Mapping[str, np.ndarray]]]:
@@ -191,23 +177,26 @@ def _steady(power: np.ndarray) -> np.ndarray:
     return sizes <= OUTLIER * np.median(sizes)
 
 
-def _floor(power: np.ndarray, step: float, size: float, unit: tuple[float, str]) -> WhiteNoise | str:
+def _floor(power: np.ndarray, step: float, size: float) -> WhiteNoise | str:
     """Return the white floor of a spectrum, or why there is none.
 
     Args:
         power: Squares of the transforms, (n_segments, n_frequencies).
         step: Smallest step between two values of the signal.
         size: Standard deviation of the signal.
-        unit: Size and name of the unit in which to print the step.
     """
     steady = _steady(power)
     if steady.mean() < 1.0 - FEW_OUTLIERS:
         return "its size changes too much in the course of the log"
     power = power[steady]
+    top = math.sqrt(float(power[:, _columns(FLOORS[-1][0])].mean()))
+    if top < HARDLY * size:
+        return "there is hardly any"
+    if top < COARSE * step < math.inf:
+        return f"it is below {COARSE:g} of the signal's smallest step"
     frequencies = np.arange(power.shape[1]) * 2.0 / SEGMENT
     bands = [power[:, (frequencies >= low) & (frequencies < low + 0.1) & (frequencies < 1.0)] for low in BANDS]
     levels = np.array([0.5 * math.log(max(float(band.mean()), 1e-300)) for band in bands])
-    noise = None
     for first, tolerance in FLOORS:
         whole = power[:, _columns(first)]
         error = _error(whole, 1.0 - BANDS[first])
@@ -224,17 +213,8 @@ def _floor(power: np.ndarray, step: float, size: float, unit: tuple[float, str])
             low, high = sigma * math.exp(-1.96 * error), sigma * math.exp(1.96 * error)
             if np.sum((floor - floor.mean()) ** 2) > (len(order) - 1 + 3.3 * math.sqrt(2 * len(order) - 2)) * each**2:
                 low, high = min(low, math.exp(floor.min())), max(high, math.exp(floor.max()))
-            noise = WhiteNoise(sigma, low, high)
-            break
-    top = math.sqrt(float(power[:, _columns(FLOORS[-1][0])].mean()))
-    if top < HARDLY * size:
-        return "there is hardly any"
-    if top < COARSE * step < math.inf:
-        steps = f"{step / unit[0]:.3g} {unit[1]}"
-        return f"it goes in steps of {steps}, and noise below {COARSE:g} of a step is the quantiser's"
-    if noise is None and levels[-1] < levels[:-1].max() - math.log(FLOORS[0][1]):
-        return "its density falls off towards half the row rate, as of a filtered or fused signal: no white floor"
-    return noise or "its density is not the same in the upper part of the band: no white floor"
+            return WhiteNoise(sigma, low, high)
+    return "there is no white floor below half the row rate, as of a filtered or fused signal"
 
 
 def _error(power: np.ndarray, share: float) -> float:

@@ -108,13 +108,12 @@ FILTERS: dict[str, MakeSignal] = {
 def test_a_filtered_tilt_has_no_white_floor(name: str) -> None:
     for seed in range(10):
         noise = tilt_noise(lambda random: motion(CLOCK) + FILTERS[name](random), seed)
-        assert isinstance(noise, str)
-        assert "falls off towards half the row rate" in noise
+        assert "no white floor" in str(noise)
 
 
 def test_a_fused_tilt_has_no_white_floor() -> None:
     for seed in range(3):
-        assert "filtered or fused" in str(tilt_noise(fused, seed))
+        assert "no white floor" in str(tilt_noise(fused, seed))
 
 
 def test_every_row_twice_is_no_white_noise() -> None:
@@ -133,7 +132,7 @@ def test_a_fine_quantiser_adds_a_twelfth_of_its_step_squared(step: float) -> Non
 def test_a_coarse_quantiser_hides_the_noise(sigma: float) -> None:
     q = np.radians(0.08)
     noise = tilt_noise(lambda random: q * np.round((motion(CLOCK) + sigma * q / SIGMA * white(random)) / q))
-    assert "it goes in steps of 0.08 deg" in str(noise)
+    assert "smallest step" in str(noise)
 
 
 def test_without_noise_there_is_none_to_tell() -> None:
@@ -157,9 +156,7 @@ def test_short_parts_tell_nothing_and_gaps_nothing_wrong() -> None:
     random = np.random.default_rng(0)
     y = motion(CLOCK) + white(random)
     short = noise_of_rows(CLOCK, slice(0, 1000), y1_rad=y).tilt
-    assert str(short).endswith(
-        "parts of 192 or more, without the first 32 and the last 32 of each; of 1,000 rows 936 are such"
-    )
+    assert str(short).endswith("there are 936")
     t = np.where(np.arange(N) < 1800, CLOCK, CLOCK + 7.0)
     parts = noise_of_rows(t, slice(0, 1800), slice(1800, 1900), slice(1900, N), y1_rad=np.where(t > 9.0, y + 1.0, y))
     assert isinstance(parts.tilt, WhiteNoise)
