@@ -1,4 +1,4 @@
-"""`cmg-mj replay` and `cmg-mj tune-log` as a user types them."""
+"""`cmg-mj replay` as a user types it."""
 
 from __future__ import annotations
 
@@ -158,51 +158,5 @@ def test_a_window_of_ones_own() -> None:
     assert figures["velocity_rms_error_push_rad_s"] == pytest.approx(figures["velocity_rms_error_rad_s"], rel=1e-2)
 
 
-def test_tune_on_a_log() -> None:
-    """For a sine without noise the smallest time constant is the best; fitted on one part, scored on the other."""
-    arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
-    outcome = cmg_mj("tune-log", *arguments, "--split", "0.3", "--json", "--out", "it", "--closed-loop", "none")
-    result = json.loads(outcome.out)
-    assert result["parameters"]["tau"] == pytest.approx(0.004, rel=0.01)
-    assert result["at_a_limit"] == ["tau"]
-    assert (result["split"], result["held_out_stretches"], result["verdict"]) == (0.3, 10, "better")
-    assert files("it") == ["tuned.json"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("sine.csv", "--columns", PLAIN), "Missing option '--observer'"),
-        (("sine.csv", "--columns", "time=t_s,tilt=tilt_rad", "--observer", "linear"), "no reference to tune to"),
-        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--split", "1"), "between 0 and 1"),
-        (("sine.csv", "--columns", PLAIN, "--observer", "ltv"), "needs a model"),
-        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--worlds", "20"), "No such option"),
-        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--closed-loop", "x"), "--closed-loop: scenario 'x'"),
-        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--noise", "100,200"), "--noise 100: no such"),
-        (("sine.csv", "--columns", PLAIN, "--observer", "linear", "--set", "tau=1"), "write observer.PARAMETER=VALUE"),
-        ((), "Missing argument 'LOG...'"),
-    ],
-)
-def test_wrong_tuning(arguments: tuple, message: str) -> None:
-    assert message in cmg_mj("tune-log", *arguments).complaint
-
-
-def test_a_real_log_has_its_licence_beside_it() -> None:
-    text = LOG.with_suffix(".txt").read_text()
-    assert "Copyright (c) 2020 ssong47" in text
-    assert "Permission is hereby granted" in text
-    assert LOG.stat().st_size < 300_000
-
-
 def test_the_same_log_twice() -> None:
     assert "sine.csv" in replay("sine.csv", "./sine.csv", "--columns", PLAIN).complaint
-    arguments = ("sine.csv", "sine.csv", "--columns", PLAIN, "--observer", "linear")
-    assert "sine.csv: this log is given twice" in cmg_mj("tune-log", *arguments).complaint
-
-
-@pytest.mark.slow
-def test_what_was_tuned_can_be_replayed() -> None:
-    arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
-    output = " ".join(cmg_mj("tune-log", *arguments, "--out", "it").err.split())
-    assert "Replay it tuned: --set 'linear.tau=0.004'" in output
-    assert replay("sine.csv", "--columns", PLAIN, "--set", "linear.tau=0.004").status == 0

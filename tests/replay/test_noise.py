@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +18,6 @@ from cmg_mj.replay.reading import read_log
 from cmg_mj.replay.table import ACCELEROMETERS
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.tilt import RadialTilt
-from cmg_mj.studies.tuning import figures_of_logs, tune_on_logs
 from tests.replay.motion import COLUMNS, DT, N, sine, write_csv
 
 PLACES = RadialTilt(0.1, 0.3)
@@ -151,12 +149,3 @@ def test_json_has_the_logs_noise(tmp_path: Path) -> None:
     fine = noisy_log(tmp_path, 0.0)
     tilt = keys(noise_figures(fine, noise_of(fine)), ("noise_by_the_log", "tilt_rad"))
     assert tilt == {"sigma": None, "reason": "there is hardly any", "used": False}
-
-
-def test_tuning_takes_the_same_noise(tmp_path: Path) -> None:
-    log = noisy_log(tmp_path, 0.36)
-    study = tune_on_logs([log], "linear", parameters=["tau"], ranges={"tau": (0.02, 0.021)})
-    assert study.noises == [noise_of(log)]
-    assert noise_remarks(log, noise_of(log))[0] in study.remarks[0]
-    (noise,) = json.loads(json.dumps(figures_of_logs(study)))["noise"]
-    assert noise["noise_by_the_log"]["tilt_rad"]["used"]

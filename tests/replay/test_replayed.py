@@ -23,7 +23,6 @@ from cmg_mj.replay.reading import read_log
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.sensors.tilt import RadialTilt, TiltNoise
 from cmg_mj.studies.save import report_run, save_run
-from cmg_mj.studies.tuning import tune_on_logs
 from tests.observers.reference import PAPER
 from tests.replay.motion import COLUMNS, DT, N, sine, write_csv
 
@@ -228,39 +227,6 @@ def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
         replay_log(one, settle_s=20.0)
     with pytest.raises(InputError, match="no observer can take part: ltv needs a model"):
         replay_log(one, ["ltv"])
-
-
-def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
-    """Its rig (no --model), its sensors' noise and its observer's parameters: the given error is that of a replay."""
-    run_log = read_log(run)
-    study = tune_on_logs([run_log], "homogeneous", parameters=["k1"], ranges={"k1": (22.0, 24.0)}, settle_s=0.3)
-    assert study.start_parameters["k1"] == 23.0
-    assert study.noises == [prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]]
-    half = run_log.cut(slice(len(run_log) // 2, None))
-    study = tune_on_logs([run_log], "gyro_free", parameters=["jerk"], settle_s=0.3)
-    error = half["reference_rad_s"] - replay_prepared(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
-    stretches = np.array_split(error[half.scored(0.3)], len(study.level.given_rms))
-    np.testing.assert_allclose(study.level.given_rms, [np.sqrt(np.mean(s**2)) for s in stretches], rtol=1e-9)
-
-
-@pytest.mark.slow
-def test_every_log_is_tuned_with_its_own_noise(run: Path) -> None:
-    run_log = read_log(run)
-    plain = read_log(run / "trajectory.parquet", ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
-    settings = {"settle_s": 0.2, "parameters": ["tau"], "ranges": {"tau": (0.01, 0.05)}}
-    run_noise, plain_noise = tune_on_logs([run_log, plain], "linear", **settings).noises
-    assert run_noise == prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]
-    assert plain_noise == noise_of(plain) != run_noise
-    for noise in tune_on_logs([run_log, plain], "linear", noises={"tilt": 0.7}, **settings).noises:
-        assert np.degrees(noise.tilt) == pytest.approx(0.7)
-
-
-def test_runs_with_other_parameters_are_not_tuned_together(run: Path) -> None:
-    run_log = read_log(run)
-    assert run_log.scenario is not None
-    scenario = dict(run_log.scenario, observer={**run_log.scenario["observer"], "k1": 21.0})
-    with pytest.raises(InputError, match="different parameters of homogeneous"):
-        tune_on_logs([run_log, dataclasses.replace(run_log, scenario=scenario)], "homogeneous", settle_s=0.2)
 
 
 @pytest.mark.parametrize("option", [{"units": {"tilt": "rad"}}, {"delay_s": 0.1}, {"delimiter": ";"}])
