@@ -140,13 +140,16 @@ class Log:
             counted[part.start + math.ceil(min(settle_s / self.dt, len(self)) - 1e-9) : part.stop] = True
         return counted
 
-    def broken(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return times [s] and values (n,), with a NaN between two parts: no line is drawn across a gap."""
-        time, drawn = [], []
-        for part in self.parts:
-            time += [self["time_s"][part], self["time_s"][part][-1:] + self.dt]
-            drawn += [values[part], np.array([np.nan])]
-        return np.concatenate(time[:-1]), np.concatenate(drawn[:-1])
+    def broken(self, values: np.ndarray) -> np.ndarray:
+        """Put a NaN between two parts of values, (n,): no line is drawn across a gap."""
+        first, *others = self.parts
+        pieces = [piece for part in others for piece in ([np.nan], values[part])]
+        return np.concatenate([values[first], *pieces]) if others else values[first]
+
+    def broken_time(self) -> np.ndarray:
+        """Return the times of `broken` values [s]."""
+        time = self.broken(self["time_s"])
+        return np.where(np.isnan(time), np.roll(time, 1) + self.dt, time)
 
     def cut(self, rows: slice) -> Log:
         """Return the log's part in a range of rows."""

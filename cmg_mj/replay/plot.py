@@ -24,6 +24,7 @@ from cmg_mj.visualization.plots.run_plot import (
     pyplot,
     save_figure,
 )
+from cmg_mj.visualization.plots.thinning import thinned
 
 if TYPE_CHECKING:
     from cmg_mj.visualization.plots.run_plot import Axes
@@ -69,9 +70,13 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
     panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
     span = liveliest_span(log)
+    time = log.broken_time()
+    detail = slice(*np.searchsorted(time, span).tolist())
 
     def line(axes: Axes, values: np.ndarray, color: str, width: float, label: str = "") -> None:
-        axes.plot(*log.broken(values), color=color, linewidth=width, label=label or None)
+        rows = slice(None) if axes in panels[:-1] else detail
+        x, y = thinned(time[rows], log.broken(values)[rows])
+        axes.plot(x, y, color=color, linewidth=width, label=label or None)
 
     line(panels[0], np.degrees(log["y1_rad"]), MEASURED, 0.8, "measured")
     panels[0].set_ylabel("tilt [deg]")

@@ -46,11 +46,12 @@ def write_replay(path: Path, replays: Sequence[ReplayResult], names: Sequence[st
 def series(replayed: ReplayResult) -> Iterator[Series]:
     """Make all time series of one log, one by one: angles in degrees, rates in rad/s."""
     log = replayed.log
+    time = log.broken_time()
 
     def row(
         path: str, name: str, values: np.ndarray, color: Colour, width: float = 1.5, whole: bool = True, by: str = ""
     ) -> Series:
-        return Series(path, name, *log.broken(values), color, width, whole, by)
+        return Series(path, name, time, log.broken(values), color, width, whole, by)
 
     yield row("tilt/measured", "measured", np.degrees(log["y1_rad"]), BASELINE_COLOURS["gyro"])
     if "reference" in log.has:

@@ -241,7 +241,7 @@ def read_table(path: Path, columns: Mapping[str, Column], options: ReadOptions) 
         ) from error
     if not table.num_rows:
         raise InputError(f"{path}: has no row")
-    values, dated = {}, False
+    values, dated, numbers = {}, False, None
     for role, column in columns.items():
         numbers = table[column.name.strip()]
         if role == "time" and pa.types.is_timestamp(numbers.type):
@@ -252,6 +252,8 @@ def read_table(path: Path, columns: Mapping[str, Column], options: ReadOptions) 
         floats = numbers.cast(pa.float64(), safe=False).to_numpy()
         with np.errstate(over="ignore", invalid="ignore"):
             values[role] = np.where(np.isfinite(floats), floats, np.nan) * column.factor + column.offset
+    del table, numbers
+    pa.default_memory_pool().release_unused()  # of a long log, as much as all its signals
     return values, dated
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import rerun.blueprint as rrb
@@ -69,7 +69,9 @@ def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping
     with open_recording(path, title, application_name(names, branches), blueprint) as rec:
         for branch in branches:
             log_styles(rec, branch)
-            log_values(rec, branch)
+            for entity, row in branch.series.items():  # one by one: of a long log, all wait in memory
+                log_values(rec, replace(branch, series={entity: row}))
+                rec.flush()
         for name, text in texts.items():
             log_page(rec, name.lower(), text)
 
