@@ -327,7 +327,7 @@ class ZeroPhase:
 
     @property
     def remark(self) -> str:
-        """What the row is."""
+        """Description of the row."""
         best = "-" if self.best_rms_error_rad_s is None else f"{self.best_rms_error_rad_s:.4f}"
         return (
             f"{ZERO_PHASE} is no observer: it sees the future. It smooths the tilt to both sides of each sample, below "

@@ -1,4 +1,4 @@
-"""What `run`, `compare` and `list` print."""
+"""Tables and lists that `run`, `compare` and `list` print."""
 
 from __future__ import annotations
 
