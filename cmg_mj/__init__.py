@@ -35,11 +35,11 @@ if TYPE_CHECKING:
     from cmg_mj.plant.mounting import mount as mount
     from cmg_mj.plant.plant import Plant as Plant
     from cmg_mj.plant.plant import load_plant as load_plant
+    from cmg_mj.replay.log import Log as Log
+    from cmg_mj.replay.log import ReadOptions as ReadOptions
     from cmg_mj.replay.log_replay import ReplayResult as ReplayResult
     from cmg_mj.replay.log_replay import replay_log as replay_log
-    from cmg_mj.replay.logs import Log as Log
-    from cmg_mj.replay.logs import ReadOptions as ReadOptions
-    from cmg_mj.replay.logs import read_log as read_log
+    from cmg_mj.replay.reading import read_log as read_log
     from cmg_mj.results.metrics import MetricsSettings as MetricsSettings
     from cmg_mj.results.result import Outcome as Outcome
     from cmg_mj.results.result import Result as Result

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -33,9 +34,9 @@ from cmg_mj.errors import InputError
 from cmg_mj.results.summary_keys import finite
 
 if TYPE_CHECKING:
-    from cmg_mj.replay.logs import ReadOptions
+    from cmg_mj.replay.log import ReadOptions
 
-_LOG_OPTIONS = all_of(
+_OPTIONS = (
     click.option(
         "--columns",
         multiple=True,
@@ -53,14 +54,33 @@ _LOG_OPTIONS = all_of(
     click.option("--offset", multiple=True, metavar="ROLE=VALUE,...", help="Addends after the scale, in column units."),
     click.option(
         "--rate",
-        type=float,
+        "rate_hz",
+        type=click.FloatRange(0.1, 1e6),
         metavar="HZ",
         help="Rate of the rows of a log without times; otherwise the rate to resample to.",
     ),
-    click.option("--max-gap", type=float, metavar="SECONDS", help="Divide the log at longer gaps.  [default: 5 rows]"),
-    click.option("--delay", type=float, default=0.0, metavar="SECONDS", help="Lag of the reference behind the tilt."),
-    click.option("--radii", metavar="INNER,OUTER", help="Distances of two accelerometers from the pivot [m]."),
-    click.option("--time-range", metavar="START:END", help="Read only this part, in seconds from the first row on."),
+    click.option(
+        "--max-gap",
+        "max_gap_s",
+        type=click.FloatRange(0.0),
+        metavar="SECONDS",
+        help="Divide the log at longer gaps.  [default: 5 rows]",
+    ),
+    click.option(
+        "--delay", "delay_s", type=float, default=0.0, metavar="SECONDS", help="Lag of the reference behind the tilt."
+    ),
+    click.option(
+        "--radii", "radii_m", metavar="INNER,OUTER", help="Distances of two accelerometers from the pivot [m]."
+    ),
+    click.option(
+        "--time-range",
+        "time_range_s",
+        metavar="START:END",
+        help="Read only this part, in seconds from the first row on.",
+    ),
+    click.option("--delimiter", default=",", show_default=True, help="Character between the cells of a CSV."),
+    click.option("--encoding", default="utf-8", show_default=True, help="Encoding of a CSV, such as latin-1."),
+    click.option("--decimal", default=".", show_default=True, help="Decimal point in a CSV."),
 )
 
 
@@ -89,49 +109,29 @@ def log_options(command: Command) -> Command:
     """Add the options of every command that reads logs, which it takes as one `ReadOptions`."""
 
     @functools.wraps(command)
-    def with_options(
-        columns: tuple[str, ...],
-        units: tuple[str, ...],
-        scale: tuple[str, ...],
-        offset: tuple[str, ...],
-        rate: float | None,
-        max_gap: float | None,
-        delay: float,
-        radii: str | None,
-        time_range: str | None,
-        **others: Any,
-    ) -> None:
-        from cmg_mj.replay.logs import ReadOptions
-        from cmg_mj.replay.logs.columns import assignments
+    def with_options(**given: Any) -> None:
+        from cmg_mj.replay.log import ReadOptions
+        from cmg_mj.replay.table import assignments
 
-        if rate is not None and not 0.1 <= rate <= 1e6:
-            raise InputError(f"--rate {rate:g}: must be from 0.1 to 1e6 Hz")
-        if max_gap is not None and not 0.0 <= max_gap < math.inf:
-            raise InputError(f"--max-gap {max_gap:g}: must be a number of seconds not below 0")
-        options = ReadOptions(
-            columns=assignments(columns, "--columns"),
-            units=assignments(units, "--units"),
-            scale=_numbers(assignments(scale, "--scale"), "--scale"),
-            offset=_numbers(assignments(offset, "--offset"), "--offset"),
-            rate_hz=rate,
-            max_gap_s=max_gap,
-            delay_s=delay,
-            radii_m=None if radii is None else _pair(radii, ",", "--radii", "INNER,OUTER, such as 0.05,0.15"),
-            time_range_s=None if time_range is None else span(time_range, "--time-range"),
-        )
-        command(options=options, **others)
+        options = {field.name: given.pop(field.name) for field in fields(ReadOptions) if field.name in given}
+        for name in ("columns", "units", "scale", "offset"):
+            options[name] = assignments(options[name], f"--{name}")
+        for name in ("scale", "offset"):
+            options[name] = {role: _number(text, f"--{name} {role}") for role, text in options[name].items()}
+        if options["radii_m"] is not None:
+            options["radii_m"] = _pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
+        if options["time_range_s"] is not None:
+            options["time_range_s"] = span(options["time_range_s"], "--time-range")
+        command(options=ReadOptions(**options), **given)
 
-    return _LOG_OPTIONS(with_options)
+    return all_of(*_OPTIONS)(with_options)
 
 
-def _numbers(texts: dict[str, str], option: str) -> dict[str, float]:
-    values = {}
-    for role, text in texts.items():
-        try:
-            values[role] = float(text)
-        except ValueError:
-            raise InputError(f"{option} {role}={text}: must be a number") from None
-    return values
+def _number(text: str, option: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{option}={text}: must be a number") from None
 
 
 def _pair(text: str, separator: str, option: str, example: str) -> tuple[float, float]:
@@ -195,12 +195,10 @@ def replay(
     Observers that need a model take part only with --model. A run's recording replays to the figures of the run.
     docs/replay.md has the details.
     """  # noqa: D301  (click wants the character itself)
-    from dataclasses import replace
-
     from cmg_mj.replay import report
-    from cmg_mj.replay.log_replays import LogReplays
+    from cmg_mj.replay.noise import noise_numbers
     from cmg_mj.replay.parameter_options import parameters_of
-    from cmg_mj.replay.user_noise import noise_numbers
+    from cmg_mj.replay.save import LogReplays
 
     options = replace(options, windows_s=tuple(span(text, "--window") for text in windows))
     replays = LogReplays(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)

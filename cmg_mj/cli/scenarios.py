@@ -87,7 +87,7 @@ def run(
 
     A rerun needs the same --driver board and --world, if they were given.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.results import terminal_tables as tables
+    from cmg_mj.results import reports as tables
     from cmg_mj.simulation.experiment import prepare
     from cmg_mj.simulation.simulate import SimulationOptions
     from cmg_mj.studies import save as runs
@@ -108,7 +108,6 @@ def run(
             options: SimulationOptions = (
                 {"on_progress": on_progress} if live_view is None else live_view.options(on_progress)
             )
-            options["spool"] = folder.part
             if board is None:
                 result = experiment.run(driver=driver, world=world, **options)
             else:
@@ -160,7 +159,7 @@ def compare(
       scenario.toml   reruns the comparison: cmg-mj compare FOLDER/scenario.toml
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.core.types import law_needs
-    from cmg_mj.results import terminal_tables as report
+    from cmg_mj.results import reports as report
     from cmg_mj.scenario.differences import describe_differences
     from cmg_mj.scenario.schema import CompareSettings
     from cmg_mj.studies import save as runs
@@ -219,7 +218,7 @@ def list_names(what: str | None) -> None:
     """
     from cmg_mj.controllers.laws import LAW_CLASSES
     from cmg_mj.observers import OBSERVER_CLASSES
-    from cmg_mj.results import terminal_tables as report
+    from cmg_mj.results import reports as report
 
     lists = {
         "scenarios": report.scenario_list,

@@ -34,7 +34,7 @@ from cmg_mj.cli.terminal import (
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.replay.logs import ReadOptions
+    from cmg_mj.replay.log import ReadOptions
 
 parameter_options = all_of(
     click.option(
@@ -171,11 +171,10 @@ def tune_log(
     parameters count as better by more than 1 % and beyond chance. Sixteen short worlds compare both in a closed loop.
     Logs are read as in replay. Writes a folder with tuned.json.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.replay.logs import read_log
-    from cmg_mj.replay.logs.checks import check_distinct_logs
+    from cmg_mj.replay.inputs import model_of
+    from cmg_mj.replay.noise import noise_numbers
     from cmg_mj.replay.parameter_options import parameters_of
-    from cmg_mj.replay.user_noise import noise_numbers
-    from cmg_mj.replay.user_pendulum import model_of
+    from cmg_mj.replay.reading import check_distinct_logs, read_log
     from cmg_mj.scenario.differences import safe_name
     from cmg_mj.studies.save import file_name
     from cmg_mj.studies.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs

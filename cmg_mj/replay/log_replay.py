@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
-from pathlib import Path
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,21 +16,14 @@ from cmg_mj.errors import InputError, raised
 from cmg_mj.inputs.users_line import in_users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.replay.alignment import Alignment
-from cmg_mj.replay.logs import Log
-from cmg_mj.replay.logs.log import REFERENCE
-from cmg_mj.replay.model_check import model_misfit
-from cmg_mj.replay.open_loop import replay_stretches
+from cmg_mj.replay.log import REFERENCE, Log
+from cmg_mj.replay.noise import noise_of
+from cmg_mj.replay.open_loop import replay_all
 from cmg_mj.replay.parameter_options import Parameters
-from cmg_mj.replay.reference import alignment_of
-from cmg_mj.replay.scores import Figures, noise_gain, scores
-from cmg_mj.replay.user_noise import noise_of
-from cmg_mj.replay.zero_phase import ZeroPhase, zero_phase
+from cmg_mj.replay.reference import Alignment, alignment_of, model_misfit
+from cmg_mj.replay.scores import Figures, ZeroPhase, noise_gain, scores, zero_phase
 from cmg_mj.results.baselines import ZERO
-from cmg_mj.results.frames import NamedColumns
-from cmg_mj.results.memory import release_free_memory
-from cmg_mj.results.stored_columns import LONG, ColumnStore, StoredColumns, shelved, stored
-from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
+from cmg_mj.results.trajectory import ESTIMATES, Layout, NamedColumns, Trajectory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,13 +76,11 @@ class ReplayResult(NamedColumns):
     @cached_property
     def trajectory(self) -> Trajectory:
         """The log's signals and all estimates, evenly sampled, in SI units and radians."""
-        known = [name for name in self.log.columns if np.isfinite(self.log[name]).any()]
-        columns = stored(self.log.columns).renamed({name: name for name in known})
+        columns = {name: values for name, values in self.log.columns.items() if np.isfinite(values).any()}
         for kind, signals in self.estimates.items():
-            columns = columns.joined(stored(signals).renamed({f"estimate/{kind}/{name}": name for name in signals}))
-        names = tuple(self.estimates)
-        extra = tuple(tuple(name for name in self.estimates[kind] if name not in ESTIMATES) for kind in names)
-        return Trajectory(columns if len(self.log) > LONG else dict(columns), {}, Layout(names, extra, ()))
+            columns |= {f"estimate/{kind}/{name}": values for name, values in signals.items()}
+        extra = tuple(tuple(name for name in signals if name not in ESTIMATES) for signals in self.estimates.values())
+        return Trajectory(columns, {}, Layout(tuple(self.estimates), extra, ()))
 
     def _columns(self) -> Mapping[str, np.ndarray]:
         return self.trajectory.columns
@@ -153,11 +141,10 @@ def replay_log(
             continue
         estimates[name] = signals
         disturbed = _estimates(observer, noisy)
-        gain = None if isinstance(disturbed, str) else noise_gain(disturbed, signals, noise.tilt, scored)
-        del disturbed
-        summaries[name] = {**scores(log, signals["x2_rad_s"], scored), "noise_gain_1_s": gain}
+        rate = signals["x2_rad_s"]
+        gain = None if isinstance(disturbed, str) else noise_gain(disturbed["x2_rad_s"], rate, noise.tilt, scored)
+        summaries[name] = {**scores(log, rate, scored), "noise_gain_1_s": gain}
     zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
-    release_free_memory()  # of the observers, before the smoother takes as much
     return ReplayResult(
         log,
         estimates,
@@ -212,17 +199,14 @@ def _ready(
         lacks = [need for need in needs(cls) if need not in available]
         if lacks:
             OBSERVER_CLASSES.check_names(name, parameters.get(name, {}))
-            assumed = "" if hasattr(cls, "needs") else ", as a class does that does not say what it needs (needs = ())"
-            left_out[name] = "needs " + " and ".join(NEEDS_IN_WORDS[need] for need in lacks) + assumed
+            left_out[name] = "needs " + " and ".join(NEEDS_IN_WORDS[need] for need in lacks)
             continue
         try:
-            observer = make_observer(name, log.dt, model or NO_MODEL, noise, **parameters.get(name, {}))
+            ready[name] = make_observer(name, log.dt, model or NO_MODEL, noise, **parameters.get(name, {}))
         except InputError as error:
             if name in parameters:
                 raise
             left_out[name] = f"refused: {error}"
-            continue
-        ready[name] = observer
     if not ready:
         reasons = "; ".join(f"{name} {reason}" for name, reason in left_out.items())
         raise InputError(f"{log.name}: no observer can take part: {reasons}")
@@ -230,67 +214,29 @@ def _ready(
 
 
 def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
-    """Return the observer's estimates, part by part; or how it failed."""
-    names = (*ESTIMATES, *extra_signals(observer))
-    store = ColumnStore(len(names), Path(tempfile.gettempdir()) if len(log) > LONG else None)
+    """Return the observer's estimates, part by part, NaN outside; or how it failed."""
+    estimates = {name: np.full(len(log), np.nan) for name in (*ESTIMATES, *extra_signals(observer))}
     for part in log.parts:
-        _fill(store, part.start - len(store))
-        pieces = replay_stretches(observer, log.trajectory(part))
-        while True:
-            try:
-                with np.errstate(all="ignore"):
-                    piece = next(pieces, None)
-            except KeyboardInterrupt:
-                raise
-            except BaseException as error:  # a user's observer may fail in any way
-                return f"raised {raised(error)}{in_users_line(error)}"
-            if piece is None:
-                break
-            if message := _not_finite(piece, log, len(store)):
-                return message
-            store.append([values[:, None] for values in piece.values()])
-    _fill(store, len(log) - len(store))
-    columns = StoredColumns({name: partial(_column, store, i) for i, name in enumerate(names)}, 0, len(log))
-    return columns if len(log) > LONG else dict(columns)
-
-
-def _column(store: ColumnStore, column: int, start: int, end: int) -> np.ndarray:
-    return store.read(column, start, end)[:, 0]
-
-
-def _fill(store: ColumnStore, n_rows: int) -> None:
-    """Add rows between two parts, which no observer estimates."""
-    if n_rows > 0:
-        store.append([np.full((n_rows, 1), np.nan)] * store.n_columns)
-
-
-def _not_finite(piece: Mapping[str, np.ndarray], log: Log, first: int) -> str:
-    """Say from when on an estimate is not finite, if one is not; the piece begins at a row of the log."""
-    for name, values in piece.items():
-        if not np.isfinite(values).all():
-            time = log["time_s"][first + int(np.argmin(np.isfinite(values)))]
-            return f"{name} is not finite from {time:.6g} s on"
-    return ""
+        try:
+            with np.errstate(all="ignore"):
+                signals = replay_all(observer, log.trajectory(part))
+        except Exception as error:  # a user's observer may fail in any way
+            return f"raised {raised(error)}{in_users_line(error)}"
+        for name, values in signals.items():
+            if not np.isfinite(values).all():
+                time = log["time_s"][part][int(np.argmin(np.isfinite(values)))]
+                return f"{name} is not finite from {time:.6g} s on"
+            estimates[name][part] = values
+    return estimates
 
 
 def _with_noise(log: Log, noise: TiltNoise) -> Log:
     """Add noise to the tilt, and to the angular acceleration if there is one, with the given correlation."""
-    random, n = np.random.default_rng(SEED), len(log)
-    first, other = shelved(random.standard_normal(n)), shelved(random.standard_normal(n))
-    known = stored(log.columns)
-
-    def tilt(start: int, end: int) -> np.ndarray:
-        return known.read("y1_rad", slice(start, end)) + noise.tilt * first(start, end)
-
-    def acceleration(start: int, end: int) -> np.ndarray:
-        second = noise.correlation * first(start, end) + math.sqrt(1.0 - noise.correlation**2) * other(start, end)
-        return known.read("acceleration_rad_s2", slice(start, end)) + noise.acceleration * second
-
-    noisy = StoredColumns({"y1_rad": tilt, "acceleration_rad_s2": acceleration}, 0, n)
-    return dataclasses.replace(log, columns=known.joined(noisy))
-
-
-def describe_log(log: Log) -> str:
-    """Describe a log in one line."""
-    parts = "" if len(log.parts) == 1 else f" in {len(log.parts)} parts"
-    return f"{log.name}: {len(log):,} samples at {1.0 / log.dt:.6g} Hz, {log.duration_s:.6g} s{parts}"
+    random = np.random.default_rng(SEED)
+    first, other = random.standard_normal(len(log)), random.standard_normal(len(log))
+    second = noise.correlation * first + math.sqrt(1.0 - noise.correlation**2) * other
+    noisy = {
+        "y1_rad": log["y1_rad"] + noise.tilt * first,
+        "acceleration_rad_s2": log["acceleration_rad_s2"] + noise.acceleration * second,
+    }
+    return replace(log, columns={**log.columns, **noisy})

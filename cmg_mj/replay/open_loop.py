@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -32,35 +33,32 @@ def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
 
 def replay_all(observer: Observer, trajectory: Trajectory) -> dict[str, np.ndarray]:
     """Replay as `replay` does; return x and the observer's other estimates (zero at the first row) by name."""
-    pieces = list(replay_stretches(observer, trajectory))
-    return {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
-
-
-def replay_stretches(observer: Observer, trajectory: Trajectory) -> Iterator[dict[str, np.ndarray]]:
-    """Replay as `replay_all` does, a stretch after the other; the observer goes on where the last one ended."""
     names = (*ESTIMATES, *extra_signals(observer))
-    state, held = None, None
-    for part in trajectory.stretches():
-        stretch = trajectory.rows(part)
-        y1, y2, u = (_rows(stretch[name]) for name in ("y1_rad", "y2_rad", "u_rad_s"))
-        measured = stretch.columns.get("acceleration_rad_s2")
-        acceleration = _rows(np.full_like(stretch["y1_rad"], np.nan) if measured is None else measured)
-        rows: list[Sequence[Scalar]] = []
-        for k in range(len(y1)):
-            measurement = Measurement(y1[k], y2[k], acceleration[k])
-            if held is None:
-                zero = 0.0 * y1[k]
-                state = observer.init(measurement)
-                rows.append((y1[k], zero, y2[k], *[zero] * (len(names) - len(ESTIMATES))))
-            else:
-                state, estimate = observer.step(state, measurement, held)
-                rows.append(estimate)
-            held = u[k]
-        shape = stretch["y1_rad"].shape
-        columns = zip(*(row[: len(names)] for row in rows), strict=True)
-        yield {name: np.array(column, dtype=float).reshape(shape) for name, column in zip(names, columns, strict=True)}
+    rows = _steps(observer, trajectory, len(names))
+    shape = trajectory["y1_rad"].shape
+    if len(shape) == 1:  # no list: of a long log, floats of Python take much memory
+        columns = np.fromiter(chain.from_iterable(rows), dtype=float).reshape(-1, len(names)).T.copy()
+    else:
+        columns = zip(*rows, strict=True)
+    return {name: np.array(column, dtype=float).reshape(shape) for name, column in zip(names, columns, strict=True)}
 
 
-def _rows(values: np.ndarray) -> Sequence[Scalar] | np.ndarray:
+def _steps(observer: Observer, trajectory: Trajectory, n_names: int) -> Iterator[Sequence[Scalar]]:
+    """Yield the estimates row by row."""
+    y1, y2, held = (_rows(trajectory[name]) for name in ("y1_rad", "y2_rad", "u_rad_s"))
+    measured = trajectory.columns.get("acceleration_rad_s2")
+    acceleration = _rows(np.full_like(trajectory["y1_rad"], np.nan) if measured is None else measured)
+    measurements = map(Measurement, y1, y2, acceleration)
+    first = next(measurements)
+    state = observer.init(first)
+    zero = 0.0 * first.y1
+    yield (first.y1, zero, first.y2, *[zero] * (n_names - len(ESTIMATES)))
+    for measurement, u in zip(measurements, held, strict=False):
+        state, estimate = observer.step(state, measurement, u)
+        yield estimate[:n_names]
+
+
+def _rows(values: np.ndarray) -> Iterator[Scalar]:
     """Return ticks as the observers take them: floats (one world) or arrays (n_worlds,)."""
-    return values.tolist() if values.ndim == 1 else np.ascontiguousarray(values)
+    contiguous = np.ascontiguousarray(values, dtype=float)
+    return iter(contiguous.data if values.ndim == 1 else contiguous)

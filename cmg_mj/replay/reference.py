@@ -1,19 +1,22 @@
-"""Remarks on a log and its reference, in replays and in tuning."""
+"""The reference beside the tilt: its lag, scale and offset, and whether a model can be that of the log."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.replay.alignment import Alignment, alignment
-from cmg_mj.replay.logs import Log
-from cmg_mj.replay.logs.log import REFERENCE
-from cmg_mj.replay.logs.units import in_si
-from cmg_mj.replay.logs.white_noise import WhiteNoise
-from cmg_mj.replay.user_noise import noise_in
+from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.replay.log import REFERENCE, Log, WhiteNoise
+from cmg_mj.replay.noise import noise_in
+from cmg_mj.replay.scores import STRETCHES, Piece, jackknife_stretches, lag_with_error
+from cmg_mj.replay.table import UNITS
 
+SPAN_S = 0.2
+"""Time over which increments of the tilt and of the integrated reference are compared [s]; slopes are mostly noise."""
 OFF = 0.005
 """Deviation of the reference's scale from 1, or its offset by its RMS, from which it matters, if it is significant."""
 NEAR = 0.05
@@ -27,27 +30,162 @@ NOISE = 1.2
 """Ratio up to which the rest of the tilt is its white noise."""
 LATE = 0.1
 """Lag from which it is reported, in periods of the log's rows or its samples, the longer of the two."""
-NOTHING = 0.001
-"""An offset that with its interval is below this share of the reference's RMS is not mentioned."""
-MOST_DECIMALS = 6
-"""Most decimals of an interval; a narrower one is not mentioned."""
 FINE = 0.01
 """Step in which a delay is offered, at most, in the same periods."""
-ALIKE = 0.5
-"""Correlation below which tilt and reference are unrelated."""
 AGREES = 0.95
 """Correlation at the best lag, of either sign, from which a cure is offered. If the tilt freezes half-way, neither lag
 nor scale is meaningful."""
-UNIT_NEAR = 1.1
-"""A scale within this factor of a degree, or of its inverse, is probably a unit."""
+RATE_SPAN_S = 0.04
+"""Time over which increments of the tilt give the rate in the model's damping term [s]."""
+WIDTH_S = 0.25
+"""Length of a stretch for the tilt's second derivative [s], of at least `FEWEST_SAMPLES` samples."""
+FEWEST_SAMPLES = 12
+FEWEST = 20
+"""Fewest stretches for a comparison."""
+MISFIT = 1.5
+"""Misfit from which a model is doubted. Right models have at most 1.15: docs/studies/model_misfit.py."""
 
 
-class _Judgement(NamedTuple):
-    """Judgement on a reference."""
+class Alignment(NamedTuple):
+    """Lag, scale and offset of a reference relative to the measured tilt; None where they cannot be found."""
 
-    remark: str
-    fault: str | None
-    """Why errors against the reference are not the estimates' own, in a clause; None if it agrees with the tilt."""
+    lag_s: float | None
+    """Lag of the reference behind the tilt, as it was read [s]."""
+    scale: float | None
+    """Factor of the reference that fits the tilt's increments."""
+    offset_rad_s: float | None
+    """Addend after the scale [rad/s]."""
+    correlation: float | None
+    """Correlation of the increments, near -1 for a reference of the other sign."""
+    lag_error_s: float | None = None
+    """Standard error of the lag [s]; these errors are jackknives over `STRETCHES` of the log."""
+    scale_error: float | None = None
+    """Standard error of the scale."""
+    offset_error_rad_s: float | None = None
+    """Standard error of the offset [rad/s]."""
+    residual_rad: float | None = None
+    """RMS of the tilt's increments less those of the fit [rad]."""
+
+
+def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: float) -> Alignment:
+    """Compare the tilt's increments over `SPAN_S` with those of the integrated reference, at every sample.
+
+    The lag is where the two correlate most. The tilt's increments are then fitted by the reference's, shifted by it.
+
+    Args:
+        tilt: Pieces of the tilt, each (n,) [rad].
+        reference: Pieces of the rate, each (n,) [rad/s]; NaN where it is unknown.
+        dt: Sample period [s].
+
+    Returns:
+        The alignment.
+    """
+    span = max(2, round(SPAN_S / dt))
+    pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
+    rises = [y[span:] - y[:-span] for y, _ in pieces]
+    late = lag_with_error([_Travels(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
+    lag_s, lag_error = late or (None, None)
+    fit = _Fit.of(rises, [_Travels(rate, span, dt, lag_s or 0.0) for _, rate in pieces])
+    line = fit and fit.line(fit.sums.sum(axis=0))
+    if fit is None or line is None:
+        return Alignment(lag_s, None, None, None)
+    errors = fit.errors(span * dt)
+    return Alignment(lag_s, line.slope, line.start / (span * dt), line.correlation, lag_error, *errors)
+
+
+@dataclass(frozen=True)
+class _Travels:
+    """Increments of the integrated reference, shifted by its lag: see `_travelled`."""
+
+    rate: np.ndarray
+    span: int
+    dt: float
+    lag_s: float
+
+    def __len__(self) -> int:
+        return len(self.rate) - self.span
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        start, stop, _ = rows.indices(len(self))
+        margin = math.ceil(abs(self.lag_s) / self.dt) + 2
+        first = max(0, start - margin)
+        rate = self.rate[first : stop + self.span + margin]
+        return _travelled(rate, self.span, self.dt, self.lag_s)[start - first : stop - first]
+
+
+class _Line(NamedTuple):
+    """A fitted line, rise = start + slope travel."""
+
+    slope: float
+    start: float
+    correlation: float
+    residual: float
+    """RMS of the rises less the line."""
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Sums over the stretches of a log, from which lines are fitted.
+
+    Attributes:
+        middle: Numbers that are subtracted from 1, travel and rise: sums of numbers near zero lose nothing, (3,).
+        sums: Products of these, (`STRETCHES`, 3, 3).
+    """
+
+    middle: np.ndarray
+    sums: np.ndarray
+
+    @classmethod
+    def of(cls, rises: Sequence[Piece], travels: Sequence[Piece]) -> _Fit | None:
+        """Sum the known pairs; None if there are none."""
+        sums, middle = np.zeros((STRETCHES, 3, 3)), None
+        for number, piece, rows in jackknife_stretches([len(rise) for rise in rises], 0):
+            pairs = np.stack([np.ones(rows.stop - rows.start), travels[piece][rows], rises[piece][rows]])
+            pairs = pairs[:, np.isfinite(pairs[1])]
+            if not pairs.shape[1]:
+                continue
+            if middle is None:
+                middle = np.array([0.0, *pairs[1:].mean(axis=1)])
+            pairs -= middle[:, None]
+            sums[number] += pairs @ pairs.T
+        return None if middle is None else cls(middle, sums)
+
+    def line(self, sums: np.ndarray) -> _Line | None:
+        """Fit a line to some sums, (3, 3); None if there is too little motion."""
+        n = sums[0, 0]
+        if n < 3:
+            return None
+        means = sums[0, 1:] / n
+        (xx, xy), (_, yy) = sums[1:, 1:] - n * np.outer(means, means)
+        rounding = n * (n * np.finfo(float).eps * (means + self.middle[1:])) ** 2
+        if not xx > rounding[0] or not yy > rounding[1]:
+            return None
+        slope = xy / xx
+        start = (means[1] + self.middle[2]) - slope * (means[0] + self.middle[1])
+        residual = math.sqrt(max(0.0, yy - slope * xy) / n)
+        return _Line(float(slope), float(start), float(xy / math.sqrt(xx * yy)), residual)
+
+    def errors(self, span_s: float) -> tuple[float | None, float | None, float | None]:
+        """Return standard errors of the slope and of the start by the span [rad/s], and the RMS of the residual."""
+        whole = self.sums.sum(axis=0)
+        line = self.line(whole)
+        others = [self.line(whole - sums) for sums in self.sums if sums[0, 0]]
+        known = [(other.slope, other.start / span_s) for other in others if other]
+        if line is None or len(known) < max(2, len(others)):
+            return None, None, line and line.residual
+        slope, start = np.sqrt((len(known) - 1) * np.var(known, axis=0)).tolist()
+        return slope, start, line.residual
+
+
+def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float) -> np.ndarray:
+    """Integrate a rate, shifted by its lag, over each span of samples; NaN where it is unknown, (n - span,)."""
+    clock = np.arange(len(rate)) * dt
+    steps = (rate[1:] + rate[:-1]) * dt / 2.0
+    unknown = np.concatenate([[0], np.cumsum(np.isnan(steps))])
+    travelled = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
+    when = clock + lag_s
+    travelled, unknown = (np.interp(when, clock, sums, left=np.nan, right=np.nan) for sums in (travelled, unknown))
+    return np.where(unknown[span:] == unknown[:-span], travelled[span:] - travelled[:-span], np.nan)
 
 
 def alignment_of(log: Log) -> Alignment | None:
@@ -58,110 +196,55 @@ def alignment_of(log: Log) -> Alignment | None:
     return alignment(tilts, references, log.dt)
 
 
-def remarks_on(log: Log, aligned: Alignment | None) -> list[str]:
-    """Describe the changes to a log, and its reference.
-
-    Args:
-        log: The log.
-        aligned: Alignment from `alignment_of`.
-
-    Returns:
-        Sentences.
-    """
-    lines = [f"{note[:1].upper()}{note[1:]}{'' if note.endswith('?') else '.'}" for note in log.notes]
-    return lines if aligned is None else [*lines, _judgement(log, aligned).remark]
-
-
-def reference_fault(log: Log, aligned: Alignment | None) -> str | None:
-    """Say in a clause why errors against a log's reference are not the estimates' own; None if nothing is known of it.
+def judge(log: Log, aligned: Alignment) -> str:
+    """Describe the reference's lag, scale and offset, with options that correct those that matter.
 
     Args:
         log: The log.
         aligned: Alignment from `alignment_of`.
     """
-    return None if aligned is None else _judgement(log, aligned).fault
-
-
-def _judgement(log: Log, aligned: Alignment) -> _Judgement:
-    """Describe the reference's lag, scale and offset, with options that correct those that matter."""
     lag, scale, offset, correlation = aligned[:4]
     if scale is None or offset is None or correlation is None:
-        remark = "The reference cannot be compared with the tilt: too little motion, or too short."
-        return _Judgement(remark, "the reference cannot be compared with the tilt")
-    lag_error, scale_error, offset_error = (
-        math.inf if error is None else CLEAR * error
-        for error in (aligned.lag_error_s, aligned.scale_error, aligned.offset_error_rad_s)
-    )
-    noisy = _is_noise(log, aligned.residual_rad)
-    if correlation <= -AGREES or (noisy and scale < -scale_error):
-        scale_now = log.options.scale.get("rate", 1.0)
-        remark = (
-            f"The reference does not go with the tilt (correlation {correlation:.2f}): it counts the other way: "
-            f"--scale rate={-scale_now:g}."
-        )
-        return _Judgement(remark, "the reference counts the other way than the tilt")
-    goes_along = noisy and scale > scale_error
-    if abs(correlation) < ALIKE and noisy and not goes_along:
-        remark = "The reference cannot be compared with the tilt, whose noise hides its motion."
-        return _Judgement(remark, "the tilt's noise hides its motion")
-    if abs(correlation) < ALIKE and not goes_along:
-        remark = (
-            f"The reference does not go with the tilt (correlation {correlation:.2f}): is it the rate of this tilt?"
-        )
-        remark += _accelerometer_question(log)
-        return _Judgement(remark, "the reference does not go with the tilt")
+        return "The reference cannot be compared with the tilt: too little motion, or too short."
+    errors = (aligned.lag_error_s, aligned.scale_error, aligned.offset_error_rad_s)
+    lag_error, scale_error, offset_error = (math.inf if error is None else CLEAR * error for error in errors)
+    noisy, options = _is_noise(log, aligned.residual_rad), log.options
+    scale_set, offset_set = options.scale.get("rate", 1.0), options.offset.get("rate", 0.0)
     period = max(log.dt, log.row_period_s or 0.0)
-    late = None if lag is None or abs(lag) <= max(LATE * period, lag_error) else lag
-    resized = abs(scale - 1.0) > max(OFF, scale_error)
-    known = log[REFERENCE][np.isfinite(log[REFERENCE])]
-    motion = math.sqrt(float(np.mean(known**2)))
-    shifted = abs(offset) > max(OFF * motion, offset_error)
+    motion = math.sqrt(float(np.nanmean(log[REFERENCE] ** 2)))
     near = lag is not None and abs(lag) <= LATE * period and abs(scale - 1.0) <= NEAR and abs(offset) <= NEAR * motion
-    if correlation < AGREES and not goes_along and not near:
-        remark = (
-            f"Tilt and reference hardly agree (correlation {correlation:.2f} at the best lag; below {AGREES:g} neither "
-            "delay nor scale is offered): look at the log, whether one of them stands still, leaps or is noise."
-        )
-        remark += _accelerometer_question(log)
-        if correlation < 0.0:
-            turned = -log.options.scale.get("rate", 1.0)
-            remark += f" The correlation is negative: does one of them count the other way (--scale rate={turned:g})?"
-        return _Judgement(remark, "tilt and reference hardly agree")
-    fit = _fit_text(scale, SURE / CLEAR * scale_error, offset, SURE / CLEAR * offset_error, motion)
-    if late is None and not resized and not shifted:
-        roughly = " as far as can be told" if SURE / CLEAR * scale_error > NEAR else ""
-        remark = f"Tilt and reference agree{roughly}: {fit.replace('it', 'the reference', 1)} fits."
-        return _Judgement(remark, None)
+    not_alike = f"The reference does not go with the tilt (correlation {correlation:.2f})"
+    if correlation <= -AGREES or (noisy and scale < -scale_error):
+        return f"{not_alike}: it counts the other way: --scale rate={-scale_set:g}."
+    if correlation < AGREES and not (noisy and scale > scale_error) and not near:
+        return f"{not_alike}: is it the rate of this tilt, and do both move and not leap? No delay or scale is offered."
+    late = lag is not None and abs(lag) > max(LATE * period, lag_error)
+    resized = abs(scale - 1.0) > max(OFF, scale_error)
+    shifted = abs(offset) > max(OFF * motion, offset_error)
+    share = SURE / CLEAR
+    fits = f"{_with_interval(scale, share * scale_error)} times the reference plus "
+    fits += f"{_with_interval(offset, share * offset_error)} rad/s fits"
+    if not (late or resized or shifted):
+        return f"Tilt and reference agree: {fits}."
     decimals = max(0, math.ceil(-math.log10(FINE * period)))
-    milliseconds = "" if late is None else f"{abs(late) * 1e3:.{max(2, decimals - 3)}f} ms"
-    behind = "" if late is None else f"comes {milliseconds} {'behind' if late > 0.0 else 'before'}; "
-    fit = f"the reference {behind}{fit}" if behind else fit.replace("it", "the reference", 1)
-    cures = [] if late is None else [f"--delay {round(log.options.delay_s + late, decimals) + 0.0:.{decimals}f}"]
+    comes, cures = "", []
+    if late and lag is not None:
+        where = "behind" if lag > 0.0 else "before"
+        comes = f"the reference comes {abs(lag) * 1e3:.{max(2, decimals - 3)}f} ms {where}; "
+        cures.append(f"--delay {options.delay_s + lag:.{decimals}f}")
     factor = scale if resized else 1.0
-    cures += [f"--scale rate={factor * log.options.scale.get('rate', 1.0):.4g}"] if resized else []
-    offset_before = log.options.offset.get("rate", 0.0)
-    unit_size = in_si("rate", log.options.units.get("rate", "rad_s"))
-    total = factor * offset_before + (offset / unit_size if shifted else 0.0)
-    cures += [f"--offset rate={total:.3g}"] if shifted or (resized and offset_before) else []
-    corrected = log.options.delay_s or "rate" in log.options.scale or "rate" in log.options.offset
-    instead = ", instead of what is set" if corrected else ""
-    cure = f" (to take it out{instead}: {' '.join(cures)})"
-    remark = f"Beside the tilt {fit} fits{cure}" + (_unit_question(log, scale) or ".")
-    size = "another scale or offset than" if resized or shifted else ""
-    if late is None:
-        return _Judgement(remark, f"the reference has {size} the tilt's rate")
-    comes = f"the reference comes {'behind' if late > 0.0 else 'before'} the tilt"
-    return _Judgement(remark, f"{comes}, with {size} its rate" if size else comes)
+    if resized:
+        cures.append(f"--scale rate={factor * scale_set:.4g}")
+    if shifted or (resized and offset_set):
+        unit_size = UNITS["rate"][options.units.get("rate", "rad_s")]
+        cures.append(f"--offset rate={factor * offset_set + (offset / unit_size if shifted else 0.0):.3g}")
+    return f"Beside the tilt {comes}{fits} (to take it out: {' '.join(cures)})."
 
 
-def _accelerometer_question(log: Log) -> str:
-    """Name the motion of one accelerometer's place among the causes of a disagreement."""
-    if "ax" not in log.options.columns:
-        return ""
-    return (
-        " Or the accelerometer's own motion puts off the tilt, with both sensors faultless: look how far, in the line "
-        "on one accelerometer."
-    )
+def remarks_on(log: Log, aligned: Alignment | None) -> list[str]:
+    """Describe the changes to a log, and its reference, in sentences."""
+    lines = [f"{note[:1].upper()}{note[1:]}." for note in log.notes]
+    return lines if aligned is None else [*lines, judge(log, aligned)]
 
 
 def _is_noise(log: Log, residual: float | None) -> bool:
@@ -170,33 +253,62 @@ def _is_noise(log: Log, residual: float | None) -> bool:
     return residual is not None and isinstance(noise, WhiteNoise) and residual <= NOISE * math.sqrt(2.0) * noise.high
 
 
-def _fit_text(scale: float, scale_error: float, offset: float, offset_error: float, motion: float) -> str:
-    """Write a scale and an offset with their intervals, where there are any; no offset that is nothing beside a motion.
-
-    An interval has at least four decimals, and more for the first digit of its half width, up to `MOST_DECIMALS`; a
-    narrower one is left out.
-    """
-    size, sign = abs(offset), "plus" if offset >= 0.0 else "less"
-    times = f"{_with_interval(scale, scale_error)} times it"
-    if size + offset_error < NOTHING * motion:
-        return times
-    return f"{times} {sign} {_with_interval(size, offset_error)} rad/s"
-
-
 def _with_interval(value: float, error: float) -> str:
-    decimals = 4 if error == 0.0 or not math.isfinite(error) else max(4, math.ceil(-math.log10(error)))
-    known = math.isfinite(error) and error > 0.0 and decimals <= MOST_DECIMALS
-    if not known:
-        return f"{value:.4f}" if abs(value) >= 0.1 else f"{value:.4g}"
-    low, high = (round(end, decimals) + 0.0 for end in (value - error, value + error))  # no -0.0000
-    return f"{value:.{decimals}f} ({low:.{decimals}f} to {high:.{decimals}f})"
+    value, low, high = (round(number, 4) + 0.0 for number in (value, value - error, value + error))  # no -0.0000
+    return f"{value:.4f} ({low:.4f} to {high:.4f})" if math.isfinite(error) else f"{value:.4f}"
 
 
-def _unit_question(log: Log, scale: float) -> str | None:
-    """Ask for the unit if a reference's scale is that of degrees taken as radians, or the other way."""
-    units = log.options.units
-    for factor, rate, tilt in ((math.pi / 180.0, "deg/s", "rad"), (180.0 / math.pi, "rad/s", "deg")):
-        if 1.0 / UNIT_NEAR < scale / factor < UNIT_NEAR:
-            tilts = f", or the tilt {tilt}" if "tilt" in units and units["tilt"] != tilt else ""
-            return f": is it {rate}{tilts}?"
-    return None
+def model_misfit(log: Log, model: ReducedModel) -> float | None:
+    """Compare the model's tilt acceleration with the tilt's second derivative.
+
+    Both are weighted over stretches of a quarter of a second, by w = (1 - s^2)^4, which ends smoothly: with
+    b = sum(y w'') and a = sum(a w) no noisy samples are subtracted. With the spread s of a set of sums (median of the
+    deviations from the median, which neither an offset of the tilt nor pushes move), the misfit is
+    s(predicted - measured)/s(measured), by what it is for white noise of the tilt alone. A model that says nothing has
+    1, a right one less or, where all is noise, 1 too.
+
+    Args:
+        log: The log; without gimbals y2 and u are zero.
+        model: The pendulum.
+
+    Returns:
+        The misfit; None for too few stretches, or if nothing moves.
+    """
+    half = max(FEWEST_SAMPLES // 2, round(WIDTH_S / 2.0 / log.dt))
+    s = np.arange(-half, half + 1) / (half + 1.0)
+    weights = (1.0 - s**2) ** 4
+    second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * log.dt) ** 2
+    second = second - second.mean()
+    m = max(1, round(RATE_SPAN_S / 2.0 / log.dt))
+    differences, measured = [np.zeros(0)], [np.zeros(0)]
+    for part in log.parts:
+        tilt = log["y1_rad"][part]
+        rate = np.zeros(len(tilt))
+        rate[m:-m] = (tilt[2 * m :] - tilt[: -2 * m]) / (2 * m * log.dt)
+        predicted = model.tilt_acceleration(tilt, rate, log["y2_rad"][part], log["u_rad_s"][part])
+        if len(tilt) >= len(weights):
+            derived = np.convolve(tilt, second, mode="valid")[::half]
+            smoothed = np.convolve(np.broadcast_to(predicted, tilt.shape), weights, mode="valid")[::half]
+            differences.append(smoothed - derived)
+            measured.append(derived)
+    size = _spread(np.concatenate(measured))
+    if sum(map(len, measured)) < FEWEST or not size > 0.0:
+        return None
+    stiffness = model.gravity_torque / model.J1
+    of_noise = float(np.linalg.norm(stiffness * weights - second) / np.linalg.norm(second))
+    return _spread(np.concatenate(differences)) / size / of_noise
+
+
+def _spread(values: np.ndarray) -> float:
+    return float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
+
+
+def model_remark(misfit: float | None) -> str | None:
+    """Doubt a model, or say nothing."""
+    if misfit is None or not misfit > MISFIT:
+        return None
+    return (
+        f"Can the model be that of this log? The tilt acceleration that it predicts misses the tilt's own by "
+        f"{misfit:.3g} times as much as one of zero would (of right models at most 1.15): look at --model, the tilt's "
+        "unit, sign and zero, or for large torques that the model does not know."
+    )

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.elementwise import Scalar
 from cmg_mj.results.error_bounds import FLOORS
-from cmg_mj.results.fused_gyro import FusedGyro
 from cmg_mj.sensors.mems_gyro import MemsGyro
 
 ZERO = "zero"
@@ -19,6 +19,121 @@ RATES = (ZERO, *GYROS)
 """Baselines that give a rate at every tick."""
 REFERENCES = (*RATES, *FLOORS)
 """Names of all baselines, in the order of every table."""
+
+RATE_START = 0.02
+"""Standard deviation of the rate at the start, about zero: that of `gyro_free` [rad/s]."""
+LEAST_TILT_SIGMA = 1e-6
+"""A y1 without any noise counts with this one, as for the law `lqg` [rad]."""
+SETTLED = 1e-13
+"""Gains that change by less from tick to tick, relative, are taken to be constant."""
+
+
+class FusedGyro:
+    """x1' = g - b - n, b' = w, y1 = x1 + v at the samples, where g is the gyro's reading.
+
+    Between samples the rate runs straight. n is the gyro's white noise, v that of y1. The bias walks by w, whose Allan
+    deviation meets the gyro's bias instability at 3 s, where IEEE Std 952 reads the walk's coefficient: so b is off by
+    the bias instability after a second. Nothing is tuned. The estimate of the rate is g - b.
+
+    Like every observer it starts at rest at the measured tilt: the first reading is taken for the bias, so that no
+    offset matters. y1 tells how far that is off.
+
+    Args:
+        gyro_sigma: Standard deviation of a sample of the gyro [rad/s].
+        bias_instability: Floor of the gyro's Allan deviation [rad/s].
+        tilt_sigmas: Standard deviation of a sample of y1 in each world [rad].
+        dt: Sample period [s].
+        rate_start: Standard deviation of the rate at the start [rad/s].
+        bias: First estimate of the bias; None for the first reading [rad/s].
+    """
+
+    def __init__(
+        self,
+        gyro_sigma: float,
+        bias_instability: float,
+        tilt_sigmas: Sequence[float],
+        dt: float,
+        rate_start: float = RATE_START,
+        bias: float | None = None,
+    ) -> None:
+        self._dt, self._bias = dt, bias
+        sigmas = np.maximum(tilt_sigmas, LEAST_TILT_SIGMA)
+        alike = bool((sigmas == sigmas[0]).all())
+        self._R: Scalar = float(sigmas[0]) ** 2 if alike else sigmas * sigmas
+        self._tilt_noise, self._walk = (gyro_sigma * dt) ** 2, bias_instability**2 * dt
+        zero = 0.0 * self._R
+        self.covariance: tuple[Scalar, Scalar, Scalar] = self._R, zero, rate_start**2 + gyro_sigma**2 + zero
+        """Covariance of the errors of x1 and b after the last sample: of x1, of both, of b."""
+        self._gains: list[tuple[Scalar, Scalar]] = []
+        self._is_settled = False
+        self._turned = self._reading = self._x1 = self._turn = np.zeros(len(sigmas))
+        self._has_started = False
+
+    def rates(self, reading: np.ndarray, y1: np.ndarray) -> np.ndarray:
+        """Estimate the rate at the next ticks.
+
+        Args:
+            reading: What the gyro shows, (n_rows, n_worlds) [rad/s].
+            y1: Measured tilt, (n_rows, n_worlds) [rad].
+
+        Returns:
+            The rate, (n_rows, n_worlds) [rad/s].
+        """
+        start = not self._has_started
+        if start:
+            self._has_started, self._reading = True, reading[0]
+            self._turn = self._dt * (reading[0] if self._bias is None else np.full_like(reading[0], self._bias))
+        n = len(reading)
+        before = np.vstack([self._reading[None], reading[:-1]])
+        turns = 0.5 * self._dt * (before + reading)
+        if start:
+            turns[0] = 0.0
+        turned = np.cumsum(np.vstack([self._turned[None], turns]), axis=0)[1:]
+        self._reading, self._turned = reading[-1], turned[-1]
+        gains = self._next_gains(n - 1, first=True) if start else self._next_gains(n)
+        biases = self._filter(y1 - turned, gains)
+        return reading - biases / self._dt
+
+    def _filter(self, seen: np.ndarray, gains: Sequence[tuple[Scalar, Scalar]]) -> np.ndarray:
+        """Filter y1 less what the gyro has turned since the start: it falls by a bias a tick, of which it returns all.
+
+        `self._x1` is the estimate of what is seen, `self._turn` the bias times the sample period.
+        """
+        single = seen.shape[1] == 1 and isinstance(self._R, float)
+        samples = seen[:, 0].tolist() if single else seen  # a float costs a twentieth of an array of one
+        x1, turn = (float(self._x1[0]), float(self._turn[0])) if single else (self._x1, self._turn)
+        turns = []
+        for sample, (k1, k2) in zip(samples, gains, strict=True):
+            x1 = x1 - turn
+            e = sample - x1
+            x1 = x1 + k1 * e
+            turn = turn + k2 * e
+            turns.append(turn)
+        self._x1, self._turn = np.atleast_1d(x1), np.atleast_1d(turn)
+        return np.array(turns).reshape(seen.shape)
+
+    def _next_gains(self, n: int, first: bool = False) -> Sequence[tuple[Scalar, Scalar]]:
+        """Compute the gains of the next n samples on x1 and on the bias times the sample period.
+
+        At the first one x1 is what is measured, and the bias stays.
+        """
+        if self._is_settled:
+            return self._gains[-1:] * n
+        gains: list[tuple[Scalar, Scalar]] = [(1.0, 0.0)] if first else []
+        dt, R, tilt_noise, walk = self._dt, self._R, self._tilt_noise, self._walk
+        xx, xb, bb = self.covariance
+        for _ in range(n):
+            xx = xx + dt * (dt * bb - 2.0 * xb) + tilt_noise
+            xb = xb - dt * bb
+            bb = bb + walk
+            k1, k2 = xx / (xx + R), xb / (xx + R)
+            xx, xb, bb = R * k1, R * k2, bb - k2 * xb
+            gains.append((k1, dt * k2))
+        self.covariance, self._gains = (xx, xb, bb), gains
+        if n > 1:
+            changes = [abs(b - a) <= SETTLED * abs(b) for a, b in zip(gains[-2], gains[-1], strict=True)]
+            self._is_settled = bool(np.all(changes[0]) and np.all(changes[1]))
+        return gains
 
 
 class References:

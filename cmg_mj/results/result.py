@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.results.frames import NamedColumns, columns_of, frame_of
-from cmg_mj.results.per_world_table import as_table
-from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, open_loop_figures
-from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.results.intervals import finite_values
+from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, as_table, open_loop_figures
+from cmg_mj.results.trajectory import NamedColumns, Trajectory, frame_of
 from cmg_mj.results.wire import WireReport
 
 if TYPE_CHECKING:
@@ -114,8 +113,7 @@ class Result(NamedColumns):
 
     def mean(self, key: str, estimator: str | None = None) -> float | None:
         """Return the mean of `values` over the worlds that have one; None if no world has."""
-        values = self.values(key, estimator)
-        known = values[np.isfinite(values)]
+        known = finite_values(self.values(key, estimator))
         return statistics.fmean(known) if len(known) else None
 
     @property
@@ -170,7 +168,8 @@ class Result(NamedColumns):
 
     @cached_property
     def _table_columns(self) -> Mapping[str, np.ndarray]:
-        return columns_of(self.table())
+        table = self.table()
+        return {name: table[name].to_numpy() for name in table.column_names}
 
     def _columns(self) -> Mapping[str, np.ndarray]:
         return self._table_columns

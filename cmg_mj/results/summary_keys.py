@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 Figures = dict[str, float | None]
 """Numbers of one estimator by their names; None where there is no such number."""
@@ -146,3 +149,29 @@ def _worst(summaries: Sequence[Mapping[str, SummaryValue]]) -> Summary:
         else:
             worst[key] = min(numbers) if key in KEYS and KEYS[key].better == "more" else max(numbers, key=abs)
     return worst
+
+
+ID_COLUMNS = {
+    "observer": "string",
+    "in_loop_of": "string",
+    "world": "int64",
+    "seed": "int64",
+    "outcome": "string",
+    "stood": "bool",
+    "end_time_s": "float64",
+    "reason": "string",
+}
+"""Columns before the figures, and their types. `in_loop_of` names the observer in the loop, for those that are not.
+
+Figures of a world that did not stand to the end are those until then: `stood` is false, and no mean may count them.
+"""
+
+
+def as_table(rows: Iterable[Summary]) -> pa.Table:
+    """Make rows, a world each, into a table. A figure that an observer or a world does not have is null."""
+    import pyarrow as pa
+
+    worlds = list(rows)
+    figures = dict.fromkeys(key for row in worlds for key in row if key not in ID_COLUMNS)
+    schema = pa.schema([*ID_COLUMNS.items(), *((key, "float64") for key in figures)])
+    return pa.table({name: [row.get(name) for row in worlds] for name in schema.names}, schema=schema)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -13,11 +14,13 @@ from pydantic import TypeAdapter
 
 from cmg_mj.errors import InputError, nearest
 from cmg_mj.results.files import METADATA_KEY, write_row_groups
-from cmg_mj.results.frames import NamedColumns, require_pandas
-from cmg_mj.results.stored_columns import STRETCH, StoredColumns, number_of_rows, select_rows
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
+
+STRETCH = 32768
+"""Number of rows of a row group, and of what a recording takes at once."""
 
 SIGNALS = (
     "x1_rad",
@@ -105,6 +108,55 @@ class Layout:
         return [*SIGNALS, *estimates]
 
 
+def require_pandas() -> Any:
+    """Import pandas.
+
+    Raises:
+        InputError: pandas is not installed.
+    """
+    try:
+        return importlib.import_module("pandas")
+    except ImportError as error:
+        raise InputError(
+            "to_pandas: pandas is not installed. Install it with `python -m pip install pandas`, or use the columns "
+            "without it: dict(...) has them as NumPy arrays"
+        ) from error
+
+
+def frame_of(table: pa.Table) -> pd.DataFrame:
+    """Convert a table to a pandas frame.
+
+    Raises:
+        InputError: pandas is not installed.
+    """
+    require_pandas()
+    return table.to_pandas()
+
+
+class NamedColumns:
+    """Columns by name, with the conventions of a pandas frame: iteration gives names, `len` counts rows."""
+
+    def _columns(self) -> Mapping[str, np.ndarray]:
+        """Return the columns, in order."""
+        raise NotImplementedError
+
+    def keys(self) -> list[str]:
+        """List the columns' names, in order; with it `dict(...)` takes all columns."""
+        return list(self._columns())
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns()
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._columns()[name]
+
+    def __len__(self) -> int:
+        return len(next(iter(self._columns().values())))
+
+
 @dataclass(frozen=True)
 class Trajectory(NamedColumns):
     """One row a control tick, by column: `trajectory["x1_rad"]`.
@@ -114,7 +166,7 @@ class Trajectory(NamedColumns):
 
     Attributes:
         columns: Name -> values, (n_ticks,) for one world, (n_ticks, n_worlds) for many; the unit ends the name.
-            In many worlds, rows after a world's end are NaN. `StoredColumns` are read when they are asked for.
+            In many worlds, rows after a world's end are NaN.
         metadata: The outcome and the resolved scenario.
         layout: The observers, joints and axes that have columns; empty for a trajectory put together by hand.
     """
@@ -125,9 +177,6 @@ class Trajectory(NamedColumns):
 
     def _columns(self) -> Mapping[str, np.ndarray]:
         return self.columns
-
-    def __len__(self) -> int:
-        return number_of_rows(self.columns)
 
     @property
     def observers(self) -> tuple[str, ...]:
@@ -168,7 +217,7 @@ class Trajectory(NamedColumns):
         names = {"time_s": "time_s"}
         for name in layout.columns():
             names[name] = name if name in self.columns else f"{axis}/{name}"
-        return replace(self, columns=_renamed(self.columns, names), layout=layout)
+        return replace(self, columns={new: self.columns[name] for new, name in names.items()}, layout=layout)
 
     @staticmethod
     def joined(axes: Mapping[str, Trajectory]) -> Trajectory:
@@ -176,12 +225,11 @@ class Trajectory(NamedColumns):
         first = next(iter(axes.values()))
         parts = tuple(replace(axis.layout, joints=(), kinds=(), name=name) for name, axis in axes.items())
         layout = replace(first.layout, axes=parts)
-        columns = _renamed(first.columns, {"time_s": "time_s"})
+        columns = {"time_s": first["time_s"]}
         for part, axis in zip(parts, axes.values(), strict=True):
-            names = {f"{part.name}/{name}": name for name in part.columns()}
-            columns = _joined(columns, _renamed(axis.columns, names))
-        joints = {name: name for name in (*layout.positions(), *layout.rates())}
-        return Trajectory(_joined(columns, _renamed(first.columns, joints)), layout=layout)
+            columns |= {f"{part.name}/{name}": axis[name] for name in part.columns()}
+        columns |= {name: first[name] for name in (*layout.positions(), *layout.rates())}
+        return Trajectory(columns, layout=layout)
 
     def qpos(self, ticks: slice | np.ndarray = slice(None)) -> np.ndarray:
         """Stack the joint positions as MuJoCo has them, (n_ticks, nq) [rad, m, quaternions w, x, y, z]."""
@@ -204,7 +252,7 @@ class Trajectory(NamedColumns):
 
     def rows(self, rows: slice) -> Trajectory:
         """Select successive rows."""
-        return replace(self, columns=select_rows(self.columns, rows))
+        return replace(self, columns={name: values[rows] for name, values in self.columns.items()})
 
     def stretches(self) -> Iterator[slice]:
         """Divide the rows into stretches to be handled one after the other; there is at least one."""
@@ -283,17 +331,3 @@ class Trajectory(NamedColumns):
                 f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"
             ) from error
         return Trajectory({name: table[name].to_numpy() for name in table.column_names}, stored, layout)
-
-
-def _renamed(columns: Mapping[str, np.ndarray], names: Mapping[str, str]) -> Mapping[str, np.ndarray]:
-    """Select columns: new name -> the one they have."""
-    if isinstance(columns, StoredColumns):
-        return columns.renamed(names)
-    return {new: columns[name] for new, name in names.items()}
-
-
-def _joined(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
-    """Put the columns of two together: both in memory, or both stored."""
-    if isinstance(one, StoredColumns) and isinstance(other, StoredColumns):
-        return one.joined(other)
-    return {**one, **other}

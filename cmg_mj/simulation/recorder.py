@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +12,6 @@ from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import References
 from cmg_mj.results.metrics import Metrics, TickBlock
-from cmg_mj.results.stored_columns import ColumnStore, StoredColumns
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.simulation.physics import Joints
 
@@ -33,7 +30,6 @@ class TickRecorder:
         references: The baselines that give a rate.
         keep: Whether to keep the pieces for a trajectory.
         joints: Whether to keep the joints.
-        spool: Folder whose disk takes what a long trajectory of one world would need in memory, if any.
     """
 
     def __init__(
@@ -46,7 +42,6 @@ class TickRecorder:
         *,
         keep: bool,
         joints: bool,
-        spool: Path | None = None,
     ) -> None:
         self._axis = plants[0].axis
         self._bias = np.array([plant.bias for plant in plants])
@@ -61,7 +56,7 @@ class TickRecorder:
         self._keep = keep
         self._single = isinstance(worlds, int)
         self._waiting: list[tuple] = []
-        self._kept = ColumnStore(len(self._layout.columns()), spool if isinstance(worlds, int) else None)
+        self._kept: list[list[np.ndarray]] = [[] for _ in self._layout.columns()]
 
     def add(
         self, q: Joints, v: Joints, tick: Tick, body_rate: Scalar, torque: Scalar, running: np.ndarray | None
@@ -93,7 +88,8 @@ class TickRecorder:
             columns, ended = piece.columns, piece.ended
             if ended is not None:
                 columns = {name: np.where(ended, np.nan, column) for name, column in columns.items()}
-            self._kept.append([columns[name] for name in self._layout.columns()])
+            for kept, name in zip(self._kept, self._layout.columns(), strict=True):
+                kept.append(columns[name])
 
     def _piece(self, waiting: Sequence[tuple]) -> TickBlock:
         qs, vs, ticks, body_rates, torques, runnings = zip(*waiting, strict=True)
@@ -122,40 +118,32 @@ class TickRecorder:
         return np.swapaxes(np.array(ticks), 0, 1)
 
     def trajectory(self) -> Trajectory | None:
-        """Return all that was kept: in memory, or read from the file when it is asked for."""
+        """Return all that was kept."""
         if not self._keep:
             return None
-        if self._kept.in_memory:
-            return self._since(0)
-        readers = {name: partial(self._read, i) for i, name in enumerate(self._layout.columns())}
-        columns = StoredColumns({"time_s": self._times, **readers}, 0, len(self._kept))
-        return Trajectory(columns, layout=self._layout)
+        for kept in self._kept:  # a column after the other: of a long run, all twice take much memory
+            kept[:] = [np.concatenate([np.zeros((0, len(self._bias))), *kept])]
+        return self._trajectory(self._kept, 0)
 
     def since(self, tick: int) -> Trajectory:
         """Return the ticks from one on, of one world whose trajectory is kept, as far as the run has come.
 
         Those that wait go on waiting: whoever looks on changes no number.
         """
-        return self._since(tick, self._piece(self._waiting).columns if self._waiting else None)
+        pieces = self._kept
+        if self._waiting:
+            waiting = self._piece(self._waiting).columns
+            pieces = [[*kept, waiting[name]] for kept, name in zip(pieces, self._layout.columns(), strict=True)]
+        return self._trajectory(pieces, tick)
 
-    def _since(self, tick: int, waiting: Mapping[str, np.ndarray] | None = None) -> Trajectory:
-        end = n_kept = len(self._kept)
+    def _trajectory(self, pieces: Sequence[Sequence[np.ndarray]], first: int) -> Trajectory:
+        """Join pieces of the columns, and take the rows from one on."""
         columns = {}
-        for i, name in enumerate(self._layout.columns()):
-            columns[name] = self._read(i, tick, n_kept)
-            if waiting is not None:
-                columns[name] = np.concatenate([columns[name], waiting[name][max(0, tick - n_kept) :, 0]])
-                end = n_kept + len(waiting[name])
-        return Trajectory({"time_s": self._times(min(tick, end), end), **columns}, layout=self._layout)
-
-    def _read(self, column: int, start: int, end: int) -> np.ndarray:
-        values = self._kept.read(column, start, end)
-        if not len(values):
-            values = np.zeros((0, len(self._bias)))
-        return values[:, 0] if self._single else values
-
-    def _times(self, start: int, end: int) -> np.ndarray:
-        return np.arange(start, end) * self._dt
+        for name, parts in zip(self._layout.columns(), pieces, strict=True):
+            whole = parts[0] if len(parts) == 1 else np.concatenate([np.zeros((0, len(self._bias))), *parts])
+            columns[name] = whole[first:, 0] if self._single else whole[first:]
+        n_rows = sum(map(len, pieces[0]))
+        return Trajectory({"time_s": np.arange(min(first, n_rows), n_rows) * self._dt, **columns}, layout=self._layout)
 
 
 class MultiAxisRecorder:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from pathlib import Path
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -49,8 +48,6 @@ class SimulationOptions(TypedDict, total=False):
     """Called after every tick with the simulated time [s]; a KeyboardInterrupt it raises ends the run."""
     on_start: Callable[[Recorder], None] | None
     """Called before the first tick with the recorder, whose `since` shows the ticks meanwhile."""
-    spool: Path
-    """Folder whose disk takes what a long trajectory of one world would need in memory; it is read from there."""
     threads: int
     """Number of threads that step many worlds; 0: as many as there are processors."""
 
@@ -159,8 +156,7 @@ class _Simulation:
         )
         metrics = Metrics(observers, len(plants), dt, self.pushes, limit, self.settings, targets, RATES, floors)
         keep, first = options.get("keep_trajectory", True), axis == self.axis_names[0]
-        spool = options.get("spool")
-        return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first, spool=spool)
+        return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first)
 
     def advance(self, physics: OneWorld | ManyWorlds, driver: Driver) -> None:
         """Run to the end, whatever that is."""

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.files import write_parquet
 from cmg_mj.results.folder import RunFolder, claimed, write_text
+from cmg_mj.results.reports import run_title
 from cmg_mj.results.result import Driver, Outcome, Result
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
-from cmg_mj.results.terminal_tables import run_title
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.results.wire import BOARD_LOG, WIRE, WireReport, WireSettings
 from cmg_mj.simulation.experiment import Experiment

@@ -16,9 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmg_mj.results.baselines import MEMS_FUSED, MEMS_GYRO, References
+from cmg_mj.results.baselines import MEMS_FUSED, MEMS_GYRO, RATE_START, FusedGyro, References
 from cmg_mj.results.error_bounds import acceleration_floor
-from cmg_mj.results.fused_gyro import RATE_START, FusedGyro
 from cmg_mj.results.markdown import table
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare

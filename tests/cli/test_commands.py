@@ -21,7 +21,7 @@ from cmg_mj.cli import cli
 from cmg_mj.inputs.files import bundled
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.baselines import REFERENCES
-from cmg_mj.results.terminal_tables import columns_of, comparison_table
+from cmg_mj.results.reports import compared_keys, comparison_table
 from cmg_mj.studies.compare import comparison
 from cmg_mj.studies.compare.statistics import standings
 from tests.command import COMMAND, cmg_mj, cmg_mj_process, environment
@@ -282,7 +282,7 @@ def test_numbers_that_there_are_not() -> None:
 def test_every_column_is_of_a_key_there_is(quick: str) -> None:
     observers = comparison.compare(comparison.prepare_comparison(load_scenario(quick), ["linear"]), 1)
     summaries = standings(observers)
-    columns = columns_of(summaries)
+    columns = compared_keys(summaries)
     assert {"velocity_rms_error_rad_s", "velocity_fit", "tilt_rms_deg", "fell_fraction"} <= set(columns)
     table = comparison_table(summaries, "").renderables[0]
     assert isinstance(table, Table)

@@ -10,13 +10,14 @@ import pytest
 
 from cmg_mj.observers import make_observer
 from cmg_mj.replay import replay
-from cmg_mj.replay.alignment import alignment
-from cmg_mj.replay.lag import lag
+from cmg_mj.replay.log import ReadOptions
 from cmg_mj.replay.log_replay import ReplayResult, replay_log
-from cmg_mj.replay.logs import ReadOptions, read_log
+from cmg_mj.replay.reading import read_log
+from cmg_mj.replay.reference import alignment
+from cmg_mj.replay.scores import lag
 from cmg_mj.results.trajectory import Trajectory
 from tests.observers.reference import PAPER
-from tests.replay.logs.motion import AMPLITUDE, COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
+from tests.replay.motion import AMPLITUDE, COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
 
 PEAK = AMPLITUDE * OMEGA
 GAIN = math.sin(OMEGA * DT / 2.0) / (OMEGA * DT / 2.0)

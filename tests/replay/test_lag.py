@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj.replay.alignment import alignment
-from cmg_mj.replay.lag import lag
+from cmg_mj.replay.reference import alignment
+from cmg_mj.replay.scores import lag
 
 N = 4000
 SEEDS = range(20)

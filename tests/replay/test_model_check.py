@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.replay.log import Log
 from cmg_mj.replay.log_replay import misfit_of, replay_log
-from cmg_mj.replay.logs import Log
-from cmg_mj.replay.model_check import MISFIT, model_misfit, model_remark
+from cmg_mj.replay.reference import MISFIT, model_misfit, model_remark
 from cmg_mj.replay.report import log_figures, remarks
-from tests.command import ROOT, cmg_mj
-from tests.replay.test_stretches import in_stretches
 
 HANGING = ReducedModel(0.06, 0.0, 0.0, 1.0, -3.4)
 N, DT = 3000, 0.005
@@ -82,13 +79,6 @@ def test_gimbals_that_are_not_in_the_log_leave_it_open() -> None:
     assert misfit_of(swing(), HANGING) is not None
 
 
-def test_stretches_give_about_what_the_whole_gives(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = dataclasses.replace(HANGING, gravity_torque=3.4)
-    whole = model_misfit(swing(1e-3), model)
-    in_stretches(monkeypatch, 500)
-    assert model_misfit(swing(1e-3), model) == pytest.approx(whole, rel=0.1)
-
-
 def test_it_is_said_in_a_replay() -> None:
     wrong = dataclasses.replace(HANGING, gravity_torque=3.4)
     replayed = replay_log(swing(), ["homogeneous"], model=wrong)
@@ -96,15 +86,6 @@ def test_it_is_said_in_a_replay() -> None:
     assert any(line.startswith("Can the model be that of this log?") for line in remarks(replayed))
     right = remarks(replay_log(swing(), ["homogeneous"], model=HANGING))
     assert not any(line.startswith("Can the model") for line in right)
-
-
-@pytest.mark.slow
-def test_a_motors_log_is_no_pendulums(elsewhere: None) -> None:
-    log = ROOT / "examples" / "data" / "stepper_encoder_gyro.csv"
-    columns = ("--columns", "time=time_s,tilt=encoder_rad,rate=gyr_y_rad_s", "--observers", "luenberger")
-    out = cmg_mj("replay", log, *columns, "--model", "inertia=0.06,gravity_torque=3.4").out
-    assert "Can the model be that of this log?" in " ".join(out.split())
-    assert Path("runs").exists()
 
 
 @pytest.mark.slow
@@ -121,10 +102,3 @@ def test_right_models_are_not_doubted(settings: list[str]) -> None:
         misfit = model_misfit(log, right)
         assert misfit is not None
         assert misfit < 1.3 < MISFIT
-
-
-def test_the_most_of_right_models_is_that_of_the_docs() -> None:
-    remark = model_remark(2.0)
-    assert remark is not None
-    assert "(of right models at most 1.15)" in remark
-    assert "right ones have at most 1.15" in (ROOT / "docs" / "replay_evidence.md").read_text(encoding="utf-8")

@@ -7,27 +7,24 @@ import json
 import math
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
-from cmg_mj.cli.logs import replay
 from cmg_mj.core.tilt import RadialTilt, TiltNoise
 from cmg_mj.core.types import needs
-from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement, make_observer
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
+from cmg_mj.replay.inputs import model_of, observer_inputs, replay_prepared
+from cmg_mj.replay.log import Log, ReadOptions
 from cmg_mj.replay.log_replay import NO_MODEL, replay_log
-from cmg_mj.replay.logs import Log, ReadOptions, read_log
-from cmg_mj.replay.observer_inputs import observer_inputs, replay_prepared
+from cmg_mj.replay.noise import noise_numbers, noise_of
 from cmg_mj.replay.parameter_options import parameters_of
-from cmg_mj.replay.user_noise import noise_numbers, noise_of
-from cmg_mj.replay.user_pendulum import model_of
+from cmg_mj.replay.reading import read_log
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.studies.save import report_run, save_run
-from cmg_mj.studies.tuning import tune_on_logs
 from tests.observers.reference import PAPER
-from tests.replay.logs.motion import COLUMNS, DT, N, sine, write_csv
+from tests.replay.motion import COLUMNS, DT, N, sine, write_csv
 
 KEYS = ("velocity_rms_error_rad_s", "velocity_fit", "velocity_rms_error_push_rad_s", "velocity_fit_push")
 SETTINGS = ["duration_s=1.4", "push.0.start_s=0.3", 'open_loop_observers="all"', "observer.k1=23.0", "seed=5"]
@@ -168,11 +165,6 @@ class Loses:
         return state + 1, (y.y1, float("nan") if state == 9 else 0.0, 0.0)
 
 
-class RaisesAtOnce(Loses):
-    def step(self, state: int, y: Measurement, u: float) -> tuple[int, tuple]:
-        raise ValueError("x")
-
-
 class Raises(Loses):
     def step(self, state: int, y: Measurement, u: float) -> tuple[int, tuple]:
         return state + 1, (y.y1, 1.0 / (9 - state), 0.0)
@@ -209,7 +201,7 @@ def test_the_noise_of_a_runs_accelerometers_can_be_set(run: Path) -> None:
 @pytest.mark.parametrize(
     ("action", "message"),
     [
-        (lambda: model_of("inertia=0.06"), "--model: gravity_torque is missing: mass x gravity x height"),
+        (lambda: model_of("inertia=0.06"), "--model: gravity_torque"),
         (lambda: model_of("inertia=-1,gravity_torque=3"), "must be greater than 0"),
         (lambda: model_of("inertia=a,gravity_torque=3"), "--model inertia=a: must be a finite number"),
         (lambda: model_of("mass=2"), "--model mass: no such number; allowed: gimbal_inertia"),
@@ -237,84 +229,20 @@ def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
         replay_log(one, ["ltv"])
 
 
-class Silent:
-    """Does not say what it needs."""
-
-    def __init__(self, dt: float, model: object) -> None:
-        pass
-
-    def init(self, y: Measurement) -> None:
-        return None
-
-    def step(self, state: None, y: Measurement, u: float) -> tuple[None, Estimate]:
-        return None, Estimate(y.y1, 0.0, y.y2)
+@pytest.mark.parametrize("option", [{"units": {"tilt": "rad"}}, {"delay_s": 0.1}, {"delimiter": ";"}])
+def test_options_that_change_a_runs_recording_are_refused(run: Path, option: dict) -> None:
+    with pytest.raises(InputError, match=next(iter(option))):
+        read_log(run, ReadOptions(**option))
 
 
-def test_a_class_that_does_not_say_what_it_needs_gets_a_hint(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"Silent needs a model .* does not say what it needs \(needs = \(\)\)"):
-        replay_log(log(tmp_path), ["tests.replay.test_replayed:Silent"])
-
-
-def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
-    """Its rig (no --model), its sensors' noise and its observer's parameters: the given error is that of a replay."""
-    run_log = read_log(run)
-    study = tune_on_logs([run_log], "homogeneous", parameters=["k1"], ranges={"k1": (22.0, 24.0)}, settle_s=0.3)
-    assert study.start_parameters["k1"] == 23.0
-    assert study.noises == [prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]]
-    half = run_log.cut(slice(len(run_log) // 2, None))
-    study = tune_on_logs([run_log], "gyro_free", parameters=["jerk"], settle_s=0.3)
-    error = half["reference_rad_s"] - replay_prepared(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
-    stretches = np.array_split(error[half.scored(0.3)], len(study.level.given_rms))
-    np.testing.assert_allclose(study.level.given_rms, [np.sqrt(np.mean(s**2)) for s in stretches], rtol=1e-9)
-
-
-@pytest.mark.slow
-def test_every_log_is_tuned_with_its_own_noise(run: Path) -> None:
-    run_log = read_log(run)
-    plain = read_log(run / "trajectory.parquet", ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
-    settings = {"settle_s": 0.2, "parameters": ["tau"], "ranges": {"tau": (0.01, 0.05)}}
-    run_noise, plain_noise = tune_on_logs([run_log, plain], "linear", **settings).noises
-    assert run_noise == prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]
-    assert plain_noise == noise_of(plain) != run_noise
-    for noise in tune_on_logs([run_log, plain], "linear", noises={"tilt": 0.7}, **settings).noises:
-        assert np.degrees(noise.tilt) == pytest.approx(0.7)
-
-
-def test_runs_with_other_parameters_are_not_tuned_together(run: Path) -> None:
-    run_log = read_log(run)
-    assert run_log.scenario is not None
-    scenario = dict(run_log.scenario, observer={**run_log.scenario["observer"], "k1": 21.0})
-    with pytest.raises(InputError, match="different parameters of homogeneous"):
-        tune_on_logs([run_log, dataclasses.replace(run_log, scenario=scenario)], "homogeneous", settle_s=0.2)
-
-
-FIELDS: dict[str, Any] = {
-    "units": {"tilt": "rad"},
-    "scale": {"tilt": 2.0},
-    "offset": {"tilt": 2.0},
-    "rate_hz": 100.0,
-    "max_gap_s": 0.0,
-    "delay_s": 0.1,
-    "radii_m": (0.1, 0.2),
-    "time_range_s": (0.0, 1.0),
-}
-"""Field of `ReadOptions` that a run's own recording cannot have -> a value."""
-
-
-@pytest.mark.parametrize("field", [field.name for field in dataclasses.fields(ReadOptions)])
-def test_an_option_that_a_runs_recording_cannot_have_is_named_as_it_is_typed(run: Path, field: str) -> None:
-    if field in ("columns", "windows_s"):  # which such a recording can have
-        assert field not in FIELDS
-        return
-    with pytest.raises(InputError, match="is a run's own recording; read it with --columns for that") as caught:
-        read_log(run, ReadOptions(**{field: FIELDS[field]}))
-    option = str(caught.value).partition(":")[0]
-    assert option in {name for parameter in replay.params for name in parameter.opts}
-
-
-def test_options_that_change_a_runs_recording_are_refused(run: Path) -> None:
-    with pytest.raises(InputError, match=r"--delay: .* is a run's own recording"):
-        read_log(run, ReadOptions(delay_s=0.1))
+def test_a_runs_recording_has_windows(run: Path) -> None:
     assert read_log(run, ReadOptions(windows_s=[(0.4, 0.6)])).windows == ((0.4, 0.6),)
-    with pytest.raises(InputError, match=r"--window 5:6: .* has no sample there"):
+    with pytest.raises(InputError, match="--window 5:6"):
         read_log(run, ReadOptions(windows_s=[(5.0, 6.0)]))
+
+
+def test_a_replay_has_its_columns_and_a_frame(tmp_path: Path) -> None:
+    pytest.importorskip("pandas")
+    result = replay_log(log(tmp_path), ["linear"])
+    assert list(dict(result)) == result.keys()
+    np.testing.assert_array_equal(result.to_pandas()["estimate/linear/x2_rad_s"], result["estimate/linear/x2_rad_s"])

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cmg_mj.replay.log import REFERENCE, Log, ReadOptions
 from cmg_mj.replay.log_replay import replay_log
-from cmg_mj.replay.logs import Log, ReadOptions, read_log
-from cmg_mj.replay.logs.log import REFERENCE
+from cmg_mj.replay.reading import read_log
 from cmg_mj.replay.report import log_figures, remarks, replay_markdown
-from cmg_mj.replay.zero_phase import ZeroPhase, noise_gain_of, rate_of_log, smoothed_rate, zero_phase
-from tests.replay.logs.motion import COLUMNS, DT, sine, write_csv
-from tests.replay.test_stretches import in_stretches
+from cmg_mj.replay.scores import ZeroPhase, noise_gain_of, smoothed_rate, zero_phase
+from tests.replay.motion import COLUMNS, DT, write_csv
 
 CUTOFF = 4.0
 
@@ -87,21 +86,6 @@ def test_the_width_is_nearly_the_best(seed: int, tmp_path: Path) -> None:
     assert 2.0 < result.cutoff_hz < 8.0
 
 
-def test_without_white_noise_it_is_said(tmp_path: Path) -> None:
-    log = read_log(write_csv(tmp_path / "log.csv", sine()), ReadOptions(COLUMNS))
-    result = scored_smoother(log)
-    assert result.smooths == (result.cutoff_hz < 98.0)
-    assert ("no white noise could be told" in result.remark()) != result.smooths
-
-
-def test_stretches_give_what_the_whole_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each stretch is smoothed with its surroundings."""
-    log = noisy_log(tmp_path)
-    whole = rate_of_log(log, CUTOFF)
-    in_stretches(monkeypatch, 500)
-    np.testing.assert_allclose(rate_of_log(log, CUTOFF), whole, atol=1e-9)
-
-
 def test_the_row_is_said_to_be_no_observer(tmp_path: Path) -> None:
     log = noisy_log(tmp_path, n=1500)
     replayed = replay_log(log, ["linear"])
@@ -124,44 +108,3 @@ def test_parts_too_short_have_no_row(tmp_path: Path) -> None:
     log = noisy_log(tmp_path, n=60)
     short = dataclasses.replace(log, parts=[slice(start, start + 3) for start in range(0, 60, 3)])
     assert zero_phase(short, short.scored(0.0)) is None
-
-
-def remark_of_smoother(log: Log) -> str:
-    (remark,) = [line for line in remarks(replay_log(log, ["finite_difference"])) if line.startswith("zero_phase")]
-    return remark
-
-
-PRICE = "What an observer of the tilt alone lacks to it is the price of causality."
-
-
-@pytest.mark.parametrize(
-    ("factor", "late", "doubt"),
-    [
-        (1.0, 0, None),
-        (
-            -1.0,
-            0,
-            "the reference counts the other way than the tilt; zero, which knows no more than the past, is nearer",
-        ),
-        (1.0, 20, "the reference comes behind the tilt"),
-        (0.5, 0, "the reference has another scale or offset than the tilt's rate"),
-    ],
-)
-def test_the_price_of_causality_is_that_only_with_a_good_reference(
-    factor: float, late: int, doubt: str | None, tmp_path: Path
-) -> None:
-    log = noisy_log(tmp_path, n=2500, sigma=0.001)
-    other = dataclasses.replace(log, columns={**log.columns, REFERENCE: factor * np.roll(log[REFERENCE], late)})
-    remark = remark_of_smoother(other)
-    assert (PRICE in remark) == (doubt is None)
-    if doubt is not None:
-        assert f"What causality costs cannot be read off it here: {doubt}" in remark
-
-
-def test_where_an_observer_beats_the_smoother_there_is_no_price(tmp_path: Path) -> None:
-    log = noisy_log(tmp_path, n=1500, sigma=0.001)
-    replayed = replay_log(log, ["linear"])
-    assert PRICE in remarks(replayed)[-1]
-    summaries = {**replayed.summaries, "linear": {**replayed.summaries["linear"], "velocity_rms_error_rad_s": 0.0}}
-    last = remarks(dataclasses.replace(replayed, summaries=summaries))[-1]
-    assert last.endswith("read off it here: linear, which knows no more than the past, is nearer to the reference.")

@@ -6,7 +6,6 @@ import math
 import sys
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ import pytest
 import cmg_mj
 from cmg_mj.errors import InputError
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.studies.compare.api import Comparison, compare
 
 SHORT = ["duration_s=0.4", "push=[]"]
 BIASES = [0.5, 40.0]  # one stands, one falls
@@ -41,32 +39,10 @@ def trajectory(result: cmg_mj.Result) -> Trajectory:
     return result.trajectory
 
 
-@cache
-def replayed() -> cmg_mj.ReplayResult:
-    log = Path(__file__).parents[2] / "examples/data/stepper_encoder_gyro.csv"
-    columns = {"time": "time_s", "tilt": "encoder_rad", "rate": "gyr_y_rad_s"}
-    return cmg_mj.replay_log(cmg_mj.read_log(log, cmg_mj.ReadOptions(columns)), ["linear", "finite_difference"])
-
-
-@cache
-def swept() -> cmg_mj.SweepResult:
-    return cmg_mj.sweep(
-        experiment().scenario, {"plant.equilibrium_bias_deg": [0.0, 0.5]}, ["linear", "gyro_free"], worlds=2
-    )
-
-
-@cache
-def compared() -> Comparison:
-    return compare(experiment().scenario, ["linear", "gyro_free"], 2)
-
-
 EVERY: dict[str, Callable[[], Any]] = {
     "trajectory": lambda: trajectory(one()),
     "trajectory of many worlds": lambda: trajectory(many()),
     "result": many,
-    "replay": replayed,
-    "sweep": swept,
-    "comparison": compared,
 }
 every = pytest.mark.parametrize("make", [pytest.param(make, id=name) for name, make in EVERY.items()])
 
@@ -85,7 +61,6 @@ def test_keys_iteration_and_look_up_agree(make: Callable[[], Any]) -> None:
 def test_as_with_a_frame_the_length_counts_rows() -> None:
     assert len(trajectory(one())) == len(trajectory(one())["time_s"]) == 80
     assert len(many()) == len(many()["observer"]) == many().table().num_rows
-    assert len(compared()) == 2
 
 
 def test_the_columns_of_a_result() -> None:
@@ -93,15 +68,6 @@ def test_the_columns_of_a_result() -> None:
     assert stood[:2].tolist() == [True, False]
     assert error[0] == many().summaries[0]["velocity_rms_error_rad_s"]
     assert many()["in_loop_of"][0] is None
-
-
-@every
-def test_no_frame_is_made_in_silence(make: Callable[[], Any]) -> None:
-    pandas = pytest.importorskip("pandas")
-    name = type(make()).__name__
-    for convert in (pandas.DataFrame, np.asarray):
-        with pytest.raises(InputError, match=rf"^{name}: is no array and no pandas.DataFrame. Call its to_pandas\(\)"):
-            convert(make())
 
 
 def test_a_trajectory_as_a_frame() -> None:
@@ -139,23 +105,6 @@ def test_results_as_frames() -> None:
     assert len(frame) == len(many())
     assert frame["velocity_rms_error_rad_s"].tolist()[0] == many().summaries[0]["velocity_rms_error_rad_s"]
     assert math.isnan(frame[frame["observer"] == "zero"]["settle_time_s"].tolist()[0])
-    np.testing.assert_array_equal(
-        replayed().to_pandas()["estimate/linear/x2_rad_s"], replayed()["estimate/linear/x2_rad_s"]
-    )
-    frame = compared().to_pandas()
-    means = frame.groupby("observer")["velocity_rms_error_rad_s"].mean()
-    for summary in compared().summaries[:2]:
-        assert means[summary["observer"]] == pytest.approx(summary["velocity_rms_error_rad_s"], rel=1e-12)
-
-
-def test_the_tables_of_a_sweep_as_frames() -> None:
-    pytest.importorskip("pandas")
-    assert swept().keys() == ["trials", "cells"]
-    assert len(swept().to_pandas("trials")) == 2 * 2 * 2
-    cells = swept().to_pandas()
-    assert cells["observer"].tolist() == swept().cells["observer"].to_pylist()
-    with pytest.raises(InputError, match="to_pandas: 'order' is no table of this sweep; allowed: cells, trials"):
-        swept().to_pandas("order")
 
 
 @every
@@ -165,18 +114,3 @@ def test_without_pandas_the_message_names_the_cure(make: Callable[[], Any], monk
     with pytest.raises(InputError, match=r"pandas is not installed. Install it with `python -m pip install pandas`"):
         table.to_pandas()
     assert dict(table)
-
-
-@pytest.mark.parametrize(
-    ("observers", "worlds", "message"),
-    [
-        (["linear", "linear"], 2, "must be a list of different names"),
-        ("linear", 2, "must be a list of different names"),
-        ([], 2, "must be a list of different names"),
-        (["linear"], 0, "worlds = 0: must be at least 1"),
-        (["liner"], 1, "did you mean 'linear'"),
-    ],
-)
-def test_a_comparison_that_cannot_be_is_refused(observers: Any, worlds: int, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        compare(experiment().scenario, observers, worlds)

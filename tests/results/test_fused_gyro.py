@@ -10,8 +10,7 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from cmg_mj.observers.gyro_free import GyroFree
-from cmg_mj.results.baselines import GYROS
-from cmg_mj.results.fused_gyro import RATE_START, FusedGyro
+from cmg_mj.results.baselines import GYROS, RATE_START, FusedGyro
 from cmg_mj.results.summary_keys import open_loop_figures, section
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.mems_gyro import MemsGyro

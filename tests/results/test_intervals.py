@@ -27,12 +27,6 @@ def test_mean_interval_is_scipys() -> None:
     assert mean_interval(values) == pytest.approx((values.mean(), expected.low, expected.high), rel=1e-12)
 
 
-def test_mean_interval_covers_the_mean_in_95_percent_of_samples() -> None:
-    rng = np.random.default_rng(1)
-    coverage = [low <= 3.0 <= high for _, low, high in (mean_interval(rng.normal(3.0, 2.0, 6)) for _ in range(2000))]
-    assert stats.binomtest(sum(coverage), len(coverage), 0.95).pvalue > 1e-3
-
-
 TIMES = 10_000
 """Samples of 100 worlds."""
 
@@ -128,28 +122,6 @@ def test_fewer_worlds_than_cover_have_no_interval(kind: str) -> None:
         assert known_interval([0.1, 0.2, 0.3][:n_worlds], positive=True) is None
     with pytest.raises(InputError, match="needs four worlds or more, not 2"):
         positive_mean_interval([0.0, 1.0])
-
-
-def test_three_worlds_of_which_half_are_zero_are_not_covered() -> None:
-    """Hence `FEWEST`: the same formula of one world fewer."""
-    mean, draw = SKEWED["half are zero"]
-    samples = draw(np.random.default_rng(3), (4000, FEWEST - 1))
-    with np.errstate(invalid="ignore"):
-        factors = np.exp([(high - mean) / mean if mean else 0.0 for mean, _, high in map(mean_interval, samples)])
-    means = samples.mean(axis=1)
-    assert np.mean((means / factors <= mean) & (mean <= means * factors)) < 0.87
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", SKEWED)
-def test_a_bootstrap_of_few_worlds_covers_less(kind: str) -> None:
-    """Scipy's bias-corrected and accelerated one."""
-    mean, draw = SKEWED[kind]
-    samples = draw(np.random.default_rng(0), (400, 6))
-    results = [stats.bootstrap((values,), np.mean, n_resamples=999, rng=1) for values in samples if values.std() > 0.0]
-    ends = [result.confidence_interval for result in results]
-    bootstrap = np.mean([low <= mean <= high for low, high in ends])
-    assert bootstrap < covered(mean, [positive_mean_interval(values) for values in samples]) - 0.05
 
 
 def test_narrow_intervals_are_students_and_zeros_have_none() -> None:

@@ -114,21 +114,17 @@ def test_equal_settings_share_one_rig() -> None:
     ("vary", "complaint"),
     [
         ({"equilibrium_bias_dg": [0.0, 1.0]}, "'equilibrium_bias_dg': no field of .plant.; did you mean"),
-        ({"settings": [1, 2]}, "no field of"),
         ({"sensors.encodr.latency_s": [0.0, 0.005]}, "sensors.encodr: no such field; did you mean 'encoder'"),
         ({"push.3.torque_n_m": [0.0, 0.005]}, "there is no push.3; it has 0 of them"),
         ({"sensors.encoder.latency_s": [0.0, 0.005]}, "sensors.encoder.latency_s differs, which worlds of one batch"),
         ({"observer.k1": [20.0, 21.0]}, "observer.k1 differs"),
         ({"equilibrium_bias_deg": 1.0}, "must be lists of values by field"),
-        ({"equilibrium_bias_deg": "ab"}, "must be lists of values by field"),
         ({}, "must be lists of values by field"),
         ({"equilibrium_bias_deg": [0.0, 1.0], "initial_tilt_deg": [1.0]}, "as many values each"),
         ({"equilibrium_bias_deg": [0.0]}, "2 worlds and 1 plants"),
         ({"equilibrium_bias_deg": [0.0, 90.0]}, "plant.equilibrium_bias_deg = 90.*must be"),
-        ({"equilibrium_bias_deg": [[0.0], 1.0]}, "plant.equilibrium_bias_deg = "),
         ({"timestep_s": [0.0005, 0.001]}, "must have the scenario's joints and timestep_s"),
         ({"model": ["scissored_pair.xml", "single_gimbal.xml"]}, "must have the scenario's joints and timestep_s"),
-        ({"integrator": ["RK4", "Euler"]}, "one integrator in common"),
     ],
 )
 def test_what_cannot_vary_is_refused(vary: dict[str, Any], complaint: str) -> None:
@@ -158,9 +154,7 @@ def test_one_world_is_one_group() -> None:
     assert math.isfinite(single.values(ERROR)[0])
 
 
-@pytest.mark.parametrize(
-    "metadata", [{"observers": ["homogeneous"]}, {"layout": 3}, {"layout": {"observers": []}}, [1]]
-)
+@pytest.mark.parametrize("metadata", [{"observers": ["homogeneous"]}, {"layout": 3}, [1]])
 def test_a_trajectory_of_an_earlier_version_is_named_so(metadata: Any, tmp_path: Path) -> None:
     table = pa.table({"time_s": [0.0], "x1_rad": [0.0]}).replace_schema_metadata(
         {b"cmg_mj": json.dumps(metadata).encode()}

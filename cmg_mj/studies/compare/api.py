@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cmg_mj.errors import InputError
-from cmg_mj.results.frames import NoArray, frame_of
 from cmg_mj.results.summary_keys import Summary
+from cmg_mj.results.trajectory import frame_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.studies.compare import comparison
@@ -24,7 +24,7 @@ WORLDS = 20
 
 
 @dataclass(frozen=True)
-class Comparison(NoArray):
+class Comparison:
     """Observers on the same plant, pushes and noise, by name: `comparison["gyro_free"]`.
 
     Attributes:

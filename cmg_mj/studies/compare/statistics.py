@@ -10,8 +10,7 @@ import numpy as np
 
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.intervals import finite_mean, finite_values, known_interval
-from cmg_mj.results.per_world_table import as_table
-from cmg_mj.results.summary_keys import KEYS, Summary, finite, open_loop_figures, section
+from cmg_mj.results.summary_keys import KEYS, Summary, as_table, finite, open_loop_figures, section
 from cmg_mj.studies.compare.comparison import ComparedObserver, standard_deviation
 
 if TYPE_CHECKING:

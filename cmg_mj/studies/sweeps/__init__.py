@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 
 from cmg_mj.errors import InputError, nearest
-from cmg_mj.results.frames import NoArray, frame_of
+from cmg_mj.results.trajectory import frame_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.studies.sweeps.cells import Trials, cells_in_blocks
@@ -25,7 +25,7 @@ WORLDS = 20
 
 
 @dataclass(frozen=True)
-class SweepResult(NoArray):
+class SweepResult:
     """The tables of a sweep, by name: `result["cells"]`, `dict(result)`.
 
     Attributes:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 
 from cmg_mj.errors import InputError, raised
-from cmg_mj.results.per_world_table import ID_COLUMNS
-from cmg_mj.results.summary_keys import KEYS, Summary, SummaryValue
+from cmg_mj.results.summary_keys import ID_COLUMNS, KEYS, Summary, SummaryValue
 from cmg_mj.simulation.batch import BatchKey, PlantStructure, can_vary_in_batch, plant_structure
 from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 from cmg_mj.studies.sweeps.study import CHUNK, MOST_TRIALS, Chunk, Point, Points, SweepStudy

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import tomli_w
 
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.inputs.files import model_files, find
+from cmg_mj.inputs.files import find, model_files
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.folder import is_own, numbered, remove, write_marker
 from cmg_mj.simulation.experiment import prepare

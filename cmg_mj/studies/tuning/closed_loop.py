@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmg_mj.errors import InputError
-from cmg_mj.replay.logs import Log
+from cmg_mj.replay.log import Log
 from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, paired_verdict, ratio_interval
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from cmg_mj.scenario.schema import ObserverSettings, Scenario

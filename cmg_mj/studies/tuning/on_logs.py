@@ -15,15 +15,12 @@ from cmg_mj.errors import InputError
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.replay import replay
-from cmg_mj.replay.alignment import Alignment
+from cmg_mj.replay.inputs import ObserverInputs, observer_inputs
+from cmg_mj.replay.log import REFERENCE, Log
 from cmg_mj.replay.log_replay import NO_MODEL, misfit_of, replay_log
-from cmg_mj.replay.logs import Log
-from cmg_mj.replay.logs.log import REFERENCE
-from cmg_mj.replay.model_check import model_remark
-from cmg_mj.replay.noise_remarks import noise_figures, noise_remarks
-from cmg_mj.replay.observer_inputs import ObserverInputs, observer_inputs
+from cmg_mj.replay.noise import noise_figures, noise_remarks
 from cmg_mj.replay.parameter_options import ParameterValue
-from cmg_mj.replay.reference import alignment_of, remarks_on
+from cmg_mj.replay.reference import Alignment, alignment_of, model_remark, remarks_on
 from cmg_mj.results.intervals import PairedVerdict
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.scenario.schema import Scenario

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmg_mj.results.stored_columns import STRETCH
+from cmg_mj.results.trajectory import STRETCH
 
 DRAWN = 8000
 """Number of samples that are left of a long signal: several for each pixel across a plot."""

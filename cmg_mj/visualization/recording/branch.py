@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmg_mj.plant.plant import Plant
-from cmg_mj.results.stored_columns import STRETCH
+from cmg_mj.results.trajectory import STRETCH
 from cmg_mj.stages.push import Push
 from cmg_mj.visualization.plots.readability import fall_start
 from cmg_mj.visualization.recording.camera import POSES, Ball, enclosing_ball

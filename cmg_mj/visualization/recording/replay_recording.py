@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -38,14 +38,12 @@ class LogSeries:
         series: The series, in the folders that `PLOTS` names: angles in degrees, rates in rad/s.
         observers: Names of all observers.
         best: Names of the observers that are switched on at first.
-        stretches: Returns the series' values, stretch by stretch, where `series` has only the outlines; None otherwise.
     """
 
     name: str
     series: Sequence[Series]
     observers: Sequence[str]
     best: Sequence[str]
-    stretches: Callable[[], Iterator[Sequence[Series]]] | None = None
 
 
 def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping[str, str]) -> None:
@@ -69,10 +67,10 @@ def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping
     boards = [_board(branch, log, list(texts)) for branch, log in zip(branches, logs, strict=True)]
     blueprint = tabbed_blueprint(boards, TIMELINE, "paused")
     with open_recording(path, title, application_name(names, branches), blueprint) as rec:
-        for branch, log in zip(branches, logs, strict=True):
+        for branch in branches:
             log_styles(rec, branch)
-            for rows in log.stretches() if log.stretches else [log.series]:
-                log_values(rec, replace(branch, series={row.path: row for row in rows}))
+            for entity, row in branch.series.items():  # one by one: of a long log, all wait in memory
+                log_values(rec, replace(branch, series={entity: row}))
                 rec.flush()
         for name, text in texts.items():
             log_page(rec, name.lower(), text)

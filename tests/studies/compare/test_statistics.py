@@ -17,8 +17,8 @@ from scipy import stats
 
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.intervals import Interval, format_interval, in_line
+from cmg_mj.results.reports import comparison_markdown
 from cmg_mj.results.result import Outcome, Result
-from cmg_mj.results.terminal_tables import comparison_markdown
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.compare.comparison import ComparedObserver, compare, prepare_comparison

@@ -10,8 +10,8 @@ import pyarrow as pa
 import pytest
 
 from cmg_mj.observers import Estimate, Measurement
-from cmg_mj.results.per_world_table import ID_COLUMNS
 from cmg_mj.results.result import Result
+from cmg_mj.results.summary_keys import ID_COLUMNS
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare, run_batch
 from cmg_mj.simulation.simulate import SimulationOptions

@@ -11,12 +11,13 @@ import pytest
 from rich.console import Console
 
 from cmg_mj import load_scenario
-from cmg_mj.replay.logs import Log, ReadOptions, read_log
+from cmg_mj.replay.log import Log, ReadOptions
+from cmg_mj.replay.reading import read_log
 from cmg_mj.results.intervals import Interval
 from cmg_mj.studies.tuning import figures_of_logs, logs_table, tune_on_logs
 from cmg_mj.studies.tuning.closed_loop import LoopComparison, compare_in_loop, judged, loop_scenario
 from cmg_mj.studies.tuning.on_logs import LogStudy
-from tests.replay.logs.motion import COLUMNS, sine, write_csv
+from tests.replay.motion import COLUMNS, sine, write_csv
 
 
 @pytest.mark.parametrize(

@@ -1,19 +1,25 @@
-"""White noise of a log's tilt and angular acceleration, from what is white in the file's own rows.
+"""White noise of a log's tilt and angular acceleration, and what observers assume of it.
 
-The rows' spectrum (Welch's, of rows less their motion) is compared from band to band below half the row rate. White
-noise has the same density in all; a filter, a fusion or a quantiser leaves no such floor.
+The spectrum of the file's own rows (Welch's, of rows less their motion) is compared from band to band below half the
+row rate. White noise has the same density in all; a filter, a fusion or a quantiser leaves no such floor.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from cmg_mj.replay.logs.resampling import EVEN
-from cmg_mj.replay.logs.sampling import Part
+from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.errors import InputError
+from cmg_mj.replay.log import Log, LogNoise, WhiteNoise
+from cmg_mj.replay.parameter_options import numbers
+from cmg_mj.replay.sampling import EVEN, Part
+from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY, Accelerometer
+from cmg_mj.sensors.encoder import Encoder
 
 SEGMENT = 128
 """Rows of a segment of Welch's spectrum; segments overlap by half, under Hann's window."""
@@ -49,29 +55,19 @@ COARSE = 0.6
 half a step on, to which a twelfth of the step's square is added."""
 HARDLY = 1e-6
 """Noise below this share of the signal is rounding."""
-UNITS = {"y1_rad": (math.pi / 180.0, "deg"), "acceleration_rad_s2": (1.0, "rad/s^2")}
-"""Signal -> size and name of the unit in which it is printed."""
 GROUPS = 16
 """Groups of segments whose scatter shows the error of the estimate, if it is larger than that of Gaussian noise."""
 
-
-class WhiteNoise(NamedTuple):
-    """Standard deviation of the white noise of one row, with its 95 % interval."""
-
-    sigma: float
-    low: float
-    high: float
-
-
-class LogNoise(NamedTuple):
-    """White noise of one row of a file, or why it cannot be told."""
-
-    tilt: WhiteNoise | str
-    """Noise of the tilt [rad]."""
-    acceleration: WhiteNoise | str | None
-    """Noise of the angular acceleration [rad/s^2]; None without one."""
-    correlation: float
-    """Correlation of both; 0 where it cannot be told from 0."""
+TILT_NOISE_DEG = 0.1
+"""Assumed noise of a tilt from an unknown sensor: standard deviation of one sample [deg]."""
+ACCELERATION_NOISE_RAD_S2 = 1.0
+"""Assumed noise of an angular acceleration that does not come from two accelerometers [rad/s^2]."""
+NOISE_DENSITY_UG_RTHZ = 400.0
+"""Assumed noise density of two accelerometers, the bench's own [ug/sqrt(Hz)]."""
+NOISES = ("accelerometer", "tilt", "acceleration")
+"""Names of `--noise`."""
+APART = 1.5
+"""Ratio of the noise that is used and the noise that the log shows, from which it is reported."""
 
 
 def white_noise_of(parts: Sequence[Part], period: float) -> LogNoise:
@@ -87,37 +83,25 @@ def white_noise_of(parts: Sequence[Part], period: float) -> LogNoise:
     names = [name for name in ("y1_rad", "acceleration_rad_s2") if name in parts[0].rows]
     residuals: list[np.ndarray] = []
     steps, sizes = dict.fromkeys(names, math.inf), dict.fromkeys(names, 0.0)
-    n_all, lead = 0, 0
     for places, values in _blocks(parts, period):
-        n_all += len(places)
         for name in names:
             steps[name] = min(steps[name], _smallest_step(values[name]))
             sizes[name] = max(sizes[name], float(np.std(values[name])))
         if names[-1] == "acceleration_rad_s2" and "u_rad_s" in values:
-            n_before = len(places)
             places, values = _without_response(places, values)
-            lead = max(lead, n_before - len(places))
         if len(places) >= 2 * TAPS + SEGMENT:
             residuals.append(np.stack([_without_motion(places, values[name]) for name in names]))
     n_rows = sum(residual.shape[1] for residual in residuals)
     if n_rows < FEWEST:
-        short = (
-            f"it takes {FEWEST:,} rows, in parts of {2 * TAPS + SEGMENT + lead} or more, without the first "
-            f"{TAPS + lead} and the last {TAPS} of each; of {n_all:,} rows {n_rows:,} are such"
-        )
+        short = f"it takes {FEWEST:,} rows, without the first and the last {TAPS} of each part; there are {n_rows:,}"
         return LogNoise(short, short if len(names) > 1 else None, 0.0)
     spectra = np.concatenate([_spectra(residual) for residual in residuals], axis=1)
-    floors = [
-        _floor(np.abs(spectrum) ** 2, steps[name], sizes[name], UNITS[name])
-        for name, spectrum in zip(names, spectra, strict=True)
-    ]
-    tilt = floors[0]
-    if len(names) == 1:
-        return LogNoise(tilt, None, 0.0)
-    acceleration = floors[1]
-    if isinstance(tilt, str) or isinstance(acceleration, str):
-        return LogNoise(tilt, acceleration, 0.0)
-    return LogNoise(tilt, acceleration, _correlation(spectra))
+    tilt, *others = (
+        _floor(np.abs(one) ** 2, steps[name], sizes[name]) for name, one in zip(names, spectra, strict=True)
+    )
+    acceleration = others[0] if others else None
+    known = isinstance(tilt, WhiteNoise) and isinstance(acceleration, WhiteNoise)
+    return LogNoise(tilt, acceleration, _correlation(spectra) if known else 0.0)
 
 
 def _blocks(parts: Sequence[Part], period: float) -> Iterator[tuple[np.ndarray, Mapping[str, np.ndarray]]]:
@@ -127,7 +111,7 @@ def _blocks(parts: Sequence[Part], period: float) -> Iterator[tuple[np.ndarray, 
     for part, start in blocks if len(blocks) <= MOST_BLOCKS else [blocks[i] for i in few]:
         rows = slice(start, start + BLOCK)
         placed = part.placed[rows]
-        yield (placed - placed[0]) / period, {name: part.rows.read(name, rows) for name in part.rows}
+        yield (placed - placed[0]) / period, {name: values[rows] for name, values in part.rows.items()}
 
 
 def _smallest_step(values: np.ndarray) -> float:
@@ -193,23 +177,26 @@ def _steady(power: np.ndarray) -> np.ndarray:
     return sizes <= OUTLIER * np.median(sizes)
 
 
-def _floor(power: np.ndarray, step: float, size: float, unit: tuple[float, str]) -> WhiteNoise | str:
+def _floor(power: np.ndarray, step: float, size: float) -> WhiteNoise | str:
     """Return the white floor of a spectrum, or why there is none.
 
     Args:
         power: Squares of the transforms, (n_segments, n_frequencies).
         step: Smallest step between two values of the signal.
         size: Standard deviation of the signal.
-        unit: Size and name of the unit in which to print the step.
     """
     steady = _steady(power)
     if steady.mean() < 1.0 - FEW_OUTLIERS:
         return "its size changes too much in the course of the log"
     power = power[steady]
+    top = math.sqrt(float(power[:, _columns(FLOORS[-1][0])].mean()))
+    if top < HARDLY * size:
+        return "there is hardly any"
+    if top < COARSE * step < math.inf:
+        return f"it is below {COARSE:g} of the signal's smallest step"
     frequencies = np.arange(power.shape[1]) * 2.0 / SEGMENT
     bands = [power[:, (frequencies >= low) & (frequencies < low + 0.1) & (frequencies < 1.0)] for low in BANDS]
     levels = np.array([0.5 * math.log(max(float(band.mean()), 1e-300)) for band in bands])
-    noise = None
     for first, tolerance in FLOORS:
         whole = power[:, _columns(first)]
         error = _error(whole, 1.0 - BANDS[first])
@@ -226,17 +213,8 @@ def _floor(power: np.ndarray, step: float, size: float, unit: tuple[float, str])
             low, high = sigma * math.exp(-1.96 * error), sigma * math.exp(1.96 * error)
             if np.sum((floor - floor.mean()) ** 2) > (len(order) - 1 + 3.3 * math.sqrt(2 * len(order) - 2)) * each**2:
                 low, high = min(low, math.exp(floor.min())), max(high, math.exp(floor.max()))
-            noise = WhiteNoise(sigma, low, high)
-            break
-    top = math.sqrt(float(power[:, _columns(FLOORS[-1][0])].mean()))
-    if top < HARDLY * size:
-        return "there is hardly any"
-    if top < COARSE * step < math.inf:
-        steps = f"{step / unit[0]:.3g} {unit[1]}"
-        return f"it goes in steps of {steps}, and noise below {COARSE:g} of a step is the quantiser's"
-    if noise is None and levels[-1] < levels[:-1].max() - math.log(FLOORS[0][1]):
-        return "its density falls off towards half the row rate, as of a filtered or fused signal: no white floor"
-    return noise or "its density is not the same in the upper part of the band: no white floor"
+            return WhiteNoise(sigma, low, high)
+    return "there is no white floor below half the row rate, as of a filtered or fused signal"
 
 
 def _error(power: np.ndarray, share: float) -> float:
@@ -258,3 +236,148 @@ def _correlation(spectra: np.ndarray) -> float:
     correlation = float(np.sum((a * b.conj()).real)) / math.sqrt(power)
     known = HANN * (1.0 - BANDS[first]) * int(steady.sum()) * SEGMENT / 2.0
     return correlation if abs(correlation) > 3.0 / math.sqrt(known) else 0.0
+
+
+def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> TiltNoise:
+    """Return the noise of a log's sensors that observers assume: the user's, else the log's own, else a default.
+
+    Args:
+        log: With two accelerometers, both noises follow from a given density, and the resolution is the bench's.
+        noises: Noises from `noise_numbers` that replace the log's.
+
+    Returns:
+        The noise of tilt and acceleration, and their correlation.
+
+    Raises:
+        InputError: A noise belongs to another sensor than the log's.
+    """
+    noises, estimate = noises or {}, noise_in(log)
+    if log.tilt is not None:
+        if {"tilt", "acceleration"} & noises.keys():
+            raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
+        gimbal = Encoder().sample_sigma
+        if isinstance(estimate.tilt, WhiteNoise) and not noises:
+            if isinstance(estimate.acceleration, WhiteNoise):
+                tilt, acceleration = estimate.tilt.sigma, estimate.acceleration.sigma
+                return TiltNoise(tilt, acceleration, estimate.correlation, gimbal)
+            sigma = estimate.tilt.sigma / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
+            return replace(log.tilt.noise(sigma, STANDARD_GRAVITY), gimbal=gimbal)
+        density = noises.get("accelerometer", NOISE_DENSITY_UG_RTHZ)
+        sensor = Accelerometer(rate_hz=_sampling_rate(log), noise_density_ug_rthz=density)
+        return replace(log.tilt.noise(sensor.sample_sigma, STANDARD_GRAVITY), gimbal=gimbal)
+    if "accelerometer" in noises:
+        raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
+    tilt = _told_or_estimated(math.radians(noises.get("tilt", TILT_NOISE_DEG)), "tilt" in noises, estimate.tilt)
+    acceleration = noises.get("acceleration", ACCELERATION_NOISE_RAD_S2)
+    acceleration = _told_or_estimated(acceleration, "acceleration" in noises, estimate.acceleration)
+    correlation = 0.0 if {"tilt", "acceleration"} <= noises.keys() else estimate.correlation
+    return TiltNoise(tilt, acceleration, correlation, Encoder().sample_sigma)
+
+
+def _told_or_estimated(value: float, is_told: bool, estimate: WhiteNoise | str | None) -> float:
+    return estimate.sigma if isinstance(estimate, WhiteNoise) and not is_told else value
+
+
+def noise_in(log: Log) -> LogNoise:
+    """Return the white noise of one sample of a log, as its rows show it.
+
+    Resampling to a quicker rate keeps the density at low frequencies: white noise of that density is larger, sample for
+    sample, than that of the rows. A spline at a slower rate lets all of a row's noise through.
+
+    Args:
+        log: The log. The recording of a run is not looked at: its sensors' noise is known.
+
+    Returns:
+        The noise, or why it cannot be told.
+    """
+    noise = log.white_noise
+    if noise is None:
+        return LogNoise("the sensors are known", None, 0.0)
+    factor = math.sqrt(max(1.0, (log.row_period_s or log.dt) / log.dt))
+
+    acceleration = noise.acceleration and _scaled(noise.acceleration, factor.__mul__)
+    return LogNoise(_scaled(noise.tilt, factor.__mul__), acceleration, noise.correlation)
+
+
+def noise_numbers(text: str) -> dict[str, float]:
+    """Parse `--noise tilt=0.05,acceleration=2` [ug/rtHz, deg, rad/s^2]."""
+    noises = numbers(text, "--noise", NOISES) if text.strip() else {}
+    for name, value in noises.items():
+        if not value > 0.0:
+            raise InputError(f"--noise {name}={value:g}: must be greater than 0")
+    return noises
+
+
+def density_of(log: Log, tilt: float) -> float:
+    """Return the density of two accelerometers that makes a noise of the tilt of one sample [ug/sqrt(Hz)].
+
+    Args:
+        log: A log of two accelerometers.
+        tilt: Standard deviation [rad].
+    """
+    assert log.tilt is not None
+    sigma = tilt / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
+    return sigma / (1e-6 * STANDARD_GRAVITY * math.sqrt(_sampling_rate(log) / 2.0))
+
+
+def _sampling_rate(log: Log) -> float:
+    """Return the rate whose white noise of a density is that of a sample: the rows' own if samples are slower [Hz]."""
+    period = log.row_period_s or log.dt
+    return 1.0 / period if log.dt > 1.000001 * period else 1.0 / log.dt
+
+
+def noise_remarks(log: Log, noise: TiltNoise) -> list[str]:
+    """Describe the noise that observers assume, and what the log shows.
+
+    Args:
+        log: The log.
+        noise: The noise of one sample that observers assume.
+
+    Returns:
+        A line for each noise; none for a run's recording, whose sensors are known.
+    """
+    if log.white_noise is None:
+        return []
+    shown, tilt_name, unit = noise_in(log), "tilt", "deg"
+    size = math.degrees
+    if log.tilt is not None:
+        tilt_name, unit = "accelerometer", "ug/rtHz"
+        size = lambda tilt: density_of(log, tilt)  # noqa: E731  (one of two units)
+    lines = [_remark(tilt_name, size(noise.tilt), _scaled(shown.tilt, size), unit)]
+    if shown.acceleration is not None and log.tilt is None:
+        lines.append(_remark("acceleration", noise.acceleration, shown.acceleration, "rad/s^2"))
+    return lines
+
+
+def _remark(name: str, used: float, estimate: WhiteNoise | str, unit: str) -> str:
+    """Describe one noise of `--noise`, in its unit."""
+    start = f"Noise of the {name}: {used:.3g} {unit} is used; the log"
+    if isinstance(estimate, str):
+        return f"{start} cannot tell: {estimate}."
+    remark = f"{start} shows {estimate.sigma:.3g} ({estimate.low:.3g} to {estimate.high:.3g})"
+    ratio = estimate.sigma / used
+    if max(ratio, 1.0 / ratio) < APART:
+        return f"{remark}."
+    return f"{remark}: give --noise {name}={estimate.sigma:.3g}, or no {name} for the log's own."
+
+
+def _scaled(noise: WhiteNoise | str, size: Callable[[float], float]) -> WhiteNoise | str:
+    return noise if isinstance(noise, str) else WhiteNoise(*map(size, noise))
+
+
+def noise_figures(log: Log, noise: TiltNoise) -> dict[str, SummaryValue]:
+    """Return the noise that a log shows as `--json` prints it; nothing for a run's recording."""
+    if log.white_noise is None:
+        return {}
+    shown = noise_in(log)
+    figures: dict[str, SummaryValue] = {"tilt_rad": _figures(shown.tilt, noise.tilt)}
+    if shown.acceleration is not None:
+        figures["acceleration_rad_s2"] = _figures(shown.acceleration, noise.acceleration)
+        figures["correlation"] = shown.correlation
+    return {"noise_by_the_log": figures}
+
+
+def _figures(estimate: WhiteNoise | str, used: float) -> dict[str, SummaryValue]:
+    if isinstance(estimate, str):
+        return {"sigma": None, "reason": estimate, "used": False}
+    return {**estimate._asdict(), "used": math.isclose(used, estimate.sigma, rel_tol=1e-9)}

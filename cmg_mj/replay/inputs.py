@@ -8,15 +8,54 @@ from typing import NamedTuple
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.errors import InputError
 from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.replay.log import Log
 from cmg_mj.replay.log_replay import SETTLE_S, OnShare, ReplayResult, replay_log
-from cmg_mj.replay.logs import Log
-from cmg_mj.replay.parameter_options import Parameters
-from cmg_mj.replay.user_noise import noise_of
-from cmg_mj.replay.user_pendulum import plant_parameters_of
+from cmg_mj.replay.noise import noise_of
+from cmg_mj.replay.parameter_options import Parameters, numbers
 from cmg_mj.scenario.design import design
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
+from cmg_mj.simulation.experiment import prepare
+
+NUMBERS = {
+    "inertia": "tilt inertia about the pivot, J1 [kg m^2]",
+    "gravity_torque": "mass x gravity x height of its centre, positive if it falls over [N m]",
+    "momentum": "spin momentum of the flywheels together, J_d omega_d [N m s]",
+    "gimbal_inertia": "what the gimbals' turn by 90 degrees adds to the inertia, J2 [kg m^2]",
+}
+"""Numbers of `--model`. The first two are required; the others are 0 for a pendulum without gimbals."""
+
+
+def model_of(text: str) -> ReducedModel:
+    """Return the reduced model of a user's pendulum.
+
+    Args:
+        text: Path or bundled name of a plant's MJCF, or numbers, `inertia=0.06,gravity_torque=3.4,...` (`NUMBERS`).
+
+    Returns:
+        The reduced model.
+
+    Raises:
+        InputError: There is no such file, or a number is missing or impossible.
+    """
+    if "=" not in text:
+        return plant_parameters_of(parse_scenario({"plant": {"model": text}}, f"--model {text}")).reduced
+    values = numbers(text, "--model", NUMBERS)
+    for name in ("inertia", "gravity_torque"):
+        if name not in values:
+            raise InputError(f"--model: {name} is missing: {NUMBERS[name]}")
+    inertia, added = values["inertia"], values.get("gimbal_inertia", 0.0)
+    if not inertia > 0.0 or not inertia + added > 0.0:
+        raise InputError("--model: inertia, and inertia + gimbal_inertia, must be greater than 0 [kg m^2]")
+    return ReducedModel(inertia, added, values.get("momentum", 0.0), 1.0, values["gravity_torque"])
+
+
+def plant_parameters_of(scenario: Scenario) -> PlantParameters:
+    """Return the parameters of a scenario's plant."""
+    experiment = prepare(scenario)
+    experiment.require_single_axis("replay")
+    return experiment.plant.parameters
 
 
 class ObserverInputs(NamedTuple):
@@ -75,19 +114,16 @@ def replay_prepared(
     settle_s: float | None = None,
     on_share: OnShare | None = None,
 ) -> ReplayResult:
-    """Replay observers on a log with the inputs of `observer_inputs`.
+    """Replay observers on a log with the inputs of `observer_inputs`, whose arguments it takes.
 
     Args:
         log: The log.
         observers: As `replay_log` takes them.
-        model: As `observer_inputs` takes it.
-        noises: As `observer_inputs` takes them.
-        parameters: As `observer_inputs` takes them.
+        model: The pendulum, which replaces the run's.
+        noises: Noises from `noise_numbers`.
+        parameters: Observer -> parameter -> value.
         settle_s: By default `replay_log`'s; 0 for a run's recording.
         on_share: Called now and then with the completed share.
-
-    Returns:
-        Estimates and figures.
 
     Raises:
         InputError: An option does not fit the log.

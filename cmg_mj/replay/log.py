@@ -5,19 +5,37 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cmg_mj.core.tilt import RadialTilt
-from cmg_mj.errors import TomlValue
-from cmg_mj.replay.logs.white_noise import LogNoise
-from cmg_mj.results.stored_columns import number_of_rows, select_rows
+from cmg_mj.errors import InputError, TomlValue
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.stages.push import Window
+from cmg_mj.stages.push import Push, Window, push_windows
 
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
+
+
+class WhiteNoise(NamedTuple):
+    """Standard deviation of the white noise of one row, with its 95 % interval."""
+
+    sigma: float
+    low: float
+    high: float
+
+
+class LogNoise(NamedTuple):
+    """White noise of one row of a file, or why it cannot be told."""
+
+    tilt: WhiteNoise | str
+    """Noise of the tilt [rad]."""
+    acceleration: WhiteNoise | str | None
+    """Noise of the angular acceleration [rad/s^2]; None without one."""
+    correlation: float
+    """Correlation of both; 0 where it cannot be told from 0."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +54,9 @@ class ReadOptions:
         radii_m: Distances of two accelerometers from the pivot, the inner first [m].
         time_range_s: Start and end of the part to read, from the first row on [s].
         windows_s: Windows that are scored separately, in the log's own time [s].
+        delimiter: Character between the cells of a CSV.
+        encoding: Encoding of a CSV.
+        decimal: Decimal point of the numbers in a CSV.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -48,6 +69,9 @@ class ReadOptions:
     radii_m: tuple[float, float] | None = None
     time_range_s: tuple[float, float] | None = None
     windows_s: Sequence[Window] = ()
+    delimiter: str = ","
+    encoding: str = "utf-8"
+    decimal: str = "."
 
     def as_toml(self) -> dict[str, TomlValue]:
         """Return the options that are not the defaults, as TOML holds them."""
@@ -92,16 +116,22 @@ class Log:
         return self.columns[name]
 
     def __len__(self) -> int:
-        return number_of_rows(self.columns)
+        return len(self["time_s"])
 
     @property
     def duration_s(self) -> float:
         """Duration without the gaps [s]."""
         return sum(part.stop - part.start - 1 for part in self.parts) * self.dt
 
+    @property
+    def title(self) -> str:
+        """The log in one line."""
+        parts = "" if len(self.parts) == 1 else f" in {len(self.parts)} parts"
+        return f"{self.name}: {len(self):,} samples at {1.0 / self.dt:.6g} Hz, {self.duration_s:.6g} s{parts}"
+
     def trajectory(self, part: slice) -> Trajectory:
         """Return one part, as `cmg_mj.replay.replay` takes it."""
-        return Trajectory(select_rows(self.columns, part))
+        return Trajectory({name: values[part] for name, values in self.columns.items()})
 
     def scored(self, settle_s: float) -> np.ndarray:
         """Return which samples count: those from `settle_s` after the start of a part on, (n,)."""
@@ -110,32 +140,51 @@ class Log:
             counted[part.start + math.ceil(min(settle_s / self.dt, len(self)) - 1e-9) : part.stop] = True
         return counted
 
-    def broken(self, values: np.ndarray, rows: slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
-        """Return times and values with a NaN between two parts, so that no line is drawn across a gap.
+    def broken(self, values: np.ndarray) -> np.ndarray:
+        """Put a NaN between two parts of values, (n,): no line is drawn across a gap."""
+        first, *others = self.parts
+        pieces = [piece for part in others for piece in ([np.nan], values[part])]
+        return np.concatenate([values[first], *pieces]) if others else values[first]
 
-        Args:
-            values: The values in some rows, (n,).
-            rows: These rows.
-
-        Returns:
-            Times [s] and values.
-        """
-        start, stop, _ = rows.indices(len(self))
-        clock = select_rows(self.columns, slice(start, stop))["time_s"]
-        time, drawn = [], []
-        for part in self.parts:
-            some = slice(max(part.start, start) - start, min(part.stop, stop) - start)
-            if some.start < some.stop:
-                time.append(clock[some])
-                drawn.append(values[some])
-                if start + some.stop == part.stop < self.parts[-1].stop:
-                    time.append(clock[some][-1:] + self.dt)
-                    drawn.append(np.array([np.nan]))
-        return np.concatenate(time), np.concatenate(drawn)
+    def broken_time(self) -> np.ndarray:
+        """Return the times of `broken` values [s]."""
+        time = self.broken(self["time_s"])
+        return np.where(np.isnan(time), np.roll(time, 1) + self.dt, time)
 
     def cut(self, rows: slice) -> Log:
         """Return the log's part in a range of rows."""
         start, stop, _ = rows.indices(len(self))
         parts = [slice(max(p.start, start) - start, min(p.stop, stop) - start) for p in self.parts]
-        columns = select_rows(self.columns, slice(start, stop))
+        columns = {name: values[start:stop] for name, values in self.columns.items()}
         return replace(self, columns=columns, parts=[part for part in parts if part.stop - part.start > 1])
+
+
+def log_of_run(path: Path) -> Log:
+    """Read a run's own recording, whose columns, pushes and scenario are known.
+
+    Raises:
+        InputError: The file is no recording of a run about one axis.
+    """
+    try:
+        trajectory = Trajectory.load(path)
+        scenario = trajectory.metadata["scenario"]
+    except (InputError, LookupError) as error:
+        raise InputError(f"{path}: say which columns are what, --columns tilt=HEADING,rate=HEADING,...") from error
+    if trajectory.axes:
+        raise InputError(
+            f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; save one of them "
+            f"from Python: Trajectory.load(path).along({trajectory.axes[0]!r}).save(...)"
+        )
+    if len(trajectory) < 2:
+        raise InputError(f"{path}: a run that ended before its second tick")
+    columns = {name: trajectory[name] for name in ("time_s", "y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2")}
+    columns[REFERENCE] = trajectory["x2_rad_s"]
+    return Log(
+        path.parent.name if path.stem == "trajectory" and path.parent.name else path.stem,
+        1.0 / float(scenario["controller"]["rate_hz"]),
+        columns,
+        [slice(0, len(trajectory))],
+        frozenset({"gimbals", "acceleration", "reference"}),
+        windows=push_windows([Push(**push) for push in scenario.get("push", ())]),
+        scenario=scenario,
+    )

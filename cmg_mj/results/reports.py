@@ -1,0 +1,180 @@
+"""Tables and lists that `run`, `compare` and `list` print."""
+
+from __future__ import annotations
+
+import sys
+import textwrap
+from collections.abc import Mapping, Sequence
+
+from rich.console import Group
+
+from cmg_mj.inputs.files import bundled
+from cmg_mj.inputs.user_classes import UserClassKind
+from cmg_mj.results.error_bounds import FLOOR_ACCELERATION, FLOORS, NO_ACCELERATION_FLOOR, NOISE_ALONE
+from cmg_mj.results.intervals import Interval, format_interval
+from cmg_mj.results.summary_keys import (
+    AXES,
+    KEYS,
+    OPEN_LOOP_COLUMNS,
+    SummaryValue,
+    capitalised,
+    format_difference,
+    format_figure,
+    heading,
+    open_loop_figures,
+    section,
+)
+from cmg_mj.results.tables import Row, Table
+from cmg_mj.scenario.description import assignments
+from cmg_mj.scenario.differences import describe_differences
+from cmg_mj.scenario.loading import load_scenario
+
+ABOUT_COMPARISONS = """\
+Means over the worlds that stood to the end (settle time: that settled), with 95 % intervals.
+Push window: from a push's start to 1 s after its end.
+Fit: 1 - RMS error / RMS of the true velocity; 1 is the truth, 0 an estimate of zero."""
+ABOUT_BASELINES = """\
+zero, an estimate of zero; mems_as_bought, a two-dollar gyro with its offset; mems_gyro, the same
+after a second at rest; mems_fused, as bought, in a Kalman filter with y1; floor_y1 and floor_accel,
+lower bounds on the error from the measured tilt, and from tilt and angular acceleration."""
+
+
+def compared_keys(summaries: Sequence[Row]) -> list[str]:
+    """List the summary keys that are compared, that of stopped worlds only if there are any."""
+    stopped = any(summary["stopped_fraction"] for summary in summaries)
+    return [key for key, about in KEYS.items() if about.compared and (stopped or key != "stopped_fraction")]
+
+
+def comparison_tables(summaries: Sequence[Row], title: str) -> list[Table]:
+    """Tabulate a comparison.
+
+    Args:
+        summaries: Its rows, as `cmg-mj compare --json` prints them.
+        title: Of the first table.
+
+    Returns:
+        The means with their 95 % intervals and, if there are any, the paired differences to the best of each column.
+    """
+    keys = compared_keys(summaries)
+    tables = [Table(_headings("observer", keys), summaries, title, _mean_entry)]
+    differences = [section(summary, "minus_best") for summary in summaries]
+    if any(less["interval"] for row in differences for less in row.values()):
+        headings = _headings("observer", [key for key in keys if any(key in row for row in differences)])
+        tables.append(Table(headings, summaries, "Less the best of each column, world by world", _difference_entry))
+    return tables
+
+
+def comparison_note(summaries: Sequence[Row]) -> str:
+    """Explain the tables of a comparison."""
+    loop = next((summary["in_loop_of"] for summary in summaries if "in_loop_of" in summary), None)
+    if not loop:
+        return ABOUT_COMPARISONS
+    floors = _about_floors(any(summary["observer"] == FLOOR_ACCELERATION for summary in summaries))
+    return f"{ABOUT_COMPARISONS}\nOpen loop, on the motion of {loop}, the best:\n{ABOUT_BASELINES}\n{floors}"
+
+
+def comparison_table(summaries: Sequence[Row], title: str) -> Group:
+    """Make what `cmg-mj compare` prints."""
+    return Group(*(table.rich() for table in comparison_tables(summaries, title)), comparison_note(summaries))
+
+
+def comparison_markdown(summaries: Sequence[Row]) -> str:
+    """Make the same in Markdown."""
+    means, *differences = comparison_tables(summaries, "")
+    less = [f"{table.title}:\n\n{table.markdown()}" for table in differences]
+    return "\n\n".join([means.markdown(), *less, comparison_note(summaries)])
+
+
+def _headings(first: str, keys: Sequence[str]) -> dict[str, str]:
+    return {"observer": first, **{key: heading(key) for key in keys}}
+
+
+def _mean_entry(summary: Row, key: str) -> str:
+    if key == "observer":
+        return str(summary[key])
+    intervals = summary["intervals"]
+    ends = intervals.get(key) if isinstance(intervals, Mapping) else None
+    return _with_interval(format_figure(key, summary[key]), key, summary[key], ends)
+
+
+def _difference_entry(summary: Row, key: str) -> str:
+    if key == "observer":
+        return str(summary[key])
+    less = section(summary, "minus_best").get(key)
+    if less is None:
+        return "best"
+    return _with_interval(format_difference(key, less["mean"]), key, less["mean"], less["interval"])
+
+
+def _with_interval(text: str, key: str, mean: SummaryValue, ends: SummaryValue) -> str:
+    match mean, ends:
+        case float(), [float() as low, float() as high]:
+            return "\n".join([text, *format_interval(KEYS[key].pattern, Interval(mean, low, high))])
+    return text
+
+
+def run_title(summary: Row) -> str:
+    """Name a run in a line: scenario, observer, seed, world, what differs from the bundled scenario."""
+    place = " on the board" if summary.get("driver") == "board" else ""
+    world = f", world {summary['world']}" if "world" in summary else ""
+    changes = summary["differs"]
+    differs = describe_differences(changes) if isinstance(changes, Mapping) else ""
+    return f"{summary['scenario'] or 'Run'}: {summary['observer']}{place}, seed {summary['seed']}{world}{differs}"
+
+
+def summary_table(summary: Row) -> Group:
+    """Make what `cmg-mj run` prints: the figures of each axis, and those of its open-loop observers."""
+    ends = {"done": "stood to the end, {:g} s", "fell": "fell at {:.2f} s"}
+    outcome = str(summary["outcome"])
+    end = ends.get(outcome, outcome + " at {:g} s").format(summary["end_time_s"])
+    axes = section(summary, AXES) or {"": summary}
+    rows: list[Row] = [{"": "Outcome", next(iter(axes)) or "figure": end}]
+    columns = {"": "", **{name or "figure": name for name in axes}}
+    for key in KEYS:
+        if key in summary:
+            figures = {name or "figure": format_figure(key, axis.get(key)) for name, axis in axes.items()}
+            rows.append({"": capitalised(heading(key)), **figures})
+    open_loop = [_open_loop_table(name, axis) for name, axis in axes.items() if open_loop_figures(axis)]
+    floors = {name for axis in axes.values() for name in FLOORS if name in open_loop_figures(axis)}
+    about = [_about_floors(FLOOR_ACCELERATION in floors)] if floors else []
+    tables = [Table(columns, rows, run_title(summary), lambda row, key: str(row.get(key, ""))), *open_loop]
+    return Group(*(table.rich() for table in tables), *about)
+
+
+def _open_loop_table(axis: str, summary: Row) -> Table:
+    """Show how well the open-loop observers and the baselines estimate an axis' rate."""
+    rows = [{"observer": name, **figures} for name, figures in open_loop_figures(summary).items()]
+    columns = _headings(f"Open loop, {axis}" if axis else "Open loop", OPEN_LOOP_COLUMNS)
+    return Table(columns, rows, entry=_figure_entry)
+
+
+def _figure_entry(row: Row, key: str) -> str:
+    return str(row[key]) if key == "observer" else format_figure(key, row.get(key))
+
+
+def _about_floors(has_acceleration: bool) -> str:
+    return NOISE_ALONE if has_acceleration else NO_ACCELERATION_FLOOR
+
+
+def scenario_list() -> str:
+    """List the bundled scenarios and their titles."""
+    names = bundled("scenarios")
+    width = max(map(len, names))
+    return "\n".join(["Scenarios", *(f"  {name:{width}}  {load_scenario(name).title}" for name in names)])
+
+
+def class_list(kind: UserClassKind) -> str:
+    """List every observer, or every control law, the defaults of its parameters, and its description."""
+    width = max(map(len, kind.known))
+    indent = " " * (width + 4)
+    lines = [f"{kind.what.capitalize()}s, and the defaults of their parameters (--set {kind.section}.NAME=VALUE)"]
+    for name in kind.known:
+        parameters = kind.takes(name)
+        title = (sys.modules[kind.find(name).__module__].__doc__ or "").partition("\n")[0]
+        defaults = assignments({key: parameters[key].default for key in kind.own(name)}) or "no parameters"
+        # A default is kept in one piece: its spaces are not those to break at.
+        wrapped = textwrap.wrap(defaults.replace(", ", ",\0"), 98, initial_indent=indent, subsequent_indent=indent)
+        wrapped[0] = f"  {name:{width}}  {wrapped[0].strip()}"
+        lines += [line.replace("\0", " ") for line in wrapped]
+        lines += textwrap.wrap(title, 98, initial_indent=indent, subsequent_indent=indent)
+    return "\n".join(lines)
