@@ -31,7 +31,6 @@ from cmg_mj.replay.user_noise import noise_of
 from cmg_mj.replay.zero_phase import ZeroPhase, zero_phase
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.frames import NamedColumns
-from cmg_mj.results.memory import release_free_memory
 from cmg_mj.results.stored_columns import LONG, ColumnStore, StoredColumns, shelved, stored
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 from cmg_mj.sensors.tilt import TiltNoise
@@ -158,7 +157,6 @@ def replay_log(
         del disturbed
         summaries[name] = {**scores(log, signals["x2_rad_s"], scored), "noise_gain_1_s": gain}
     zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
-    release_free_memory()  # of the observers, before the smoother takes as much
     return ReplayResult(
         log,
         estimates,

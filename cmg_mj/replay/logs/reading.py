@@ -32,7 +32,6 @@ from cmg_mj.replay.logs.sampling import SAME_TIME, Part, Sampler
 from cmg_mj.replay.logs.table import read_table
 from cmg_mj.replay.logs.units import in_si
 from cmg_mj.replay.logs.white_noise import white_noise_of
-from cmg_mj.results.memory import release_free_memory
 from cmg_mj.results.stored_columns import (
     LONG,
     Reader,
@@ -97,7 +96,6 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     options = replace(options, units=units)
     period = sampler.period or dt
     noise = white_noise_of(parts, period)
-    release_free_memory()  # of the file's cells and the resampling
     return Log(path.stem, dt, joined, slices, has, rows.tilt, windows, tuple(notes), options, None, period, noise)
 
 
