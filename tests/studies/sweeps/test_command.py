@@ -159,6 +159,9 @@ def test_a_study_file_with_settings_and_its_own_model(tmp_path: Path) -> None:
         (["--vary", "plant.equilibrium_bias=0,1"], "plant.equilibrium_bias: no such field; did you mean"),
         (["--vary", f"{BIAS}=0,90"], f"{BIAS} = 90: must be"),
         (["--vary", f"{BIAS}"], "no values"),
+        ([], "nothing is varied"),
+        (["--vary", f"{BIAS}=0:1"], "a range without a count is for --sample and --sobol"),
+        (["--vary", f"{BIAS}=0:1", "--sobol", "200"], "--sobol 200: must be a power of two, such as 256"),
         (["--vary", "observer.k1=10,20", "--observers", "homogeneous,linear"], "observer.k1"),
         (["--vary", "observer.k1=10,-20"], "observer.k1"),
         (

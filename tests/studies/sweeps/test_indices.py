@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.studies.sweeps.sobol import LOST, IndexRow, Indices, index_rows, indices
+from cmg_mj.studies.sweeps.sobol import LOST, IndexRow, index_rows, indices
 from cmg_mj.studies.sweeps.study import SweepStudy, sampled
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, VELOCITY, make_trials
 
@@ -39,13 +39,6 @@ def test_the_indices_of_a_known_function() -> None:
 def test_decisive_only_where_intervals_part(weights: tuple[float, float], decisive: list[bool]) -> None:
     n = 256
     assert indices(sampled(2, n, 3, indices=True) @ np.array(weights), n, 0).decisive.tolist() == decisive
-
-
-def test_an_estimate_above_an_interval_is_not_decisive_if_its_own_reaches_down() -> None:
-    z = np.zeros(2)
-    totals = np.array([0.6, 0.4]), np.array([0.45, 0.3]), np.array([0.8, 0.5])
-    assert Indices(z, z, z, *totals).decisive.tolist() == [False, False]
-    assert Indices(z, z, z, totals[0], totals[1] + 0.06, totals[2]).decisive.tolist() == [True, False]
 
 
 def sobol(error: Any, n: int = 64) -> list[IndexRow]:

@@ -76,12 +76,11 @@ def test_in_a_study_file(sweep: str, complaint: str) -> None:
     assert not Path("out").exists()
 
 
-@pytest.mark.parametrize("options", [[], ["--sample", "2"], ["--sobol", "2"]])
 @pytest.mark.usefixtures("elsewhere")
-def test_a_design_that_there_is_not(options: list[str]) -> None:
+def test_a_design_that_there_is_not() -> None:
     """An option that replaces the design does not make the study file right."""
     Path("s.toml").write_text(f'scenario = "push_recovery"\n[sweep]\ndesign = "nope"\n[vary]\n"{BIAS}" = "0:1"\n')
-    complaint = cmg_mj("sweep", "s.toml", *options, "--dry-run").complaint
+    complaint = cmg_mj("sweep", "s.toml", "--sample", "2", "--dry-run").complaint
     assert_in("s.toml: sweep.design = 'nope': must be one of grid, sample, sobol", complaint)
 
 

@@ -90,18 +90,3 @@ def test_a_design_takes_each_value_of_a_list_equally_often(design: Any) -> None:
     assert len(pairs) == 16  # and every combination is there
     assert len({point[BIAS] for point in points[:64]}) == 64
     assert sum(len(chunk.trials) for chunk in sweep.chunks) == sweep.trials
-
-
-@pytest.mark.parametrize(
-    ("settings", "options", "complaint"),
-    [
-        ((), {}, "--vary: nothing is varied"),
-        ((f"{BIAS}=0,1", f"{BIAS}=2,3"), {}, f"--vary {BIAS}: given twice"),
-        ((f"{BIAS}=0:1",), {}, "a range without a count is for --sample and --sobol"),
-        ((f"{BIAS}=0:1",), {"design": "sobol", "n": 200}, "--sobol 200: must be a power of two, such as 256"),
-        ((f"{BIAS}=0:1",), {"design": "sobol", "n": 1}, "must be a power of two"),
-    ],
-)
-def test_what_is_no_study(settings: tuple[str, ...], options: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(InputError, match=complaint):
-        study(*settings, **options)
