@@ -770,7 +770,6 @@ COMMANDS: dict[str, Notes] = {
     "bench board": Notes(
         "about three seconds for one observer.", ("cmg-mj bench board --observers gyro_free",), "board.md"
     ),
-    "bench sweep": Notes("about a minute for one observer.", ("cmg-mj bench sweep --observers homogeneous",)),
 }
 """Command -> examples and durations."""
 NEEDS = {

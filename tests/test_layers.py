@@ -209,7 +209,7 @@ def test_only_one_place_knows_a_heavy_library(library: str) -> None:
 @pytest.mark.slow
 def test_heavy_libraries_are_imported_where_they_are_used() -> None:
     """All modules but these leave them out: nothing imports matplotlib before a plot is drawn."""
-    inner = ("cmg_mj.codegen.export.", "cmg_mj.visualization.studio.", "cmg_mj.studies.sweeps.dask_", *EAGER)
+    inner = ("cmg_mj.codegen.export.", "cmg_mj.visualization.studio.", "cmg_mj.studies.sweeps.cluster", *EAGER)
     code = "import importlib, sys\n"
     for name in modules():
         if not name.startswith(inner):

@@ -1,4 +1,4 @@
-"""The commands that measure speed: of the closed loop, of an update on a board, and of sweeps."""
+"""The commands that measure speed: of the closed loop, and of an update on a board."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from cmg_mj.cli.terminal import progress, show, users_code
 from cmg_mj.errors import InputError
 
 
-@click.group(short_help="Measure the speed of the closed loop, a board or sweeps.", invoke_without_command=True)
+@click.group(short_help="Measure the speed of the closed loop or a board.", invoke_without_command=True)
 @click.pass_context
 def bench(context: click.Context) -> None:
-    """Measure the speed of the closed loop, of an observer's update on a board, or of sweeps.
+    """Measure the speed of the closed loop, or of an observer's update on a board.
 
     \b
       cmg-mj bench loop --observers homogeneous,ltv
@@ -49,17 +49,3 @@ def board(observers: list[str], markdown: bool, as_json: bool) -> None:
     with progress("Bench on the board", 1.0) as on_progress:
         figures = measure([prepare(cost_scenario(name)) for name in observers], on_progress)
     show(figures, cost_markdown(figures) if markdown else cost_table(figures), as_json)
-
-
-@bench.command(short_help="Time the trials of sweeps against MuJoCo's batch.")
-@observers_option()
-@worlds_option("Worlds that run together.", default=512)
-@json_option()
-@users_code()
-def sweep(observers: list[str], worlds: int, as_json: bool) -> None:
-    """Time the trials of sweeps: processor time of a whole trial against that of MuJoCo's batch alone."""
-    from cmg_mj.studies.sweeps.cost import measure, table
-
-    with progress("Bench of sweeps", 1.0) as on_progress:
-        figures = measure(observers, worlds, on_progress)
-    show(figures, table(figures), as_json)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
 from cmg_mj.cli.arguments import RunArguments, observers_option, output_path, overwrites, run_options, worlds_option
-from cmg_mj.cli.progress_rate import ProgressRate, duration_text
 from cmg_mj.cli.terminal import (
     CtrlC,
     end_interrupted,
@@ -22,9 +20,6 @@ from cmg_mj.cli.terminal import (
 from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.results.summary_keys import SummaryValue
-    from cmg_mj.studies.sweeps.cells import Trials
-    from cmg_mj.studies.sweeps.sobol import IndexRow
     from cmg_mj.studies.sweeps.study import SweepStudy
     from cmg_mj.studies.sweeps.study_file import SweepFields
 
@@ -82,16 +77,16 @@ def sweep(
       study.toml      reruns the sweep
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.scenario.differences import safe_name
-    from cmg_mj.studies.sweeps.cells import COLUMNS, Trials
+    from cmg_mj.studies.sweeps.cells import COLUMNS, Trials, cells_of
     from cmg_mj.studies.sweeps.chunk import estimate_cost
+    from cmg_mj.studies.sweeps.cluster import local_workers, on_cluster
     from cmg_mj.studies.sweeps.report import save, summary
     from cmg_mj.studies.sweeps.sobol import index_rows
     from cmg_mj.studies.sweeps.store import Store
+    from cmg_mj.studies.sweeps.store import run as run_here
     from cmg_mj.studies.sweeps.study import MOST_TRIALS, check_values, counted
 
     if cluster is not None:
-        from cmg_mj.studies.sweeps.cluster import local_workers
-
         local_workers(cluster)
     study = _study(arguments, options)
     check_values(study)
@@ -105,7 +100,7 @@ def sweep(
             f"{MOST_TRIALS} give --yes (--dry-run prints the time and memory)"
         )
     path = output_path(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
-    with _runner(cluster) as run:
+    with nullcontext(run_here) if cluster is None else on_cluster(cluster) as run:
         store = Store.open(path, study, overwrite=overwrites())
         left = store.left()
         before = study.trials - sum(study.chunks.size(number) for number in left)
@@ -113,8 +108,7 @@ def sweep(
             note(f"resuming: {before} of {study.trials} trials are done")
         with CtrlC() as ctrl_c:
             try:
-                pace = ProgressRate("trials", study.trials, before)
-                with progress(f"sweep {arguments.name}", study.trials, ctrl_c, pace) as on_progress:
+                with progress(f"sweep {arguments.name}", study.trials, ctrl_c) as on_progress:
                     run(store, left, on_progress)
             except KeyboardInterrupt:
                 kept = f"finished trials are kept in {store.folder}"
@@ -122,24 +116,12 @@ def sweep(
             trials = Trials(study, store.tables(COLUMNS))
             indices = index_rows(trials) if study.design == "sobol" else []
             save(store, trials, indices)
-    figures = _as_json(trials, indices) if arguments.as_json else None
+    figures = {"trials": study.trials, "cells": list(cells_of(trials))} if arguments.as_json else {}
+    if study.design == "sobol":
+        figures["indices"] = [row._asdict() for row in indices]
     show(figures, summary(trials, indices), arguments.as_json)
     if not arguments.as_json or store.folder != path:
         click.echo(f"Written to {store.folder}. Read {store.folder / 'report.md'}", err=True)
-
-
-@contextmanager
-def _runner(cluster: str | None) -> Iterator[Callable[..., None]]:
-    """Provide the function that runs the chunks: in this process, or on a cluster."""
-    if cluster is None:
-        from cmg_mj.studies.sweeps.store import run
-
-        yield run
-    else:
-        from cmg_mj.studies.sweeps.cluster import on_cluster
-
-        with on_cluster(cluster) as run:
-            yield run
 
 
 def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
@@ -150,7 +132,10 @@ def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
     from cmg_mj.studies.sweeps.study_file import axes_of, design_of, locate_tracks, scenario_of, study_file
 
     design = sampling(options["sample"], options["sobol"], prefix="--")
-    axes = [parse_axis(*_split(setting), f"--vary {setting}") for setting in options["varied"]]
+    axes = []
+    for setting in options["varied"]:
+        field, _, values = setting.partition("=")
+        axes.append(parse_axis(field, values, f"--vary {setting}"))
     fields = study_file(arguments.name)
     settings: SweepFields = {}
     if fields is None:
@@ -169,28 +154,8 @@ def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
     return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *(design or file_design))
 
 
-def _split(setting: str) -> tuple[str, str]:
-    field, _, values = setting.partition("=")
-    return field.strip(), values
-
-
-def _as_json(trials: Trials, indices: Sequence[IndexRow]) -> SummaryValue:
-    from cmg_mj.studies.sweeps.cells import cells_of
-
-    return {
-        "trials": trials.study.trials,
-        "cells": list(cells_of(trials)),
-        **({"indices": [row._asdict() for row in indices]} if trials.study.design == "sobol" else {}),
-    }
-
-
 def _cost_text(cost: dict[str, float]) -> str:
-    from cmg_mj.studies.sweeps.study import counted
-
-    def count(key: str) -> str:
-        return counted(int(cost[key]), key[:-1])
-
-    size = " x ".join(count(key) for key in ("points", "observers", "worlds"))
-    seconds = cost["minutes"] * 60.0
-    time = f"{seconds:.2g} s" if seconds < 10.0 else duration_text(seconds)
-    return f"{size} = {count('trials')} in {count('chunks')}; about {time} on this machine, {cost['memory_mb']:.0f} MB"
+    size = "{points} points x {observers} observers x {worlds} worlds = {trials} trials in {chunks} chunks".format(
+        **cost
+    )
+    return f"{size}; about {cost['minutes']:.2g} min on this machine, {cost['memory_mb']:.0f} MB"

@@ -13,12 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.errors import InputError
 from cmg_mj.replay.log import Log, LogNoise, WhiteNoise
 from cmg_mj.replay.parameter_options import numbers
 from cmg_mj.replay.sampling import EVEN, Part
 from cmg_mj.results.summary_keys import SummaryValue
-from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY, Accelerometer
+from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 
 SEGMENT = 128

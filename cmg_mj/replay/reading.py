@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.errors import InputError
 from cmg_mj.replay.log import REFERENCE, Log, ReadOptions, log_of_run
 from cmg_mj.replay.noise import white_noise_of
 from cmg_mj.replay.sampling import SAME_TIME, Part, Sampler, sampled_where_known
 from cmg_mj.replay.table import ACCELEROMETERS, ONE_ACCELEROMETER, ROLES, UNITS, Column, columns_of, read_table
-from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY
 from cmg_mj.stages.push import Window, inside
 
 UNWRAP_STEP = 1.5 * math.pi

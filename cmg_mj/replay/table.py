@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.errors import InputError, nearest, shortened
 from cmg_mj.replay.log import ReadOptions
-from cmg_mj.sensors.accelerometer import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -49,30 +49,24 @@ def write_bytes(path: Path, content: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def write_parquet(
-    path: Path, table: pa.Table, metadata: Mapping[str, Any] | None = None, *, durable: bool = False
-) -> None:
+def write_parquet(path: Path, table: pa.Table, metadata: Mapping[str, Any] | None = None) -> None:
     """Write a table as Parquet.
 
     Args:
         path: The file.
         table: The table.
         metadata: What the file says of the table beside it; by default nothing.
-        durable: Whether the file must outlast a power cut.
     """
-    write_row_groups(path, [table], metadata, durable=durable)
+    write_row_groups(path, [table], metadata)
 
 
-def write_row_groups(
-    path: Path, tables: Iterable[pa.Table], metadata: Mapping[str, Any] | None = None, *, durable: bool = False
-) -> None:
+def write_row_groups(path: Path, tables: Iterable[pa.Table], metadata: Mapping[str, Any] | None = None) -> None:
     """Write tables with the same columns as one Parquet file, a row group each.
 
     Args:
         path: The file.
         tables: The tables, at least one; each is written before the next is asked for.
         metadata: What the file says of the table beside it; by default nothing.
-        durable: Whether the file must outlast a power cut.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -88,6 +82,3 @@ def write_row_groups(
             pa.default_memory_pool().release_unused()  # of a long file, hundreds of row groups pile up
         assert writer is not None
         writer.close()
-        if durable:
-            file.flush()
-            os.fsync(file.fileno())

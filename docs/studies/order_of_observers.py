@@ -9,9 +9,11 @@ logarithm of the ratio of the first two.
 
 from __future__ import annotations
 
+import math
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,13 +26,13 @@ FIGURES = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "tilt_rm
 
 def main(folder: Path, order: list[str]) -> None:
     """Print both."""
-    trials = pd.read_parquet(folder / "trials.parquet")
+    trials: Any = pd.read_parquet(folder / "trials.parquet")
     study = tomllib.loads((folder / "study.toml").read_text(encoding="utf-8"))
     for figure in FIGURES:
         of_trials = trials.assign(error=trials[figure].where(trials["outcome"] != "fell", np.inf))
         errors = of_trials.pivot(index=["point", "world"], columns="observer", values="error")[order]
         means = errors.groupby("point").agg(lambda worlds: worlds.mean(skipna=False))
-        known = means[means.notna().all(axis=1)].to_numpy()
+        known = means.dropna().to_numpy()
         better, worse = known[:, :-1], known[:, 1:]
         held = (better < worse).all(axis=1)
         decided = held | ((better >= worse) & np.isfinite(worse)).any(axis=1)
@@ -38,7 +40,7 @@ def main(folder: Path, order: list[str]) -> None:
             share, low, high = fell_interval(int(held.sum()), int(decided.sum()))
             print(f"{figure}: {' < '.join(order)} at {held.sum()} of {decided.sum()} points", end=" ")
             print(f"({100 * share:.1f} %, {100 * low:.1f} to {100 * high:.1f})")
-        ratio = np.log(errors[order[0]] / errors[order[1]]).groupby("point").mean().to_numpy()
+        ratio = (errors[order[0]] / errors[order[1]]).map(math.log).groupby("point").mean().to_numpy()
         if study["sweep"]["design"] == "sobol" and np.isfinite(ratio).all():
             result = indices(ratio, study["sweep"]["n"], study["scenario"]["seed"])
             for field, *total in zip(study["vary"], result.total, result.total_low, result.total_high, strict=True):

@@ -12,11 +12,13 @@ from cmg_mj.core.axes import YawCoupling
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.noise import CORNERS_HZ, NoiseStream, spread_of
 from cmg_mj.core.sensor import steps_until, whole_steps
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.errors import InputError
-from cmg_mj.sensors.accelerometer import INSIDE_HZ, STANDARD_GRAVITY, Accelerometer
+from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.mems_gyro import PIECE, MemsGyro
+from cmg_mj.stages.low_pass import INSIDE_HZ
 
 MOST_AXES = 4
 MOST_GIMBALS = 8

@@ -174,15 +174,12 @@ def cells_schema(study: SweepStudy) -> pa.Schema:
     """Declare the columns of `cells_of`."""
     counts = [(name, "int64") for name in ("trials", "stood", "fell", "stopped")]
     shares = [(name, "float64") for name in ("fell_share", "fell_low", "fell_high")]
-    ends = ("", "_low", "_high")
-    figures = [
-        column
-        for key in COMPARED
-        for column in [
-            *((f"{name}{end}", "float64") for name in (key, f"{key}_behind_best") for end in ends),
-            (f"{key}_best", "string"),
+    figures: list[tuple[str, str]] = []
+    for key in COMPARED:
+        figures += [
+            (f"{name}{end}", "float64") for name in (key, f"{key}_behind_best") for end in ("", "_low", "_high")
         ]
-    ]
+        figures.append((f"{key}_best", "string"))
     return pa.schema([*point_columns(study), ("observer", "string"), *counts, *shares, *figures])
 
 
@@ -295,22 +292,18 @@ def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
     figure = trials.figure(key)
     if study.design == "sobol":
         figure = figure[: 2 * study.n]
-    contenders = study.contenders
-    best, sure, least = least_error(figure, contenders)
+    best, sure, least = least_error(figure, study.contenders)
     ahead = baselines_ahead(study, figure, least)
     rows = []
     for place, name in enumerate(study.observers):
         errors = figure[:, place]
-        is_baseline = name in ahead
-        if is_baseline:
+        leads, surely = best == place, (best == place) & sure
+        if name in ahead:
             leads = ahead[name] > 0.5
-            leaders = [figure[i, best[i]] for i in range(len(figure))]
-            pairs = zip(leads, best, errors, leaders, strict=True)
-            surely = np.array([bool(lead) and (b < 0 or _is_less(own, other)) for lead, b, own, other in pairs])
-        else:
-            leads = best == place
-            surely = leads & sure
+            surely = [
+                bool(leads[i]) and (best[i] < 0 or _is_less(errors[i], figure[i, best[i]])) for i in range(len(best))
+            ]
         close = errors.mean(axis=-1) <= CLOSE * least
-        counts = (Count(int(mask.sum()), len(figure)) for mask in (leads, surely, close))
-        rows.append(LeadRow(name, is_baseline, *counts))
+        counts = (Count(int(np.sum(mask)), len(figure)) for mask in (leads, surely, close))
+        rows.append(LeadRow(name, name in ahead, *counts))
     return sorted(rows, key=lambda row: row.is_baseline)

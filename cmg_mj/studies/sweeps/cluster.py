@@ -8,7 +8,7 @@ import re
 import signal
 import sys
 import threading
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from functools import partial
@@ -39,7 +39,7 @@ LOOK_S = 0.25
 WINDOW = 256
 """Chunks that are handed over at once; each takes about 0.1 MB there."""
 KILLS = 3
-"""Workers that a chunk may kill before it is abandoned, on a cluster that is started here."""
+"""Workers that a chunk may kill before it is abandoned."""
 _one_at_a_time = threading.Lock()
 """A worker with many threads is handed as many chunks: one is computed, on all of its threads."""
 
@@ -133,7 +133,7 @@ def _started(workers: int) -> Iterator[Any]:
             preload=__name__,
             memory_limit=0,  # as in this process: a worker that is ended for its memory would look as if killed
             silence_logs=logging.CRITICAL,
-            scheduler_kwargs={"allowed_failures": KILLS - 1, "dashboard": False},
+            scheduler_kwargs={"allowed_failures": 0, "dashboard": False},
         ) as cluster,
     ):
         yield cluster
@@ -148,17 +148,25 @@ def _run(
 ) -> None:
     """Run the chunks that are left. The result does not depend on the workers, their number or their order.
 
+    A chunk whose worker died is tried alone, at the end: a neighbour that waited on the same worker may be the cause.
+
     Raises:
         InputError: A worker lacks something.
         RunStopped: The cluster has gone away, or something fails on it.
     """
-    from distributed import CancelledError, wait
+    from distributed import CancelledError, KilledWorker, wait
 
     chunks, waiting = store.study.chunks, deque(left)
+    suspects: deque[int] = deque()
+    killed: Counter[int] = Counter()
+    alone: int | None = None
     done = store.study.trials - sum(chunks.size(number) for number in left)
     running: dict[Future, int] = {}
     try:
-        while waiting or running:
+        while waiting or suspects or running:
+            if suspects and not waiting and not running:
+                alone = suspects.popleft()
+                waiting.append(alone)
             while waiting and len(running) < WINDOW:
                 number = waiting.popleft()
                 running[client.submit(_compute_part, _part_of(store.study, chunks[number]), pure=False)] = number
@@ -167,7 +175,16 @@ def _run(
                 waited = wait(list(running), timeout=LOOK_S, return_when="FIRST_COMPLETED")
             for future in waited.done if waited else ():
                 number = running.pop(future)
-                store.keep(number, _result(future, store.study, number, address))
+                try:
+                    table = _result(future, address)
+                except KilledWorker as error:
+                    killed[number] += error.allowed_failures + 1
+                    if number != alone or killed[number] < KILLS:
+                        suspects.append(number)
+                        continue
+                    reason = f"its chunk has killed {killed[number]} workers"
+                    table = table_of(store.study, rows_of_failed_chunk(store.study, chunks[number], reason))
+                store.keep(number, table)
                 done += chunks.size(number)
             if on_progress:
                 on_progress(done)
@@ -178,17 +195,13 @@ def _run(
             client.cancel(list(running))
 
 
-def _result(future: Future, study: SweepStudy, number: int, address: str) -> pa.Table:
-    """Return a chunk's table; of a chunk that killed its workers, rows that say so."""
+def _result(future: Future, address: str) -> pa.Table:
     from distributed import CancelledError, KilledWorker
 
     try:
         return future.result()
-    except CancelledError:
+    except (CancelledError, KilledWorker):
         raise
-    except KilledWorker as error:
-        reason = f"its chunk has killed {error.allowed_failures + 1} workers"
-        return table_of(study, rows_of_failed_chunk(study, study.chunks[number], reason))
     except InputError as error:
         raise InputError(f"--cluster {address}: {error}") from None
     except Exception as error:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -93,17 +92,16 @@ def curves(trials: Trials, field: str) -> Picture:
         if np.isfinite(values).any():
             lines = _error_lines(study.observers, x, values)
             y = np.concatenate([line.y for line in lines])
-            if np.nanmin(y) > 0.0 and np.nanmax(y) > LOGARITHMIC * np.nanmin(y):
-                panels.append(panel(heading(key), lines, y_scale="log", y_ticks=round_values(y)))
-            else:
-                panels.append(panel(heading(key), lines))
+            is_log = np.nanmin(y) > 0.0 and np.nanmax(y) > LOGARITHMIC * np.nanmin(y)
+            of_log = {"y_scale": "log", "y_ticks": round_values(y)} if is_log else {}
+            panels.append(panel(heading(key), lines, **of_log))
     if trials.fell.any():
         lines = _fall_lines(trials, x, order, scale)
         panels.append(panel("share of falls", lines, y_range=(-0.03, 1.03)))
     if panels:
-        names = itertools.chain(study.observers, itertools.repeat(""))
-        labelled = [replace(line, label=name) for line, name in zip(panels[0].lines, names, strict=False)]
-        panels[0] = replace(panels[0], lines=labelled)
+        n = len(study.observers)
+        labelled = [replace(line, label=name) for line, name in zip(panels[0].lines[:n], study.observers, strict=True)]
+        panels[0] = replace(panels[0], lines=[*labelled, *panels[0].lines[n:]])
     return Picture(CURVES, title_of(trials), panels, panel_height=2.9)
 
 
@@ -115,7 +113,7 @@ def _error_lines(observers: Sequence[str], x: np.ndarray, values: np.ndarray) ->
     lines, marks = [], []
     for place, name in enumerate(observers):
         worlds = values[:, place]
-        intervals = [known_interval(point, positive=True) or _without_interval(point) for point in worlds]
+        intervals = [known_interval(point, positive=True) or Interval(*[_mean(point)] * 3) for point in worlds]
         mean = np.array([interval.mean for interval in intervals])
         lines.append(Line(x, mean, color=name, spread=_heights(intervals)))
         whole = np.isfinite(worlds).all(axis=1)
@@ -125,11 +123,10 @@ def _error_lines(observers: Sequence[str], x: np.ndarray, values: np.ndarray) ->
     return lines + marks
 
 
-def _without_interval(worlds: np.ndarray) -> Interval:
+def _mean(worlds: np.ndarray) -> float:
     """Average the worlds that stood, too few for an interval, if one did."""
-    known = finite_mean(worlds)
-    mean = math.nan if known is None else known
-    return Interval(mean, mean, mean)
+    mean = finite_mean(worlds)
+    return math.nan if mean is None else mean
 
 
 def _heights(intervals: Sequence[Interval]) -> np.ndarray:
@@ -171,6 +168,12 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
     if study.references:
         halves[TRUE_RATE] = shares[:, :, study.observers.index(study.references[0])]
     boundaries = {name: half for name, half in halves.items() if (half < 0.5).any() and (half > 0.5).any()}
+    scales = {"x_scale": scale_of(trials, across, x), "y_scale": scale_of(trials, up, y)}
+
+    def panel(ticks: int, **parts: Any) -> Panel:
+        x_ticks, y_ticks = ticks_of(x, ticks), ticks_of(y, ticks)
+        return Panel(in_words(up), (), x_label=in_words(across), x_ticks=x_ticks, y_ticks=y_ticks, **scales, **parts)
+
     pictures = []
     for key, name in MAPS.items():
         if key == "fell":
@@ -192,32 +195,19 @@ def maps(trials: Trials, across: str, up: str) -> list[Picture]:
             label, value, levels, nobody = heading(key), "mean error", round_values(least), "none stood in every world"
         half = "half of the worlds fall"
         cells = Map(x, y, study.observers, best, sure, least, levels, boundaries, nobody, half, ahead)
-        panel = partial(
-            Panel,
-            in_words(up),
-            (),
-            x_label=in_words(across),
-            x_scale=scale_of(trials, across, x),
-            y_scale=scale_of(trials, up, y),
-        )
-        best_of = panel(
-            title=f"Best observer, by colour; thin lines: its {value}",
-            x_ticks=ticks_of(x),
-            y_ticks=ticks_of(y),
-            map=cells,
-        )
-        panel = partial(panel, x_ticks=ticks_of(x, FEW_TICKS), y_ticks=ticks_of(y, FEW_TICKS))
         surfaces = _surfaces(x, y, alone, label, (0.5,) if key == "fell" else None)
         titles = short_names(list(surfaces))
-        each = [panel(title=titles[name], surface=surface) for name, surface in surfaces.items()]
+        best_of = panel(MOST_TICKS, title=f"Best observer, by colour; thin lines: its {value}", map=cells)
+        each = [panel(FEW_TICKS, title=titles[name], surface=surface) for name, surface in surfaces.items()]
+        columns = min(COLUMNS, len(each))
         pictures.append(
             Picture(
                 name,
                 title_of(trials, label),
                 [best_of, *each],
-                columns=min(COLUMNS, len(each)),
+                columns=columns,
                 panel_height=2.1,
-                panel_width=10.4 / min(COLUMNS, len(each)),
+                panel_width=10.4 / columns,
                 first_height=4.7,
             )
         )

@@ -75,6 +75,8 @@ class Store:
             folder = next(folder for folder in numbered(path) if _may_take(folder, fields, overwrite))
             store = Store(folder, study, store.hash)
             (folder / CHUNKS).mkdir(parents=True, exist_ok=True)
+            for begun in folder.rglob(".*.partial*"):  # by a process that was killed
+                begun.unlink(missing_ok=True)
             with whole_file(folder / STUDY) as temporary:
                 temporary.write_text(tomli_w.dumps(fields), encoding="utf-8")
             chunks = [f"{CHUNKS}/{store.path(number).name}" for number in range(len(study.chunks))]

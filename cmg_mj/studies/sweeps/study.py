@@ -260,17 +260,6 @@ NOT_VARIED = {
 """Fields that a sweep does not vary, and why. Fields below them are not varied either, but for an observer's own."""
 
 
-def listed_names(names: Iterable[str], argument: str) -> tuple[str, ...]:
-    """Make a list of names that Python gave into a tuple.
-
-    Raises:
-        InputError: It is no list.
-    """
-    if isinstance(names, str) or not isinstance(names, Iterable):
-        raise InputError(f"{argument} = {shown(names)}: must be a list of observers' names, such as ['linear', 'ltv']")
-    return tuple(names)
-
-
 def check_axes(axes: Sequence[VariedField], design: str) -> None:
     """Check that something is varied, each field once, so that it makes a difference, and that a range is sampled."""
     if not axes:

@@ -45,7 +45,6 @@ KILL = "os.kill(os.getpid(), signal.SIGKILL)"
 IN_A_TRIAL = "getattr(y.y1, 'ndim', 0) and pathlib.Path('cluster').exists()"
 """In a trial, of many worlds, and not when the observer is tried before it."""
 KILLS_ITSELF = f"{IN_A_TRIAL} and {KILL}"
-KILLS_ITSELF_ONCE = f"{IN_A_TRIAL} and (pathlib.Path('cluster').unlink(), {KILL})"
 
 
 def sweep(cwd: Path, out: str, *arguments: str) -> CommandOutcome:
@@ -80,21 +79,6 @@ def test_two_workers_find_what_one_process_finds(tmp_path: Path) -> None:
     assert (tmp_path / "two" / "trials.parquet").read_bytes() == (tmp_path / "one" / "trials.parquet").read_bytes()
     for chunk in (tmp_path / "one" / "chunks").iterdir():
         assert (tmp_path / "two" / "chunks" / chunk.name).read_bytes() == chunk.read_bytes()
-
-
-@pytest.mark.slow
-@needs_distributed
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
-def test_a_killed_worker_costs_what_it_was_computing(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(KILLER.format(name="Once", what=KILLS_ITSELF_ONCE))
-    observers = ("--observers", "linear,mine:Once,gyro_free,homogeneous")
-    assert sweep(tmp_path, "one", *observers).status == 0
-    (tmp_path / "cluster").touch()
-    said = sweep(tmp_path, "two", *observers, "--cluster", "local:2")
-    assert said.status == 0, said
-    assert told(said.err)[0].startswith("Written to two."), said
-    assert not (tmp_path / "cluster").exists()  # a worker was killed
-    assert (tmp_path / "two" / "trials.parquet").read_bytes() == (tmp_path / "one" / "trials.parquet").read_bytes()
 
 
 @pytest.mark.slow

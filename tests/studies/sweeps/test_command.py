@@ -134,24 +134,6 @@ def test_a_design_for_indices(tmp_path: Path) -> None:
     assert not list(out.glob("*.png"))
 
 
-def test_one_world_is_shown_without_an_interval(tmp_path: Path) -> None:
-    arguments = [*SMALL[:-1], "1", *SHORT]
-    outcome = cmg_mj(*arguments, "--out", str(tmp_path / "out"))
-    trials = pq.read_table(tmp_path / "out" / "trials.parquet").to_pylist()
-    cells = pq.read_table(tmp_path / "out" / "cells.parquet").to_pylist()
-    for cell in cells:
-        (trial,) = (row for row in trials if (row["point"], row["observer"]) == (cell["point"], cell["observer"]))
-        error = trial["velocity_rms_error_rad_s"]
-        assert cell["velocity_rms_error_rad_s"] == error
-        assert (cell["velocity_rms_error_rad_s_low"], cell["velocity_rms_error_rad_s_high"]) == (None, None)
-        assert f" {error:.4f} |" in outcome.out
-    report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
-    assert "2 points, 2 observers, 1 world: 4 trials." in report
-    assert cmg_mj(*arguments, "--dry-run").out.startswith(
-        "2 points x 2 observers x 1 world = 4 trials in 2 chunks; about "
-    )
-
-
 def test_a_study_file_with_settings_and_its_own_model(tmp_path: Path) -> None:
     """The model is beside the file, `--set` changes the file's scenario, options its design."""
     for name in ("scissored_pair.xml", "cube.xml"):
@@ -171,28 +153,21 @@ def test_a_study_file_with_settings_and_its_own_model(tmp_path: Path) -> None:
     assert (wrong.status, "controller.feedbak: no such field" in wrong.complaint) == (2, True)
 
 
-@pytest.mark.slow
-def test_a_plan_runs_nothing(tmp_path: Path) -> None:
-    outcome = cmg_mj(*SMALL, "--dry-run", "--out", str(tmp_path / "out"))
-    assert outcome.out.startswith("2 points x 2 observers x 3 worlds = 12 trials in 2 chunks; about ")
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
         (["--vary", "plant.equilibrium_bias=0,1"], "plant.equilibrium_bias: no such field; did you mean"),
         (["--vary", f"{BIAS}=0,90"], f"{BIAS} = 90: must be"),
-        (["--vary", f"{BIAS}=1:1:3"], "an empty range"),
         (["--vary", f"{BIAS}"], "no values"),
         ([], "nothing is varied"),
+        (["--vary", f"{BIAS}=0:1"], "a range without a count is for --sample and --sobol"),
+        (["--vary", f"{BIAS}=0:1", "--sobol", "200"], "--sobol 200: must be a power of two, such as 256"),
         (["--vary", "observer.k1=10,20", "--observers", "homogeneous,linear"], "observer.k1"),
         (["--vary", "observer.k1=10,-20"], "observer.k1"),
         (
             ["--vary", f"{BIAS}=0:1:11", *NOISES, "--worlds", "10000"],
             "1100000 trials; for more than 1000000 give --yes",
         ),
-        (["--vary", f"{BIAS}=0:1", "--sobol", "200"], "--sobol 200: must be a power of two, such as 256"),
         (["--vary", f"{BIAS}=0:1", "--sobol", "2", "--sample", "3"], "--sample and --sobol: one of them"),
         (["--vary", f"{BIAS}=0,1", "--observers", "linar"], "no such observer; did you mean 'linear'"),
     ],

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.studies.sweeps.sobol import LOST, IndexRow, Indices, index_rows, indices
+from cmg_mj.studies.sweeps.sobol import LOST, IndexRow, index_rows, indices
 from cmg_mj.studies.sweeps.study import SweepStudy, sampled
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, VELOCITY, make_trials
 
@@ -35,34 +35,10 @@ def test_the_indices_of_a_known_function() -> None:
     assert all(np.array_equal(a, b) for a, b in zip(result, rerun, strict=True))
 
 
-def test_the_indices_of_a_list() -> None:
-    """y = a + b, a of 0, 1, 2, 3 and b evenly from 0 to 4: variances 5/4 and 4/3."""
-    trials = make_trials(
-        {BIAS: "0,1,2,3", NOISE: "0:4"},
-        ("linear",),
-        1,
-        lambda point, *_: point[BIAS] + point[NOISE],
-        design="sobol",
-        n=1024,
-    )
-    row_of = {row.field: row for row in index_rows(trials) if row.figure == VELOCITY}
-    for field, variance in ((BIAS, 5.0 / 4.0), (NOISE, 4.0 / 3.0)):
-        share = variance / (5.0 / 4.0 + 4.0 / 3.0)
-        assert row_of[field].first == pytest.approx(share, abs=0.01)
-        assert row_of[field].total == pytest.approx(share, abs=0.01)
-
-
 @pytest.mark.parametrize(("weights", "decisive"), [((4.0, 1.0), [True, False]), ((1.0, 1.0), [False, False])])
 def test_decisive_only_where_intervals_part(weights: tuple[float, float], decisive: list[bool]) -> None:
     n = 256
     assert indices(sampled(2, n, 3, indices=True) @ np.array(weights), n, 0).decisive.tolist() == decisive
-
-
-def test_an_estimate_above_an_interval_is_not_decisive_if_its_own_reaches_down() -> None:
-    z = np.zeros(2)
-    totals = np.array([0.6, 0.4]), np.array([0.45, 0.3]), np.array([0.8, 0.5])
-    assert Indices(z, z, z, *totals).decisive.tolist() == [False, False]
-    assert Indices(z, z, z, totals[0], totals[1] + 0.06, totals[2]).decisive.tolist() == [True, False]
 
 
 def sobol(error: Any, n: int = 64) -> list[IndexRow]:
@@ -135,7 +111,3 @@ def make_points() -> list[dict[str, Any]]:
 
 def test_the_same_everywhere_depends_on_nothing() -> None:
     assert {row.refused for row in sobol(lambda *_: 0.1)} == {"the same at every point"}
-
-
-def test_of_few_rows_nothing_is_decisive() -> None:
-    assert not any(row.decisive for row in sobol(lambda point, *_: point[BIAS], n=8))

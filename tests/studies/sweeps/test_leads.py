@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import matplotlib.image
 import numpy as np
 import pytest
 
@@ -18,8 +16,6 @@ from cmg_mj.studies.sweeps.cells import cells_of, lead_rows
 from cmg_mj.studies.sweeps.pictures import pictures_of
 from cmg_mj.studies.sweeps.report import _leads as leads
 from cmg_mj.studies.sweeps.study import SweepStudy, parse_axis
-from cmg_mj.visualization.plots.colours import BASELINE_COLOURS
-from cmg_mj.visualization.plots.run_plot import draw
 from tests.command import cmg_mj
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, VELOCITY, make_trials
 
@@ -52,15 +48,6 @@ def test_leaders_are_counted_and_baselines_stand_apart() -> None:
     assert zero.surely.held == 3  # the leader's worlds pull apart at 400
 
 
-def test_the_table_of_leaders() -> None:
-    heading, about, table = leads(make_trials(GRID, OBSERVERS, 4, error))
-    assert heading == "## Who leads"
-    assert "close: stood in every world, with at most 1.2 times the least error" in about
-    assert [cell.strip() for cell in table.splitlines()[-1].split("|")[1:3]] == ["zero (baseline)", "4 of 6"]
-    for observers in (("linear", "ltv"), ("zero", "mems_fused")):
-        assert leads(make_trials(GRID, observers, 4, lambda *_: 0.1)) == []
-
-
 @pytest.mark.slow
 def test_of_a_design_for_indices_the_independent_points_count() -> None:
     ranges = {BIAS: "0:1", NOISE: "100:400"}
@@ -84,22 +71,6 @@ def test_a_map_shows_where_baselines_are_ahead() -> None:
     plain = pictures_of(make_trials(GRID, ("linear", "ltv"), 4, error))[0].panels[0].map
     assert plain is not None
     assert not plain.ahead
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("fused", [0.15, None])
-def test_the_map_is_drawn_with_a_baselines_line(tmp_path: Path, fused: float | None) -> None:
-    """A line of the fused gyro's colour, unless the true rate falls throughout."""
-    observers = ("linear", "ltv", "mems_fused")
-
-    def drawn(point: dict[str, Any], name: str, world: int) -> float | None:
-        return fused if name == "mems_fused" else error(point, name, world)
-
-    path = tmp_path / "map.png"
-    draw(path, pictures_of(make_trials(GRID, observers, 4, drawn))[0])
-    pixels = (255 * matplotlib.image.imread(path)[:, :400, :3]).round()  # left of the legend
-    of_line = (np.abs(pixels - BASELINE_COLOURS["mems_fused"]).max(axis=2) <= 2.0).sum()
-    assert (of_line > 100) == (fused is not None)
 
 
 def test_a_falls_map_has_the_true_rate_for_the_baselines() -> None:

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.studies.sweeps.cells import Trials, fell_interval
+from cmg_mj.studies.sweeps.cells import Trials
 from cmg_mj.studies.sweeps.pictures import in_words, is_logarithmic, pictures_of, round_values
 from cmg_mj.studies.sweeps.store import PICTURES
 from cmg_mj.visualization.plots.figure_spec import Map, Picture
-from cmg_mj.visualization.plots.map_plot import edges
 from cmg_mj.visualization.plots.run_plot import draw
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, RATE, make_trials
 
@@ -106,20 +105,6 @@ def test_a_stop_is_no_share_of_falls() -> None:
     assert error_map.boundaries["ltv"][2, 1] == pytest.approx(2.0 / 3.0)
 
 
-def test_a_curve_of_falls_is_of_those_that_fell_or_stood() -> None:
-    """The interval, too."""
-    trials = make_trials({NOISE: "100,200"}, OBSERVERS, 4, lambda p, name, w: error({BIAS: 1, **p}, name, w))
-    trials.outcome[0, 1, 0] = "stopped"
-    trials.outcome[1, 1, :] = "refused"
-    trials.stood = trials.outcome == "done"
-    (picture,) = pictures_of(trials)
-    line = picture.panels[-1].lines[1]
-    assert np.asarray(line.y) == pytest.approx([2.0 / 3.0, math.nan], nan_ok=True)
-    lower, upper = np.asarray(line.spread)[:, 0]
-    interval = fell_interval(2, 3)
-    assert (2.0 / 3.0 - lower, 2.0 / 3.0 + upper) == pytest.approx((interval.low, interval.high))
-
-
 def test_one_field_makes_curves() -> None:
     trials = make_trials({NOISE: "400,100,200"}, OBSERVERS, 4, lambda p, name, w: error({BIAS: 1, **p}, name, w))
     (picture,) = pictures_of(trials)
@@ -167,11 +152,6 @@ def test_they_can_be_drawn(tmp_path: Path, worlds: int) -> None:
 )
 def test_logarithmic_values(values: tuple[float, ...], logarithmic: bool) -> None:
     assert is_logarithmic(values) == logarithmic
-
-
-def test_cells_end_half_way_on_their_axis() -> None:
-    assert edges(np.array([0.0, 1.0, 3.0]), log=False).tolist() == [-0.5, 0.5, 2.0, 4.0]
-    np.testing.assert_allclose(edges(np.array([1.0, 100.0]), log=True), [0.1, 10.0, 1000.0])
 
 
 @pytest.mark.parametrize("ends", [(0.01, 3.0), (0.1, 0.2), (0.1, 0.11)])

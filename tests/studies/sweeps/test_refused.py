@@ -11,8 +11,6 @@ import pytest
 from cmg_mj.errors import InputError
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.studies import sweeps as swept
-from cmg_mj.studies.sweeps.chunk import table_of
-from cmg_mj.studies.sweeps.study import SweepStudy, parse_axis
 from tests.command import cmg_mj
 
 BIAS, NOISE = "plant.equilibrium_bias_deg", "sensors.accelerometer.noise_density_ug_rthz"
@@ -45,22 +43,11 @@ def nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
         (["--vary", "seed=1,2"], "--vary seed: is not varied: .* --worlds says how many, --seed which"),
         (["--vary", "observer.kind=linear,ltv"], "--vary observer.kind: is not varied: --observers names them"),
         (["--vary", "title=a,b"], "--vary title: is not varied: no trial depends on it"),
-        (["--vary", "based_on=a,b"], "--vary based_on: is not varied"),
-        (["--vary", "versions.mujoco=a,b"], "--vary versions.mujoco: is not varied"),
         (["--vary", f"{BIAS}+compare.worlds=1,2"], "--vary compare.worlds: is not varied"),
-        (
-            ["--vary", 'open_loop_observers=["ltv"],[]'],
-            "--vary open_loop_observers: is not varied: a sweep runs without them",
-        ),
         (["--vary", f"{BIAS}=0,1", "--observers", "linear,ltv,linear"], "observers: 'linear' is there twice"),
         (["--vary", f"{BIAS}=0,1", "--observers", "linear,broken:Broken"], "observer broken:Broken: ValueError: never"),
-        (
-            ["--vary", f"{BIAS}=0,1", "--observers", "linear,broken:None"],
-            "observer.kind = 'broken:None': cannot be imported",
-        ),
         (["--vary", f"{INNER}=0.05,0.5"], f"--vary {INNER}=0.5: .* the inner accelerometer must lie nearer"),
         (["--vary", "plant.model=nope.xml"], "--vary plant.model: plant.model = 'nope.xml': no such file"),
-        (["--vary", "plant.model=cube,nope.xml", "--vary", f"{BIAS}=0,1"], "'nope.xml': no such file"),
         (["--vary", f"{BIAS}=0,1", "--dry-run", "--cluster", "nonsense"], "--cluster nonsense: write tcp://HOST:PORT"),
     ],
 )
@@ -75,15 +62,10 @@ def test_on_the_command_line(arguments: list[str], complaint: str) -> None:
     ("sweep", "complaint"),
     [
         ("worlds = 0", "worlds = 0: must be a whole number, 1 or more"),
-        ("worlds = -3", "worlds = -3: must be"),
         ('design = "sample"\nn = -4', "n = -4: must be a whole number of points, 1 or more"),
-        ('design = "sample"', "n = 0: must be a whole number of points"),
-        ('design = "sobol"', "--sobol 0: must be a power of two"),
         ("n = 4", "n = 4: is for the designs sample and sobol"),
         ("observers = [1]", "observers: 1: must be an observer's name"),
         ("observers = []", "observers: there must be one at least"),
-        ('observers = ["linar"]', "observers: 'linar': no such observer; did you mean 'linear'"),
-        ('observers = ["ltv", "ltv"]', "observers: 'ltv' is there twice"),
         ("order = [1, 2]", "sweep.order: no such field"),
     ],
 )
@@ -94,27 +76,21 @@ def test_in_a_study_file(sweep: str, complaint: str) -> None:
     assert not Path("out").exists()
 
 
-@pytest.mark.parametrize("options", [[], ["--sample", "2"], ["--sobol", "2"]])
 @pytest.mark.usefixtures("elsewhere")
-def test_a_design_that_there_is_not(options: list[str]) -> None:
+def test_a_design_that_there_is_not() -> None:
     """An option that replaces the design does not make the study file right."""
     Path("s.toml").write_text(f'scenario = "push_recovery"\n[sweep]\ndesign = "nope"\n[vary]\n"{BIAS}" = "0:1"\n')
-    complaint = cmg_mj("sweep", "s.toml", *options, "--dry-run").complaint
+    complaint = cmg_mj("sweep", "s.toml", "--sample", "2", "--dry-run").complaint
     assert_in("s.toml: sweep.design = 'nope': must be one of grid, sample, sobol", complaint)
 
 
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        ({"worlds": 0}, "worlds = 0: must be"),
         ({"worlds": 1.5}, "worlds = 1.5: must be"),
         ({"worlds": True}, "worlds = true: must be"),
-        ({"sample": 0}, "n = 0: must be a whole number of points"),
-        ({"sample": -2}, "n = -2: must be"),
         ({"sample": 2, "sobol": 2}, "sample and sobol: one of them"),
-        ({"sobol": 0}, "--sobol 0: must be a power of two"),
         ({"sobol": 2.0}, "--sobol 2.0: must be a power of two"),
-        ({"observers": [1]}, "observers: 1: must be an observer's name"),
         ({"observers": "linear"}, "observers = 'linear': must be a list of names, such as"),
         ({"vary": {BIAS: {"a": 1}}}, "must be a list of values, or text"),
         ({"vary": {BIAS: None}}, "must be a list of values, or text"),
@@ -147,18 +123,6 @@ def test_what_fits_only_with_another_value_is_allowed(monkeypatch: pytest.Monkey
     monkeypatch.undo()
     result = swept.sweep(load_scenario("push_recovery", SHORT), {INNER: [0.05, 0.5], OUTER: [0.2, 0.6]}, worlds=1)
     assert result.trials["outcome"].to_pylist() == ["done", "done", "refused", "done"]
-
-
-def test_a_whole_number_that_no_column_of_them_holds() -> None:
-    """Which scenarios take such a number depends on pydantic's version, so it stands in a table without a run."""
-    axis = parse_axis("push.0.torque_n_m", "0,99999999999999999999", "--vary push.0.torque_n_m")
-    study = SweepStudy(load_scenario("push_recovery"), (axis,), ("linear",), 1)
-    rows = [
-        {"point": number, **point, "observer": "linear", "world": 0, "seed": 0, "outcome": "done"}
-        for number, point in enumerate(study.points)
-    ]
-    column = table_of(study, rows)["push.0.torque_n_m"]
-    assert (str(column.type), column.to_pylist()) == ("double", [0.0, 1e20])
 
 
 def assert_in(pattern: str, message: str) -> None:

@@ -64,8 +64,11 @@ def test_it_goes_on_where_it_was(whole: Store) -> None:
     before = pa.concat_tables(whole.tables())
     for number in (3, 7):
         whole.path(number).unlink()
+    begun = whole.path(3).with_name(".000003.parquet.7.partial")
+    begun.touch()
     again = Store.open(whole.folder, study())
     assert again.left() == [3, 7]
+    assert not begun.exists()
     done: list[float] = []
     run(again, again.left(), done.append)
     assert done[-1] == again.study.trials == 80

@@ -75,15 +75,6 @@ def test_a_design_for_indices_is_saltellis() -> None:
     np.testing.assert_allclose(result.total_order, expected.total_order, atol=0.1)
 
 
-def test_the_same_study_has_the_same_points() -> None:
-    def sample() -> SweepStudy:
-        return study(f"{BIAS}=-1:1", f"{NOISE}=log:100:800", design="sample", n=50)
-
-    assert list(sample().points) == list(sample().points)
-    noise: list[Any] = [point[NOISE] for point in sample().points]
-    assert np.median(noise) == pytest.approx(np.sqrt(80_000.0), rel=0.1)
-
-
 @pytest.mark.parametrize("design", ["sample", "sobol"])
 def test_a_design_takes_each_value_of_a_list_equally_often(design: Any) -> None:
     rates = "controller.rate_hz"
@@ -99,24 +90,3 @@ def test_a_design_takes_each_value_of_a_list_equally_often(design: Any) -> None:
     assert len(pairs) == 16  # and every combination is there
     assert len({point[BIAS] for point in points[:64]}) == 64
     assert sum(len(chunk.trials) for chunk in sweep.chunks) == sweep.trials
-
-
-def test_a_list_that_is_no_power_of_two_comes_out_about_evenly() -> None:
-    sweep = study("controller.rate_hz=50,100,200", design="sample", n=100)
-    _, times = np.unique(np.array([point["controller.rate_hz"] for point in sweep.points]), return_counts=True)
-    assert abs(times - 100 / 3).max() < 2.0
-
-
-@pytest.mark.parametrize(
-    ("settings", "options", "complaint"),
-    [
-        ((), {}, "--vary: nothing is varied"),
-        ((f"{BIAS}=0,1", f"{BIAS}=2,3"), {}, f"--vary {BIAS}: given twice"),
-        ((f"{BIAS}=0:1",), {}, "a range without a count is for --sample and --sobol"),
-        ((f"{BIAS}=0:1",), {"design": "sobol", "n": 200}, "--sobol 200: must be a power of two, such as 256"),
-        ((f"{BIAS}=0:1",), {"design": "sobol", "n": 1}, "must be a power of two"),
-    ],
-)
-def test_what_is_no_study(settings: tuple[str, ...], options: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(InputError, match=complaint):
-        study(*settings, **options)
