@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple, Protocol, TypedDict
+from typing import Any, Literal, NamedTuple, Protocol, TypedDict
 
 from cmg_mj.core.runners import LawRunner, ObserverRunner
 from cmg_mj.core.sensor import SampledSensor, steps_until, whole_steps
@@ -124,7 +124,7 @@ class Controller:
     ) -> None:
         self.observer = observer
         self.law = law
-        self.sensors = sensors
+        self.sensors: Any = sensors
         self.plant = plant
         self.tilt, self.gimbal_angle, self.timestep, self.backlash = plant
         self.seed = seed

@@ -61,9 +61,7 @@ class Accelerometer(
 
     A reading gets its errors in this order: vibration, misalignment, cross-axis, scale, offset, noise (white, then
     1/f), range, low-pass, resolution. An overshoot of the low-pass is clipped at the range once more.
-
-    Each base has the fields of an effect, in the file of its stage.
-    """
+    """  # each base has the fields of an effect, in the file of its stage
 
     channels = 4
 
