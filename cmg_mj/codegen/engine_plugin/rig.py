@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from cmg_mj.codegen.engine_plugin.sensor_numbers import Clock, steps_of
-from cmg_mj.core.axes import YawCoupling
 from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError
 from cmg_mj.sensors.mems_gyro import MemsGyro
 from cmg_mj.stages.low_pass import INSIDE_HZ
+from cmg_mj.stages.turning import YawCoupling
 
 MOST_AXES = 4
 MOST_GIMBALS = 8
