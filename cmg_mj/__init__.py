@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from cmg_mj.simulation.experiment import prepare as prepare
     from cmg_mj.simulation.make import plugin as plugin
     from cmg_mj.stages.push import Push as Push
-    from cmg_mj.stages.push import Swing as Swing
+    from cmg_mj.stages.swing import Swing as Swing
     from cmg_mj.studies.compare.api import Comparison as Comparison
     from cmg_mj.studies.compare.api import compare as compare
     from cmg_mj.studies.compare.comparison import ComparedObserver as ComparedObserver

@@ -36,7 +36,8 @@ from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.mems_gyro import MemsGyro
-from cmg_mj.stages.push import Push, Swing
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.swing import Swing
 
 DOCS = Path(__file__).resolve().parent
 WRITTEN = "<!-- Written by `python docs/reference_pages.py`; edit that file or the docstrings it reads. -->"

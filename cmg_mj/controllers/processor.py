@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol, Unpack
 
-from cmg_mj.core.controller import Controller, ControllerOptions, PlantInterface, Tick
+from cmg_mj.core.controller import Controller, ControllerOptions, PlantInterface, Sensors, Tick
 from cmg_mj.core.runners import as_estimate
 from cmg_mj.core.types import Forces, Law, Measurement, Observer
 from cmg_mj.elementwise import Scalar
 from cmg_mj.errors import InputError, RunStopped
-from cmg_mj.sensors.sampled import Sensors
+from cmg_mj.stages.trim import trim_of
 
 
 class Decision(NamedTuple):
@@ -106,8 +106,9 @@ class ProcessorController(Controller):
         self._remote.estimate = decision.estimate
         is_first = self.tick is None
         tick = super().decide(step, forces, encoders, fog, rate)
-        trimmed = step < self.trimmed_until
-        x_e = self.trim_gain * decision.estimate[self.trim_part] if trimmed else decision.x_e
+        trim = trim_of(self)
+        trimmed = step < trim.until
+        x_e = trim.gain * decision.estimate[trim.part] if trimmed else decision.x_e
         if is_first and not trimmed and tick.x_e:  # the processor's law has begun in this update
             x_e = tick.x_e
         self.tick = tick._replace(

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple, Protocol, TypedDict
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, NamedTuple, Protocol, TypedDict
 
 from cmg_mj.core.runners import LawRunner, ObserverRunner
-from cmg_mj.core.sensor import SampledSensor, steps_until, whole_steps
+from cmg_mj.core.sensor import SampledSensor, whole_steps
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
-from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, feedback_state
+from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, State, feedback_state
 from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError
-from cmg_mj.stages.backlash import Backlash
-from cmg_mj.stages.notch import Notch
-from cmg_mj.stages.trim import integrator_trim
 
 Feedback = Literal["observer", "fog", "truth"]
 AngleSource = Literal["measured", "estimated"]
@@ -46,6 +42,40 @@ class Sensors(Protocol):
         ...
 
 
+class CommandStage(Protocol):
+    """An effect on the gimbal rate: on the law's command, which observers are told, or behind it in the servo."""
+
+    def __call__(self, u: Scalar, /) -> Scalar:
+        """Return the rate with the effect, once a control tick [rad/s]."""
+        ...
+
+
+class MemoryStage(Protocol):
+    """An effect on the law's memory before its step."""
+
+    def __call__(self, step: int, estimate: Sequence[Scalar], memory: State, /) -> State:
+        """Return the memory with the effect, once a control tick.
+
+        Args:
+            step: Number of the physics step.
+            estimate: The estimate of the observer in the loop.
+            memory: The law's memory.
+        """
+        ...
+
+
+class ControllerSite(NamedTuple):
+    """The controller that a stage is made for."""
+
+    law: Law
+    timestep: float
+    """Physics step [s]."""
+    extra_signals: Sequence[str]
+    """Names of what the observer in the loop estimates beyond x."""
+    settings: Mapping[str, Any]
+    """The settings of stages, by the name of the scenario's field."""
+
+
 class PlantInterface(NamedTuple):
     """The plant's properties that its controller knows."""
 
@@ -55,8 +85,8 @@ class PlantInterface(NamedTuple):
     """y2 from its encoders: directions and zeros of the gimbals."""
     timestep: float
     """Physics step [s]."""
-    backlash: Scalar = 0.0
-    """Between the servos' motors and the gimbals, one for all worlds or (n_worlds,) [rad]."""
+    servos: Sequence[Callable[[float], CommandStage]] = ()
+    """Make the stages between the commanded rate and the gimbals' own, from the control period [s]."""
 
 
 class ControllerOptions(TypedDict, total=False):
@@ -67,9 +97,9 @@ class ControllerOptions(TypedDict, total=False):
     feedback: Feedback
     angle_source: AngleSource
     open_loop_observers: Mapping[str, Observer] | None
-    bias_trim_s: float
-    notch_hz: float
     axis: int
+    commands: Sequence[Callable[[], CommandStage]]
+    memories: Sequence[MemoryStage]
 
 
 class Controller:
@@ -77,9 +107,6 @@ class Controller:
 
     It does not know MuJoCo. `sample` takes the number of the physics step and the ideal readings there. `control`
     decides at a tick. `update` does both.
-
-    Every keyword-only option, a subclass's too, is kept in an attribute of the option's name: the export reads it there
-    and refuses an option that is no attribute.
 
     Args:
         observer: The observer whose estimate the law uses.
@@ -91,19 +118,17 @@ class Controller:
         feedback: Which rate the law uses: the observer's, the gyro's or the true one.
         angle_source: Whether the law uses y1, y2 as (8) says or the estimates, as the text after (10) says.
         open_loop_observers: Observers that run open loop, by name.
-        bias_trim_s: For so long from the start, the integrator is held at k_e1/k_e4 e, the value that the observer's
-            bias estimate asks for, instead of finding it by integration [s].
-        notch_hz: The middle of a notch on the law's command; 0: none [Hz].
         axis: The number of the rig's axis, on which the noise depends.
+        commands: Make the stages on the law's command.
+        memories: The stages on the law's memory.
 
     Attributes:
         extra_signals: Names of what the observer, then each open-loop observer, estimates beyond x.
-        trimmed_until: The physics step from which on the integrator goes free.
-        trim_part: Which part of the estimate is the bias that it is trimmed with.
-        trim_gain: The gain on it [s].
+        command_stages: The stages on the law's command.
+        servo_stages: The stages behind the command.
 
     Raises:
-        InputError: A rate does not fit the physics step, or there is no bias estimate to trim with.
+        InputError: A rate does not fit the physics step.
     """
 
     def __init__(
@@ -118,20 +143,21 @@ class Controller:
         feedback: Feedback = "observer",
         angle_source: AngleSource = "measured",
         open_loop_observers: Mapping[str, Observer] | None = None,
-        bias_trim_s: float = 0.0,
-        notch_hz: float = 0.0,
         axis: int = 0,
+        commands: Sequence[Callable[[], CommandStage]] = (),
+        memories: Sequence[MemoryStage] = (),
     ) -> None:
         self.observer = observer
         self.law = law
-        self.sensors = sensors
+        self.sensors: Any = sensors
         self.plant = plant
-        self.tilt, self.gimbal_angle, self.timestep, self.backlash = plant
+        self.tilt, self.gimbal_angle, self.timestep, self.servos = plant
+        self.commands, self.memories = commands, memories
         self.seed = seed
         self.worlds = worlds
         self.axis = axis
         self.turns_gimbals = True
-        """True if `update` turns the gimbals; with several axes the compensation of a turn comes between."""
+        """True if `update` turns the gimbals; with several axes a stage on all of them may come between."""
         self.feedback: Feedback = feedback
         self.angle_source: AngleSource = angle_source
         self.open_loop_observers = dict(open_loop_observers or {})
@@ -142,14 +168,6 @@ class Controller:
         observers = [observer, *self.open_loop_observers.values()]
         self._observers = ObserverRunner(observers, self._single, timestep)
         self.extra_signals = self._observers.extra_signals
-        self.bias_trim_s = bias_trim_s
-        self.trim_part, self.trim_gain = integrator_trim(bias_trim_s, law, self.extra_signals[0])
-        self.trimmed_until = steps_until(bias_trim_s, timestep)
-        self.notch_hz = notch_hz
-        if notch_hz * law.dt >= 0.5:
-            raise InputError(
-                f"controller.notch_hz = {notch_hz:g}: must be below {0.5 / law.dt:g} Hz, half the control rate"
-            )
         self.reset()
 
     @property
@@ -163,11 +181,9 @@ class Controller:
         self.tick: Tick | None = None
         self._integrator: Scalar | None = None
         self.gimbal_rate: Scalar = None
-        """The rate at which the gimbals are turned since the last tick: its u, behind the backlash [rad/s]."""
-        self._backlash = (
-            None if type(self.backlash) is float and not self.backlash else Backlash(self.backlash, self.law.dt)
-        )
-        self._notch = Notch(self.notch_hz, self.law.dt, self.law.rate_limit) if self.notch_hz else None
+        """The rate at which the gimbals are turned since the last tick: its u, behind the servo's stages [rad/s]."""
+        self.command_stages = [make() for make in self.commands]
+        self.servo_stages = [make(self.law.dt) for make in self.servos]
         self._true_rate: Scalar = math.nan
         self.body_rate: Scalar = math.nan
         """Rate of the frame along the tilt axis at the last update, as a perfect gyro on it shows [rad/s]."""
@@ -225,7 +241,9 @@ class Controller:
 
     def command_rate(self, u: Scalar) -> None:
         """Turn the gimbals at a rate from now on [rad/s]."""
-        self.gimbal_rate = u if self._backlash is None else self._backlash(u)
+        for stage in self.servo_stages:
+            u = stage(u)
+        self.gimbal_rate = u
 
     def decide(self, step: int, forces: Forces, encoders: Sequence[Scalar], fog: Scalar, rate: Scalar) -> Tick:
         """Take the control decision of a tick from the samples that have been delivered.
@@ -261,8 +279,8 @@ class Controller:
             held = self.tick.u
             estimates = self._observers.advance(y, held, step)
         estimate = estimates[0]
-        if step < self.trimmed_until:
-            self._law.state = self._law.state._replace(x_e=self.trim_gain * estimate[self.trim_part])
+        for remember in self.memories:
+            self._law.state = remember(step, estimate, self._law.state)
         x1, x2, x3 = (y1, estimate[1], y2) if self.angle_source == "measured" else estimate[:3]
         if self.feedback != "observer":
             x2 = fog if self.feedback == "fog" else rate
@@ -270,7 +288,7 @@ class Controller:
         if len(estimate) > 3:
             x.extra = estimate[3:]
         u, x_e = self._law.decide(y, x, held, step)
-        if self._notch is not None:
-            u = self._notch(u)
+        for stage in self.command_stages:
+            u = stage(u)
         self.tick = _new(Tick, (y1, y2, acceleration, fog, u, x_e, estimates))
         return self.tick

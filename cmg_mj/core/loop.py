@@ -2,13 +2,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
 
 from cmg_mj.core.axes import AnyController
-from cmg_mj.core.outside import Instant
+from cmg_mj.core.controller import Tick
+from cmg_mj.core.outside import Disturbance, Outside, instants
+from cmg_mj.core.types import IdealReading, MultiAxisReading
 from cmg_mj.elementwise import Scalar
-from cmg_mj.simulation.physics import Joints, Physics
+
+Joints = Sequence[Scalar] | np.ndarray
+"""Joint angles or rates: a list of floats, or an array (n, n_worlds)."""
+State = tuple[Joints, Joints]
+"""Joint angles, joint rates."""
+Acceleration = Sequence[Scalar]
+"""Acceleration of the pivot: x, y, z [m/s^2]."""
+Reading = IdealReading | MultiAxisReading
+
+
+class Physics(Protocol):
+    """The physics of one world or of many, as the loop advances it.
+
+    Attributes:
+        any_running: Whether any world is still stepped.
+    """
+
+    any_running: bool
+
+    @property
+    def running(self) -> np.ndarray | None:
+        """True for each world that is still stepped, (n_worlds,); None for one world."""
+        ...
+
+    @property
+    def stop_failed(self) -> Callable[[Tick], Sequence[tuple[int, str]]] | None:
+        """Function that stops worlds whose observer or law returned a non-finite value. It returns indices and reasons.
+
+        None for one world, where the controller raises.
+        """
+        ...
+
+    def state(self) -> State:
+        """Read joint angles and rates."""
+        ...
+
+    def tilt(self, qpos: Joints, /) -> Scalar:
+        """Compute the tilt from the keyframe, of several axes the largest [rad]."""
+        ...
+
+    def reading(self, v: Joints) -> Reading:
+        """Compute what perfect sensors show at the present state, with the torques and commands that hold there."""
+        ...
+
+    def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
+        """Set the torques about the axes [N m]; return them with a value for every world."""
+        ...
+
+    def accelerate(self, acceleration: Acceleration) -> None:
+        """Set the pivot's acceleration [m/s^2]."""
+        ...
+
+    def command(self, u: Scalar, axis: int = 0) -> None:
+        """Set the gimbal rates of an axis, each module in its direction [rad/s]."""
+        ...
+
+    def advance(self, steps: int, /) -> None:
+        """Take physics steps."""
+        ...
+
+    def stop_fallen(self, tilt: Scalar, limit: float) -> Sequence[tuple[int, float]]:
+        """Stop the worlds whose tilt is beyond a limit, or no number; return each one's index and tilt [rad]."""
+        ...
+
 
 _new = tuple.__new__  # a named tuple's own takes twice as long
 
@@ -51,7 +118,8 @@ class ControlLoop:
     Args:
         physics: The physics.
         controller: The controller.
-        instants: When something is due, and the torques from outside from then on.
+        end: Number of the physics steps.
+        disturbances: What acts from outside.
         fall_angle: A world that tilts farther is stepped no more [rad].
 
     Attributes:
@@ -60,13 +128,18 @@ class ControlLoop:
     """
 
     def __init__(
-        self, physics: Physics, controller: AnyController, instants: Iterable[Instant], fall_angle: float
+        self,
+        physics: Physics,
+        controller: AnyController,
+        end: int,
+        disturbances: Sequence[Disturbance],
+        fall_angle: float,
     ) -> None:
         self.physics = physics
         self.controller = controller
         self.step = 0
         self.endings: dict[int, Ending] = {}
-        self._instants = instants
+        self._end, self._disturbances = end, disturbances
         self._fall_angle = fall_angle
         self._steps = 0
         self._parts = list(enumerate(controller.parts))
@@ -78,12 +151,19 @@ class ControlLoop:
         steps_per_sample, period = self.controller.steps_per_sample, self.controller.period
         state, tilt, stop_fallen = physics.state, physics.tilt, physics.stop_fallen
         reading, sample = physics.reading, self._sample
+        still = Outside([0.0] * len(self._parts))
         held: Sequence[Scalar] | None = None
         torques: Sequence[Scalar] = ()
-        for step, steps, instant_torques in self._instants:
+        edges = [edge for disturbance in self._disturbances for edge in disturbance.edges]
+        for step, steps in instants(self._end, steps_per_sample, edges):
             self.step, self._steps = step, steps
-            if instant_torques is not held:
-                held = instant_torques
+            outside = still
+            for disturb in self._disturbances:
+                outside = disturb(step, steps, outside)
+            if outside.acceleration is not None:
+                physics.accelerate(outside.acceleration)
+            if outside.torques is not held:
+                held = outside.torques
                 torques = physics.push(held)
             q, v = state()
             for world, angle in stop_fallen(tilt(q), fall_angle):

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from cmg_mj.core.axes import YawCoupling
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.effective_inertia import wheel_momentum
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.parts import Module
 from cmg_mj.plant.tilt_line import UP
+from cmg_mj.stages.turning import YawCoupling
 
 
 def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCoupling:

@@ -16,9 +16,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from cmg_mj.controllers.laws import Law, StateFeedback
-from cmg_mj.controllers.make_controller import make_controller
-from cmg_mj.core.axes import MultiAxisController, YawCoupling
-from cmg_mj.core.controller import Controller, ControllerOptions, PlantInterface
+from cmg_mj.controllers.make_controller import StageOptions, make_controller
+from cmg_mj.core.axes import MultiAxisController
+from cmg_mj.core.controller import Controller, PlantInterface
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import MultiAxisReading
 from cmg_mj.elementwise import Scalar
@@ -44,7 +44,8 @@ from cmg_mj.scenario.schema import ObserverSettings
 from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.stages.backlash import ARCMIN_A_DEGREE
+from cmg_mj.stages.backlash import ARCMIN_A_DEGREE, backlash
+from cmg_mj.stages.turning import YawCoupling, compensation
 
 
 class Plant:
@@ -268,7 +269,7 @@ class Plant:
         """The plant as a controller of the axis knows it."""
         zeros = tuple(module.gimbal_zero for module in self.axis.modules)
         gimbal_angle = GimbalAngle(tuple(self.axis.directions), zeros)
-        return PlantInterface(self.radial_tilt, gimbal_angle, self.model.opt.timestep, self.backlash)
+        return PlantInterface(self.radial_tilt, gimbal_angle, self.model.opt.timestep, backlash(self.backlash))
 
     def controller(
         self,
@@ -276,7 +277,7 @@ class Plant:
         *,
         law: Law | None = None,
         sensors: Sensors | None = None,
-        **options: Unpack[ControllerOptions],
+        **options: Unpack[StageOptions],
     ) -> Controller:
         """Make a fresh controller for a plant of one axis, without a scenario.
 
@@ -313,7 +314,7 @@ class Plant:
         *,
         law: Law | None = None,
         sensors: Sensors | None = None,
-        **options: Unpack[ControllerOptions],
+        **options: Unpack[StageOptions],
     ) -> MultiAxisController:
         """Make a fresh controller for a plant of several axes: one an axis, all made alike, as `controller` makes it.
 
@@ -324,7 +325,7 @@ class Plant:
             plant.controller(observer, law=law, sensors=sensors, **{**options, "axis": i})
             for i, plant in enumerate(plants)
         ]
-        return MultiAxisController(parts, self.turning)
+        return MultiAxisController(parts, compensation(self.turning, parts[0].sensors.mems_gyro))
 
     @property
     def timestep(self) -> float:

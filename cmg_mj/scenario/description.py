@@ -19,7 +19,8 @@ from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.scenario.sliding_pivot import IN_THE_MODEL, NOT_IN_THE_MODEL, sliding_words
 from cmg_mj.scenario.stability_check import bend_hint, closed_loop, hints, plant_hints
-from cmg_mj.stages.push import Push, Swing
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.swing import Swing
 
 BEYOND: dict[BendBeyond, str] = {
     "sensors": "with the sensors; the modules, whose tilt and rate count as true, are before it",

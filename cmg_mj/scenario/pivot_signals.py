@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.outside import Outside
 from cmg_mj.elementwise import Scalar
 from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.pivot_track import read_track
@@ -161,3 +162,22 @@ class PivotSignals:
             acceleration = signal(start, end)
             total = [part + along * acceleration for part, along in zip(total, direction, strict=True)]
         return total
+
+
+class MovingPivot:
+    """The acceleration of the pivot as a disturbance: its mean until the next instant.
+
+    Args:
+        signals: The acceleration in time.
+        timestep: Physics step [s].
+    """
+
+    edges: Collection[int] = ()
+
+    def __init__(self, signals: PivotSignals, timestep: float) -> None:
+        self._signals, self._timestep = signals, timestep
+
+    def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
+        """Set the acceleration: see `Disturbance`."""
+        mean = self._signals.mean(step * self._timestep, (step + steps) * self._timestep)
+        return Outside(outside.torques, mean)

@@ -39,7 +39,8 @@ from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.stages.push import Push, Swing
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.swing import Swing
 
 FORBID = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 MOST_CLAUSES = 20

@@ -25,6 +25,7 @@ from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.simulation.batch_values import batch_values
+from cmg_mj.stages.backlash import backlash
 from cmg_mj.stages.push import Push
 
 T = TypeVar("T")
@@ -167,7 +168,8 @@ def batched_interface(plant: Plant, plants: Sequence[Plant], axis: int) -> Plant
         axis: The number of the axis.
     """
     tilt = batch_values([world_plant.axes[axis].radial_tilt for world_plant in plants])
-    return plant.interface._replace(tilt=tilt, backlash=batch_values([world_plant.backlash for world_plant in plants]))
+    gap = batch_values([world_plant.backlash for world_plant in plants])
+    return plant.interface._replace(tilt=tilt, servos=backlash(gap))
 
 
 def require_same_structure(plants: Sequence[Plant], worlds: int, scenario_plant: Plant | None = None) -> None:

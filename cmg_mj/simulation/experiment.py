@@ -48,6 +48,7 @@ from cmg_mj.simulation.batch import (
 from cmg_mj.simulation.prepare import check_scenario, plant_on_grid
 from cmg_mj.simulation.simulate import SimulationOptions, simulate
 from cmg_mj.stages.push import Push
+from cmg_mj.stages.turning import compensation
 
 if TYPE_CHECKING:
     import control
@@ -124,8 +125,9 @@ class Experiment:
         """Join the controllers of the axes; of one axis its controller itself."""
         if len(controllers) == 1:
             return controllers[0]
-        coupling = self.plant.turning if self.scenario.controller.compensate_turning else None
-        return MultiAxisController(controllers, coupling, self.scenario.sensors.mems_gyro)
+        compensates = self.scenario.controller.compensate_turning
+        between = compensation(self.plant.turning, self.scenario.sensors.mems_gyro) if compensates else None
+        return MultiAxisController(controllers, between)
 
     def run(self, driver: Driver = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world. Options are those of `simulate`."""

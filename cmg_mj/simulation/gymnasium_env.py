@@ -15,7 +15,7 @@ import numpy as np
 
 from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.noise import NoiseStream, normals
-from cmg_mj.core.outside import sampling_instants, with_moving_pivot, with_swing_torques
+from cmg_mj.core.outside import Disturbance
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.types import IdealReading
 from cmg_mj.errors import InputError, nearest
@@ -23,10 +23,12 @@ from cmg_mj.plant.moving_pivot import pivot_directions, with_own_model
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.baselines import MEMS_GYRO
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.scenario.pivot_signals import PivotSignals
+from cmg_mj.scenario.pivot_signals import MovingPivot, PivotSignals
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.physics import OneWorld
+from cmg_mj.stages.push import Pushes
+from cmg_mj.stages.swing import Swings
 
 try:
     import gymnasium
@@ -162,15 +164,14 @@ class ScissoredPairEnv(gymnasium.Env):
         self._read_gyro = gyro.make_reading_function(experiment.law.dt, noise)
         self._fall = np.radians(scenario.metrics.fall_angle_deg).item()
         self._steps = whole_steps(scenario.duration_s, timestep, "duration_s", f"{scenario.duration_s:g} s")
-        instants = sampling_instants(
-            self._steps, self._controller.steps_per_sample, scenario.push, timestep, plant.axis_names
-        )
-        if scenario.swing:
-            instants = with_swing_torques(instants, scenario.swing, timestep, plant.axis_names)
+        disturbances: list[Disturbance] = [
+            Pushes(scenario.push, timestep, plant.axis_names),
+            Swings(scenario.swing, timestep, plant.axis_names),
+        ]
         if scenario.pivot:
             pivot = PivotSignals(scenario.pivot, pivot_directions(plant, scenario.pivot), seed, self._world)
-            instants = with_moving_pivot(instants, pivot, self._physics.accelerate, timestep)
-        self._loop = ControlLoop(self._physics, self._controller, instants, self._fall)
+            disturbances.append(MovingPivot(pivot, timestep))
+        self._loop = ControlLoop(self._physics, self._controller, self._steps, disturbances, self._fall)
         self._ticks = self._loop.ticks()
         self._running = True
         self._to_tick()

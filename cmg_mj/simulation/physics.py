@@ -3,78 +3,18 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import Protocol
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from cmg_mj.core.controller import Tick
-from cmg_mj.core.types import IdealReading, MultiAxisReading
+from cmg_mj.core.loop import Acceleration, Joints, Reading, State
 from cmg_mj.elementwise import Scalar
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.tilt_line import apply_torques
-
-Joints = Sequence[Scalar] | np.ndarray
-"""Joint angles or rates: a list of floats, or an array (n, n_worlds)."""
-State = tuple[Joints, Joints]
-"""Joint angles, joint rates."""
-Acceleration = Sequence[Scalar]
-"""Acceleration of the pivot: x, y, z [m/s^2]."""
-Reading = IdealReading | MultiAxisReading
-
-
-class Physics(Protocol):
-    """The physics of one world or of many, as the loop advances it.
-
-    Attributes:
-        any_running: Whether any world is still stepped.
-    """
-
-    any_running: bool
-
-    @property
-    def running(self) -> np.ndarray | None:
-        """True for each world that is still stepped, (n_worlds,); None for one world."""
-        ...
-
-    @property
-    def stop_failed(self) -> Callable[[Tick], Sequence[tuple[int, str]]] | None:
-        """Function that stops worlds whose observer or law returned a non-finite value. It returns indices and reasons.
-
-        None for one world, where the controller raises.
-        """
-        ...
-
-    def state(self) -> State:
-        """Read joint angles and rates."""
-        ...
-
-    def tilt(self, qpos: Joints, /) -> Scalar:
-        """Compute the tilt from the keyframe, of several axes the largest [rad]."""
-        ...
-
-    def reading(self, v: Joints) -> Reading:
-        """Compute what perfect sensors show at the present state, with the torques and commands that hold there."""
-        ...
-
-    def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
-        """Set the torques about the axes [N m]; return them with a value for every world."""
-        ...
-
-    def command(self, u: Scalar, axis: int = 0) -> None:
-        """Set the gimbal rates of an axis, each module in its direction [rad/s]."""
-        ...
-
-    def advance(self, steps: int, /) -> None:
-        """Take physics steps."""
-        ...
-
-    def stop_fallen(self, tilt: Scalar, limit: float) -> Sequence[tuple[int, float]]:
-        """Stop the worlds whose tilt is beyond a limit, or no number; return each one's index and tilt [rad]."""
-        ...
 
 
 class OneWorld:

@@ -12,7 +12,7 @@ import numpy as np
 from cmg_mj.core.axes import AnyController
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.loop import ControlLoop, Ending
-from cmg_mj.core.outside import sampling_instants, with_moving_pivot, with_swing_torques
+from cmg_mj.core.outside import Disturbance
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.types import BIAS
 from cmg_mj.errors import InputError, RunStopped
@@ -25,13 +25,14 @@ from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.result import Driver, Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
 from cmg_mj.scenario.pivot import Pivot
-from cmg_mj.scenario.pivot_signals import PivotSignals
+from cmg_mj.scenario.pivot_signals import MovingPivot, PivotSignals
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.simulation.batch_values import split_values
 from cmg_mj.simulation.callback import CallbackLoop, control_callback
 from cmg_mj.simulation.physics import ManyWorlds, OneWorld
 from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
-from cmg_mj.stages.push import Push, Swing
+from cmg_mj.stages.push import Push, Pushes
+from cmg_mj.stages.swing import Swing, Swings
 
 DIVERGED_TILT = 2.0 * math.pi
 """No plant that stood at one instant lies a whole turn farther at the next one: it has diverged [rad]."""
@@ -131,8 +132,18 @@ class _Simulation:
         if on_start := options.get("on_start"):
             on_start(self.recorder)
         self.outcomes: list[Outcome] = []
-        instants = sampling_instants(steps, controller.steps_per_sample, pushes, timestep, names)
-        self.instants = with_swing_torques(instants, swings, timestep, names) if swings else instants
+        self.steps = steps
+        self.disturbances: list[Disturbance] = []
+        if pushes:
+            self.disturbances.append(Pushes(pushes, timestep, names))
+        if swings:
+            self.disturbances.append(Swings(swings, timestep, names))
+        if pivots:
+            for plant in dict.fromkeys(plants):
+                refuse_other_forces(plant)
+            directions = pivot_directions(plants[0], pivots)
+            signals = PivotSignals(pivots, directions, controller.seed, controller.worlds)
+            self.disturbances.append(MovingPivot(signals, timestep))
 
     def _recorder_of(self, axis: str, controller: Controller, options: SimulationOptions) -> TickRecorder:
         """Make what records and judges the ticks of one axis; that of the first axis has the joints."""
@@ -160,17 +171,11 @@ class _Simulation:
 
     def advance(self, physics: OneWorld | ManyWorlds, driver: Driver) -> None:
         """Run to the end, whatever that is."""
-        if self.pivots:
-            for plant in dict.fromkeys(self.plants):
-                refuse_other_forces(plant)
-            directions = pivot_directions(self.plants[0], self.pivots)
-            pivot = PivotSignals(self.pivots, directions, self.controller.seed, self.controller.worlds)
-            self.instants = with_moving_pivot(self.instants, pivot, physics.accelerate, self.timestep)
         called_back = driver == "callback"
         loop_class = CallbackLoop if called_back else ControlLoop
         if driver == "plugin":
             from cmg_mj.simulation.driver import PluginLoop as loop_class
-        loop = loop_class(physics, self.controller, self.instants, self.fall_angle)
+        loop = loop_class(physics, self.controller, self.steps, self.disturbances, self.fall_angle)
         driving: AbstractContextManager = nullcontext()
         if called_back:
             driving = control_callback(self.plants[0], self.controller)

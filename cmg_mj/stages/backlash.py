@@ -6,6 +6,9 @@ The observers get the command, not the motion of the gimbals.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from cmg_mj.elementwise import Scalar, clip, where
 
 ARCMIN_A_DEGREE = 60.0
@@ -20,7 +23,7 @@ class Backlash:
     """
 
     def __init__(self, gap: Scalar, dt: float) -> None:
-        self._gap = gap
+        self.gap = gap
         self._dt = dt
         self._motor: Scalar = None
         self._gimbal: Scalar = None
@@ -36,8 +39,13 @@ class Backlash:
         """
         if self._motor is None:
             self._motor = self._gimbal = 0.0 * u
-        half = self._gap / 2.0
+        half = self.gap / 2.0
         self._motor = self._motor + u * self._dt
         before = self._gimbal
         self._gimbal = clip(before, self._motor - half, self._motor + half)
-        return where(self._gap > 0.0, (self._gimbal - before) / self._dt, u)
+        return where(self.gap > 0.0, (self._gimbal - before) / self._dt, u)
+
+
+def backlash(gap: Scalar) -> tuple[Callable[[float], Backlash], ...]:
+    """Make the stage of servos whose gap is not zero in every world [rad]."""
+    return () if type(gap) is float and not gap else (partial(Backlash, gap),)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from pydantic.dataclasses import dataclass
 
@@ -11,13 +9,11 @@ from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream
 from cmg_mj.core.sensor import SensorStage, Site
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
 from cmg_mj.inputs.types import STRICT, NoiseSize
-
-if TYPE_CHECKING:
-    from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.stages.pair import PairSettings
 
 
 @dataclass(frozen=True, config=STRICT)
-class FlickerSettings:
+class FlickerSettings(PairSettings):
     """1/f noise of the accelerometers.
 
     Attributes:
@@ -40,7 +36,7 @@ class Flicker:
         site: Their place in the run.
     """
 
-    def __init__(self, part: Accelerometer, site: Site) -> None:
+    def __init__(self, part: FlickerSettings, site: Site) -> None:
         self._channels = part.channels
         self._noise = site.noise(NoiseStream.FLICKER, len(CORNERS_HZ) * part.channels)
         self._wander = FlickerNoise(part.flicker_floor, 1.0 / part.raw_rate_hz, self._drawn())
@@ -57,6 +53,6 @@ class Flicker:
         return [force + more for force, more in zip(forces, added.tolist(), strict=True)]
 
 
-def flicker(part: Accelerometer, site: Site) -> SensorStage | None:
+def flicker(part: FlickerSettings, site: Site) -> SensorStage | None:
     """Make the stage of accelerometers whose bias wanders."""
     return Flicker(part, site) if part.bias_instability_ug else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
@@ -14,9 +14,7 @@ from cmg_mj.core.sensor import SensorStage, Site, Timing
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
 from cmg_mj.elementwise import Scalar, clip
 from cmg_mj.inputs.types import STRICT
-
-if TYPE_CHECKING:
-    from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.stages.pair import PairSettings
 
 INSIDE_HZ = 1000.0
 """The part's own sampling, at which its low-pass works (MPU-6050: the accelerometer's output rate)."""
@@ -25,7 +23,7 @@ NARROWEST_HZ = 1.0
 
 
 @dataclass(frozen=True, config=STRICT)
-class LowPassSettings:
+class LowPassSettings(PairSettings):
     """The low-pass inside the accelerometers.
 
     Attributes:
@@ -71,7 +69,7 @@ class LowPass:
         site: Their place in the run.
     """
 
-    def __init__(self, part: Accelerometer, site: Site) -> None:
+    def __init__(self, part: LowPassSettings, site: Site) -> None:
         # So long a low-pass needs to forget its start, all but 1e-4 of it.
         settle = math.ceil(2.0 * INSIDE_HZ / part.bandwidth_hz)
         self.timing = Timing(inside=site.steps(1.0 / INSIDE_HZ, "bandwidth_hz", part.inside_text), settle=settle)
@@ -132,6 +130,6 @@ def low_pass(bandwidth_hz: float, rate_hz: float, start: Scalar) -> Callable[[Sc
     return passed
 
 
-def low_pass_stage(part: Accelerometer, site: Site) -> SensorStage | None:
+def low_pass_stage(part: LowPassSettings, site: Site) -> SensorStage | None:
     """Make the stage of accelerometers with a low-pass."""
     return LowPass(part, site) if part.bandwidth_hz else None

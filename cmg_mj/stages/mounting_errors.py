@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -12,9 +12,7 @@ from pydantic.dataclasses import dataclass
 from cmg_mj.core.sensor import SensorStage, Site
 from cmg_mj.core.types import Forces, IdealReading
 from cmg_mj.inputs.types import STRICT
-
-if TYPE_CHECKING:
-    from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.stages.pair import PairSettings
 
 CROSSWISE = [1, 0, 3, 2]
 """Each channel's other axis of the same part."""
@@ -23,7 +21,7 @@ Angle = Annotated[float, Field(gt=-45.0, lt=45.0)]
 
 
 @dataclass(frozen=True, config=STRICT)
-class MountingErrorsSettings:
+class MountingErrorsSettings(PairSettings):
     """Errors of scale and mounting.
 
     Attributes:
@@ -69,7 +67,7 @@ class MountingErrors:
         return [a * x + b * z for a, x, b, z in zip(self._same, forces, self._other, crossed, strict=True)]
 
 
-def mounting_errors(part: Accelerometer, site: Site) -> SensorStage | None:
+def mounting_errors(part: MountingErrorsSettings, site: Site) -> SensorStage | None:
     """Make the stage of accelerometers that are not perfectly scaled and mounted."""
     weights = part.mounting_weights()
     return None if weights == ([1.0] * 4, [0.0] * 4) else MountingErrors(*weights)

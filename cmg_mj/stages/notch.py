@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
+from cmg_mj.core.controller import ControllerSite
 from cmg_mj.elementwise import Scalar, clip
+from cmg_mj.errors import InputError
 
 DEPTH_DAMPING, WIDTH_DAMPING = 0.02, 0.5
 """Damping ratios of the notch's zeros and poles: a 25th of the command remains at its middle."""
@@ -49,3 +53,17 @@ class Notch:
         self._one = b1 * u - a1 * result + self._two
         self._two = b2 * u - a2 * result
         return clip(result, -self._limit, self._limit)
+
+
+def notch(site: ControllerSite) -> Callable[[], Notch] | None:
+    """Make the stage of a controller with a notch.
+
+    Raises:
+        InputError: The notch is above half the control rate.
+    """
+    middle, law = site.settings.get("notch_hz", 0.0), site.law
+    if not middle:
+        return None
+    if middle * law.dt >= 0.5:
+        raise InputError(f"controller.notch_hz = {middle:g}: must be below {0.5 / law.dt:g} Hz, half the control rate")
+    return partial(Notch, middle, law.dt, law.rate_limit)

@@ -1,17 +1,17 @@
-"""Torques from outside: pushes, held for a while, and swings, sinusoids such as the legs' of a gait."""
+"""Pushes: constant torques about the tilt axes for a while, and the times in which estimates are judged by them."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.elementwise import Scalar
-from cmg_mj.inputs.types import STRICT, Batched, Duration, GridDuration, GridInstant, Instant
+from cmg_mj.core.outside import Outside
+from cmg_mj.core.sensor import whole_steps
+from cmg_mj.elementwise import Scalar, where
+from cmg_mj.inputs.types import STRICT, Batched, GridDuration, GridInstant
 
 AFTER_PUSH_S = 1.0
 """Estimates are judged from a push's start until so long after its end [s]: at other times the rig hardly
@@ -43,32 +43,39 @@ class Push:
         return self.start_s + self.duration_s
 
 
-@dataclass(frozen=True, config=STRICT)
-class Swing:
-    """A sinusoidal torque about the tilt axis, such as a gait's. Each sample holds the value at its middle.
+class Pushes:
+    """The torques of pushes. A push about an axis that the rig does not have, since it is locked, moves nothing.
 
-    Attributes:
-        frequency_hz: Frequency of the torque [Hz].
-        amplitude_n_m: Amplitude of the torque about the tilt axis [N m].
-        phase_deg: Phase of the torque at its start [deg].
-        start_s: Time at which the torque begins [s].
-        duration_s: Duration of the torque; without it, to the end of the run [s].
-        axis: Name of the tilt axis, on a rig of several axes.
+    Args:
+        pushes: The pushes; a torque may be an array (n_worlds,).
+        timestep: Physics step [s].
+        axes: The axes' names.
     """
 
-    frequency_hz: Annotated[float, Field(gt=0.0, le=20.0)]
-    amplitude_n_m: float = 0.5
-    phase_deg: float = 0.0
-    start_s: Instant = 0.0
-    duration_s: Duration | None = None
-    axis: str | None = None
+    def __init__(self, pushes: Sequence[Push], timestep: float, axes: Sequence[str]) -> None:
+        self._changes: dict[int, list[Scalar]] = {}
+        for push in pushes:
+            for time, torque in ((push.start_s, push.torque_n_m), (push.end_s, -push.torque_n_m)):
+                step = whole_steps(time, timestep, "push", f"{time:g} s")
+                change = self._changes.setdefault(step, [0.0] * len(axes))
+                about = push.axis or axes[0]
+                if about in axes:
+                    change[axes.index(about)] += torque
+        self.edges = self._changes.keys()
+        self._torques: list[Scalar] = [0.0] * len(axes)
+        self._others: Sequence[Scalar] | None = None
+        self._sum: Sequence[Scalar] = ()
 
-    def torque(self, time: float) -> float:
-        """At a time [N m]."""
-        since = time - self.start_s
-        if since < 0.0 or (self.duration_s is not None and since >= self.duration_s):
-            return 0.0
-        return self.amplitude_n_m * math.sin(2.0 * math.pi * self.frequency_hz * since + math.radians(self.phase_deg))
+    def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
+        """Add the torques: see `Disturbance`."""
+        others, acceleration = outside
+        change = self._changes.get(step)
+        if change is not None:
+            self._torques = [torque + more for torque, more in zip(self._torques, change, strict=True)]
+        if change is not None or others is not self._others:
+            held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in self._torques]  # no remainders
+            self._others, self._sum = others, [a + b for a, b in zip(others, held, strict=True)]
+        return Outside(self._sum, acceleration)
 
 
 def push_windows(pushes: Iterable[Push]) -> list[Window]:
@@ -88,23 +95,3 @@ def inside(time: np.ndarray, windows: Sequence[Window]) -> np.ndarray:
     for start, end in windows:
         mask |= (time > start - 1e-9) & (time < end - 1e-9)
     return mask
-
-
-def add_swing_torques(
-    torques: Sequence[Scalar], swings: Sequence[Swing], axes: Sequence[str], time: float
-) -> Sequence[Scalar]:
-    """Each axis' torque with that of the swings.
-
-    Args:
-        torques: Without them, one an axis [N m].
-        swings: The swings; one about an axis that the rig does not have, since it is locked, moves nothing.
-        axes: The axes' names.
-        time: When [s].
-
-    Returns:
-        The sums; the list itself if there is no swing.
-    """
-    if not swings:
-        return torques
-    added = [sum(swing.torque(time) for swing in swings if (swing.axis or axes[0]) == axis) for axis in axes]
-    return [torque + more for torque, more in zip(torques, added, strict=True)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 from pydantic import ValidationInfo, field_validator
@@ -12,13 +12,11 @@ from pydantic.dataclasses import dataclass
 from cmg_mj.core.sensor import SensorStage, Site, Timing
 from cmg_mj.core.types import Forces, IdealReading
 from cmg_mj.inputs.types import STRICT, NonNegative, OnGrid
-
-if TYPE_CHECKING:
-    from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.stages.pair import PairSettings
 
 
 @dataclass(frozen=True, config=STRICT)
-class SkewSettings:
+class SkewSettings(PairSettings):
     """Skew of the accelerometers.
 
     Attributes:
@@ -63,6 +61,6 @@ class Skew:
         return (*forces[:2], *outer[2:])
 
 
-def skew(part: Accelerometer, site: Site) -> SensorStage | None:
+def skew(part: SkewSettings, site: Site) -> SensorStage | None:
     """Make the stage of accelerometers that are not sampled at once."""
     return Skew(site.steps(part.skew_s, "skew_s", f"{part.skew_s:g} s")) if part.skew_s else None

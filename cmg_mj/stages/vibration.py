@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -16,9 +16,7 @@ from cmg_mj.core.sensor import SensorStage, Site
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
 from cmg_mj.elementwise import Scalar, atan2, cos, sin
 from cmg_mj.inputs.types import STRICT, Batched, NoiseSize, NonNegative
-
-if TYPE_CHECKING:
-    from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.stages.pair import PairSettings
 
 MOST_HARMONICS = 20
 """No flywheel's tones beyond this multiple of its speed."""
@@ -29,7 +27,7 @@ AXES = 4
 
 
 @dataclass(frozen=True, config=STRICT)
-class VibrationSettings:
+class VibrationSettings(PairSettings):
     """Vibration of the accelerometers.
 
     Attributes:
@@ -151,7 +149,7 @@ class Vibration:
         site: Their place in the run.
     """
 
-    def __init__(self, part: Accelerometer, site: Site) -> None:
+    def __init__(self, part: VibrationSettings, site: Site) -> None:
         dt, milli_g = 1.0 / part.raw_rate_hz, 1e-3 * STANDARD_GRAVITY
         self._rms = milli_g * part.vibration_mg
         self._broadband = self._tones = None
@@ -174,6 +172,6 @@ class Vibration:
         return [force + part for force, part in zip(forces, added, strict=True)]
 
 
-def vibration(part: Accelerometer, site: Site) -> SensorStage | None:
+def vibration(part: VibrationSettings, site: Site) -> SensorStage | None:
     """Make the stage of accelerometers that vibrate in any world."""
     return Vibration(part, site) if np.any(part.vibration_mg) or any(part.wheel_harmonics_mg) else None

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
 from cmg_mj.controllers.laws.state_feedback import StateFeedback, lqr_gains
+from cmg_mj.controllers.make_controller import make_controller
 from cmg_mj.core.controller import Controller, PlantInterface
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import IdealReading
@@ -271,7 +272,7 @@ def reading(tilt: float, gimbal: float, rate: float) -> IdealReading:
 
 
 def controller(observer: Any, law: StateFeedback | None = None, **options: Any) -> Controller:
-    return Controller(
+    return make_controller(
         observer,
         law or StateFeedback(DT),
         IDEAL_SENSORS,

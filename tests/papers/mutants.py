@@ -198,7 +198,7 @@ MUTANTS = [
            "return with_model", LOOP + "test_section_6_needs_both_steps_and_no_fall"),
     Mutant("Section V: the best in one setting will do", S + "comparison.py", "holds=wins,",
            "holds=any(wins.values()),", LOOP + "test_verdict_of_the_comparison_follows_the_errors"),
-    Mutant("a gap twice as wide", "../controllers/backlash.py", "half = self._gap / 2.0", "half = self._gap",
+    Mutant("a gap twice as wide", "../stages/backlash.py", "half = self.gap / 2.0", "half = self.gap",
            GAP + "test_share_is_the_fundamental_of_what_a_gap_passes"),
     Mutant("a gap that leads", S + "gap_prediction.py", "-root * root / math.pi", "root * root / math.pi",
            GAP + "test_share_is_the_fundamental_of_what_a_gap_passes"),

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
-from typing import Any, cast
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -441,18 +441,3 @@ def test_a_start_between_two_samples_of_a_slow_sensor() -> None:
     data = plant.new_data()
     data.time = 0.005
     assert control(plant, controller, data)
-
-
-def test_an_option_that_no_controller_has_is_named_with_those_it_has() -> None:
-    wrong: Any = {"seed": 1, "feedbck": "fog"}
-    with pytest.raises(InputError) as caught:
-        load_plant().controller("linear", **wrong)
-    assert str(caught.value) == (
-        "controller: 'feedbck': no such option; did you mean 'feedback'? "
-        "allowed: angle_source, axis, bias_trim_s, feedback, notch_hz, open_loop_observers, seed, worlds"
-    )
-
-
-def test_the_name_of_a_law_is_refused_with_what_to_give() -> None:
-    with pytest.raises(InputError, match=r"law = 'lqg': must be a law, not its name\. Give StateFeedback"):
-        load_plant().controller("linear", law=cast(Any, "lqg"))

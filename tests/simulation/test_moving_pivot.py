@@ -9,14 +9,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from cmg_mj.core.outside import sampling_instants, with_moving_pivot
+from cmg_mj.core.outside import Outside, instants
 from cmg_mj.core.types import IdealReading
 from cmg_mj.errors import InputError
 from cmg_mj.plant.moving_pivot import pivot_directions, with_own_model
 from cmg_mj.results.summary_keys import section
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.pivot import Pivot
-from cmg_mj.scenario.pivot_signals import PivotSignals
+from cmg_mj.scenario.pivot_signals import MovingPivot, PivotSignals
 from cmg_mj.simulation.callback import control
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.physics import OneWorld
@@ -62,12 +62,14 @@ def test_equals_a_base_that_slide_joints_drive(scenario: str, settings: list[str
     shifted, driven = OneWorld(plant), DrivenBase(plant)
     steps, per_sample, h = round(0.5 / plant.timestep), round(0.005 / plant.timestep), plant.timestep
 
-    def instants(physics: OneWorld | DrivenBase):
-        bare = sampling_instants(steps, per_sample, [], h, plant.axis_names)
-        return with_moving_pivot(bare, signals(rig, pivots), physics.accelerate, h)
+    move = MovingPivot(signals(rig, pivots), h)
 
     joints, readings = [], []
-    for (step, held, _), _ in zip(instants(shifted), instants(driven), strict=True):
+    for step, held in instants(steps, per_sample):
+        acceleration = move(step, held, Outside([0.0])).acceleration
+        assert acceleration is not None
+        shifted.accelerate(acceleration)
+        driven.accelerate(acceleration)
         u = 0.5 * math.sin(20.0 * step * h)
         shifted.command(u)
         for servo, direction in zip(plant.axis.servos, plant.axis.directions, strict=True):

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.axes import YawCoupling
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.noise import CORNERS_HZ, NoiseStream, spread_of
 from cmg_mj.core.sensor import steps_until, whole_steps
@@ -19,6 +18,7 @@ from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.mems_gyro import PIECE, MemsGyro
 from cmg_mj.stages.low_pass import INSIDE_HZ
+from cmg_mj.stages.turning import YawCoupling
 
 MOST_AXES = 4
 MOST_GIMBALS = 8

@@ -24,6 +24,8 @@ from cmg_mj.codegen.engine_plugin.sensors import (
 )
 from cmg_mj.codegen.export import generate_code
 from cmg_mj.errors import InputError
+from cmg_mj.stages.backlash import Backlash
+from cmg_mj.stages.trim import trim_of
 
 if TYPE_CHECKING:
     from cmg_mj.codegen.export.law_code import LawPrinter
@@ -120,16 +122,17 @@ def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: L
         The text.
     """
     controller = axis.controller
-    n, gap, formulas = name, float(controller.backlash), law.law
-    trimmed = -(-controller.trimmed_until // controller.period)
+    n, trim, formulas = name, trim_of(controller), law.law
+    gap = sum(stage.gap for stage in controller.servo_stages if isinstance(stage, Backlash))
+    trimmed = -(-trim.until // controller.period)
     fields = {
         "estimates": 3 + len(controller.extra_signals[0]),
         "observer": max(1, observer_numbers),
         "law": max(1, formulas.numbers),
         "integrator": formulas.numbers - 1 if formulas.has_integrator else -1,
         "trimmed": trimmed,
-        "trim_part": controller.trim_part if trimmed else 0,
-        "trim_gain": controller.trim_gain if trimmed else 0.0,
+        "trim_part": trim.part if trimmed else 0,
+        "trim_gain": trim.gain if trimmed else 0.0,
         "angles_are_estimated": int(controller.angle_source == "estimated"),
         "rate_limit": controller.law.rate_limit,
         "has_backlash": int(gap > 0.0),

@@ -70,9 +70,9 @@ def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
         copy.deepcopy(controller.observer),
         copy.deepcopy(controller.law),
         controller.sensors,
-        controller.plant._replace(backlash=0.0),
+        controller.plant._replace(servos=()),
         angle_source=controller.angle_source,
-        bias_trim_s=controller.bias_trim_s,
+        memories=controller.memories,
     )
     rows = []
     for k, row in enumerate(samples.tolist()):

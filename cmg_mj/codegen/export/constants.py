@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from cmg_mj.controllers.laws import Law, StateFeedback
 from cmg_mj.core.controller import Controller
+from cmg_mj.stages.trim import trim_of
 
 
 class Constant(NamedTuple):
@@ -43,7 +44,7 @@ class Constants(NamedTuple):
 
 def constants_of(controller: Controller) -> Constants:
     """Collect the constants of a controller."""
-    tilt, gimbals = controller.tilt, controller.gimbal_angle
+    tilt, gimbals, trim = controller.tilt, controller.gimbal_angle, trim_of(controller)
     centre = "the common mass centre of rig and cart" if tilt.height else "the tilt axis"
     numbered = list(enumerate(zip(gimbals.directions, gimbals.zeros, strict=True), 1))
     return Constants(
@@ -54,9 +55,9 @@ def constants_of(controller: Controller) -> Constants:
             *(Constant(f"zero_{i}", zero, f"encoder {i} at a gimbal angle of 0 [rad]") for i, (_, zero) in numbered),
         ],
         of_law=_of_law(controller.law),
-        trimmed=-(-controller.trimmed_until // controller.period),
-        trim_gain=Constant("trim_gain", controller.trim_gain, "from the bias to the integrator [s]"),
-        trim_part=controller.trim_part,
+        trimmed=-(-trim.until // controller.period),
+        trim_gain=Constant("trim_gain", trim.gain, "from the bias to the integrator [s]"),
+        trim_part=trim.part,
         gimbals=len(gimbals.directions),
     )
 

@@ -11,8 +11,9 @@ import numpy as np
 from cmg_mj.controllers.laws import Law, StateFeedback
 from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError, TomlValue, shown
+from cmg_mj.stages.trim import Trim
 
-EXPORTED_OPTIONS = ("angle_source", "bias_trim_s")
+EXPORTED_OPTIONS = ("angle_source", "memories", "commands")
 """Options of a `Controller` that its C has."""
 SIMULATION_OPTIONS = ("seed", "worlds", "axis", "open_loop_observers")
 """Options that concern the simulation around a controller alone."""
@@ -39,6 +40,13 @@ def refuse_unexported(controller: Controller) -> None:
         if option.kind is option.KEYWORD_ONLY and option.name not in EXPORTED_OPTIONS + SIMULATION_OPTIONS
     }
     _refuse_in_use(controller, option_defaults)
+    for stage in controller.command_stages:
+        name = f"{type(stage).__name__.lower()}_hz"
+        reason = REASONS.get(name, "C has no such stage")
+        raise InputError(f"controller.{name}: cannot be exported: {reason}; set controller.{name}=0.0")
+    for memory in controller.memories:
+        if not isinstance(memory, Trim):
+            raise InputError(f"{type(memory).__name__}: cannot be exported: C has no such stage")
     if type(law) is StateFeedback:
         fields = [field for field in dataclasses.fields(law) if field.name not in EXPORTED_LAW_FIELDS]
         _refuse_in_use(law, {field.name: _default_of(field) for field in fields})

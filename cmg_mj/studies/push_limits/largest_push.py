@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.controller import PlantInterface
-from cmg_mj.core.loop import ControlLoop
+from cmg_mj.core.loop import ControlLoop, Joints
+from cmg_mj.core.outside import Outside
 from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.core.types import IdealReading
 from cmg_mj.elementwise import Scalar
@@ -18,7 +19,6 @@ from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import common_period
-from cmg_mj.simulation.physics import Joints
 from cmg_mj.studies.push_limits.recoverable_states import ceiling
 
 WORLDS = 10
@@ -86,10 +86,9 @@ def _stands(scenario: Scenario, design: Design, impulses: np.ndarray) -> np.ndar
     steps = math.ceil((BEFORE_S + PUSH_S + after) / h)
     pushed = range(round(BEFORE_S / h), round((BEFORE_S + PUSH_S) / h))
     push, none = (np.tile(impulses / PUSH_S, WORLDS),), (np.zeros(len(numbers)),)
-    sample = controller.steps_per_sample
-    instants = ((step, sample, push if step in pushed else none) for step in range(0, steps, sample))
+    end = -(-steps // controller.steps_per_sample) * controller.steps_per_sample
     fall_angle = math.radians(scenario.metrics.fall_angle_deg)
-    loop = ControlLoop(physics, controller, instants, fall_angle)
+    loop = ControlLoop(physics, controller, end, [_Held(push, none, pushed)], fall_angle)
     with np.errstate(all="ignore"):
         for _ in loop.ticks():
             loop.decide()
@@ -98,8 +97,20 @@ def _stands(scenario: Scenario, design: Design, impulses: np.ndarray) -> np.ndar
     return ~physics.fallen.reshape(WORLDS, len(impulses))
 
 
+class _Held:
+    """Torques that are held from one step to another: a `Disturbance`."""
+
+    edges = ()
+
+    def __init__(self, push: Sequence[Scalar], none: Sequence[Scalar], pushed: range) -> None:
+        self._push, self._none, self._pushed = push, none, pushed
+
+    def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
+        return Outside(self._push if step in self._pushed else self._none)
+
+
 class ReducedPhysics:
-    """Steps many worlds of the reduced model (4), whose gimbals turn as commanded; see `simulation.physics.Physics`.
+    """Steps many worlds of the reduced model (4), whose gimbals turn as commanded; see `core.loop.Physics`.
 
     Args:
         plant: The plant's parameters.
@@ -149,6 +160,10 @@ class ReducedPhysics:
         """Set the torque about the line, (n_worlds,) [N m]."""
         (self._torque,) = torques
         return torques
+
+    def accelerate(self, acceleration: Sequence[Scalar]) -> None:
+        """Refuse: the pivot of the reduced model is not driven."""
+        raise NotImplementedError
 
     def command(self, u: Scalar, axis: int = 0) -> None:
         """Set the gimbal rate, (n_worlds,) [rad/s]."""

@@ -10,12 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.loop import ControlLoop
-from cmg_mj.core.outside import sampling_instants
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
 from cmg_mj.simulation.batch_values import batch_values
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.simulation.physics import ManyWorlds
-from cmg_mj.stages.push import Push
+from cmg_mj.stages.push import Push, Pushes
 from cmg_mj.studies.push_limits.largest_push import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS
 from cmg_mj.studies.push_limits.prospects import Prospects
 
@@ -231,14 +230,15 @@ def _attempt(
     push = batch_values([Push(BEFORE_S, PUSH_S, impulse / PUSH_S, axis or None) for _, impulse in pushes])
     period = controller.period
     steps = period * math.ceil(duration_s / (period * plant.timestep))
-    instants = sampling_instants(steps, controller.steps_per_sample, [push], plant.timestep, plant.axis_names)
+    pushed = Pushes([push], plant.timestep, plant.axis_names)
     modules = plant.single_axis(axis).axis.modules
     servos, gimbals = [module.servo for module in modules], [module.gimbal_dof for module in modules]
     torque = rate = 0.0
     with set_control_callback(None), np.errstate(all="ignore"):
         physics = ManyWorlds([plant] * len(pushes))
         forces = physics.batch.bind("actuator_force")
-        loop = ControlLoop(physics, controller, instants, math.radians(experiment.scenario.metrics.fall_angle_deg))
+        fall_angle = math.radians(experiment.scenario.metrics.fall_angle_deg)
+        loop = ControlLoop(physics, controller, steps, [pushed], fall_angle)
         for tick in loop.ticks():
             time_limit.check(now)
             if early and loop.endings:

@@ -12,7 +12,8 @@ import numpy as np
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.summary_keys import format_figure
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.stages.push import Push, Swing
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.swing import Swing
 from cmg_mj.visualization.plots.colours import BOUND_COLOURS, colour, colours, hexadecimal
 from cmg_mj.visualization.plots.figure_spec import Panel, Picture
 from cmg_mj.visualization.plots.map_plot import draw_map, draw_surface, mappable

@@ -12,7 +12,8 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.stages.push import Push, Swing
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.swing import Swing
 from cmg_mj.visualization.plots.readability import Summary, figures_by_observer, observers_to_draw, section
 
 POSE_RATE_HZ = 100.0

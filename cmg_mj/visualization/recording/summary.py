@@ -10,7 +10,8 @@ from cmg_mj.results import markdown
 from cmg_mj.results.error_bounds import NOISE_ALONE
 from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, format_figure, heading
 from cmg_mj.scenario.resolve import versions
-from cmg_mj.stages.push import Push, Swing
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.swing import Swing
 from cmg_mj.visualization.plots.readability import FEW
 from cmg_mj.visualization.recording.branch import Branch
 from cmg_mj.visualization.recording.legend import LegendEntry

@@ -6,7 +6,8 @@ from bisect import bisect_right
 from collections.abc import Sequence
 
 from cmg_mj.core.sensor import whole_steps
-from cmg_mj.stages.push import Push, Swing, add_swing_torques
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.swing import Swing, add_swing_torques
 
 PushSteps = tuple[int, int, float, int]
 """First step, step after the last, torque [N m], index of the axis; -1 for an axis that the plant lacks."""

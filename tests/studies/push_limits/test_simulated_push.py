@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.loop import ControlLoop
-from cmg_mj.core.outside import sampling_instants
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.mounting import mount
 from cmg_mj.plant.plant import load_plant
@@ -21,6 +20,7 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.physics import OneWorld
+from cmg_mj.stages.push import Pushes
 from cmg_mj.studies.push_limits import mount_files, simulated_push
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS, PushMargin
 from cmg_mj.studies.push_limits.mount_files import PUSH_SHARE, write_scenario
@@ -318,13 +318,9 @@ def test_a_servo_takes_what_one_world_shows() -> None:
     pushed = experiment.with_settings({**push, "plant.initial_tilt_deg": 0.0})
     attempt = simulated_push._attempt(pushed, [(0, 0.35)], 4.0, "", TimeLimit(1000.0), "")
     physics, controller = OneWorld(pushed.plant), pushed.controller(0)
-    instants = sampling_instants(
-        round(4.0 / pushed.plant.timestep),
-        controller.steps_per_sample,
-        pushed.scenario.push,
-        pushed.plant.timestep,
-    )
-    loop, torques, rates = ControlLoop(physics, controller, instants, 1.0), [0.0], [0.0]
+    pushes = Pushes(pushed.scenario.push, pushed.plant.timestep, [""])
+    end = round(4.0 / pushed.plant.timestep)
+    loop, torques, rates = ControlLoop(physics, controller, end, [pushes], 1.0), [0.0], [0.0]
     servos = [module.servo for module in pushed.plant.axis.modules]
     for tick in loop.ticks():
         loop.decide()

@@ -14,7 +14,8 @@ from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
-from cmg_mj.stages.push import Push, Swing
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.swing import Swing
 from cmg_mj.visualization.plots.colours import BOUND_COLOURS, colour, hexadecimal
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 from cmg_mj.visualization.plots.readability import fall_start

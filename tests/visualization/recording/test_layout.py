@@ -20,7 +20,7 @@ from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Outcome
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.stages.push import Swing
+from cmg_mj.stages.swing import Swing
 from cmg_mj.studies.compare.comparison import prepare_comparison
 from cmg_mj.studies.save import report_run
 from cmg_mj.visualization.plots.readability import fall_start, labelled_ticks

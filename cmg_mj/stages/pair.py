@@ -1,0 +1,81 @@
+"""A pair of accelerometers: sampling, offsets and white noise, range and resolution."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.core.noise import NoiseStream
+from cmg_mj.core.sensor import SensorStage, Shown, Site, White
+from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.inputs.types import STRICT, Batched, Instant, NoiseSize, NonNegative, Positive, Rate
+
+
+@dataclass(frozen=True, config=STRICT)
+class PairSettings:
+    """Sampling, white noise, offsets, range and resolution of the accelerometers.
+
+    Attributes:
+        rate_hz: Sampling rate of both accelerometers.
+        noise_density_ug_rthz: One-sided density of the white noise; one sample's sigma is density * sqrt(rate/2).
+        bias_mg: Offsets of the tangential axes of the inner and the outer accelerometer [mg].
+        range_g: Largest acceleration that a reading shows [g].
+        counts_per_g: Resolution; 0 for readings that are not rounded.
+        latency_s: Delay from the sampling of a reading to its use by the controller [s].
+    """
+
+    rate_hz: Rate = 200.0
+    noise_density_ug_rthz: Annotated[NoiseSize, Batched()] = 400.0
+    bias_mg: Annotated[tuple[float, float], Batched()] = (0.0, 0.0)
+    range_g: Positive = 2.0
+    counts_per_g: NonNegative = 16384.0
+    latency_s: Instant = 0.0
+
+    inside_hz = 0.0
+    """Samples a second that the part takes; 0: as many as it delivers."""
+    noise_gain = 1.0
+    """The variance of white noise that is delivered, by that which the part takes."""
+    channels = 4
+
+    @property
+    def raw_rate_hz(self) -> float:
+        """Samples a second that the part takes: more than it delivers if it filters them."""
+        return self.inside_hz or self.rate_hz
+
+    @property
+    def raw_sigma(self) -> float:
+        """Standard deviation of the white noise of one sample that the part takes [m/s^2]."""
+        return self.noise_density_ug_rthz * 1e-6 * STANDARD_GRAVITY * math.sqrt(self.raw_rate_hz / 2.0)
+
+    @property
+    def white_noise_sigma(self) -> float:
+        """Standard deviation of the white noise of one sample that is delivered [m/s^2]."""
+        return self.raw_sigma * math.sqrt(self.noise_gain)
+
+    @property
+    def resolution(self) -> float:
+        """Step between two readings; 0 for readings that are not rounded [m/s^2]."""
+        return STANDARD_GRAVITY / self.counts_per_g if self.counts_per_g else 0.0
+
+    @property
+    def sample_sigma(self) -> float:
+        """Standard deviation of one sample with the quantisation, as filters assume it [m/s^2]."""
+        return math.hypot(self.white_noise_sigma, self.resolution / math.sqrt(12.0))
+
+    @property
+    def bias(self) -> tuple[float, float]:
+        """Offsets of the tangential axes of the inner and the outer accelerometer [m/s^2]."""
+        inner, outer = (bias * 1e-3 * STANDARD_GRAVITY for bias in self.bias_mg)
+        return inner, outer
+
+
+def white(part: PairSettings, site: Site) -> SensorStage:
+    """Make the stage of offsets and white noise."""
+    return White(part.bias, part.raw_sigma, site.noise(NoiseStream.ACCELEROMETER, part.channels))
+
+
+def shown(part: PairSettings, site: Site) -> SensorStage:
+    """Make the stage of range and resolution."""
+    return Shown(part.range_g * STANDARD_GRAVITY, part.resolution)

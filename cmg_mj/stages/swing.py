@@ -1,0 +1,83 @@
+"""Swings: sinusoidal torques about the tilt axes, such as those of the legs in a gait."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from typing import Annotated
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.core.outside import Outside
+from cmg_mj.elementwise import Scalar
+from cmg_mj.inputs.types import STRICT, Duration, Instant
+
+
+@dataclass(frozen=True, config=STRICT)
+class Swing:
+    """A sinusoidal torque about the tilt axis, such as a gait's. Each sample holds the value at its middle.
+
+    Attributes:
+        frequency_hz: Frequency of the torque [Hz].
+        amplitude_n_m: Amplitude of the torque about the tilt axis [N m].
+        phase_deg: Phase of the torque at its start [deg].
+        start_s: Time at which the torque begins [s].
+        duration_s: Duration of the torque; without it, to the end of the run [s].
+        axis: Name of the tilt axis, on a rig of several axes.
+    """
+
+    frequency_hz: Annotated[float, Field(gt=0.0, le=20.0)]
+    amplitude_n_m: float = 0.5
+    phase_deg: float = 0.0
+    start_s: Instant = 0.0
+    duration_s: Duration | None = None
+    axis: str | None = None
+
+    def torque(self, time: float) -> float:
+        """At a time [N m]."""
+        since = time - self.start_s
+        if since < 0.0 or (self.duration_s is not None and since >= self.duration_s):
+            return 0.0
+        return self.amplitude_n_m * math.sin(2.0 * math.pi * self.frequency_hz * since + math.radians(self.phase_deg))
+
+
+class Swings:
+    """The torques of swings, at their value in the middle between two instants.
+
+    Args:
+        swings: The swings.
+        timestep: Physics step [s].
+        axes: The axes' names.
+    """
+
+    edges: Collection[int] = ()
+
+    def __init__(self, swings: Sequence[Swing], timestep: float, axes: Sequence[str]) -> None:
+        self._swings, self._timestep, self._axes = swings, timestep, axes
+
+    def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
+        """Add the torques: see `Disturbance`."""
+        torques, acceleration = outside
+        time = (step + 0.5 * steps) * self._timestep
+        return Outside(add_swing_torques(torques, self._swings, self._axes, time), acceleration)
+
+
+def add_swing_torques(
+    torques: Sequence[Scalar], swings: Sequence[Swing], axes: Sequence[str], time: float
+) -> Sequence[Scalar]:
+    """Each axis' torque with that of the swings.
+
+    Args:
+        torques: Without them, one an axis [N m].
+        swings: The swings; one about an axis that the rig does not have, since it is locked, moves nothing.
+        axes: The axes' names.
+        time: When [s].
+
+    Returns:
+        The sums; the list itself if there is no swing.
+    """
+    if not swings:
+        return torques
+    added = [sum(swing.torque(time) for swing in swings if (swing.axis or axes[0]) == axis) for axis in axes]
+    return [torque + more for torque, more in zip(torques, added, strict=True)]
