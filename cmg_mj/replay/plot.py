@@ -13,28 +13,15 @@ from cmg_mj.replay.logs.log import REFERENCE
 from cmg_mj.replay.report import figure_text, shown_first
 from cmg_mj.replay.scores import Figures
 from cmg_mj.results.stored_columns import LONG, select_rows, stretches
-from cmg_mj.visualization.plots.colours import colours, hexadecimal
-from cmg_mj.visualization.plots.readability import short_names
-from cmg_mj.visualization.plots.run_plot import (
-    INK,
-    MEASURED,
-    PAGE,
-    PANEL_HEIGHT,
-    SMALL_COLUMNS,
-    SMALL_HEIGHT,
-    fit,
-    pyplot,
-    save_figure,
-)
-from cmg_mj.visualization.plots.thinning import thinned
+from cmg_mj.visualization.plots.figure_spec import pyplot, save_figure
+from cmg_mj.visualization.plots.run_plot import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_COLUMNS, SMALL_HEIGHT
+from cmg_mj.visualization.plots.style import colours, hexadecimal, short_names, thinned
 
 if TYPE_CHECKING:
     from cmg_mj.visualization.plots.run_plot import Axes
 
 DETAIL_S = 2.0
 """Length of the detail [s]."""
-FEW_DRAWN = 1000
-"""Number of samples that are left of a stretch of a long log where its outline is enough."""
 
 
 def liveliest_span(replayed: ReplayResult) -> tuple[float, float]:
@@ -88,7 +75,6 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     start, end = liveliest_span(replayed)
     _line(panels[0], replayed, np.degrees(log["y1_rad"]), None, color=MEASURED, linewidth=0.8, label="measured")
     panels[0].set_ylabel("tilt [deg]")
-    rates = None
     for axes in (panels[1], panels[-1]):
         detail = (start, end) if axes is panels[-1] else None
         if referred:
@@ -98,8 +84,6 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
             _line(axes, replayed, rate, detail, color=palette[name], linewidth=0.8, label=labels[name].lstrip("_"))
             del rate
         axes.set_ylabel("tilt rate\n[rad/s]")
-        estimates = [_outline(replayed.estimates[name]["x2_rad_s"]) for name in few]
-        rates = fit(axes, [_outline(log[REFERENCE])] if referred else [], estimates)
     if referred:
         panels[2].plot([], [], " ", label="RMS:")
         for name in few:
@@ -108,9 +92,9 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
             _line(panels[2], replayed, error, None, color=palette[name], linewidth=0.6, label=text)
             del error  # of a long log, a column takes much memory
         panels[2].set_ylabel("estimate less\nreference [rad/s]")
-        errors = [_outline(replayed.estimates[n]["x2_rad_s"] - log[REFERENCE]) for n in few]
-        fit(panels[2], [_outline(log[REFERENCE])], errors)
+    rates = panels[1].get_ylim()
     panels[-1].set_xlim(start, end)
+    panels[-1].set_ylim(*rates)
     for axes in panels[:-1]:
         axes.axvspan(start, end, color="0.5", alpha=0.15, linewidth=0, zorder=0)
         axes.set_xlim(log["time_s"][0], log["time_s"][-1])
@@ -141,19 +125,12 @@ def _line(
     if len(log) <= LONG:
         x, y = log.broken(values)
     elif detail is None:
-        pieces = [thinned(*log.broken(values[rows], rows), FEW_DRAWN) for rows in stretches(len(log))]
+        pieces = [thinned(*log.broken(values[rows], rows)) for rows in stretches(len(log))]
         x, y = (np.concatenate(part) for part in zip(*pieces, strict=True))
     else:
         first, last = np.searchsorted(log["time_s"], (detail[0] - DETAIL_S, detail[1] + DETAIL_S)).tolist()
         x, y = log.broken(values[first:last], slice(first, last))
     axes.plot(x, y, color=color, linewidth=linewidth, label=label)
-
-
-def _outline(values: np.ndarray) -> np.ndarray:
-    """Return enough of a long signal to choose an axis by."""
-    if len(values) <= LONG:
-        return values
-    return np.concatenate([thinned(values[rows], values[rows], FEW_DRAWN)[1] for rows in stretches(len(values))])
 
 
 def _draw_small(
@@ -162,7 +139,7 @@ def _draw_small(
     name: str,
     label: str,
     color: str,
-    rates: tuple[float, float] | None,
+    rates: tuple[float, float],
     span: tuple[float, float],
 ) -> None:
     """Draw another observer in detail, on the axis of the few."""
@@ -173,8 +150,7 @@ def _draw_small(
     axes.set_title(text, loc="left", fontsize="small", parse_math=False, pad=2.0)
     axes.set_xlim(*span)
     axes.grid(alpha=0.3)
-    if rates is not None:
-        axes.set_ylim(*rates)
+    axes.set_ylim(*rates)
 
 
 def _rms(figures: Figures) -> str:

@@ -14,9 +14,8 @@ from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import KEYS
 from cmg_mj.studies.compare.comparison import ComparedObserver
 from cmg_mj.studies.compare.statistics import ComparisonRow, comparison_rows
-from cmg_mj.visualization.plots.colours import colours, hexadecimal
-from cmg_mj.visualization.plots.readability import short_names
-from cmg_mj.visualization.plots.run_plot import pyplot, save_figure
+from cmg_mj.visualization.plots.figure_spec import pyplot, save_figure
+from cmg_mj.visualization.plots.style import colours, hexadecimal, short_names
 
 COLUMNS = 3
 """Panels in a row."""

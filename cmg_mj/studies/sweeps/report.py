@@ -17,8 +17,7 @@ from cmg_mj.studies.sweeps.report_sections import CELLS, INDICES, ORDER
 from cmg_mj.studies.sweeps.sobol import IndexRow, index_rows, index_table
 from cmg_mj.studies.sweeps.study import counted
 from cmg_mj.studies.sweeps.trials import write_tables
-from cmg_mj.visualization.plots.figure_spec import Picture
-from cmg_mj.visualization.plots.run_plot import draw
+from cmg_mj.visualization.plots.figure_spec import Picture, draw
 
 if TYPE_CHECKING:
     from pathlib import Path

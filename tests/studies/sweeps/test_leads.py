@@ -20,8 +20,8 @@ from cmg_mj.studies.sweeps.leads import lead_rows
 from cmg_mj.studies.sweeps.pictures import pictures_of
 from cmg_mj.studies.sweeps.report_sections import leads
 from cmg_mj.studies.sweeps.study import SweepStudy
-from cmg_mj.visualization.plots.colours import BASELINE_COLOURS
-from cmg_mj.visualization.plots.run_plot import draw
+from cmg_mj.visualization.plots.figure_spec import draw
+from cmg_mj.visualization.plots.style import BASELINE_COLOURS
 from tests.command import cmg_mj
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, VELOCITY, make_trials
 

@@ -13,9 +13,8 @@ import pytest
 from cmg_mj.studies.sweeps.cells import Trials, fell_interval
 from cmg_mj.studies.sweeps.pictures import in_words, is_logarithmic, pictures_of, round_values
 from cmg_mj.studies.sweeps.report import PICTURES
-from cmg_mj.visualization.plots.figure_spec import Map, Panel, Picture, Surface
+from cmg_mj.visualization.plots.figure_spec import Map, Panel, Picture, Surface, draw
 from cmg_mj.visualization.plots.map_plot import edges
-from cmg_mj.visualization.plots.run_plot import draw
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, RATE, make_trials
 
 OBSERVERS = ("linear", "ltv")

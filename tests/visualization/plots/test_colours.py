@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from cmg_mj.observers import OBSERVERS
 from cmg_mj.visualization.plots.colours import (
     BASELINE_COLOURS,
     BOUND_COLOURS,
@@ -16,6 +14,8 @@ from cmg_mj.visualization.plots.colours import (
     colours,
     hexadecimal,
 )
+
+from cmg_mj.observers import OBSERVERS
 from cmg_mj.visualization.recording.signals import CONTROLLER
 
 SIGHT = {

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-
 from cmg_mj.visualization.plots.readability import (
     FEW,
     MARGIN,

@@ -9,15 +9,15 @@ from typing import Any
 import matplotlib.figure
 import numpy as np
 import pytest
+from cmg_mj.visualization.plots.colours import BOUND_COLOURS, colour, hexadecimal
+from cmg_mj.visualization.plots.readability import fall_start
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
-from cmg_mj.visualization.plots.colours import BOUND_COLOURS, colour, hexadecimal
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
-from cmg_mj.visualization.plots.readability import fall_start
 from cmg_mj.visualization.plots.run_plot import PAGE, draw, plot_run
 
 BAND, LIMIT = 1.0, 4.7

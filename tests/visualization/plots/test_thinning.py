@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cmg_mj.visualization.plots.thinning import thinned
 
 from cmg_mj.visualization.plots import thinning
-from cmg_mj.visualization.plots.thinning import thinned
 
 
 @pytest.fixture(autouse=True)

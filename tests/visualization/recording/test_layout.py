@@ -14,6 +14,12 @@ import mujoco
 import numpy as np
 import pytest
 import rerun.blueprint as rrb
+from cmg_mj.visualization.plots.readability import fall_start, labelled_ticks
+from cmg_mj.visualization.recording.blueprint import ACTUATOR_PLOTS, COLUMN, TILT_PLOTS, _sized
+from cmg_mj.visualization.recording.branch import make_branches
+from cmg_mj.visualization.recording.camera import FARTHEST, enclosing_ball
+from cmg_mj.visualization.recording.legend import legend, numbered_parts
+from cmg_mj.visualization.recording.summary import ROW_TABLES, summary_page
 from rerun.chunk import RrdReader
 
 from cmg_mj.observers import OBSERVERS
@@ -23,14 +29,8 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.studies.compare.comparison import prepare_comparison
 from cmg_mj.studies.save import report_run
-from cmg_mj.visualization.plots.readability import fall_start, labelled_ticks
 from cmg_mj.visualization.recording import RecordingHeader, Run, write_recording
-from cmg_mj.visualization.recording.blueprint import ACTUATOR_PLOTS, COLUMN, TILT_PLOTS, _sized
-from cmg_mj.visualization.recording.branch import make_branches
-from cmg_mj.visualization.recording.camera import FARTHEST, enclosing_ball
-from cmg_mj.visualization.recording.legend import legend, numbered_parts
 from cmg_mj.visualization.recording.run import best_observers
-from cmg_mj.visualization.recording.summary import ROW_TABLES, summary_page
 from cmg_mj.visualization.recording.views import EYE, Choice, plot_view
 
 SHORT = ("duration_s=0.6", "push.0.start_s=0.2")

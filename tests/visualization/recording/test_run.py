@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 import rerun as rr
+from cmg_mj.visualization.recording.summary import ROW_TABLES
 from rerun.chunk import RrdReader
 
 from cmg_mj.errors import InputError
@@ -31,7 +32,6 @@ from cmg_mj.visualization.recording.run import POSE_RATE_HZ, phases, torque_step
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
 from cmg_mj.visualization.recording.shapes import drawn_shapes
 from cmg_mj.visualization.recording.signals import instant, time_column
-from cmg_mj.visualization.recording.summary import ROW_TABLES
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1", 'open_loop_observers=["linear"]')
 NANOSECONDS = 1e9
