@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 
@@ -36,7 +38,10 @@ class LiveView:
         self._ticks, self._shown_at = 0, 0.0
         self._rec = rr.RecordingStream("cmg-mj live")
         require_enabled(self._rec)
-        self._rec.spawn()
+        # rr.spawn's viewer would listen on every network interface
+        command = [sys.executable, "-m", "rerun_cli", "--bind", "127.0.0.1", "--expect-data-soon"]
+        self._viewer = subprocess.Popen(command, start_new_session=True)
+        self._rec.connect_grpc()
         set_up(self._rec, header.title or name)
 
     def options(self, on_progress: Callable[[float], None]) -> SimulationOptions:

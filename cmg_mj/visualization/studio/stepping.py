@@ -15,10 +15,9 @@ from mujoco.studio import (
 
 from cmg_mj.errors import InputError
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.visualization.studio.live import StudioSession
-from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
+from cmg_mj.visualization.studio.panel import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
+from cmg_mj.visualization.studio.session import StudioSession
 from cmg_mj.visualization.studio.settings import choosable_laws, choosable_observers, current_law, current_settings
-from cmg_mj.visualization.studio.step_scheduler import StepScheduler
 
 AFTER_STUDIO = 0
 """Priority of a handler after Studio's."""
@@ -26,8 +25,49 @@ STATE_INTERVAL_S = 1.0 / 30.0
 """Interval between two states for the panel [s]."""
 REST_S = 0.002
 """Pause between two checks for due steps, without which the viewer's thread would starve [s]."""
+MOST_BEHIND_S = 0.1
+"""Largest delay that the simulation catches up; it discards more [s]."""
+MEASURED_OVER_S = 0.5
+"""Interval over which the speed is measured [s]."""
 
 logger = logging.getLogger(__name__)
+
+
+class StepScheduler:
+    """Schedules physics steps by a clock.
+
+    Args:
+        clock: Returns the time [s].
+
+    Attributes:
+        speed: Speed of simulated time [% of real time].
+        measured: The measured speed, or -1 if none has been measured [% of real time].
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self.speed = 100.0
+        self.begin(0.0)
+
+    def begin(self, time: float) -> None:
+        """Start pacing now, at a simulated time [s]."""
+        self._from = (self._clock(), time)
+        self._measured_from = self._from
+        self.measured = -1.0
+
+    def steps_due(self, time: float, timestep: float) -> int:
+        """Return the number of physics steps due at a simulated time [s]."""
+        now = self._clock()
+        since, start = self._from
+        behind = start + (now - since) * self.speed / 100.0 - time
+        if behind > MOST_BEHIND_S:
+            self._from = (now, time + MOST_BEHIND_S)
+            behind = MOST_BEHIND_S
+        elapsed = now - self._measured_from[0]
+        if elapsed >= MEASURED_OVER_S:
+            self.measured = 100.0 * (time - self._measured_from[1]) / elapsed
+            self._measured_from = (now, time)
+        return max(0, int(behind / timestep + 1e-6))
 
 
 class Stepping(plugin.SimPlugin):
@@ -58,8 +98,6 @@ class Stepping(plugin.SimPlugin):
         self._complaint = ""
         self._axis = ""
         self.live: StudioSession | None = None
-
-    # --- model and time ------------------------------------------------------------------------------------
 
     @messages.handler
     def on_load_model(self, event: messages.LoadModelEvent) -> bool:
@@ -118,8 +156,6 @@ class Stepping(plugin.SimPlugin):
         self._sleep(REST_S)
         return True
 
-    # --- Studio's step control -----------------------------------------------------------------------------
-
     def _state(self) -> messages.StepControlSnapshot:
         measured = 5.0 * round(self._pace.measured / 5.0)  # reported when it changes
         return messages.StepControlSnapshot(
@@ -148,8 +184,6 @@ class Stepping(plugin.SimPlugin):
         """Request a physics step during a pause."""
         self._single_steps += self._pause != sim.PauseState.UNPAUSED
         return True
-
-    # --- the panel -----------------------------------------------------------------------------------------
 
     @messages.handler
     def on_choose(self, event: ChangeSettings) -> None:
@@ -189,7 +223,7 @@ class Stepping(plugin.SimPlugin):
         live, data = self.live, self.handle.data
         if live is None or data is None:
             return SessionState(note=self._complaint)
-        now, stopped = live.settings_at(data)
+        now = live.now
         axis = self._axis_index(live)
         part = now.parts[axis]
         ticks = np.array([tick[axis] for tick in live.ticks if tick[axis].time_s < data.time - 1e-9]).reshape(-1, 6)
@@ -203,7 +237,7 @@ class Stepping(plugin.SimPlugin):
             gains=tuple(getattr(part.law, "gains", ())),
             laws=choosable_laws(live.base),
             law=current_law(live.base, now),
-            stopped=stopped,
+            stopped=live.stopped,
             note=self._complaint or live.note,
             ticks=ticks,
         )

@@ -11,8 +11,14 @@ from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
 from cmg_mj.visualization.studio import panel as module
-from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
-from cmg_mj.visualization.studio.panel import StudioPanel
+from cmg_mj.visualization.studio.panel import (
+    ChangeSettings,
+    PushRequest,
+    RestartController,
+    SessionState,
+    ShowAxis,
+    StudioPanel,
+)
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, LAW, OBSERVER
 from tests.visualization.studio.session import session
 
