@@ -88,30 +88,6 @@ def test_of_a_scenario(command: str, wrong_input: str, fragments: list[str]) -> 
     assert len(complaint) < 2000
 
 
-@table(
-    ("two dots", "a..b:1", "--connect 'a..b:1': no name of a computer before the port"),
-    ("a dot", ".:1", "--connect '.:1': no name of a computer before the port"),
-    (
-        "300 letters",
-        f"{'a' * 300}:1",
-        "--connect 'aaaa",
-        "aaa...': no name",
-        "a part of it has 300 letters, at most 63 may",
-    ),
-    ("300 letters that are not ASCII", f"{'ö' * 300}:1", "--connect 'öööö", "ö...': no name of a computer before"),
-    ("bytes", f"{BYTES}:1", r"--connect 'a\udcff:1': no name of a computer before the port"),
-    ("two dots in an address", "rerun+http://a..b:1/proxy", "no name of a computer before the port"),
-    ("no bracket", "[::1:1", "--connect '[::1:1': no address of a viewer; give PORT"),
-    ("no such port", "[::1]:99999", "--connect '[::1]:99999': no address of a viewer; give PORT"),
-    ("port 0", "0", "--connect '0': no address of a viewer; give PORT"),
-    ("a digit that is no number", "²", "--connect '²': no address of a viewer; give PORT"),
-    ("digits of another script", "١٢٣٤٥٦", "--connect '١٢٣٤٥٦': no address of a viewer; give PORT"),
-)
-def test_hosts(wrong_input: str, fragments: list[str]) -> None:
-    assert_in_order(fragments, cmg_mj("run", "push_recovery", "--connect", wrong_input).complaint)
-    assert os.listdir() == ["robot.xml"]
-
-
 def test_a_host_of_a_cluster_that_is_none() -> None:
     vary = ("--vary", "plant.equilibrium_bias_deg=0,1", "--worlds", "1")
     complaint = cmg_mj("sweep", "push_recovery", *vary, "--cluster", "tcp://a..b:1").complaint

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmg_mj.observers import OBSERVERS
 from cmg_mj.visualization.plots import style
 from cmg_mj.visualization.plots.style import (
     BASELINE_COLOURS,
