@@ -81,7 +81,7 @@ def _copy(read_end: int, path: Path) -> None:
             with path.open("wb") as file:
                 shutil.copyfileobj(pipe, file)
         finally:
-            while pipe.read(shutil.COPY_BUFSIZE):
+            while pipe.read(1 << 20):
                 pass
 
 

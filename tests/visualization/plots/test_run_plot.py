@@ -15,7 +15,6 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture, draw
 from cmg_mj.visualization.plots.run_plot import PAGE, plot_run
 from cmg_mj.visualization.plots.style import colour, hexadecimal
 
@@ -108,12 +107,6 @@ def test_a_swing_is_not_called_a_push(few: Trajectory, tmp_path: Path, figures: 
     spans = [(xy[:, 0].min(), xy[:, 0].max()) for xy in corners if np.ptp(xy[:, 1]) < 0.1]
     np.testing.assert_allclose(spans, [(0.0, few["time_s"][-1]), (0.1, 0.2)])
     assert len(tilt.patches) == 2
-
-
-def test_a_picture_has_the_observers_colours(tmp_path: Path, figures: list[matplotlib.figure.Figure]) -> None:
-    lines = [Line([0.0, 1.0], [0.0, 1.0], "(10) ltv", color="ltv"), Line([0.0, 1.0], [1.0, 0.0], "other", color=3)]
-    draw(tmp_path / "it.png", Picture("it", "A title", [Panel("y", lines)]))
-    assert [line.get_color() for line in figures[-1].axes[0].lines] == [hexadecimal(colour("ltv")), "C3"]
 
 
 @pytest.mark.slow

@@ -85,12 +85,6 @@ def test_an_observer_keeps_its_colour_whatever_it_is_shown_with() -> None:
     assert list(colours(names)) == names
 
 
-def test_users_own_differ_from_each_other() -> None:
-    names = [f"mine:Observer{i}" for i in range(len(USER_COLOURS))]
-    assert set(colours(names).values()) == set(USER_COLOURS)
-    assert set(colours([*names, "mine:OneMore"])) == {*names, "mine:OneMore"}
-
-
 @pytest.mark.parametrize("sight", SIGHT)
 def test_bounds_are_not_taken_for_what_they_bound(sight: str) -> None:
     assert least_distance([BOUND_COLOURS["settle band"], BASELINE_COLOURS["true"]], sight) > 0.1

@@ -327,27 +327,6 @@ def test_a_run_of_no_length(run: Run, experiment: Experiment, tmp_path: Path, ti
     assert "fallen" in [state for (state,) in states]
 
 
-def test_an_open_loop_observer_that_diverged(run: Run, experiment: Experiment, tmp_path: Path) -> None:
-    columns = dict(run.trajectory.columns)
-    columns["estimate/linear/x2_rad_s"] = columns["x2_rad_s"].copy()
-    columns["estimate/linear/x2_rad_s"][50:] = [*[1e300, -np.inf], *[np.nan] * (len(run.trajectory) - 52)]
-    path = write(tmp_path / "nan.rrd", experiment, [replace(run, trajectory=replace(run.trajectory, columns=columns))])
-    _, recorded_values = scalars(path, "/homogeneous/rate_estimate/2_linear")
-    assert np.array_equal(recorded_values, columns["estimate/linear/x2_rad_s"], equal_nan=True)
-
-
-def test_a_users_observer_may_have_any_name(run: Run, experiment: Experiment, tmp_path: Path) -> None:
-    name = "my_lab.observers:Kalman"
-    columns = {key.replace("/linear/", f"/{name}/"): values for key, values in run.trajectory.columns.items()}
-    layout = replace(run.trajectory.layout, observers=("homogeneous", name))
-    users_run = replace(run, name=name, trajectory=replace(run.trajectory, columns=columns, layout=layout))
-    path = write(tmp_path / "named.rrd", experiment, [users_run])
-    part = rr.escape_entity_path_part(name)
-    assert {f"/{part}/rig/frame", f"/{part}/rate_estimate/2_{part}"} <= entities(path)
-    color = static(path, f"/{part}/rate_estimate/2_{part}", "SeriesLines:colors")
-    assert color != static(path, f"/{part}/rate_estimate/1_homogeneous", "SeriesLines:colors")
-
-
 def test_two_observers_have_a_branch_each(run: Run, experiment: Experiment, tmp_path: Path) -> None:
     other = record(prepare(scenario().with_observer("ltv")))
     path = write(tmp_path / "compare.rrd", experiment, [run, other])

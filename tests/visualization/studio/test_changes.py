@@ -45,41 +45,6 @@ def test_pushes_add_up() -> None:
         ]
 
 
-def test_studios_mouse_reaches_the_rig_and_adds_up_with_a_push() -> None:
-    """The viewer sends a force on a body with every frame; the same torque from both sides is no torque."""
-
-    def tilts(button: float, mouse: float) -> np.ndarray:
-        with session("push=[]") as studio:
-            force = np.zeros((studio.live.model.nbody, 6))
-            force[studio.live.plant.axis.frame, 4] = mouse  # about y, the tilt's axis, in the world's directions
-            state = int(mujoco.mjtState.mjSTATE_XFRC_APPLIED)
-            studio.run(0.5)
-            if button:
-                studio.send(PushRequest(button, 0.2))
-            studio.send(messages.PerturbSnapshot(state=force.ravel(), state_sig=state))
-            studio.run(0.2)
-            studio.send(messages.PerturbSnapshot(state=0.0 * force.ravel(), state_sig=state))
-            studio.run(0.5)
-            assert not studio.live.stopped
-            return studio.rows[:, RATE]
-
-    nothing = tilts(0.0, 0.0)
-    by_mouse = tilts(0.0, 0.5)
-    assert np.abs(by_mouse - nothing).max() > 0.05
-    by_button = tilts(0.5, 0.0)
-    assert np.abs(by_mouse - by_button).max() < 0.3 * np.abs(by_button - nothing).max()
-    assert np.abs(tilts(-0.5, 0.5) - nothing).max() < 0.3 * np.abs(by_button - nothing).max()
-
-
-def test_the_scenarios_observer_has_its_parameters_again() -> None:
-    with session("observer.k1=40.0") as studio:
-        for kind in ("linear", "homogeneous"):
-            studio.run(0.3)
-            studio.send(ChangeSettings({OBSERVER: kind}))
-        assert studio.live.now.scenario.observer.parameters == {"k1": 40.0}
-        assert vars(studio.live.controller.parts[0].observer)["k1"] == 40.0
-
-
 @pytest.mark.slow
 def test_noise_and_bias() -> None:
     with session("push=[]", "plant.initial_tilt_deg=0.0") as studio:

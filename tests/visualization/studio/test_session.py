@@ -99,15 +99,6 @@ def test_reset_is_the_scenarios_start_with_the_wheels_at_speed(key: int | None) 
         same(studio.rows, runner_rows("duration_s=4.0"))
 
 
-def test_reset_to_a_keyframe_is_that_keyframe() -> None:
-    with session("plant.initial_tilt_deg=3.0") as studio:
-        studio.run(0.5)
-        studio.send(messages.ResetEvent(key=0))
-        assert studio.data.qpos[studio.live.plant.tilt] == studio.live.plant.tilt_zero
-        studio.run(0.5)
-        assert not studio.live.stopped
-
-
 def test_reload_begins_as_the_file_is_now() -> None:
     settings = ["observer.kind=linear"]
     with session() as studio:

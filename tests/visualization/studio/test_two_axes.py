@@ -9,7 +9,7 @@ from mujoco.studio import messages
 from cmg_mj import load_scenario, prepare
 from cmg_mj.visualization.studio.panel import ChangeSettings, PushRequest, ShowAxis
 from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, choosable_laws, current_law
-from tests.visualization.studio.session import SIGNALS, Session, as_rows, session
+from tests.visualization.studio.session import SIGNALS, as_rows, session
 from tests.visualization.studio.test_session import runner_rows, same
 
 ROLL, PITCH = 0, len(SIGNALS)
@@ -74,18 +74,6 @@ def test_a_push_by_button_is_about_the_axis_that_is_shown() -> None:
         studio.run(0.5)
         assert np.count_nonzero(studio.rows[:, PUSH + PITCH]) == 40
         assert np.count_nonzero(studio.rows[:, PUSH + ROLL]) == 40
-
-
-def test_the_axis_shown_stays_through_a_reload_as_long_as_there_is_one() -> None:
-    settings: list[str] = []
-    studio = Session(lambda path: prepare(load_scenario("two_axes", settings)))
-    assert studio.session_state().axis == "roll"
-    with studio.handle:
-        studio.send(ShowAxis("pitch"), messages.LoadModelEvent())
-        assert studio.session_state().axis == "pitch"
-        settings.append('plant.locked_axes=["pitch"]')
-        studio.send(messages.LoadModelEvent())
-        assert (studio.session_state().axes, studio.session_state().axis) == (("roll",), "roll")
 
 
 def test_a_law_is_the_runners_on_both_axes_from_the_start() -> None:
