@@ -27,8 +27,6 @@ REST_S = 0.002
 """Pause between two checks for due steps, without which the viewer's thread would starve [s]."""
 MOST_BEHIND_S = 0.1
 """Largest delay that the simulation catches up; it discards more [s]."""
-MEASURED_OVER_S = 0.5
-"""Interval over which the speed is measured [s]."""
 
 logger = logging.getLogger(__name__)
 
@@ -41,7 +39,6 @@ class StepScheduler:
 
     Attributes:
         speed: Speed of simulated time [% of real time].
-        measured: The measured speed, or -1 if none has been measured [% of real time].
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -52,8 +49,6 @@ class StepScheduler:
     def begin(self, time: float) -> None:
         """Start pacing now, at a simulated time [s]."""
         self._from = (self._clock(), time)
-        self._measured_from = self._from
-        self.measured = -1.0
 
     def steps_due(self, time: float, timestep: float) -> int:
         """Return the number of physics steps due at a simulated time [s]."""
@@ -63,10 +58,6 @@ class StepScheduler:
         if behind > MOST_BEHIND_S:
             self._from = (now, time + MOST_BEHIND_S)
             behind = MOST_BEHIND_S
-        elapsed = now - self._measured_from[0]
-        if elapsed >= MEASURED_OVER_S:
-            self.measured = 100.0 * (time - self._measured_from[1]) / elapsed
-            self._measured_from = (now, time)
         return max(0, int(behind / timestep + 1e-6))
 
 
@@ -136,7 +127,6 @@ class Stepping(plugin.SimPlugin):
         if event.model.opt.timestep != live.timestep:
             event.model.opt.timestep = live.timestep
             self._complain(f"the physics step stays {live.timestep:g} s: samples and ticks fall on whole steps")
-        before = self._state()
         if self._pause == sim.PauseState.UNPAUSED:
             due = self._pace.steps_due(data.time, live.timestep)
         else:
@@ -146,9 +136,8 @@ class Stepping(plugin.SimPlugin):
             live.step(data)
             if live.diverged:
                 self._pause = sim.PauseState.NORMAL_PAUSED  # there is nothing more to show
+                self.handle.send_to_viewer(self._state())
                 break
-        if self._state() != before:
-            self.handle.send_to_viewer(self._state())
         now = self._clock()
         if not 0.0 <= now - self._state_sent_at < STATE_INTERVAL_S:
             self._state_sent_at = now
@@ -157,10 +146,7 @@ class Stepping(plugin.SimPlugin):
         return True
 
     def _state(self) -> messages.StepControlSnapshot:
-        measured = 5.0 * round(self._pace.measured / 5.0)  # reported when it changes
-        return messages.StepControlSnapshot(
-            pause_state=self._pause, speed=self._pace.speed, speed_measured=measured if measured >= 0.0 else -1.0
-        )
+        return messages.StepControlSnapshot(pause_state=self._pause, speed=self._pace.speed)
 
     @messages.handler
     def on_step_control(self, event: messages.StepControlSnapshot) -> bool:

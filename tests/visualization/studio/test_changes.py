@@ -50,12 +50,12 @@ def test_noise_and_bias() -> None:
     with session("push=[]", "plant.initial_tilt_deg=0.0") as studio:
         studio.run(3.0)
         studio.send(ChangeSettings({NOISE: 0.0}))
-        studio.run(3.0)
+        studio.run(12.0)  # the integrator starts at zero
         rows = studio.rows
         noisy, quiet = (np.ptp(part[:, U]) for part in (rows[400:600], rows[-200:]))
         assert quiet < 0.1 * noisy
         studio.send(ChangeSettings({BIAS: 1.5}))
-        studio.run(12.0)
+        studio.run(24.0)
         tilt = studio.data.qpos[studio.live.plant.tilt] - studio.live.plant.tilt_zero
         assert np.degrees(tilt) == pytest.approx(-1.5, abs=0.1)
 

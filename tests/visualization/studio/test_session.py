@@ -61,8 +61,6 @@ def test_it_keeps_the_clocks_pace() -> None:
             studio.now += 0.01
             studio.handle.sync()
         assert studio.data.time == pytest.approx(1.1, abs=0.006)
-        (remark,) = studio.receive(messages.StepControlSnapshot)
-        assert remark.speed_measured == pytest.approx(10.0, abs=5.0)
         studio.now += 60.0  # a machine that sleeps for a minute does not run it to catch up
         studio.handle.sync()
         assert studio.data.time < 1.5
