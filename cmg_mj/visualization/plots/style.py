@@ -1,4 +1,4 @@
-"""What all figures share: colours, short names, the observers to draw, thinned signals.
+"""The common ground of all figures: colours, short names, the observers to draw, thinned signals.
 
 `colour("ltv")` is (69, 144, 254); matplotlib takes `hexadecimal(colour("ltv"))`. The names are those of observers, of
 the signals `true` and `gyro`, and of the baselines of tables (`cmg_mj/results/baselines.py`). Every colour stands out
