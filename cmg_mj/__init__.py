@@ -68,7 +68,6 @@ if TYPE_CHECKING:
     from cmg_mj.studies.compare.api import Comparison as Comparison
     from cmg_mj.studies.compare.api import compare as compare
     from cmg_mj.studies.compare.comparison import ComparedObserver as ComparedObserver
-    from cmg_mj.studies.live_run import LiveRun as LiveRun
     from cmg_mj.studies.save import RunReport as RunReport
     from cmg_mj.studies.save import report_run as report_run
     from cmg_mj.studies.save import save_run as save_run
@@ -76,7 +75,7 @@ if TYPE_CHECKING:
     from cmg_mj.studies.sweeps import sweep as sweep
     from cmg_mj.studies.tuning import TuningResult as TuningResult
     from cmg_mj.studies.tuning import tune as tune
-    from cmg_mj.visualization.recording.notebook import show_recording as show_recording
+    from cmg_mj.visualization.recording.stream import show_recording as show_recording
 
 
 def _listed_names() -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import tomllib
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,7 +22,6 @@ from cmg_mj.cli.arguments import (
     settings_option,
     worlds_option,
 )
-from cmg_mj.cli.live import live_options, live_run
 from cmg_mj.cli.terminal import (
     WRONG_INPUT,
     CtrlC,
@@ -63,7 +62,7 @@ if TYPE_CHECKING:
 )
 @wire_options
 @click.option("--plot", is_flag=True, help="Also write plot.png.")
-@live_options
+@click.option("--live", is_flag=True, help="Show the run in a rerun viewer as it happens.")
 @users_code()
 def run(
     arguments: RunArguments,
@@ -73,8 +72,6 @@ def run(
     wire: WireOptions,
     plot: bool,
     live: bool,
-    connect: str | None,
-    pace: str,
 ) -> None:
     """Run a scenario and write its results to a folder.
 
@@ -100,27 +97,24 @@ def run(
         note("[compare] is for cmg-mj compare; this is one run")
     board = wire.connect(experiment)
     label = runs.file_name(scenario.observer.kind)
-    settings = None if board is None else board.settings
     folder = arguments.folder(label, experiment, driver, world)
-    live_view = live_run(experiment, live, connect, pace, driver, world, settings)
-    with CtrlC() as ctrl_c, live_view or nullcontext():
+    live_view = runs.live_view(experiment) if live else None
+    with CtrlC() as ctrl_c:
         with progress(scenario.title or arguments.name, scenario.duration_s, ctrl_c) as on_progress:
-            options: SimulationOptions = (
-                {"on_progress": on_progress} if live_view is None else live_view.options(on_progress)
-            )
+            options: SimulationOptions = {"on_progress": on_progress}
+            if live_view is not None:
+                options |= live_view.options(on_progress)
             if board is None:
                 result = experiment.run(driver=driver, world=world, **options)
             else:
                 result = experiment.run_on(board, world, **options)
-        report = runs.report_run(experiment, result)
         if live_view is not None:
-            live_view.ended(report)
+            live_view.show()
+        report = runs.report_run(experiment, result)
         try:
             place = runs.save_run(folder, report, plot=plot)
         finally:
             show(report.summary, tables.summary_table(report.summary), arguments.as_json)
-    if live_view is not None and live_view.failure:
-        note(f"the viewer missed a part: {live_view.failure}; the run and its files are complete")
     say_written(
         folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", arguments.as_json
     )

@@ -50,8 +50,7 @@ def studio(
     """Open SCENARIO in MuJoCo Studio with its controller running. Close the viewer or press Ctrl-C to end.
 
     Without user actions the trajectory equals that of cmg-mj run. A panel pushes the plant, switches the observer, the
-    gains and the feedback, and sets the bias and the accelerometers' noise. Studio pauses, steps, resets, and goes
-    back in time (docs/studio.md).
+    gains and the feedback, and sets the bias and the accelerometers' noise (docs/studio.md).
     """
     from cmg_mj.simulation.experiment import prepare
 

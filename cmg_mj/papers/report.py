@@ -15,7 +15,7 @@ from cmg_mj.papers.claim import MEANINGS, Claim, Verdict
 from cmg_mj.papers.sentences import SentenceLog
 from cmg_mj.results import markdown
 from cmg_mj.results.folder import RunFolder, Writers, claimed, write_text
-from cmg_mj.visualization.plots.run_plot import draw
+from cmg_mj.visualization.plots.figure_spec import draw
 
 
 def figures_of(entries: Sequence[Reproduction]) -> dict[str, Any]:

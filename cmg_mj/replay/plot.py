@@ -11,20 +11,9 @@ from cmg_mj.replay.log import REFERENCE, Log
 from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.report import figure_text, shown_first
 from cmg_mj.replay.scores import Figures
-from cmg_mj.visualization.plots.colours import colours, hexadecimal
-from cmg_mj.visualization.plots.readability import short_names
-from cmg_mj.visualization.plots.run_plot import (
-    INK,
-    MEASURED,
-    PAGE,
-    PANEL_HEIGHT,
-    SMALL_COLUMNS,
-    SMALL_HEIGHT,
-    fit,
-    pyplot,
-    save_figure,
-)
-from cmg_mj.visualization.plots.thinning import thinned
+from cmg_mj.visualization.plots.figure_spec import pyplot, save_figure
+from cmg_mj.visualization.plots.run_plot import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_COLUMNS, SMALL_HEIGHT
+from cmg_mj.visualization.plots.style import colours, hexadecimal, short_names, thinned
 
 if TYPE_CHECKING:
     from cmg_mj.visualization.plots.run_plot import Axes
@@ -86,13 +75,11 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         for name in few:
             line(axes, rates[name], palette[name], 0.8, labels[name])
         axes.set_ylabel("tilt rate\n[rad/s]")
-        limits = fit(axes, reference, [rates[name] for name in few])
     for true in reference:
         panels[2].plot([], [], " ", label="RMS:")
         for name in few:
             line(panels[2], rates[name] - true, palette[name], 0.6, f"{labels[name]} {scores[name]}")
         panels[2].set_ylabel("estimate less\nreference [rad/s]")
-        fit(panels[2], reference, [rates[name] - true for name in few])
     for axes in panels[:-1]:
         axes.axvspan(*span, color="0.5", alpha=0.15, linewidth=0, zorder=0)
         axes.set_xlim(log["time_s"][0], log["time_s"][-1])
@@ -103,8 +90,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
             line(axes, values, INK, 0.8)
         axes.set_title(f"{labels[name]} {scores[name]}", loc="left", fontsize="small", parse_math=False, pad=2.0)
         axes.tick_params(labelsize="small")
-        if limits is not None:
-            axes.set_ylim(*limits)
+        axes.set_ylim(*panels[1].get_ylim())
     for axes in (panels[-1], *small):
         axes.set_xlim(*span)
     for axes in panels:

@@ -11,10 +11,9 @@ from cmg_mj.core.types import BIAS
 from cmg_mj.replay.log import REFERENCE
 from cmg_mj.replay.log_replay import ReplayResult
 from cmg_mj.replay.report import replay_markdown, shown_first
-from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, Colour, colours
-from cmg_mj.visualization.plots.readability import short_names
-from cmg_mj.visualization.recording.legend import numbered_parts
+from cmg_mj.visualization.plots.style import BASELINE_COLOURS, Colour, colours, short_names
 from cmg_mj.visualization.recording.replay_recording import LogSeries, write_logs
+from cmg_mj.visualization.recording.run import numbered_parts
 from cmg_mj.visualization.recording.signals import CONTROLLER, MODULES, Series
 
 
@@ -33,7 +32,7 @@ def write_replay(path: Path, replays: Sequence[ReplayResult], names: Sequence[st
     """
     title = f"Replay: {', '.join(names)}"
     logs = [
-        LogSeries(name, list(series(replayed)), list(replayed.estimates), shown_first(replayed))
+        LogSeries(name, list(series(replayed)), shown_first(replayed))
         for name, replayed in zip(names, replays, strict=True)
     ]
     texts = {
@@ -48,10 +47,8 @@ def series(replayed: ReplayResult) -> Iterator[Series]:
     log = replayed.log
     time = log.broken_time()
 
-    def row(
-        path: str, name: str, values: np.ndarray, color: Colour, width: float = 1.5, whole: bool = True, by: str = ""
-    ) -> Series:
-        return Series(path, name, time, log.broken(values), color, width, whole, by)
+    def row(path: str, name: str, values: np.ndarray, color: Colour, width: float = 1.5, by: str = "") -> Series:
+        return Series(path, name, time, log.broken(values), color, width, by)
 
     yield row("tilt/measured", "measured", np.degrees(log["y1_rad"]), BASELINE_COLOURS["gyro"])
     if "reference" in log.has:
@@ -66,10 +63,10 @@ def series(replayed: ReplayResult) -> Iterator[Series]:
         if BIAS in estimates:
             signals["bias"] = np.degrees(estimates[BIAS])
         for folder, values in signals.items():
-            yield row(f"{folder}/{part}", labels[name], values, color, whole=False, by=name)
+            yield row(f"{folder}/{part}", labels[name], values, color, by=name)
     if "acceleration" in log.has:
         measured = log["acceleration_rad_s2"]
-        yield row("acceleration/measured", "measured", measured, BASELINE_COLOURS["gyro"], 1.0, whole=False)
+        yield row("acceleration/measured", "measured", measured, BASELINE_COLOURS["gyro"], 1.0)
     if "gimbals" in log.has:
         yield row("command/u", "command", log["u_rad_s"], CONTROLLER)
         yield row("gimbal/y2", "measured", np.degrees(log["y2_rad"]), MODULES[0])

@@ -16,7 +16,7 @@ from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.intervals import Interval, format_interval, known_interval
 from cmg_mj.results.summary_keys import Key, SummaryValue
 from cmg_mj.results.tables import Row, Table
-from cmg_mj.visualization.plots.readability import observers_to_draw
+from cmg_mj.visualization.plots.style import observers_to_draw
 
 FIGURES = {
     "velocity_rms_error_rad_s": Key("RMS error", "rad/s", "{:.4f}"),

@@ -24,6 +24,7 @@ from cmg_mj.studies.compare.statistics import standings, worlds_table
 
 if TYPE_CHECKING:
     from cmg_mj.visualization.recording import RecordingHeader, Run
+    from cmg_mj.visualization.recording.live import LiveView
 
 
 @dataclass(frozen=True)
@@ -228,6 +229,13 @@ def recording_header(
         rate_limit_rad_s=experiment.law.rate_limit,
         scenario_toml=experiment.as_toml(driver, world, wire),
     )
+
+
+def live_view(experiment: Experiment) -> LiveView:
+    """Start rerun's viewer for a run of an experiment."""
+    from cmg_mj.visualization.recording.live import LiveView
+
+    return LiveView(recording_header(experiment), experiment.scenario.observer.kind)
 
 
 def _write_json(path: Path, value: Summary | list[Summary]) -> None:

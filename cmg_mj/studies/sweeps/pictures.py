@@ -15,7 +15,7 @@ from cmg_mj.results.summary_keys import heading
 from cmg_mj.studies.sweeps.cells import Trials, baselines_ahead, fell_interval, least_error, smallest
 from cmg_mj.studies.sweeps.study import counted, is_number
 from cmg_mj.visualization.plots.figure_spec import Line, Map, Panel, Picture, Surface
-from cmg_mj.visualization.plots.readability import short_names
+from cmg_mj.visualization.plots.style import short_names
 
 ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
 """Figures that are drawn, and whose indices are shown, where a trial has them; tables show the first."""

@@ -22,8 +22,7 @@ from cmg_mj.studies.sweeps.pictures import ERRORS, fall_counts, pictures_of
 from cmg_mj.studies.sweeps.sobol import FEWEST, LOST, IndexRow, index_table
 from cmg_mj.studies.sweeps.store import CELLS, GOES_ON, INDICES, REPORT, TRIALS, Store
 from cmg_mj.studies.sweeps.study import SweepStudy, VariedField, counted
-from cmg_mj.visualization.plots.figure_spec import Picture
-from cmg_mj.visualization.plots.run_plot import draw
+from cmg_mj.visualization.plots.figure_spec import Picture, draw
 
 MOST_ROWS = 60
 """Rows of a table on the terminal or in the report; the files have all."""

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmg_mj.visualization.plots.colours import colours, hexadecimal
-from cmg_mj.visualization.plots.figure_spec import Map, Surface
-from cmg_mj.visualization.plots.readability import short_names
+from cmg_mj.visualization.plots.style import colours, hexadecimal, short_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
     from matplotlib.contour import QuadContourSet
+
+    from cmg_mj.visualization.plots.figure_spec import Map, Surface
 
 EMPTY = (232, 232, 232)
 """Colour of a cell without a best."""
@@ -83,18 +83,9 @@ def _contours(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray) -> None:
 
 
 def _labelled(axes: Axes, lines: QuadContourSet) -> None:
-    """Label every level, in the middle of its longest piece: matplotlib leaves short lines without a label."""
-    places = []
-    for paths in lines.get_paths():
-        polygons = map(np.asarray, paths.to_polygons(closed_only=False))
-        pieces = [piece for piece in polygons if len(piece) > 1]
-        if pieces:
-            longest = max(pieces, key=len)
-            places.append(longest[len(longest) // 2])
-    if places:
-        for text in axes.clabel(lines, fmt="%g", fontsize="small", manual=places, inline=False):
-            text.set_color("0.1")
-            text.set_bbox({"facecolor": CASING, "edgecolor": "none", "alpha": 0.8, "pad": 0.8})
+    for text in axes.clabel(lines, fmt="%g", fontsize="small", inline=False):
+        text.set_color("0.1")
+        text.set_bbox({"facecolor": CASING, "edgecolor": "none", "alpha": 0.8, "pad": 0.8})
 
 
 def draw_surface(axes: Axes, spec: Surface) -> None:
@@ -158,13 +149,5 @@ def _to_edges(spec: Map, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> tu
     return across, up, np.ma.masked_invalid(np.pad(values, 1, "edge"))
 
 
-def _in_legend(
-    axes: Axes,
-    style: str,
-    label: str,
-    color: str | None = None,
-    markersize: float | None = None,
-    linewidth: float | None = None,
-) -> None:
-    properties = {"color": color, "markersize": markersize, "linewidth": linewidth}
+def _in_legend(axes: Axes, style: str, label: str, **properties: Any) -> None:
     axes.plot([], [], style, label=label.lstrip("_"), **properties)  # matplotlib hides a leading underscore

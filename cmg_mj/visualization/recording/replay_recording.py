@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import rerun.blueprint as rrb
 
-from cmg_mj.visualization.recording.legend import numbered_parts
+from cmg_mj.visualization.recording.run import numbered_parts
 from cmg_mj.visualization.recording.signals import Lines, Series, log_styles, log_values
 from cmg_mj.visualization.recording.stream import application_name, log_page, open_recording
-from cmg_mj.visualization.recording.views import Choice, Plot, page_tabs, plot_view, tabbed_blueprint
+from cmg_mj.visualization.recording.views import Plot, page_tabs, plot_view, tabbed_blueprint
 
 TIMELINE = "time"
 """Name of the timeline: a log's time is not simulated."""
@@ -36,13 +36,11 @@ class LogSeries:
     Attributes:
         name: Name of the log, unique in a recording.
         series: The series, in the folders that `PLOTS` names: angles in degrees, rates in rad/s.
-        observers: Names of all observers.
         best: Names of the observers that are switched on at first.
     """
 
     name: str
     series: Sequence[Series]
-    observers: Sequence[str]
     best: Sequence[str]
 
 
@@ -69,22 +67,15 @@ def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping
     with open_recording(path, title, application_name(names, branches), blueprint) as rec:
         for branch in branches:
             log_styles(rec, branch)
-            for entity, row in branch.series.items():  # one by one: of a long log, all wait in memory
-                log_values(rec, replace(branch, series={entity: row}))
-                rec.flush()
+            log_values(rec, branch)
         for name, text in texts.items():
             log_page(rec, name.lower(), text)
 
 
 def _board(branch: Lines, log: LogSeries, titles: Sequence[str]) -> rrb.Container:
     """Lay out everything about one log. The legends have all observers, most of them switched off."""
-    views: dict[Plot, rrb.View] = {}
-    for plot in PLOTS:
-        rows = [row for path, row in branch.series.items() if path.startswith(plot.entities)]
-        if rows:
-            observers = {row.observer for row in rows}
-            visible = [n for n in log.best if n in observers] or [n for n in log.observers if n in observers]
-            views[plot] = plot_view(plot, branch, Choice(visible, full_legend=True))
+    plots = [plot for plot in PLOTS if any(path.startswith(plot.entities) for path in branch.series)]
+    views = {plot: plot_view(plot, branch, log.best, full_legend=True) for plot in plots}
     left = [view for plot, view in views.items() if plot in MAIN]
     right = [view for plot, view in views.items() if plot not in MAIN]
     return rrb.Horizontal(

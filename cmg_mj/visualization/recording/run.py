@@ -1,12 +1,13 @@
-"""A run to record, and its torques, phases and poses in time."""
+"""A run to record: its names and colours, and its torques, phases and poses in time."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import rerun as rr
 
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Outcome
@@ -14,7 +15,15 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
-from cmg_mj.visualization.plots.readability import Summary, figures_by_observer, observers_to_draw, section
+from cmg_mj.visualization.plots.style import (
+    Colour,
+    Summary,
+    colours,
+    figures_by_observer,
+    observers_to_draw,
+    section,
+    short_names,
+)
 
 POSE_RATE_HZ = 100.0
 """Largest rate at which poses are recorded; the eye needs no more."""
@@ -87,10 +96,48 @@ class Run:
         return self.trajectory.observers[1:]
 
 
-def best_observers(run: Run, names: Collection[str] | None = None) -> list[str]:
-    """Choose the observer in the loop and the best open-loop observers; only from `names`, unless it is None."""
-    summaries = {name: summary for name, summary in run.observers.items() if names is None or name in names}
-    return observers_to_draw(summaries, always=[name for name in run.trajectory.observers[:1] if name in summaries])
+@dataclass(frozen=True)
+class LegendEntry:
+    """A run or an observer as a recording names it.
+
+    Attributes:
+        name: The name.
+        part: Its part of an entity path.
+        label: The shortened name.
+        color: Its colour.
+        is_best: Whether it is switched on at first.
+    """
+
+    name: str
+    part: str
+    label: str
+    color: Colour
+    is_best: bool
+
+
+def legend(figures: Mapping[str, Summary], always: Collection[str] = ()) -> list[LegendEntry]:
+    """Make the legend of runs or observers.
+
+    Args:
+        figures: Name -> its numbers, which rank it.
+        always: Names that are switched on in any case.
+
+    Returns:
+        An entry for each, in the order of `figures`.
+    """
+    names = list(figures)
+    best, labels = observers_to_draw(figures, always), short_names(names)
+    places = zip(numbered_parts(names), colours(names).items(), strict=True)
+    return [LegendEntry(name, part, labels[name], color, name in best) for part, (name, color) in places]
+
+
+def numbered_parts(names: Sequence[str]) -> list[str]:
+    """Make parts of entity paths; each of several gets a number before its name, because the viewer sorts by path."""
+    digits = len(str(len(names)))
+    return [
+        rr.escape_entity_path_part(f"{i:0{digits}}_{name}" if len(names) > 1 else name)
+        for i, name in enumerate(names, 1)
+    ]
 
 
 def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, float]]:
@@ -105,11 +152,6 @@ def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, floa
     """
     edges = sorted({time for push in pushes for time in (push.start_s, push.end_s) if time < end_s})
     return [(t, sum(p.torque_n_m for p in pushes if p.start_s <= t < p.end_s)) for t in edges]
-
-
-def largest_torque(pushes: Sequence[Push]) -> float:
-    """Return the largest torque that ever acts, the scale of the arrows [N m]."""
-    return max((abs(torque) for _, torque in torque_steps(pushes, math.inf)), default=0.0)
 
 
 def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[tuple[float, str]]:
@@ -157,31 +199,16 @@ def _recovery(trajectory: Trajectory, start: float, end: float, band: float) -> 
     return steps
 
 
-def pose_stride(dt: float) -> int:
-    """Return the number of ticks, dt [s] apart, from one recorded pose to the next."""
-    return max(1, round(1.0 / (POSE_RATE_HZ * dt)))
-
-
-def pose_ticks(trajectory: Trajectory) -> np.ndarray:
-    """Choose the ticks at which poses are recorded, (n_poses,); none, if there is no tick."""
-    n = len(trajectory)
-    if n == 0:
-        return np.zeros(0, dtype=int)
-    time = trajectory.rows(slice(2))["time_s"]
-    return np.union1d(np.arange(0, n, pose_stride(time[1] - time[0]) if n > 1 else 1), n - 1)
-
-
-def poses_at(plant: Plant, trajectory: Trajectory, ticks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the poses at some ticks; the initial pose, if the run has no tick.
-
-    Args:
-        plant: The plant.
-        trajectory: The run's trajectory.
-        ticks: The ticks, (n_poses,).
+def recorded_poses(plant: Plant, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Choose the poses that are recorded; the initial pose, if the run has no tick.
 
     Returns:
         Times, (n_poses,) [s], and joint angles, (n_poses, n_joints) [rad].
     """
-    if len(trajectory) == 0:
+    n = len(trajectory)
+    if n == 0:
         return np.zeros(1), plant.new_data().qpos[None].copy()
-    return trajectory["time_s"][ticks], trajectory.qpos(ticks)
+    time = trajectory["time_s"]
+    stride = max(1, round(1.0 / (POSE_RATE_HZ * (time[1] - time[0])))) if n > 1 else 1
+    ticks = np.union1d(np.arange(0, n, stride), n - 1)
+    return time[ticks], trajectory.qpos(ticks)

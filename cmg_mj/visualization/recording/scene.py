@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 
 import mujoco
 import numpy as np
@@ -10,10 +10,9 @@ import rerun as rr
 
 from cmg_mj.plant.parts import Module
 from cmg_mj.plant.plant import Plant
-from cmg_mj.visualization.recording.branch import Branch
-from cmg_mj.visualization.recording.run import largest_torque, torque_steps
-from cmg_mj.visualization.recording.shapes import drawn_shapes
-from cmg_mj.visualization.recording.signals import TIMELINE, instant, time_column
+from cmg_mj.visualization.recording.run import recorded_poses, torque_steps
+from cmg_mj.visualization.recording.shapes import drawn_shapes, enclosing_ball
+from cmg_mj.visualization.recording.signals import TIMELINE, Branch, instant, time_column
 
 FLYWHEEL_SLOWDOWN = 100.0
 """Flywheels are drawn turning this many times slower.
@@ -27,38 +26,25 @@ PUSH_LENGTH, PUSH_RADIUS = 0.8, 0.047
 """Length and radius of the strongest push's arrow, in radii of the rig."""
 
 
-def log_rig(rec: rr.RecordingStream, branch: Branch) -> None:
-    """Record the mechanism of one run under `<branch>/rig`, but for its poses."""
-    log_shapes(rec, branch.path, branch.plant, branch.radius)
-    steps, largest = torque_steps(branch.pushes, branch.run.outcome.time_s), largest_torque(branch.pushes)
-    log_torques(rec, branch.path, branch.plant, steps, largest, branch.radius)
-
-
-def log_poses(rec: rr.RecordingStream, branch: str, plant: Plant, time: np.ndarray, qpos: np.ndarray) -> None:
-    """Record poses of all bodies.
-
-    Args:
-        rec: The recording.
-        branch: The run's branch.
-        plant: The plant.
-        time: Times, (n,) [s].
-        qpos: Joint angles, (n, n_joints) [rad].
-    """
-    positions, quaternions = body_poses(plant, qpos)
+def log_poses(rec: rr.RecordingStream, branch: Branch) -> None:
+    """Record poses of all bodies under `<branch>/rig`."""
+    plant = branch.plant
+    time, qpos = recorded_poses(plant, branch.run.trajectory)
     times = time_column(time)
+    positions, quaternions = body_poses(plant, qpos)
     for body in range(1, plant.model.nbody):
         poses = rr.Transform3D.columns(translation=positions[:, body], quaternion=quaternions[:, body])
-        rec.send_columns(body_path(branch, plant, body), [times], poses)
+        rec.send_columns(body_path(branch, body), [times], poses)
     for module in plant.axis.modules:
         translation, quaternion = _turn_back(plant, module, qpos)
         poses = rr.Transform3D.columns(translation=translation, quaternion=quaternion)
-        rec.send_columns(_slowed_path(branch, plant, module), [times], poses)
+        rec.send_columns(_slowed_path(branch, module), [times], poses)
 
 
-def body_path(branch: str, plant: Plant, body: int) -> str:
+def body_path(branch: Branch, body: int) -> str:
     """Name a body's entity: `cube1/gimbal` is `cube1.gimbal`, flat under the rig, as poses are in the world's frame."""
-    name = plant.model.body(body).name or f"body{body}"
-    return f"{branch}/rig/{rr.escape_entity_path_part(name.replace('/', '.'))}"
+    name = branch.plant.model.body(body).name or f"body{body}"
+    return f"{branch.path}/rig/{rr.escape_entity_path_part(name.replace('/', '.'))}"
 
 
 def body_poses(plant: Plant, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -94,42 +80,27 @@ def _turn_back(plant: Plant, module: Module, qpos: np.ndarray) -> tuple[np.ndarr
     return anchor - rotated_anchor, quaternion
 
 
-def _slowed_path(branch: str, plant: Plant, module: Module) -> str:
-    return f"{body_path(branch, plant, int(plant.model.dof_bodyid[module.flywheel_dof]))}/slowed"
+def _slowed_path(branch: Branch, module: Module) -> str:
+    return f"{body_path(branch, int(branch.plant.model.dof_bodyid[module.flywheel_dof]))}/slowed"
 
 
-def log_shapes(rec: rr.RecordingStream, branch: str, plant: Plant, radius: float) -> None:
+def log_shapes(rec: rr.RecordingStream, branch: Branch) -> None:
     """Record the plant's shapes: one static entity for each geom and site, under its body."""
-    model = plant.drawn_model
-    parents = {body: body_path(branch, plant, body) for body in range(model.nbody)}
+    plant, model = branch.plant, branch.plant.drawn_model
+    parents = {body: body_path(branch, body) for body in range(model.nbody)}
     for module in plant.axis.modules:
-        parents[int(model.dof_bodyid[module.flywheel_dof])] = _slowed_path(branch, plant, module)
-    for body, name, shape in drawn_shapes(model, radius):
+        parents[int(model.dof_bodyid[module.flywheel_dof])] = _slowed_path(branch, module)
+    for body, name, shape in drawn_shapes(model, _radius(plant)):
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
         rec.log(f"{parents[body]}/{path}", shape, static=True)
 
 
-def log_torques(
-    rec: rr.RecordingStream,
-    branch: str,
-    plant: Plant,
-    steps: Sequence[tuple[float, float]],
-    largest: float,
-    radius: float,
-) -> None:
-    """Record an arrow on the frame's upper edge that shows a torque as the force of a hand, while the torque lasts.
-
-    Args:
-        rec: The recording.
-        branch: The run's branch.
-        plant: The plant.
-        steps: (time [s], torque from then on [N m]).
-        largest: Result of `largest_torque` [N m].
-        radius: Radius of the plant [m].
-    """
-    path = f"{body_path(branch, plant, plant.axis.frame)}/push"
-    tip, direction = _edge(plant)
-    for time, torque in steps:
+def log_pushes(rec: rr.RecordingStream, branch: Branch) -> None:
+    """Record an arrow on the frame's upper edge that shows a push as the force of a hand, while the push lasts."""
+    path = f"{body_path(branch, branch.plant.axis.frame)}/push"
+    (tip, direction), radius = _edge(branch.plant), _radius(branch.plant)
+    largest = max((abs(torque) for _, torque in torque_steps(branch.pushes, math.inf)), default=0.0)
+    for time, torque in torque_steps(branch.pushes, branch.run.outcome.time_s):
         rec.set_time(TIMELINE, duration=instant(time))
         if abs(torque) <= 1e-9 * largest:
             rec.log(path, rr.Clear(recursive=False))
@@ -138,6 +109,11 @@ def log_torques(
         style = {"radii": [PUSH_RADIUS * radius], "colors": [PUSH_COLOR], "labels": [f"push {torque:+.3g} N m"]}
         rec.log(path, rr.Arrows3D(vectors=[force], origins=[tip - force], **style))
     rec.reset_time()
+
+
+def _radius(plant: Plant) -> float:
+    """Return the radius of the rig at its start, the scale of arrows and floors [m]."""
+    return enclosing_ball(plant, np.empty((0, plant.model.nq))).radius
 
 
 def _edge(plant: Plant) -> tuple[np.ndarray, np.ndarray]:

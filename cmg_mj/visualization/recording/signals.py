@@ -1,22 +1,29 @@
-"""The time series of a run: paths, units, colours; and the recording's timeline."""
+"""The branches of a recording, one a run: their time series with paths, units, colours; the timeline; the phases."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
 
 from cmg_mj.core.types import BIAS
 from cmg_mj.plant.plant import Plant
-from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push
-from cmg_mj.visualization.plots.colours import BASELINE_COLOURS, BOUND_COLOURS, Colour
-from cmg_mj.visualization.plots.thinning import thinned
-from cmg_mj.visualization.recording.legend import LegendEntry
-from cmg_mj.visualization.recording.run import BALANCING, ENDINGS, PUSH, RECOVERING, SETTLED, Run, phases
+from cmg_mj.visualization.plots.style import BASELINE_COLOURS, BOUND_COLOURS, Colour
+from cmg_mj.visualization.recording.run import (
+    BALANCING,
+    ENDINGS,
+    PUSH,
+    RECOVERING,
+    SETTLED,
+    LegendEntry,
+    RecordingHeader,
+    Run,
+    legend,
+    phases,
+)
 
 TIMELINE = "sim_time"
 """Simulated time from the start of the run."""
@@ -48,7 +55,6 @@ class Series:
         values: Values, (n,) or (n, n_lines), in the unit that the plot's title names.
         color: Colour of the lines.
         width: Width of the lines.
-        whole: Whether an axis must show the whole series; bounds, measurements and estimates may be cut off.
         observer: The observer that made the series; empty if none did.
     """
 
@@ -58,7 +64,6 @@ class Series:
     values: np.ndarray
     color: Colour
     width: float = 1.5
-    whole: bool = True
     observer: str = ""
 
 
@@ -71,14 +76,59 @@ class Lines:
         label: Shortened name of the run or log.
         series: Path below the group -> series.
         timeline: Name of the timeline.
-        falls_from: Time from which the run only fell; what follows takes no room on an axis [s].
     """
 
     path: str
     label: str
     series: dict[str, Series]
     timeline: str = TIMELINE
-    falls_from: float = math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Branch(Lines):
+    """A run and its place in the recording.
+
+    Attributes:
+        run: The run.
+        entry: The run in the legends.
+        observers: The run's observers in the legends.
+        plant: The plant; of several axes, with the run's axis alone.
+        pushes: The pushes about the run's axis.
+    """
+
+    run: Run
+    entry: LegendEntry
+    observers: Sequence[LegendEntry]
+    plant: Plant
+    pushes: Sequence[Push]
+
+
+def make_branches(header: RecordingHeader, runs: Sequence[Run]) -> list[Branch]:
+    """Make the branches of a recording, each named after its run.
+
+    Raises:
+        ValueError: There is no run, or two have the same name.
+    """
+    names = [run.name for run in runs]
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"a recording needs runs of different names, not {names}")
+    entries = legend({run.name: run.ranking for run in runs})
+    return [_make_branch(header, run, entry) for run, entry in zip(runs, entries, strict=True)]
+
+
+def _make_branch(header: RecordingHeader, run: Run, entry: LegendEntry) -> Branch:
+    plant = header.plant if run.axis is None else header.plant.single_axis(run.axis)
+    observers = legend(run.observers, always=run.trajectory.observers[:1])
+    return Branch(
+        path=f"/{entry.part}",
+        label=entry.label,
+        series={row.path: row for row in _series(run, plant, observers, header)},
+        run=run,
+        entry=entry,
+        observers=observers,
+        plant=plant,
+        pushes=[push for push in header.pushes if run.axis is None or push.axis == run.axis],
+    )
 
 
 def instant(seconds: float) -> np.timedelta64:
@@ -91,52 +141,17 @@ def time_column(seconds: np.ndarray, timeline: str = TIMELINE) -> rr.TimeColumn:
     return rr.TimeColumn(timeline, duration=np.rint(seconds * 1e9).astype("timedelta64[ns]"))
 
 
-def run_series(
-    run: Run,
-    plant: Plant,
-    observers: Sequence[LegendEntry],
-    settings: MetricsSettings,
-    rate_limit: float | None,
-    *,
-    thin: bool = False,
-) -> list[Series]:
-    """Make all time series of a run.
-
-    Args:
-        run: The run.
-        plant: The plant.
-        observers: The run's observers.
-        settings: The settle band.
-        rate_limit: Largest gimbal rate, if it is known [rad/s].
-        thin: Whether the outlines of a long run's series are enough.
-
-    Returns:
-        The series: tilt and gimbal angles in degrees, rates in rad/s, the integrator in rad s.
-    """
-    rows = _series(run, plant, observers, settings, rate_limit)
-    return [_thinned(row) for row in rows] if thin else list(rows)
-
-
-def _thinned(row: Series) -> Series:
-    if row.values.ndim > 1:
-        return row
-    time, values = thinned(row.time, row.values)
-    return replace(row, time=time, values=values)
-
-
-def _series(
-    run: Run, plant: Plant, observers: Sequence[LegendEntry], settings: MetricsSettings, rate_limit: float | None
-) -> Iterator[Series]:
-    """Make the series one by one: of a long run, all at once take much memory."""
-    t = run.trajectory
+def _series(run: Run, plant: Plant, observers: Sequence[LegendEntry], header: RecordingHeader) -> Iterator[Series]:
+    """Make all time series of a run: tilt and gimbal angles in degrees, rates in rad/s, the integrator in rad s."""
+    t, rate_limit = run.trajectory, header.rate_limit_rad_s
     time = t["time_s"]
     true, gyro = BASELINE_COLOURS["true"], BASELINE_COLOURS["gyro"]
-    yield Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), gyro, 1.0, whole=False)
+    yield Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), gyro, 1.0)
     yield Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), true, 2.5)
-    yield _bounds("tilt/settle_band", "settle band", time, settings.settle_band_deg)
+    yield _bounds("tilt/settle_band", "settle band", time, header.settings.settle_band_deg)
     yield Series("rate/true", "true", time, t["x2_rad_s"], true, 3.0)
     # the viewer draws in the order of the paths: the thin line of the gyro over the wide one that it follows
-    yield Series("rate/true_by_gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0, whole=False)
+    yield Series("rate/true_by_gyro", "gyro", time, t["fog_rad_s"], gyro, 1.0)
     for observer in observers:
         yield from _estimates(run, observer)
     yield Series("command/u", "command", time, t["u_rad_s"], CONTROLLER)
@@ -163,7 +178,7 @@ def _estimates(run: Run, observer: LegendEntry) -> Iterator[Series]:
     width = 1.5 if name == t.observers[0] else 1.0
 
     def line(folder: str, values: np.ndarray) -> Series:
-        return Series(f"{folder}/{part}", label, time, values, color, width, whole=False, observer=name)
+        return Series(f"{folder}/{part}", label, time, values, color, width, observer=name)
 
     yield line("rate_estimate", rate)
     yield line("rate_error", rate - t["x2_rad_s"])
@@ -172,12 +187,6 @@ def _estimates(run: Run, observer: LegendEntry) -> Iterator[Series]:
         if isinstance(bias := run.observers[name].get("bias_deg"), (int, float)):
             ends = _ends(time)
             yield Series("bias/true", "true", ends, np.full(len(ends), bias), BASELINE_COLOURS["true"], 2.5)
-
-
-def log_series(rec: rr.RecordingStream, branch: Lines) -> None:
-    """Record time series, a column each."""
-    log_styles(rec, branch)
-    log_values(rec, branch)
 
 
 def log_styles(rec: rr.RecordingStream, branch: Lines) -> None:
@@ -189,49 +198,37 @@ def log_styles(rec: rr.RecordingStream, branch: Lines) -> None:
 
 
 def log_values(rec: rr.RecordingStream, branch: Lines) -> None:
-    """Record the values of the series."""
+    """Record the values of the series, a column each."""
     for row in branch.series.values():
         if len(row.time):
             scalars = rr.Scalars.columns(scalars=row.values)
             rec.send_columns(f"{branch.path}/{row.path}", [time_column(row.time, branch.timeline)], scalars)
 
 
-def phase_steps(run: Run, pushes: Sequence[Push], settings: MetricsSettings, until_s: float) -> list[tuple[float, str]]:
-    """Divide a run into the phases of its lane; the lane ends with a run that did not reach its end.
+def log_phases(rec: rr.RecordingStream, header: RecordingHeader, branch: Branch, until_s: float) -> None:
+    """Record the lane of phases; it ends with a run that did not reach its end.
 
     Args:
-        run: The run.
-        pushes: Torques from outside.
-        settings: The settle band.
+        rec: The recording.
+        header: The experiment.
+        branch: The run.
         until_s: Time until which a fall is shown; at least a little after the run, so that it is seen [s].
-
-    Returns:
-        (time [s], name of the phase from then on), in order of time.
     """
-    steps, outcome = phases(run, pushes, settings), run.outcome
+    path, outcome = f"{branch.path}/phase", branch.run.outcome
+    rec.log(path, rr.StateConfiguration(values=list(PHASES), colors=list(PHASES.values())), static=True)
+    steps = phases(branch.run, branch.pushes, header.settings)
     if outcome.kind in ENDINGS:
         steps.append((max(until_s, 1.05 * outcome.time_s, outcome.time_s + 0.1), NO_PHASE))
-    return steps
-
-
-def log_lane(rec: rr.RecordingStream, branch: str) -> None:
-    """Record the colours of a branch's lane of phases."""
-    states = rr.StateConfiguration(values=list(PHASES), colors=list(PHASES.values()))
-    rec.log(f"{branch}/phase", states, static=True)
-
-
-def log_phases(rec: rr.RecordingStream, branch: str, steps: Sequence[tuple[float, str]]) -> None:
-    """Record phases: (time [s], name)."""
     for time, name in steps:
         rec.set_time(TIMELINE, duration=instant(time))
-        rec.log(f"{branch}/phase", rr.StateChange(state=name))
+        rec.log(path, rr.StateChange(state=name))
     rec.reset_time()
 
 
 def _bounds(path: str, name: str, time: np.ndarray, bound: float) -> Series:
     """Make two horizontal lines at +-bound."""
     ends = _ends(time)
-    return Series(path, name, ends, np.tile([bound, -bound], (len(ends), 1)), BOUND_COLOURS[name], 1.0, whole=False)
+    return Series(path, name, ends, np.tile([bound, -bound], (len(ends), 1)), BOUND_COLOURS[name], 1.0)
 
 
 def _ends(time: np.ndarray) -> np.ndarray:

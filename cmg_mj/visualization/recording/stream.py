@@ -1,15 +1,18 @@
-"""Writes a recording to its file, whole or not at all; rerun's warnings become errors."""
+"""A recording's file, written whole or not at all, and its view in a notebook's cell."""
 
 from __future__ import annotations
 
+import contextlib
+import importlib
+import io
 import os
 import re
-import threading
+import shutil
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import IO
+from typing import Any
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -18,16 +21,13 @@ from cmg_mj.errors import InputError
 from cmg_mj.results.files import whole_file
 from cmg_mj.visualization.recording.signals import Lines
 
-PIPES = "/dev/fd"
-"""Folder in which a process finds its pipes as files."""
-PIPED = 1 << 20
-"""Largest number of bytes read from a pipe at once."""
-
+PIPES = Path("/dev/fd")
+"""Folder in which a process finds its pipes as files; Windows has none."""
 LONGEST_LIST = 120
 """Longest list of runs in an application's name [characters]."""
 
 
-@contextmanager
+@contextlib.contextmanager
 def open_recording(path: Path, name: str, application: str, blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
     """Open a recording to log to; write its file at the end.
 
@@ -44,7 +44,7 @@ def open_recording(path: Path, name: str, application: str, blueprint: rrb.Bluep
         InputError: The environment turns rerun off.
         OSError: The file cannot be written.
     """
-    with whole_file(path) as temporary, strict(), rr.RecordingStream(application) as rec:
+    with whole_file(path) as temporary, _strict(), rr.RecordingStream(application) as rec:
         require_enabled(rec)
         with _written(rec, temporary):
             rec.send_blueprint(blueprint, make_active=False, make_default=True)
@@ -52,66 +52,37 @@ def open_recording(path: Path, name: str, application: str, blueprint: rrb.Bluep
             yield rec
 
 
-@contextmanager
+@contextlib.contextmanager
 def _written(rec: rr.RecordingStream, path: Path) -> Iterator[None]:
-    """Write what is logged to a file, while it is logged.
-
-    Rerun's own writing to a file hides a full disk, or waits for ever: it writes to a pipe, whose other end is here.
-    """
-    with path.open("wb") as file:
-        read_end, write_end = os.pipe()
-        entry = f"{PIPES}/{write_end}"
-        if not os.path.exists(entry):  # as on Windows: memory takes all of it
-            os.close(read_end)
-            os.close(write_end)
-            memory = rec.memory_recording()
-            try:
-                yield
-            finally:  # rerun would complain on standard error about data left in memory
-                content = memory.drain_as_bytes()
-            file.write(content)
-            return
-        pump = _Pump(read_end, file)
+    """Write what is logged to a file, through a pipe: rerun by itself hides a full disk, or waits for ever."""
+    if not PIPES.exists():
+        rec.save(path)
+        yield
+        rec.disconnect()
+        return
+    read_end, write_end = os.pipe()
+    with ThreadPoolExecutor(1) as pool:
+        copied = pool.submit(_copy, read_end, path)
         try:
             try:
-                rec.save(entry)
+                rec.save(PIPES / str(write_end))
             finally:
                 os.close(write_end)  # rerun has opened one of its own
             yield
         finally:
             rec.disconnect()
-            pump.join()
-    if pump.error is not None:
-        raise pump.error
+        copied.result()
 
 
-class _Pump(threading.Thread):
-    """Copies a pipe to a file until its writers have closed it; what the file does not take is lost.
-
-    Args:
-        read_end: The pipe.
-        file: The file.
-
-    Attributes:
-        error: The reason why the file is not whole.
-    """
-
-    def __init__(self, read_end: int, file: IO[bytes]) -> None:
-        super().__init__(name="recording", daemon=True)
-        self.error: OSError | ValueError | None = None
-        self._read_end, self._file = read_end, file
-        self.start()
-
-    def run(self) -> None:
-        """Copy."""
-        with open(self._read_end, "rb", buffering=0) as pipe:
-            while content := pipe.read(PIPED):
-                if self.error is None:
-                    try:
-                        self._file.write(content)
-                        self._file.flush()
-                    except (OSError, ValueError) as error:  # of a full disk; of a file closed by a second Ctrl-C
-                        self.error = error
+def _copy(read_end: int, path: Path) -> None:
+    """Copy a pipe to a file; after a failure empty the pipe, because rerun waits for that."""
+    with open(read_end, "rb") as pipe:
+        try:
+            with path.open("wb") as file:
+                shutil.copyfileobj(pipe, file)
+        finally:
+            while pipe.read(1 << 20):
+                pass
 
 
 def require_enabled(rec: rr.RecordingStream) -> None:
@@ -121,7 +92,7 @@ def require_enabled(rec: rr.RecordingStream) -> None:
         InputError: The environment variable RERUN turns rerun off.
     """
     if not rr.is_enabled(rec):
-        raise InputError("the environment variable RERUN turns recording off: unset it")
+        raise InputError("RERUN: this environment variable turns recording off; unset it")
 
 
 def set_up(rec: rr.RecordingStream, name: str) -> None:
@@ -149,8 +120,8 @@ def log_page(rec: rr.RecordingStream, path: str, page: str) -> None:
     rec.log(path, rr.TextDocument(page, media_type=rr.MediaType.MARKDOWN), static=True)
 
 
-@contextmanager
-def strict() -> Iterator[None]:
+@contextlib.contextmanager
+def _strict() -> Iterator[None]:
     """Make rerun raise where it would only warn."""
     before = rr.strict_mode()
     rr.set_strict_mode(True)
@@ -158,3 +129,37 @@ def strict() -> Iterator[None]:
         yield
     finally:
         rr.set_strict_mode(before)
+
+
+def show_recording(path: Path | str, *, height: int = 600) -> Any:
+    """Show a recording in the cell of a notebook: make this call the cell's last line.
+
+    The viewer runs in the browser and holds the whole recording in memory. This process serves the viewer's code on a
+    port of localhost. For a notebook on another computer set `RERUN_NOTEBOOK_ASSET=inline` before the first call: the
+    code, 20 MB, is then part of the cell.
+
+    Args:
+        path: The file, `recording.rrd`, of a run or a comparison.
+        height: Height of the viewer [px]. The viewer is as wide as the cell.
+
+    Returns:
+        The viewer: a Jupyter widget, `rerun_notebook.Viewer`.
+
+    Raises:
+        InputError: The file cannot be read, or rerun's notebook viewer is not installed.
+    """
+    try:
+        recording = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "serve-local")  # by itself rerun fetches the code from its own site
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):  # it prints the port
+            viewer = importlib.import_module("rerun_notebook").Viewer(width="auto", height=height)
+    except ImportError as error:
+        raise InputError(
+            "show_recording: rerun's notebook viewer is not installed. Install it with `python -m pip install "
+            f'"cmg_mj[notebook]"`, or run `rerun {path}`'
+        ) from error
+    viewer.send_rrd(recording)
+    return viewer

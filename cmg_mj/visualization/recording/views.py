@@ -1,33 +1,23 @@
-"""The views of a recording: plots of one run or of several, the mechanism, lanes of phases, pages of text."""
+"""The layout of a recording: its tabs, plots, mechanism, lanes of phases and pages; the observers switched on."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from cmg_mj.visualization.plots.colours import Colour
-from cmg_mj.visualization.plots.readability import (
-    axis_range,
-    error_range,
-    free_corner,
-    is_seen,
-    stretched,
-    with_scale,
-)
-from cmg_mj.visualization.recording.branch import Branch
-from cmg_mj.visualization.recording.run import ENDINGS
-from cmg_mj.visualization.recording.signals import Lines, Series
+from cmg_mj.visualization.plots.style import FEW, observers_to_draw
+from cmg_mj.visualization.recording.run import recorded_poses
+from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
+from cmg_mj.visualization.recording.shapes import enclosing_ball
+from cmg_mj.visualization.recording.signals import TIMELINE, Branch, Lines
 
-RATE, RATE_ERROR = "rate/true", "rate_error/"
-"""Errors are drawn to the scale of the rate: a small axis would make a small error look large."""
-
-Override = rr.SeriesLines | rrb.EntityBehavior
 PlayState = Literal["paused", "playing", "following"]
+Override = rr.SeriesLines | rrb.EntityBehavior
 
 
 @dataclass(frozen=True)
@@ -38,165 +28,163 @@ class Plot:
         title: Quantity and unit.
         entities: Paths below the run's branch, folders with their slash.
         height: Share of the column's height.
-        least: Least span of the axis, in the unit of the title.
-        points: Height of the plot in a window of common size, without its title and time axis [points].
     """
 
     title: str
     entities: tuple[str, ...]
     height: float = 1.0
-    least: float = 0.0
-    points: float = 200.0
 
 
-@dataclass(frozen=True)
-class Choice:
-    """The observers, or runs, that are switched on. The axes fit them.
+TILT_PLOTS = (
+    Plot("Tilt [deg]", ("tilt/",), 1.9),
+    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 2.75),
+    Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",), 2.75),
+    Plot("Estimated equilibrium bias [deg]", ("bias/",), 1.3),
+)
+"""The last one is shown only if an observer estimates the bias."""
+ACTUATOR_PLOTS = (
+    Plot("Command, gimbal rate [rad/s]", ("command/",), 3.0),
+    Plot("Gimbal angles from upright [deg]", ("gimbal/",), 2.4),
+    Plot("Flywheel speeds [rad/s]", ("flywheel/",), 1.8),
+    Plot("Integrator [rad s]", ("integrator/",), 1.8),
+)
+COMPARED_TILT_PLOTS = (
+    Plot("Tilt, true [deg]", ("tilt/true",)),
+    Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",)),
+)
+COMPARED_ACTUATOR_PLOTS = (
+    Plot("Command, gimbal rate [rad/s]", ("command/u",)),
+    Plot("Gimbal angle of the first module from upright [deg]", ("gimbal/",)),
+    Plot("Integrator [rad s]", ("integrator/x_e",)),
+)
 
-    Attributes:
-        names: Names of the observers or runs.
-        full_legend: Whether the legend has the others too, where a click switches them on. Otherwise the list of the
-            view's entities has them.
-    """
-
-    names: Collection[str]
-    full_legend: bool = False
-
-    def visibility(self, name: str) -> list[Override]:
-        """Return the overrides that switch the line of an observer or run on or off."""
-        visible = name in self.names
-        return [rr.SeriesLines(visible_series=[visible]) if self.full_legend else rrb.EntityBehavior(visible=visible)]
-
-    def style_line(self, name: str, color: Colour, label: str) -> list[Override]:
-        """Return the overrides that style the line of a run and switch it on or off."""
-        visible_series = [name in self.names] if self.full_legend else None
-        style = rr.SeriesLines(visible_series=visible_series, colors=[color], names=[label], widths=[1.5])
-        return [style] if self.full_legend else [*self.visibility(name), style]
-
-
+LANE, COLUMN = 0.045, 0.6
+"""Height of a lane of phases, and the largest of all lanes, in heights of the column."""
 EYE = (1.48, -1.65, 0.63)
 """Vector from the rig's centre to the camera, in radii of the rig: a square view holds all of the rig."""
-
 BACKGROUND = (58, 63, 71)
+ALL = "All observers"
 
 
-def plot_view(plot: Plot, branch: Lines, observers: Choice) -> rrb.View:
-    """Lay out a plot of one run or log, with all its observers, some of them switched off."""
-    rows = [row for path, row in branch.series.items() if path.startswith(plot.entities)]
-    visible = [row for row in rows if not row.observer or row.observer in observers.names]
-    ranges = _Ranges()
-    for row in visible:
-        ranges.add(row, branch.falls_from)
-    if RATE_ERROR in plot.entities:
-        ranges.add_rate(branch.series[RATE], branch.falls_from)
-    axis = ranges.axis(plot)
-    overrides: dict[str, list[Override]] = {}
-    for row in rows:
-        if row not in visible:
-            overrides[f"{branch.path}/{row.path}"] = observers.visibility(row.observer)
-        elif len(row.time) and not is_seen(row.values, axis):  # the legend would name a line that is not there
-            overrides[f"{branch.path}/{row.path}"] = [rrb.EntityBehavior(visible=False)]
-    contents = [f"{branch.path}/{entity}**" for entity in plot.entities]
-    return _series_view(plot, branch.path, contents, overrides, axis, visible)
-
-
-def overlay_view(plot: Plot, branches: Sequence[Branch], module: str, runs: Choice) -> rrb.View:
-    """Lay out a plot of the same series of all runs, each in its run's colour.
+def default_blueprint(branches: Sequence[Branch], play_state: PlayState = "playing") -> rrb.Blueprint:
+    """Lay out a recording.
 
     Args:
-        plot: The plot; `{module}` in title and entities stands for the name of a module.
         branches: The runs.
-        module: Name of the module.
-        runs: The runs that are switched on.
+        play_state: Whether the viewer plays from the start or follows the newest ticks.
 
     Returns:
-        The view.
+        A board for one run; for several, a comparison and a tab for each. Of more than a few observers the best are
+        switched on, and another tab has all of them in its legends.
     """
-    part = rr.escape_entity_path_part(module)
-    overrides: dict[str, list[Override]] = {}
-    visible = []
-    stands = any(branch.run.name in runs.names and branch.run.outcome.kind not in ENDINGS for branch in branches)
-    ranges = _Ranges()
-    for branch in branches:
-        name = branch.run.name
-        row = _row(branch, plot.entities[0].format(module=part))
-        overrides[f"{branch.path}/{row.path}"] = runs.style_line(name, branch.entry.color, branch.label)
-        if name in runs.names:
-            visible.append(row)
-            is_optional = stands and branch.run.outcome.kind in ENDINGS
-            ranges.add(replace(row, whole=row.whole and not is_optional), branch.falls_from)
-            if RATE_ERROR in plot.entities and not is_optional:
-                ranges.add_rate(branch.series[RATE], branch.falls_from)
-    plot = replace(plot, title=plot.title.format(module=module))
-    return _series_view(plot, "/", list(overrides), overrides, ranges.axis(plot), visible)
+    several = len(branches) > 1
+    has_observers = not several or any(branch.run.open_loop_observers for branch in branches)
+    pages = ["Summary", *(["Observers"] if has_observers else []), "Scenario"]
+    boards = [_board(branch.label, [branch], pages) for branch in branches]
+    if several:
+        best = [branch for branch in branches if branch.entry.is_best]
+        boards.insert(0, _board("Comparison" if branches[0].run.axis is None else "All axes", branches, pages))
+        if len(best) < len(branches):
+            boards.insert(1, _board(ALL, branches, pages, full_legend=True))
+    elif len(branches[0].observers) > FEW:
+        boards.append(_board(ALL, branches, pages, full_legend=True))
+    return tabbed_blueprint(boards, TIMELINE, play_state)
 
 
-class _Ranges:
-    """The values that decide about the axis of a plot: those that it must show, those that it may cut off, falls."""
-
-    def __init__(self) -> None:
-        self._required: list[np.ndarray] = []
-        self._optional: list[np.ndarray] = []
-        self._falls: list[np.ndarray] = []
-        self._rates: list[np.ndarray] = []
-
-    def add(self, row: Series, falls_from: float) -> None:
-        """Add a series of a run that only fell from some time on [s]."""
-        before = row.time <= falls_from
-        (self._required if row.whole else self._optional).append(row.values[before])
-        if row.whole:
-            self._falls.append(row.values[~before])
-
-    def add_rate(self, row: Series, falls_from: float) -> None:
-        """Add a true rate, to whose scale errors are drawn."""
-        self._rates.append(row.values[row.time <= falls_from])
-
-    def axis(self, plot: Plot) -> tuple[float, float] | None:
-        """Choose the range of the axis."""
-        if self._rates:
-            axis = error_range(self._rates, [*self._required, *self._optional])
-        else:
-            axis = stretched(axis_range(self._required, self._optional), self._falls)
-        if axis is None:
-            return None
-        more = max(0.0, plot.least - (axis[1] - axis[0])) / 2.0
-        return with_scale((axis[0] - more, axis[1] + more), plot.points)
-
-
-def _row(branch: Branch, entity: str) -> Series:
-    """Find a series; in a folder, the series of the observer in the loop."""
-    observers = ("", branch.run.trajectory.observers[0])
-    return next(row for path, row in branch.series.items() if path.startswith(entity) and row.observer in observers)
-
-
-def _series_view(
-    plot: Plot,
-    origin: str,
-    contents: list[str],
-    overrides: Mapping[str, list[Override]],
-    axis: tuple[float, float] | None,
-    visible: Sequence[Series],
-) -> rrb.View:
-    corner = "".join(word.capitalize() for word in free_corner([(row.time, row.values) for row in visible], axis))
-    return rrb.TimeSeriesView(
-        origin=origin,
-        contents=contents,
-        name=plot.title,
-        overrides={**overrides},
-        axis_x=_time_axis(),
-        axis_y=rrb.ScalarAxis(range=axis) if axis else None,
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.auto(corner), visible=True),
+def _board(name: str, branches: Sequence[Branch], pages: Sequence[str], *, full_legend: bool = False) -> rrb.Container:
+    """Lay out everything about one run, or several over each other."""
+    best = [branch for branch in branches if branch.entry.is_best or len(branches) == 1]
+    lanes = branches if full_legend else best
+    if len(branches) == 1:
+        names = [entry.name for entry in branches[0].observers if entry.is_best]
+        kinds = [[plot for plot in plots if _rows(plot, branches[0])] for plots in (TILT_PLOTS, ACTUATOR_PLOTS)]
+        columns = [[plot_view(plot, branches[0], names, full_legend=full_legend) for plot in plots] for plots in kinds]
+    else:
+        kinds = [list(COMPARED_TILT_PLOTS), list(COMPARED_ACTUATOR_PLOTS)]
+        columns = [[_overlay_view(plot, branches, full_legend=full_legend) for plot in plots] for plots in kinds]
+    heights = [[plot.height for plot in plots] for plots in kinds]
+    lane = min(LANE * (1.3 + len(lanes)), COLUMN)
+    is_open_loop = len(branches) == 1 and branches[0].run.open_loop_observers
+    return rrb.Horizontal(
+        rrb.Vertical(
+            rrb.Tabs(*map(mechanism_view, best), active_tab=0),
+            page_tabs(pages, "Observers" if is_open_loop else "Summary"),
+        ),
+        rrb.Vertical(phase_lanes(lanes), *columns[0], row_shares=[lane / (1.0 - lane) * sum(heights[0]), *heights[0]]),
+        rrb.Vertical(*columns[1], row_shares=heights[1]),
+        column_shares=[9, 8, 6],
+        name=name,
     )
 
 
-def mechanism_view(branch: Branch, name: str) -> rrb.View:
+def _rows(plot: Plot, branch: Lines) -> list[str]:
+    """List the paths of a plot's series."""
+    return [path for path in branch.series if path.startswith(plot.entities)]
+
+
+def _switched(is_on: bool, full_legend: bool) -> Override:
+    """Switch a line on or off: in the legend, where a click switches it, or out of the legend."""
+    return rr.SeriesLines(visible_series=[is_on]) if full_legend else rrb.EntityBehavior(visible=is_on)
+
+
+def plot_view(plot: Plot, branch: Lines, best: Collection[str], *, full_legend: bool = False) -> rrb.View:
+    """Lay out a plot of one run or log, with all its observers, only the best of them switched on.
+
+    Args:
+        plot: The plot.
+        branch: The run or log.
+        best: Names of the best observers.
+        full_legend: Whether the legend has the others too; otherwise the list of the view's entities has them.
+    """
+    by_observer = {path: branch.series[path].observer for path in _rows(plot, branch)}
+    estimating = {name: {} for name in by_observer.values() if name}
+    shown = set(best) & set(estimating) or set(observers_to_draw(estimating))
+    overrides: dict[str, list[Override]] = {
+        f"{branch.path}/{path}": [_switched(False, full_legend)]
+        for path, name in by_observer.items()
+        if name and name not in shown
+    }
+    contents = [f"{branch.path}/{entity}**" for entity in plot.entities]
+    return _series_view(plot.title, branch.path, contents, overrides)
+
+
+def _overlay_view(plot: Plot, branches: Sequence[Branch], *, full_legend: bool) -> rrb.View:
+    """Lay out a plot of the same series of all runs, each in its run's colour."""
+    overrides: dict[str, list[Override]] = {}
+    for branch in branches:
+        observers = ("", branch.run.trajectory.observers[0])
+        path = next(path for path in _rows(plot, branch) if branch.series[path].observer in observers)
+        style = {"colors": [branch.entry.color], "names": [branch.label], "widths": [1.5]}
+        is_on = branch.entry.is_best
+        overrides[f"{branch.path}/{path}"] = (
+            [rr.SeriesLines(visible_series=[is_on], **style)]
+            if full_legend
+            else [_switched(is_on, False), rr.SeriesLines(**style)]
+        )
+    return _series_view(plot.title, "/", list(overrides), overrides)
+
+
+def _series_view(title: str, origin: str, contents: list[str], overrides: dict[str, list[Override]]) -> rrb.View:
+    return rrb.TimeSeriesView(
+        origin=origin,
+        contents=contents,
+        name=title,
+        overrides={**overrides},
+        axis_x=_time_axis(),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=True),
+    )
+
+
+def mechanism_view(branch: Branch) -> rrb.View:
     """Lay out the moving mechanism, all of it in view."""
-    centre = branch.ball.centre
-    eye = centre + branch.ball.radius * np.array(EYE)
+    _, qpos = recorded_poses(branch.plant, branch.run.trajectory)
+    ball = enclosing_ball(branch.plant, qpos)
     return rrb.Spatial3DView(
         origin=f"{branch.path}/rig",
-        name=name,
-        eye_controls=rrb.EyeControls3D(position=eye, look_target=centre, eye_up=(0.0, 0.0, 1.0)),
+        name=f"{branch.label} (flywheels drawn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed)",
+        eye_controls=rrb.EyeControls3D(
+            position=ball.centre + ball.radius * np.array(EYE), look_target=ball.centre, eye_up=(0.0, 0.0, 1.0)
+        ),
         line_grid=False,
         background=rrb.Background(color=BACKGROUND),
     )

@@ -1,17 +1,17 @@
-"""The panel in Studio's viewer, on the viewer's thread: choices, pushes and plots."""
+"""The panel in Studio's viewer, on the viewer's thread: choices, pushes and plots; and its messages."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 from mujoco.studio import messages, plugin
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
-from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
-from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, FieldValues, Settings
+from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, Fields, FieldValues, Settings
 
 TITLE = "Gyroscopic balance"
 PLOTTED_S = 6.0
@@ -19,6 +19,66 @@ PLOT_HEIGHT = 122.0
 FEEDBACKS = {"observer": "the observer's", "fog": "the gyro's", "truth": "the true one"}
 
 logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class ChangeSettings(messages.Event):
+    """The user changes settings of the scenario, named as with `--set`."""
+
+    values: FieldValues
+
+
+@dataclass(frozen=True)
+class PushRequest(messages.Event):
+    """The user pushes: torque about the axis shown [N m], duration [s]."""
+
+    torque_n_m: float
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class ShowAxis(messages.Event):
+    """The user chooses the axis to show and push, by its name."""
+
+    axis: str
+
+
+@dataclass(frozen=True)
+class RestartController(messages.Event):
+    """The user restarts a controller that has stopped."""
+
+
+@dataclass(frozen=True, eq=False)
+class SessionState(messages.Snapshot):
+    """The state of the session, for the panel.
+
+    Attributes:
+        title: The scenario's title.
+        time_s: Simulated time [s].
+        axes: Names of the plant's axes.
+        axis: The axis shown, of settings, gains and ticks.
+        settings: The settings that can be changed; None before a scenario is loaded.
+        observers: The observers to choose from.
+        gains: Gains of a linear law on x1, x2, x3, x_e; empty for other laws.
+        laws: The laws to choose from: name -> fields.
+        law: Name of the law in use; empty if it is none of `laws`.
+        stopped: The reason why the controller has stopped; empty while it runs.
+        note: Result of the last change.
+        ticks: The plotted ticks, (n_ticks, 6), with the columns of `session.PlottedTick`.
+    """
+
+    title: str = ""
+    time_s: float = 0.0
+    axes: tuple[str, ...] = ()
+    axis: str = ""
+    settings: Settings | None = None
+    observers: tuple[str, ...] = ()
+    gains: tuple[float, ...] = ()
+    laws: dict[str, Fields] = field(default_factory=dict)
+    law: str = ""
+    stopped: str = ""
+    note: str = ""
+    ticks: np.ndarray = field(default_factory=lambda: np.empty((0, 6)))
 
 
 class StudioPanel(plugin.ViewerPlugin):
@@ -117,15 +177,15 @@ class StudioPanel(plugin.ViewerPlugin):
         self._build_number(f"e{on_all} [deg]", BIAS, settings.bias_deg, 0.1)
         self._build_number(f"noise{on_all} [ug/rtHz]", NOISE, settings.noise_ug_rthz, 100.0)
 
-    def _build_number(self, label: str, field: str, value: float, step: float) -> None:
+    def _build_number(self, label: str, name: str, value: float, step: float) -> None:
         """Draw a number, which is sent when the user has finished typing."""
-        changed, typed = imgui.InputDouble(label, self._typed.get(field, value), step, 10.0 * step, "%.4g")
+        changed, typed = imgui.InputDouble(label, self._typed.get(name, value), step, 10.0 * step, "%.4g")
         if changed:
-            self._typed[field] = typed
-        if imgui.IsItemDeactivatedAfterEdit() and field in self._typed:
-            self._choose({field: self._typed[field]})
+            self._typed[name] = typed
+        if imgui.IsItemDeactivatedAfterEdit() and name in self._typed:
+            self._choose({name: self._typed[name]})
         if not imgui.IsItemActive():
-            self._typed.pop(field, None)
+            self._typed.pop(name, None)
 
     def _build_plots(self, now: SessionState) -> None:
         for title, unit, curves in (

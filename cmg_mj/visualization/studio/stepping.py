@@ -15,10 +15,9 @@ from mujoco.studio import (
 
 from cmg_mj.errors import InputError
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.visualization.studio.live import StudioSession
-from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
+from cmg_mj.visualization.studio.panel import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
+from cmg_mj.visualization.studio.session import StudioSession
 from cmg_mj.visualization.studio.settings import choosable_laws, choosable_observers, current_law, current_settings
-from cmg_mj.visualization.studio.step_scheduler import StepScheduler
 
 AFTER_STUDIO = 0
 """Priority of a handler after Studio's."""
@@ -26,8 +25,40 @@ STATE_INTERVAL_S = 1.0 / 30.0
 """Interval between two states for the panel [s]."""
 REST_S = 0.002
 """Pause between two checks for due steps, without which the viewer's thread would starve [s]."""
+MOST_BEHIND_S = 0.1
+"""Largest delay that the simulation catches up; it discards more [s]."""
 
 logger = logging.getLogger(__name__)
+
+
+class StepScheduler:
+    """Schedules physics steps by a clock.
+
+    Args:
+        clock: Returns the time [s].
+
+    Attributes:
+        speed: Speed of simulated time [% of real time].
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self.speed = 100.0
+        self.begin(0.0)
+
+    def begin(self, time: float) -> None:
+        """Start pacing now, at a simulated time [s]."""
+        self._from = (self._clock(), time)
+
+    def steps_due(self, time: float, timestep: float) -> int:
+        """Return the number of physics steps due at a simulated time [s]."""
+        now = self._clock()
+        since, start = self._from
+        behind = start + (now - since) * self.speed / 100.0 - time
+        if behind > MOST_BEHIND_S:
+            self._from = (now, time + MOST_BEHIND_S)
+            behind = MOST_BEHIND_S
+        return max(0, int(behind / timestep + 1e-6))
 
 
 class Stepping(plugin.SimPlugin):
@@ -58,8 +89,6 @@ class Stepping(plugin.SimPlugin):
         self._complaint = ""
         self._axis = ""
         self.live: StudioSession | None = None
-
-    # --- model and time ------------------------------------------------------------------------------------
 
     @messages.handler
     def on_load_model(self, event: messages.LoadModelEvent) -> bool:
@@ -98,7 +127,6 @@ class Stepping(plugin.SimPlugin):
         if event.model.opt.timestep != live.timestep:
             event.model.opt.timestep = live.timestep
             self._complain(f"the physics step stays {live.timestep:g} s: samples and ticks fall on whole steps")
-        before = self._state()
         if self._pause == sim.PauseState.UNPAUSED:
             due = self._pace.steps_due(data.time, live.timestep)
         else:
@@ -108,9 +136,8 @@ class Stepping(plugin.SimPlugin):
             live.step(data)
             if live.diverged:
                 self._pause = sim.PauseState.NORMAL_PAUSED  # there is nothing more to show
+                self.handle.send_to_viewer(self._state())
                 break
-        if self._state() != before:
-            self.handle.send_to_viewer(self._state())
         now = self._clock()
         if not 0.0 <= now - self._state_sent_at < STATE_INTERVAL_S:
             self._state_sent_at = now
@@ -118,13 +145,8 @@ class Stepping(plugin.SimPlugin):
         self._sleep(REST_S)
         return True
 
-    # --- Studio's step control -----------------------------------------------------------------------------
-
     def _state(self) -> messages.StepControlSnapshot:
-        measured = 5.0 * round(self._pace.measured / 5.0)  # reported when it changes
-        return messages.StepControlSnapshot(
-            pause_state=self._pause, speed=self._pace.speed, speed_measured=measured if measured >= 0.0 else -1.0
-        )
+        return messages.StepControlSnapshot(pause_state=self._pause, speed=self._pace.speed)
 
     @messages.handler
     def on_step_control(self, event: messages.StepControlSnapshot) -> bool:
@@ -148,8 +170,6 @@ class Stepping(plugin.SimPlugin):
         """Request a physics step during a pause."""
         self._single_steps += self._pause != sim.PauseState.UNPAUSED
         return True
-
-    # --- the panel -----------------------------------------------------------------------------------------
 
     @messages.handler
     def on_choose(self, event: ChangeSettings) -> None:
@@ -189,7 +209,7 @@ class Stepping(plugin.SimPlugin):
         live, data = self.live, self.handle.data
         if live is None or data is None:
             return SessionState(note=self._complaint)
-        now, stopped = live.settings_at(data)
+        now = live.now
         axis = self._axis_index(live)
         part = now.parts[axis]
         ticks = np.array([tick[axis] for tick in live.ticks if tick[axis].time_s < data.time - 1e-9]).reshape(-1, 6)
@@ -203,7 +223,7 @@ class Stepping(plugin.SimPlugin):
             gains=tuple(getattr(part.law, "gains", ())),
             laws=choosable_laws(live.base),
             law=current_law(live.base, now),
-            stopped=stopped,
+            stopped=live.stopped,
             note=self._complaint or live.note,
             ticks=ticks,
         )

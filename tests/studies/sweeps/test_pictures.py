@@ -12,8 +12,7 @@ import pytest
 from cmg_mj.studies.sweeps.cells import Trials
 from cmg_mj.studies.sweeps.pictures import in_words, is_logarithmic, pictures_of, round_values
 from cmg_mj.studies.sweeps.store import PICTURES
-from cmg_mj.visualization.plots.figure_spec import Map, Picture
-from cmg_mj.visualization.plots.run_plot import draw
+from cmg_mj.visualization.plots.figure_spec import Map, Picture, draw
 from tests.studies.sweeps.synthetic_trials import BIAS, NOISE, RATE, make_trials
 
 OBSERVERS = ("linear", "ltv")

@@ -16,10 +16,8 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
-from cmg_mj.visualization.plots.colours import BOUND_COLOURS, colour, hexadecimal
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
-from cmg_mj.visualization.plots.readability import fall_start
-from cmg_mj.visualization.plots.run_plot import PAGE, draw, plot_run
+from cmg_mj.visualization.plots.run_plot import PAGE, plot_run
+from cmg_mj.visualization.plots.style import colour, hexadecimal
 
 BAND, LIMIT = 1.0, 4.7
 PUSHES = [Push(0.2, 0.1)]
@@ -90,31 +88,6 @@ def test_eleven_lines_on_one_page(
         assert line.get_color() == hexadecimal(colour(name))
 
 
-def test_an_estimate_that_goes_astray_takes_no_axis(
-    all_observers: tuple[Trajectory, dict[str, Any]],
-    tmp_path: Path,
-    figures: list[matplotlib.figure.Figure],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    trajectory, summary = all_observers
-    columns = dict(trajectory.columns)
-    estimate = columns["x2_rad_s"].copy()
-    estimate[50:] = [*[1e300, -np.inf], *[np.nan] * (len(trajectory) - 52)]
-    for name in trajectory.observers[:3]:
-        columns[f"estimate/{name}/x2_rad_s"] = estimate
-    layout = replace(
-        trajectory.layout, observers=trajectory.observers[:3], extra_signals=trajectory.layout.extra_signals[:3]
-    )
-    few = replace(trajectory, columns=columns, layout=layout)
-    true = trajectory["x2_rad_s"]
-    monkeypatch.setattr(matplotlib.figure.Figure, "get_layout_engine", lambda figure: None)  # takes as long as drawing
-    for axes in plot(tmp_path, few, summary, figures).axes[1:3]:
-        low, high = axes.get_ylim()
-        assert low <= true.min()
-        assert true.max() <= high
-        assert high - low < 8.0 * np.ptp(true)
-
-
 @pytest.fixture
 def few(all_observers: tuple[Trajectory, dict[str, Any]], monkeypatch: pytest.MonkeyPatch) -> Trajectory:
     """The run with its first three observers; the figures are not laid out, which takes as long as drawing."""
@@ -137,80 +110,6 @@ def test_a_swing_is_not_called_a_push(few: Trajectory, tmp_path: Path, figures: 
     assert len(tilt.patches) == 2
 
 
-def test_the_legend_names_only_lines_that_are_there(
-    few: Trajectory, tmp_path: Path, figures: list[matplotlib.figure.Figure]
-) -> None:
-    """A command of a tenth of the limit leaves the limit out of the panel; an estimate has no finite value."""
-    name = few.observers[1]
-    lost = np.full(len(few), np.nan)
-    columns = {**few.columns, "u_rad_s": 0.01 * few["u_rad_s"], f"estimate/{name}/x2_rad_s": lost}
-    _, rate, error, _, command = plot(tmp_path, replace(few, columns=columns), {}, figures).axes
-    assert command.get_ylim()[1] < LIMIT
-    assert "rate limit" not in labels(command)
-    assert not any(text.startswith(name) for text in [*labels(rate), *labels(error)])
-    assert any(text.startswith(few.observers[2]) for text in labels(rate))
-
-
-@pytest.mark.slow
-def test_a_fall_does_not_flatten_what_went_before(
-    few: Trajectory, tmp_path: Path, figures: list[matplotlib.figure.Figure]
-) -> None:
-    time, start = few["time_s"], 0.3
-    fall = np.where(time > start, np.expm1(20.0 * (time - start)), 0.0)
-    columns = {**few.columns, "x1_rad": few["x1_rad"] + fall, "x2_rad_s": few["x2_rad_s"] + 20.0 * fall}
-    fallen = replace(few, columns=columns)
-    before = time <= fall_start(time, fallen["x1_rad"], fell=True)
-    assert 0.2 < time[before][-1] <= start + 0.02
-    panels = {fell: plot(tmp_path, fallen, {"fell": fell}, figures).axes for fell in (True, False)}
-    for column, unit, panel in (("x1_rad", 180.0 / np.pi, 0), ("x2_rad_s", 1.0, 1)):
-        spans = {fell: np.ptp(axes[panel].get_ylim()) for fell, axes in panels.items()}
-        heights = {fell: unit * np.ptp(fallen[column][before]) / span for fell, span in spans.items()}
-        assert heights[True] > 0.08
-        assert heights[True] > 3.0 * heights[False]
-
-
-def test_bounds_differ_from_what_they_bound(
-    few: Trajectory, tmp_path: Path, figures: list[matplotlib.figure.Figure]
-) -> None:
-    tilt, *_, command = plot(tmp_path, few, {}, figures).axes
-    for axes, bound, signal in ((tilt, "settle band", "true"), (command, "rate limit", "command")):
-        lines = {line.get_label().split(" $")[0]: line for line in axes.lines}
-        assert lines[bound].get_color() == hexadecimal(BOUND_COLOURS[bound])
-        assert (lines[bound].get_linestyle(), lines[signal].get_linestyle()) == ("--", "-")
-
-
-def test_long_names_do_not_narrow_the_panels(
-    all_observers: tuple[Trajectory, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The layout alone is computed: drawing takes as long again."""
-
-    figures: list[matplotlib.figure.Figure] = []
-
-    def lay_out(figure: matplotlib.figure.Figure, path: Path, **_: Any) -> None:
-        figures.append(figure)
-        figure.draw_without_rendering()
-        path.touch()
-
-    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lay_out)
-    trajectory, summary = all_observers
-    longest = sorted(OBSERVERS, key=len)[-3:]
-    figures_of = summary["open_loop_observers"] | {"homogeneous": summary}
-    open_loop_observers = {name: dict.fromkeys(figures_of[name], 0.0) for name in longest[1:]}
-    signals = tuple(trajectory.extra_signals(name) for name in longest)
-    layout = replace(trajectory.layout, observers=tuple(longest), extra_signals=signals)
-    few = replace(trajectory, layout=layout)
-    summary = {**figures_of[longest[0]], "open_loop_observers": open_loop_observers}
-    plot_run(tmp_path / "plot.png", few, "A title", summary, settle_band_deg=BAND, rate_limit_rad_s=LIMIT)
-    (figure,) = figures
-    assert figure.axes[0].get_position().x0 < 0.15
-
-
-def test_a_picture_has_the_observers_colours(tmp_path: Path, figures: list[matplotlib.figure.Figure]) -> None:
-    lines = [Line([0.0, 1.0], [0.0, 1.0], "(10) ltv", color="ltv"), Line([0.0, 1.0], [1.0, 0.0], "other", color=3)]
-    draw(tmp_path / "it.png", Picture("it", "A title", [Panel("y", lines)]))
-    assert [line.get_color() for line in figures[-1].axes[0].lines] == [hexadecimal(colour("ltv")), "C3"]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("ticks", [0, 1, 2])
 def test_a_run_of_no_length(
@@ -222,3 +121,11 @@ def test_a_run_of_no_length(
     trajectory, _ = all_observers
     columns = {name: values[:ticks] for name, values in trajectory.columns.items()}
     plot(tmp_path, replace(trajectory, columns=columns), {}, figures)
+
+
+def test_a_diverged_estimate_is_drawn_without_a_warning(few: Trajectory, tmp_path: Path, figures: list[Any]) -> None:
+    estimate = few["x2_rad_s"].copy()
+    estimate[50:] = [*[1e300, -np.inf], *[np.nan] * (len(few) - 52)]
+    plot(
+        tmp_path, replace(few, columns={**few.columns, f"estimate/{few.observers[1]}/x2_rad_s": estimate}), {}, figures
+    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import resource
 import subprocess
 import sys
@@ -17,7 +16,6 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from cmg_mj.errors import InputError
-from cmg_mj.results import trajectory
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.summary_keys import KEYS, format_figure, heading
@@ -26,12 +24,10 @@ from cmg_mj.scenario.loading import Scenario, load_scenario
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.stages.push import Push
-from cmg_mj.visualization.recording import RecordingHeader, Run, save, stream, write_recording
-from cmg_mj.visualization.recording.run import POSE_RATE_HZ, phases, torque_steps
+from cmg_mj.studies.save import live_view
+from cmg_mj.visualization.recording import RecordingHeader, Run, live, save, write_recording
+from cmg_mj.visualization.recording.run import POSE_RATE_HZ, phases
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
-from cmg_mj.visualization.recording.shapes import drawn_shapes
-from cmg_mj.visualization.recording.signals import instant, time_column
-from cmg_mj.visualization.recording.summary import ROW_TABLES
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1", 'open_loop_observers=["linear"]')
 NANOSECONDS = 1e9
@@ -109,9 +105,6 @@ def rerun(home: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str
     return subprocess.run(command, env=os.environ | {"HOME": str(home)}, capture_output=True, text=True, check=False)
 
 
-# --- what is there -------------------------------------------------------------------------------------------
-
-
 def test_everything_promised_is_there(path: Path, experiment: Experiment) -> None:
     branch_entities = {
         *("phase", "tilt/true", "tilt/measured", "tilt/settle_band", "rate/true", "rate/true_by_gyro"),
@@ -156,17 +149,6 @@ def test_values_equal_the_trajectory(path: Path, run: Run, experiment: Experimen
     assert limits.tolist() == [[experiment.law.rate_limit, -experiment.law.rate_limit]] * 2
 
 
-def test_an_observer_keeps_its_colour(path: Path) -> None:
-    colors = {
-        (kind, name): tuple(static(path, f"/homogeneous/{kind}/{name}", "SeriesLines:colors"))
-        for kind in ("rate_estimate", "rate_error")
-        for name in ("1_homogeneous", "2_linear")
-    }
-    assert colors["rate_estimate", "2_linear"] == colors["rate_error", "2_linear"]
-    assert len(set(colors.values())) == 2
-    assert static(path, "/homogeneous/rate_estimate/2_linear", "SeriesLines:names") == ["linear"]
-
-
 def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
     """In degrees, in the loop and open loop; the summary has its figures."""
     setup = prepare(
@@ -184,31 +166,6 @@ def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
     np.testing.assert_allclose(true, setup.scenario.plant.equilibrium_bias_deg, rtol=1e-12)
     (summary,) = static(path, "/summary", "TextDocument:text")
     assert heading("bias_estimate_deg") in summary
-
-
-def test_summary_scenario_name_and_layout(path: Path, run: Run) -> None:
-    (summary,) = static(path, "/summary", "TextDocument:text")
-    assert {key for keys in ROW_TABLES for key in keys} <= run.summary.keys()
-    assert heading("bias_estimate_deg") not in summary
-    summary_keys = [key for key in KEYS if heading(key) in summary]
-    assert summary_keys == [key for key in KEYS if key in run.summary]
-    assert "# A title" in summary
-    assert "+1 N m for 0.1 s at 0.2 s" in summary
-    rows = [[cell.strip() for cell in line.split("|")] for line in summary.splitlines()]
-    assert ["", heading("tilt_rms_deg"), format_figure("tilt_rms_deg", run.summary["tilt_rms_deg"]), ""] in rows
-    assert ["", "Outcome", "done at 0.5 s", ""] in rows
-    (observers,) = static(path, "/observers", "TextDocument:text")
-    names = [[cell.strip() for cell in line.split("|")][1] for line in observers.splitlines() if "|" in line]
-    rows = ["**homogeneous**", "**linear**", *REFERENCES]
-    assert [name for name in names if name and not name.startswith(":-")] == 2 * rows  # two tables, for their width
-    assert 'kind = "made up"' in static(path, "/scenario", "TextDocument:text")[0]
-    assert static(path, "/__properties", "RecordingInfo:name") == ["A title: homogeneous"]
-    assert len(RrdReader(path).blueprints()) == 1
-    timelines = {name for chunk in RrdReader(path).stream() for name in chunk.timeline_names}
-    assert timelines == {"sim_time"}
-
-
-# --- the mechanism -------------------------------------------------------------------------------------------
 
 
 def matrix(xyzw: np.ndarray) -> np.ndarray:
@@ -285,45 +242,6 @@ def test_shapes_span_what_mujoco_draws(path: Path, experiment: Experiment) -> No
     assert corners.max(axis=0) == pytest.approx([1.0, 1.0, 0.0])
 
 
-SHAPES = """
-<mujoco>
-  <asset><mesh name="wedge" vertex="0 0 0  .1 0 0  0 .1 0  0 0 .1"/></asset>
-  <worldbody>
-    <geom name="ball" type="sphere" size=".1" pos="1 2 3"/>
-    <geom name="egg" type="ellipsoid" size=".1 .2 .3"/>
-    <geom name="sheet" type="plane" size="0 .5 1" euler="90 0 0"/>
-    <geom name="wedge" type="mesh" mesh="wedge" pos="1 0 0" euler="0 0 90" rgba="1 0 0 .5"/>
-    <geom type="box" size=".1 .1 .1"/>
-    <geom name="collision" type="sphere" size=".1" group="3"/>
-    <geom name="glass" type="sphere" size=".1" rgba="1 1 1 0"/>
-  </worldbody>
-</mujoco>
-"""
-
-
-def test_other_robots_shapes() -> None:
-    model = mujoco.MjModel.from_xml_string(SHAPES)
-    shapes = {name: shape for _, name, shape in drawn_shapes(model, 0.25)}
-    assert shapes.keys() == {"ball", "egg", "sheet", "wedge", "geom4"}
-    assert isinstance(shapes["ball"], rr.Ellipsoids3D)
-    egg, plane, mesh = shapes["egg"], shapes["sheet"], shapes["wedge"]
-    assert isinstance(egg, rr.Ellipsoids3D)
-    assert egg.half_sizes is not None
-    assert isinstance(plane, rr.Mesh3D)
-    assert plane.vertex_positions is not None
-    assert isinstance(mesh, rr.Mesh3D)
-    assert mesh.vertex_positions is not None
-    assert egg.half_sizes.as_arrow_array().to_pylist() == [pytest.approx([0.1, 0.2, 0.3])]
-    sheet = np.array(plane.vertex_positions.as_arrow_array().to_pylist())
-    assert np.ptp(sheet, axis=0) == pytest.approx([2.0, 0.0, 1.0], abs=1e-6)
-    wedge = np.array(mesh.vertex_positions.as_arrow_array().to_pylist())
-    corners = [[1, 0, 0], [1, 0.1, 0], [0.9, 0, 0], [1, 0, 0.1]]
-    assert {tuple(v) for v in np.round(wedge, 5) + 0.0} == {tuple(map(float, corner)) for corner in corners}
-
-
-# --- push and phases -----------------------------------------------------------------------------------------
-
-
 def test_the_push_is_an_arrow_while_it_lasts(path: Path) -> None:
     entity = "/homogeneous/rig/frame/push"
     start_times, vectors = column(path, entity, "Arrows3D:vectors")
@@ -335,19 +253,6 @@ def test_the_push_is_an_arrow_while_it_lasts(path: Path) -> None:
     assert vector[0] > 0.0 > vector[2]
     assert vector[0] == pytest.approx(-vector[2])
     assert vector[1] == 0.0
-
-
-def test_the_torque_as_steps() -> None:
-    pushes = [Push(1.0, 0.5, 2.0), Push(1.25, 1.0, -3.0), Push(9.0)]
-    assert torque_steps(pushes, end_s=5.0) == [(1.0, 2.0), (1.25, -1.0), (1.5, -3.0), (2.25, 0.0)]
-    assert torque_steps(pushes, end_s=1.5) == [(1.0, 2.0), (1.25, -1.0)]
-
-
-def test_times_are_rounded_to_the_nanosecond() -> None:
-    milliseconds = np.arange(20_000)
-    times = time_column(milliseconds * 0.001).as_arrow_array().to_numpy(zero_copy_only=False)
-    assert np.array_equal(times.astype(np.int64), milliseconds * 1_000_000)
-    assert instant(0.001 * 4.35e3) == np.timedelta64(4_350, "ms")
 
 
 def test_phases_are_recorded(path: Path, run: Run, experiment: Experiment) -> None:
@@ -408,55 +313,6 @@ def test_phases(run: Run, pushes: list[Push], expected: list[tuple[float, str]])
     assert [time for time, _ in actual] == pytest.approx([time for time, _ in expected])
 
 
-def test_settled_when_the_summary_says(experiment: Experiment) -> None:
-    run = record(prepare(scenario("duration_s=3.0")))
-    push_end = max(push.end_s for push in experiment.scenario.push)
-    settle_times = [
-        time for time, name in phases(run, experiment.scenario.push, MetricsSettings()) if name == "settled"
-    ]
-    settle_time = run.summary["settle_time_s"]
-    assert isinstance(settle_time, float)
-    assert settle_times == [pytest.approx(push_end + settle_time)]
-
-
-# --- the file ------------------------------------------------------------------------------------------------
-
-
-def test_rerun_verifies_it_and_finds_a_cut(path: Path, tmp_path: Path) -> None:
-    assert rerun(tmp_path, "verify", path).returncode == 0
-    cut_path = tmp_path / "cut.rrd"
-    cut_path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
-    assert rerun(tmp_path, "verify", cut_path).returncode != 0
-
-
-def test_the_same_run_gives_the_same_recording(path: Path, experiment: Experiment, tmp_path: Path) -> None:
-    repetition = write(tmp_path / "again.rrd", experiment, [record(experiment)])
-    compare = ("compare", "--unordered")
-    assert rerun(tmp_path, *compare, path, repetition).returncode == 0
-    other = write(tmp_path / "other.rrd", experiment, [record(prepare(scenario("seed=1")))])
-    assert rerun(tmp_path, *compare, path, other).returncode != 0
-
-
-def test_two_observers_have_a_branch_each(tmp_path: Path) -> None:
-    experiments = [prepare(scenario().with_observer(kind)) for kind in ("homogeneous", "ltv")]
-    runs = [record(experiment) for experiment in experiments]
-    path = write(tmp_path / "compare.rrd", experiments[0], runs)
-    for i, run in enumerate(runs, 1):
-        for signal, entity in (
-            ("x2_rad_s", "rate/true"),
-            (f"estimate/{run.name}/x2_rad_s", f"rate_estimate/1_{run.name}"),
-        ):
-            _, recorded_values = scalars(path, f"/{i}_{run.name}/{entity}")
-            assert np.array_equal(recorded_values, run.trajectory[signal])
-    branches = [
-        {name.removeprefix(f"/{i}_{run.name}") for name in entities(path) if name.startswith(f"/{i}_{run.name}/")}
-        for i, run in enumerate(runs, 1)
-    ]
-    assert {name for name in branches[0] if "/rig/" in name} == {name for name in branches[1] if "/rig/" in name}
-    (summary,) = static(path, "/summary", "TextDocument:text")
-    assert re.search(r"\| +homogeneous \| +ltv \|", summary)
-
-
 @pytest.mark.daily_cases("0", "2")
 @pytest.mark.parametrize("ticks", [0, 1, 2])
 def test_a_run_of_no_length(run: Run, experiment: Experiment, tmp_path: Path, ticks: int) -> None:
@@ -471,136 +327,83 @@ def test_a_run_of_no_length(run: Run, experiment: Experiment, tmp_path: Path, ti
     assert "fallen" in [state for (state,) in states]
 
 
-def test_a_fall_in_the_first_tick(tmp_path: Path) -> None:
-    experiment = prepare(scenario("plant.initial_tilt_deg=40.0"))
-    run = record(experiment)
-    assert (run.outcome.kind, len(run.trajectory)) == ("fell", 0)
-    path = write(tmp_path / "fell.rrd", experiment, [run])
-    _, translation, quaternion = pose(path, "/homogeneous/rig/cube1.gimbal", 0)
-    body = experiment.plant.new_data().body("cube1/gimbal")
-    np.testing.assert_allclose(translation, body.xpos, atol=1e-7)
-    np.testing.assert_allclose(matrix(quaternion), body.xmat.reshape(3, 3), atol=1e-6)
-
-
-def test_an_open_loop_observer_that_diverged(run: Run, experiment: Experiment, tmp_path: Path) -> None:
-    columns = dict(run.trajectory.columns)
-    columns["estimate/linear/x2_rad_s"] = columns["x2_rad_s"].copy()
-    columns["estimate/linear/x2_rad_s"][50:] = [*[1e300, -np.inf], *[np.nan] * (len(run.trajectory) - 52)]
-    path = write(tmp_path / "nan.rrd", experiment, [replace(run, trajectory=replace(run.trajectory, columns=columns))])
-    _, recorded_values = scalars(path, "/homogeneous/rate_estimate/2_linear")
-    assert np.array_equal(recorded_values, columns["estimate/linear/x2_rad_s"], equal_nan=True)
-
-
-def test_a_users_observer_may_have_any_name(run: Run, experiment: Experiment, tmp_path: Path) -> None:
-    name = "my_lab.observers:Kalman"
-    columns = {key.replace("/linear/", f"/{name}/"): values for key, values in run.trajectory.columns.items()}
-    layout = replace(run.trajectory.layout, observers=("homogeneous", name))
-    users_run = replace(run, name=name, trajectory=replace(run.trajectory, columns=columns, layout=layout))
-    path = write(tmp_path / "named.rrd", experiment, [users_run])
-    part = rr.escape_entity_path_part(name)
-    assert {f"/{part}/rig/frame", f"/{part}/rate_estimate/2_{part}"} <= entities(path)
-    color = static(path, f"/{part}/rate_estimate/2_{part}", "SeriesLines:colors")
-    assert color != static(path, f"/{part}/rate_estimate/1_homogeneous", "SeriesLines:colors")
-
-
-@pytest.mark.daily_cases("long")
-@pytest.mark.parametrize("name", ["my_lab.observers:Kalman", "a/b (c) é", "x" * 300], ids=["class", "odd", "long"])
-def test_rerun_does_not_complain_of_a_name(
-    run: Run, experiment: Experiment, tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str
-) -> None:
-    write(tmp_path / "named.rrd", experiment, [replace(run, name=name)])
-    assert capfd.readouterr() == ("", "")
-
-
-def test_runs_need_names_of_their_own(run: Run, experiment: Experiment, tmp_path: Path) -> None:
+def test_two_observers_have_a_branch_each(run: Run, experiment: Experiment, tmp_path: Path) -> None:
+    other = record(prepare(scenario().with_observer("ltv")))
+    path = write(tmp_path / "compare.rrd", experiment, [run, other])
+    for i, branch in enumerate((run, other), 1):
+        _, rate = scalars(path, f"/{i}_{branch.name}/rate/true")
+        assert np.array_equal(rate, branch.trajectory["x2_rad_s"])
     for runs in ([], [run, run]):
         with pytest.raises(ValueError, match="different names"):
-            write(tmp_path / "recording.rrd", experiment, runs)
-    assert list(tmp_path.iterdir()) == []
+            write(tmp_path / "none.rrd", experiment, runs)
+    assert [file.name for file in tmp_path.iterdir()] == ["compare.rrd"]
 
 
-@pytest.mark.daily_cases("old1-pipe", "old0-memory")
-@pytest.mark.parametrize("through", ["pipe", "memory"])
-@pytest.mark.parametrize("old", [[], ["recording.rrd"]])
-def test_a_full_disk_leaves_no_half_file(
-    run: Run,
-    experiment: Experiment,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    through: str,
-    old: list[str],
+def test_pages_name_and_layout(path: Path, run: Run) -> None:
+    (summary,) = static(path, "/summary", "TextDocument:text")
+    assert [key for key in KEYS if heading(key) in summary] == [key for key in KEYS if key in run.summary]
+    assert format_figure("tilt_rms_deg", run.summary["tilt_rms_deg"]) in summary
+    (observers,) = static(path, "/observers", "TextDocument:text")
+    assert all(name in observers for name in ("homogeneous", "linear", *REFERENCES))
+    assert 'kind = "made up"' in static(path, "/scenario", "TextDocument:text")[0]
+    assert static(path, "/__properties", "RecordingInfo:name") == ["A title: homogeneous"]
+    assert len(RrdReader(path).blueprints()) == 1
+    assert {name for chunk in RrdReader(path).stream() for name in chunk.timeline_names} == {"sim_time"}
+
+
+def test_the_same_run_gives_the_same_recording(path: Path, experiment: Experiment, tmp_path: Path) -> None:
+    again = write(tmp_path / "again.rrd", experiment, [record(experiment)])
+    other = write(tmp_path / "other.rrd", experiment, [record(prepare(scenario("seed=1")))])
+    assert rerun(tmp_path, "verify", path).returncode == 0
+    assert rerun(tmp_path, "compare", "--unordered", path, again).returncode == 0
+    assert rerun(tmp_path, "compare", "--unordered", path, other).returncode != 0
+
+
+def test_a_full_disk_or_ctrl_c_leaves_the_old_file(
+    run: Run, experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in old:
-        (tmp_path / name).write_text("old")
-    if through == "memory":
-        monkeypatch.setattr(stream, "PIPES", "/nowhere")
+    path = tmp_path / "recording.rrd"
+    path.write_text("old")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (5000, before[1]))
     try:
         with pytest.raises(OSError, match="File too large"):
-            write(tmp_path / "recording.rrd", experiment, [run])
+            write(path, experiment, [run])
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "old") for name in old]
 
-
-def test_a_pipe_and_memory_record_alike(
-    run: Run, experiment: Experiment, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(stream, "PIPES", "/nowhere")
-    other = write(tmp_path / "other.rrd", experiment, [run])
-    assert rerun(tmp_path, "compare", path, other).returncode == 0
-
-
-def test_stretches_record_what_the_whole_does(
-    run: Run, experiment: Experiment, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(trajectory, "STRETCH", 33)
-    other = write(tmp_path / "other.rrd", experiment, [run])
-    assert rerun(tmp_path, "verify", other).returncode == 0
-    assert rows_by_entity(other) == rows_by_entity(path)
-
-
-def rows_by_entity(path: Path) -> dict[tuple[str, str], list[tuple]]:
-    """Entity and component -> (time, value), in order, but for the bounds, which are drawn from end to end."""
-    rows: dict[tuple[str, str], list[tuple]] = {}
-    for chunk in RrdReader(path).stream().filter(has_timeline="sim_time"):
-        batch = chunk.to_record_batch()
-        names = {"Scalars:scalars", "Transform3D:translation", "StateChange:state"} & set(batch.schema.names)
-        if chunk.entity_path.rpartition("/")[2] not in ("settle_band", "limit"):
-            times = batch.column("sim_time").cast("int64").to_pylist()
-            for name in names:
-                row = rows.setdefault((chunk.entity_path, name), [])
-                row += zip(times, batch.column(name).to_pylist(), strict=True)
-    return {key: sorted(row) for key, row in rows.items()}
-
-
-def test_an_interrupted_recording_leaves_nothing(
-    run: Run, experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(save, "log_phases", interrupt)
-    with pytest.raises(KeyboardInterrupt):
-        write(tmp_path / "recording.rrd", experiment, [run])
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_place_that_cannot_be_written(run: Run, experiment: Experiment, tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError):
-        write(tmp_path / "missing" / "recording.rrd", experiment, [run])
-
-
-def test_rerun_turned_off_by_the_environment(
-    run: Run, experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(save, "log_phases", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            write(path, experiment, [run])
     monkeypatch.setenv("RERUN", "off")
     with pytest.raises(InputError, match="RERUN"):
-        write(tmp_path / "recording.rrd", experiment, [run])
-    assert list(tmp_path.iterdir()) == []
+        write(path, experiment, [run])
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["old"]
 
 
-def test_strict_mode_is_left_as_it_was(path: Path) -> None:
-    assert path.exists()
-    assert rr.strict_mode() is False
+@pytest.mark.parametrize("name", ["push_recovery", "two_axes"])
+def test_a_viewer_receives_the_run_while_it_goes_on(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Series and poses are those of the run, which is the one that nobody looks at."""
+    path = tmp_path / "live.rrd"
+    monkeypatch.setattr(live.subprocess, "Popen", lambda *_, **__: None)
+    monkeypatch.setattr(rr.RecordingStream, "connect_grpc", lambda rec: rec.save(path))
+    experiment = prepare(load_scenario(name, ["duration_s=0.5", "push=[]"]))
+    view = live_view(experiment)
+    result = experiment.run(**view.options(lambda _: None))
+    view.show()
+    view._rec.disconnect()
+    trajectory = result.trajectory
+    alone = experiment.run().trajectory
+    assert trajectory is not None
+    assert alone is not None
+    runs = {f"/{i}_{axis}": trajectory.along(axis) for i, axis in enumerate(trajectory.axes, 1)}
+    for branch, columns in (runs or {"/homogeneous": trajectory}).items():
+        times, rate = scalars(path, f"{branch}/rate/true")
+        assert np.array_equal(rate, columns["x2_rad_s"])
+        np.testing.assert_allclose(times, columns["time_s"], atol=1e-9)
+        assert len(column(path, f"{branch}/rig/frame", "Transform3D:translation")[0]) > 10
+    assert all(np.array_equal(trajectory[name], alone[name]) for name in trajectory.columns)

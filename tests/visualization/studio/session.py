@@ -20,8 +20,8 @@ from mujoco.studio import (
 from cmg_mj import load_scenario, prepare
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.visualization.studio.live import StudioSession
-from cmg_mj.visualization.studio.messages import SessionState
+from cmg_mj.visualization.studio.panel import SessionState
+from cmg_mj.visualization.studio.session import StudioSession
 from cmg_mj.visualization.studio.settings import Settings
 from cmg_mj.visualization.studio.stepping import Stepping
 

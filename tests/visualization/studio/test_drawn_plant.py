@@ -12,7 +12,7 @@ import pytest
 from cmg_mj import load_scenario, prepare
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.visualization.studio.drawn_plant import PHYSICS_ARRAYS, copy_physics_numbers, drawn_plant
+from cmg_mj.visualization.studio.session import PHYSICS_ARRAYS, copy_physics_numbers, drawn_plant
 
 VARIATIONS = {
     "equilibrium_bias_deg": 1.5,

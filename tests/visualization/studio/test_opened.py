@@ -13,9 +13,8 @@ from pathlib import Path
 import pytest
 from mujoco.studio import endpoints, messages, viewer_protocol
 
-from cmg_mj.errors import InputError
-from cmg_mj.visualization.studio import viewers
-from cmg_mj.visualization.studio.messages import SessionState
+from cmg_mj.visualization.studio import open as opening
+from cmg_mj.visualization.studio.panel import SessionState
 from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, cmg_mj_process
 
 BAD_ARGUMENTS = [
@@ -38,24 +37,6 @@ def test_graphics_that_cannot_be_had_are_one_line(monkeypatch: pytest.MonkeyPatc
     complaint = cmg_mj("studio", "push_recovery", "--viewer", "native").complaint
     assert complaint.startswith("--viewer native: MuJoCo Studio")
     assert complaint.endswith("; take --viewer web")
-
-
-@pytest.mark.parametrize(
-    ("status_and_error", "message"),
-    [
-        ((1, "x\nValueError: Target not found: out\nbye"), "(ValueError: Target not found: out)"),
-        ((134, ""), "(a window ends the process, status 134)"),
-    ],
-)
-def test_graphics_are_tried_in_a_process_of_their_own(
-    monkeypatch: pytest.MonkeyPatch, status_and_error: tuple[int, str], message: str
-) -> None:
-    monkeypatch.setattr(sys, "version_info", (3, 12, 0))
-    process = subprocess.CompletedProcess([], status_and_error[0], "", status_and_error[1])
-    monkeypatch.setattr(viewers.subprocess, "run", lambda *_, **__: process)
-    with pytest.raises(InputError, match="take --viewer web") as error:
-        viewers.check_graphics("vulkan")
-    assert message in str(error.value)
 
 
 def free_port() -> int:
@@ -84,7 +65,7 @@ class Looker:
 def test_the_command_opens_a_scenario_until_its_viewer_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     """All but the browser's view, which the slow tests open."""
     opened: list[Looker] = []
-    monkeypatch.setattr(viewers, "LoopbackViewer", Looker)
+    monkeypatch.setattr(opening, "LoopbackViewer", Looker)
     monkeypatch.setattr(viewer_protocol, "run_viewer_loop", lambda looker: (opened.append(looker), looker.look()))
     outcome = cmg_mj("studio", "push_recovery", "--observer", "ltv", "--port", "8123")
     assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
@@ -108,13 +89,13 @@ BOTH_THREADS = """
 import sys, time
 from mujoco.studio import app, messages, sim_history, viewer_protocol
 from cmg_mj import load_scenario, prepare
-from cmg_mj.visualization.studio import viewers
-from cmg_mj.visualization.studio.messages import SessionState
+from cmg_mj.visualization.studio import open as opening
+from cmg_mj.visualization.studio.panel import SessionState
 from cmg_mj.visualization.studio.panel import StudioPanel
 from cmg_mj.visualization.studio.stepping import Stepping
 opened = prepare(load_scenario("push_recovery"))
 plugins = [app.App(), StudioPanel(), Stepping(lambda path: opened), sim_history.SimHistory()]
-with viewers.launch(viewer_protocol.ViewerConfig(gfx="web", http_port=int(sys.argv[1])), plugins) as handle:
+with opening.launch(viewer_protocol.ViewerConfig(gfx="web", http_port=int(sys.argv[1])), plugins) as handle:
     handle.dispatch(messages.LoadModelEvent())
     start = time.monotonic()
     while handle.data.time < 0.5:

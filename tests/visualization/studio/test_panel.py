@@ -11,9 +11,15 @@ from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
 from cmg_mj.visualization.studio import panel as module
-from cmg_mj.visualization.studio.messages import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
-from cmg_mj.visualization.studio.panel import StudioPanel
-from cmg_mj.visualization.studio.settings import BIAS, FEEDBACK, LAW, OBSERVER
+from cmg_mj.visualization.studio.panel import (
+    ChangeSettings,
+    PushRequest,
+    RestartController,
+    SessionState,
+    ShowAxis,
+    StudioPanel,
+)
+from cmg_mj.visualization.studio.settings import FEEDBACK, LAW, OBSERVER
 from tests.visualization.studio.session import session
 
 LQG = {"rate_hz": 200.0, "rate_limit_rad_s": 4.7, "angle_source": "measured", "bias_trim_s": 0.0, "kind": "lqg"}
@@ -132,32 +138,6 @@ def test_of_several_axes_one_is_chosen(
     screen.frame()
     assert screen.sent == [ShowAxis("pitch")]
     assert not screen.panel._broken
-
-
-def test_a_number_counts_once_it_is_typed_to_the_end(
-    screen: Screen, state_of_balance: SessionState, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    screen.panel.on_state(state_of_balance)
-    edit = {"now": False}
-    values = iter([1.0, 1.2, 1.25])
-    current = {"label": ""}
-
-    def number(label: str, value: float, *_: Any) -> tuple[bool, float]:
-        current["label"] = label
-        return (True, next(values)) if label.startswith("e ") else (False, value)
-
-    def is_e() -> bool:
-        return current["label"].startswith("e ")
-
-    monkeypatch.setattr(module.imgui, "InputDouble", number)
-    monkeypatch.setattr(module.imgui, "IsItemActive", lambda: is_e() and not edit["now"])
-    monkeypatch.setattr(module.imgui, "IsItemDeactivatedAfterEdit", lambda: is_e() and edit["now"])
-    screen.frame()
-    screen.frame()
-    assert screen.sent == []
-    edit["now"] = True
-    screen.frame()
-    assert screen.sent == [ChangeSettings({BIAS: 1.25})]
 
 
 def test_a_stopped_controller_is_said_and_can_be_started(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""One colour an observer, told apart by everybody."""
+"""One colour an observer, told apart by everybody; the best few observers; thinned signals."""
 
 from __future__ import annotations
 
@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.visualization.plots.colours import (
+from cmg_mj.visualization.plots import style
+from cmg_mj.visualization.plots.style import (
     BASELINE_COLOURS,
     BOUND_COLOURS,
     COLOURS,
     USER_COLOURS,
     Colour,
+    Summary,
     colour,
     colours,
-    hexadecimal,
+    observers_to_draw,
+    short_names,
+    thinned,
 )
 from cmg_mj.visualization.recording.signals import CONTROLLER
 
@@ -81,17 +85,57 @@ def test_an_observer_keeps_its_colour_whatever_it_is_shown_with() -> None:
     assert list(colours(names)) == names
 
 
-def test_users_own_differ_from_each_other() -> None:
-    names = [f"mine:Observer{i}" for i in range(len(USER_COLOURS))]
-    assert set(colours(names).values()) == set(USER_COLOURS)
-    assert set(colours([*names, "mine:OneMore"])) == {*names, "mine:OneMore"}
-
-
-def test_as_matplotlib_takes_it() -> None:
-    assert hexadecimal((6, 109, 61)) == "#066d3d"
-
-
 @pytest.mark.parametrize("sight", SIGHT)
 def test_bounds_are_not_taken_for_what_they_bound(sight: str) -> None:
     assert least_distance([BOUND_COLOURS["settle band"], BASELINE_COLOURS["true"]], sight) > 0.1
     assert least_distance([BOUND_COLOURS["rate limit"], CONTROLLER], sight) > 0.1
+
+
+def summary(error: float | None, *, push: float | None = None, fell: bool = False) -> Summary:
+    return {"velocity_rms_error_rad_s": error, "velocity_rms_error_push_rad_s": push, "fell": fell}
+
+
+def test_the_best_in_the_order_given() -> None:
+    errors = {"a": 0.4, "b": 0.1, "c": 0.3, "d": 0.2, "e": None, "f": float("nan")}
+    summaries = {name: summary(error) for name, error in errors.items()}
+    assert observers_to_draw(summaries) == ["b", "c", "d"]
+    assert observers_to_draw(summaries, ["e"]) == ["b", "d", "e"]
+    assert observers_to_draw(summaries, list("acef")) == ["a", "c", "e", "f"]
+    assert observers_to_draw({**summaries, "b": summary(0.1, fell=True)}) == ["a", "c", "d"]
+    assert observers_to_draw({"zero": summary(0.01), **summaries}) == ["b", "c", "d"]
+    by_push = {name: summary(error, push=1.0 - error) for name, error in zip("abcd", (0.1, 0.2, 0.3, 0.4), strict=True)}
+    assert observers_to_draw(by_push) == ["b", "c", "d"]
+
+
+def test_names_are_shortened_where_they_stay_apart() -> None:
+    names = ["linear", "mine:Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
+    assert list(short_names(names).values()) == ["linear", "Kalman", "lab.a:Other", "lab.b:Other", "odd:"]
+    assert list(short_names(["mine:linear", "linear"]).values()) == ["mine:linear", "linear"]
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(style, "LONG", 1000)
+    monkeypatch.setattr(style, "DRAWN", 200)
+
+
+def test_a_short_signal_stays_as_it_is(small: None) -> None:
+    time = np.arange(1000.0)
+    x, y = thinned(time, time**2)
+    assert x is time
+    assert len(y) == 1000
+
+
+def test_a_long_one_keeps_its_outline(small: None) -> None:
+    time = np.arange(12345) / 100.0
+    values = np.random.default_rng(0).normal(size=len(time))
+    values[[0, 777, 5000]] = [9.0, np.nan, -30.0]
+    x, y = thinned(time, values)
+    assert len(x) <= 200 + 130
+    assert np.all(np.diff(x) > 0.0)
+    assert (x[0], x[-1]) == (time[0], time[-1])
+    assert np.array_equal(values[np.searchsorted(time, x)], y, equal_nan=True)
+    for start in range(0, 12000, 500):  # each of these spans has its highest and its lowest
+        inside = (x >= time[start] - 1.3) & (x <= time[start + 499] + 1.3)
+        assert np.nanmax(y[inside]) >= np.nanmax(values[start : start + 500])
+        assert np.nanmin(y[inside]) <= np.nanmin(values[start : start + 500])

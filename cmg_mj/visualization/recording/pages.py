@@ -12,11 +12,10 @@ from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, format_figure, 
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
-from cmg_mj.visualization.plots.readability import FEW
-from cmg_mj.visualization.recording.branch import Branch
-from cmg_mj.visualization.recording.legend import LegendEntry
-from cmg_mj.visualization.recording.run import RecordingHeader, Run
+from cmg_mj.visualization.plots.style import FEW
+from cmg_mj.visualization.recording.run import LegendEntry, RecordingHeader, Run
 from cmg_mj.visualization.recording.scene import FLYWHEEL_SLOWDOWN
+from cmg_mj.visualization.recording.signals import Branch
 from cmg_mj.visualization.recording.stream import log_page
 
 ROW_TABLES = (
@@ -33,26 +32,19 @@ BOLD = "In bold: those that are switched on in the plots; the legends of the oth
 NOTES = f"In the 3-D view the flywheels turn at 1/{FLYWHEEL_SLOWDOWN:g} of their speed."
 
 
-def log_results(rec: rr.RecordingStream, header: RecordingHeader, branches: Sequence[Branch]) -> None:
-    """Record properties and result pages of finished runs."""
-    summary, observers = summary_page(header, branches), observers_page(branches)
-    runs = [branch.run for branch in branches]
+def log_pages(rec: rr.RecordingStream, header: RecordingHeader, branches: Sequence[Branch]) -> None:
+    """Record the properties and pages of finished runs."""
     package_versions = {name: versions()[name] for name in ("cmg_mj", "mujoco")}
-    rec.send_property(
-        "experiment", rr.AnyValues(True, **package_versions, title=header.title, runs=[run.name for run in runs])
-    )
-    for run in runs:
+    names = [branch.run.name for branch in branches]
+    rec.send_property("experiment", rr.AnyValues(True, **package_versions, title=header.title, runs=names))
+    for run in (branch.run for branch in branches):
         numbers = {key: value for key, value in run.summary.items() if isinstance(value, float)}
         values = rr.AnyValues(True, **numbers, outcome=run.outcome.kind, time_s=run.outcome.time_s)
         rec.send_property(rr.escape_entity_path_part(run.name), values)
-    log_page(rec, "summary", summary)
-    if observers:
+    log_page(rec, "summary", summary_page(header, branches))
+    if observers := observers_page(branches):
         log_page(rec, "observers", observers)
-
-
-def log_scenario(rec: rr.RecordingStream, toml: str) -> None:
-    """Record the page with the resolved scenario."""
-    log_page(rec, "scenario", f"# Scenario\n\n```toml\n{toml.strip()}\n```\n")
+    log_page(rec, "scenario", f"# Scenario\n\n```toml\n{header.scenario_toml.strip()}\n```\n")
 
 
 def summary_page(header: RecordingHeader, branches: Sequence[Branch]) -> str:
