@@ -693,13 +693,6 @@ COMMANDS: dict[str, Notes] = {
         ("cmg-mj reproduce dao2023",),
         "reproduced.md",
     ),
-    "bench loop": Notes(
-        "about a minute and a quarter for one observer.", ("cmg-mj bench loop --observers homogeneous",)
-    ),
-    "bench board": Notes(
-        "about three seconds for one observer.", ("cmg-mj bench board --observers gyro_free",), "board.md"
-    ),
-    "bench sweep": Notes("about a minute for one observer.", ("cmg-mj bench sweep --observers homogeneous",)),
     "bench plugin": Notes(
         "about half a minute for one observer.", ("cmg-mj bench plugin --observers gyro_free",), "plugin.md"
     ),
@@ -709,7 +702,6 @@ NEEDS = {
     "export": 'This command needs the extra `export`: `python -m pip install ".[export]"`.',
     "plugin": 'This command needs a C compiler and the extra `export`: `python -m pip install ".[export]"`.',
     "reproduce": 'This command needs the extra `papers`: `python -m pip install ".[papers]"`.',
-    "bench board": "This command needs the emulator and the cross-compiler of [board.md](board.md).",
 }
 """Command -> what must be installed."""
 COMMAND_PAGES = {

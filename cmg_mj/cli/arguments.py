@@ -19,7 +19,6 @@ from cmg_mj.errors import InputError, nearest
 if TYPE_CHECKING:
     from cmg_mj.results.result import Driver
     from cmg_mj.results.run_folder import RunFolder
-    from cmg_mj.results.wire import WireSettings
     from cmg_mj.scenario.schema import Scenario
     from cmg_mj.simulation.experiment import Experiment
 
@@ -64,7 +63,6 @@ class RunArguments:
         experiment: Experiment,
         driver: Driver = "native",
         world: int = 0,
-        wire: WireSettings | None = None,
     ) -> RunFolder:
         """Claim the folder for files: --out, or one in runs/ named for the scenario, the label and the settings."""
         from cmg_mj.scenario.differences import folder_suffix, safe_name
@@ -77,7 +75,7 @@ class RunArguments:
             *([f"world{world}"] if world else []),
         )
         name = "-".join(parts) + folder_suffix(experiment.differences)
-        return claim_output(self.out, name, names, request_toml=experiment.as_toml(driver, world, wire))
+        return claim_output(self.out, name, names, request_toml=experiment.as_toml(driver, world))
 
 
 def _as_utf8(argument: str) -> str:

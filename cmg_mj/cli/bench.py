@@ -1,4 +1,4 @@
-"""The commands that measure speed: of the closed loop, of an update on a board, of sweeps and of plugins."""
+"""The command that measures the speed of plugins."""
 
 from __future__ import annotations
 
@@ -6,67 +6,21 @@ import os
 
 import click
 
-from cmg_mj.cli.arguments import json_option, markdown_option, observers_option, worlds_option
+from cmg_mj.cli.arguments import json_option, observers_option, worlds_option
 from cmg_mj.cli.terminal import progress, show, users_code
 from cmg_mj.errors import InputError
 
 
-@click.group(
-    short_help="Measure the speed of the closed loop, a board, sweeps or plugins.", invoke_without_command=True
-)
+@click.group(short_help="Measure the speed of plugins.", invoke_without_command=True)
 @click.pass_context
 def bench(context: click.Context) -> None:
-    """Measure the speed of the closed loop, of an observer's update on a board, of sweeps, or of plugins.
+    """Measure the speed of plugins.
 
     \b
-      cmg-mj bench loop --observers homogeneous,ltv
-      cmg-mj bench board
+      cmg-mj bench plugin --observers gyro_free
     """  # noqa: D301  (click wants the character itself)
     if context.invoked_subcommand is None:
         raise InputError(f"bench: name what to time: {', '.join(bench.commands)}")
-
-
-@bench.command(short_help="Time the closed loop against bare MuJoCo.")
-@observers_option()
-@worlds_option("Worlds of the batch.", default=256)
-@json_option()
-@users_code()
-def loop(observers: list[str], worlds: int, as_json: bool) -> None:
-    """Time the closed loop against bare MuJoCo doing the same physics, and an update of each observer."""
-    from cmg_mj.studies.benchmark import bench_table, measure
-
-    with progress("Bench", 1.0) as on_progress:
-        figures = measure(observers, worlds, on_progress)
-    show(figures, bench_table(figures), as_json)
-
-
-@bench.command(short_help="Count an update's instructions and memory on an emulated Cortex-M7.")
-@observers_option()
-@markdown_option()
-@json_option()
-@users_code()
-def board(observers: list[str], markdown: bool, as_json: bool) -> None:
-    """Count the instructions, stack, memory and flash of an update as C on the papers' processor, a Cortex-M7."""
-    from cmg_mj.codegen.board.cost import cost_markdown, cost_scenario, cost_table, measure
-    from cmg_mj.simulation.experiment import prepare
-
-    with progress("Bench on the board", 1.0) as on_progress:
-        figures = measure([prepare(cost_scenario(name)) for name in observers], on_progress)
-    show(figures, cost_markdown(figures) if markdown else cost_table(figures), as_json)
-
-
-@bench.command(short_help="Time the trials of sweeps against MuJoCo's batch.")
-@observers_option()
-@worlds_option("Worlds that run together.", default=512)
-@json_option()
-@users_code()
-def sweep(observers: list[str], worlds: int, as_json: bool) -> None:
-    """Time the trials of sweeps: processor time of a whole trial against that of MuJoCo's batch alone."""
-    from cmg_mj.studies.sweeps.cost import measure, table
-
-    with progress("Bench of sweeps", 1.0) as on_progress:
-        figures = measure(observers, worlds, on_progress)
-    show(figures, table(figures), as_json)
 
 
 @bench.command(short_help="Time MuJoCo with a plugin against the same model without.")

@@ -14,7 +14,6 @@ from cmg_mj.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.results.result import Driver
-    from cmg_mj.results.wire import WireSettings
     from cmg_mj.simulation.experiment import Experiment
     from cmg_mj.studies.live_run import LiveRun
 
@@ -62,7 +61,6 @@ def live_run(
     pace: str,
     driver: Driver,
     world: int,
-    wire: WireSettings | None = None,
 ) -> LiveRun | None:
     """Set up the view of a run; None without one.
 
@@ -84,4 +82,4 @@ def live_run(
     if connect is not None:
         require_listening(connect)
     url = url_of(connect) if connect is not None else start_viewer().url
-    return LiveRun(experiment, url, RealTimeClock(factor), driver=driver, world=world, wire=wire)
+    return LiveRun(experiment, url, RealTimeClock(factor), driver=driver, world=world)

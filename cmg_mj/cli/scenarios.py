@@ -37,7 +37,6 @@ from cmg_mj.cli.terminal import (
     show,
     users_code,
 )
-from cmg_mj.cli.wire import WireOptions, wire_options
 from cmg_mj.errors import InputError, RunStopped
 
 if TYPE_CHECKING:
@@ -61,7 +60,6 @@ if TYPE_CHECKING:
     largest=2**63 - 1,  # tables hold it in 64 bits
     default=0,
 )
-@wire_options
 @click.option("--plot", is_flag=True, help="Also write plot.png.")
 @live_options
 @users_code()
@@ -70,7 +68,6 @@ def run(
     observer: str | None,
     driver: Driver,
     world: int,
-    wire: WireOptions,
     plot: bool,
     live: bool,
     connect: str | None,
@@ -83,7 +80,6 @@ def run(
       trajectory.parquet  all signals, a row for each control tick
       recording.rrd       rerun recording
       scenario.toml       scenario with all defaults, which reruns to the same numbers
-      board.frames        with --port: the traffic of the wire, as a log for cmg-mj replay
 
     A rerun needs the same --driver board and --world, if they were given.
     """  # noqa: D301  (click wants the character itself)
@@ -93,27 +89,21 @@ def run(
     from cmg_mj.studies import save as runs
 
     scenario = arguments.scenario(observer)
-    wire.check(driver)
     experiment = prepare(scenario)
     note_hints(experiment.hints)
     if scenario.compare:
         note("[compare] is for cmg-mj compare; this is one run")
-    board = wire.connect(experiment)
     label = runs.file_name(scenario.observer.kind)
-    files = runs.files_of_run(experiment, plot=plot, wired=board is not None)
-    settings = None if board is None else board.settings
-    folder = arguments.folder(label, files, experiment, driver, world, settings)
-    live_view = live_run(experiment, live, connect, pace, driver, world, settings)
+    files = runs.files_of_run(experiment, plot=plot)
+    folder = arguments.folder(label, files, experiment, driver, world)
+    live_view = live_run(experiment, live, connect, pace, driver, world)
     with CtrlC() as ctrl_c, live_view or nullcontext():
         with progress(scenario.title or arguments.name, scenario.duration_s, ctrl_c) as on_progress:
             options: SimulationOptions = (
                 {"on_progress": on_progress} if live_view is None else live_view.options(on_progress)
             )
             options["spool"] = folder.path
-            if board is None:
-                result = experiment.run(driver=driver, world=world, **options)
-            else:
-                result = experiment.run_on(board, world, **options)
+            result = experiment.run(driver=driver, world=world, **options)
         report = runs.report_run(experiment, result)
         if live_view is not None:
             live_view.ended(report)

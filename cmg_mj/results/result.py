@@ -16,7 +16,6 @@ from cmg_mj.results.frames import NamedColumns, columns_of, frame_of
 from cmg_mj.results.per_world_table import as_table
 from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, open_loop_figures
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.results.wire import WireReport
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,7 +62,6 @@ class Result(NamedColumns):
         seed: Seed of the sensors' noise.
         worlds: The worlds' numbers, (n_worlds,).
         driver: Who called the controller, or was it.
-        wire: Exchange with a real board, if one decided.
     """
 
     outcomes: list[Outcome]
@@ -74,7 +72,6 @@ class Result(NamedColumns):
     seed: int = 0
     worlds: Sequence[int] = ()
     driver: Driver = "native"
-    wire: WireReport | None = None
 
     @property
     def stood(self) -> np.ndarray:

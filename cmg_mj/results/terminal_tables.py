@@ -28,7 +28,6 @@ from cmg_mj.results.summary_keys import (
     open_loop_figures,
     section,
 )
-from cmg_mj.results.wire import wire_line
 from cmg_mj.scenario.description import assignments
 from cmg_mj.scenario.differences import describe_differences
 from cmg_mj.scenario.loading import load_scenario
@@ -173,8 +172,7 @@ def summary_table(summary: Mapping[str, SummaryValue]) -> Group:
     open_loop = [_open_loop_table(name, axis_summary) for name, axis_summary in axes.items()]
     floors = {name for axis_summary in axes.values() for name in FLOORS if name in open_loop_figures(axis_summary)}
     about = [_about_floors(FLOOR_ACCELERATION in floors)] if floors else []
-    wire = [line] if (line := wire_line(summary)) else []
-    return Group(table, *(rows for rows in open_loop if rows.row_count), *about, *wire)
+    return Group(table, *(rows for rows in open_loop if rows.row_count), *about)
 
 
 def _about_floors(has_acceleration: bool) -> str:

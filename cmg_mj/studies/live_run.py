@@ -9,7 +9,6 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from cmg_mj.results.result import Driver
-from cmg_mj.results.wire import WireSettings
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.simulation.recorder import MultiAxisRecorder, TickRecorder
 from cmg_mj.simulation.simulate import SimulationOptions
@@ -58,9 +57,7 @@ class RealTimeClock:
             self._start -= ahead
 
 
-def shown_before(
-    experiment: Experiment, driver: Driver = "native", world: int = 0, wire: WireSettings | None = None
-) -> StreamHeader:
+def shown_before(experiment: Experiment, driver: Driver = "native", world: int = 0) -> StreamHeader:
     """Collect what a viewer needs before a run's first tick."""
     from cmg_mj.visualization.recording.streaming import BranchSpec, StreamHeader
 
@@ -70,7 +67,7 @@ def shown_before(
         bias = math.degrees(part.plant.apparent_bias(part.scenario.sensors.accelerometer))
         axis = part.plant.axis.name if several else None
         branches.append(BranchSpec(axis or experiment.scenario.observer.kind, bias, axis))
-    return StreamHeader(recording_header(experiment, driver, world, wire), branches, experiment.law.dt)
+    return StreamHeader(recording_header(experiment, driver, world), branches, experiment.law.dt)
 
 
 class LiveRun:
@@ -84,7 +81,6 @@ class LiveRun:
         pace: The clock that the run is held to.
         driver: Who calls the controller.
         world: Number of the world.
-        wire: Settings of the wire to a real board, if one decides.
     """
 
     def __init__(
@@ -95,11 +91,10 @@ class LiveRun:
         *,
         driver: Driver = "native",
         world: int = 0,
-        wire: WireSettings | None = None,
     ) -> None:
         from cmg_mj.visualization.recording.live import ViewerStream  # 0.4 s of import, needed only here
 
-        self._view = ViewerStream(url, shown_before(experiment, driver, world, wire))
+        self._view = ViewerStream(url, shown_before(experiment, driver, world))
         self._pace = pace
         self._ticks = 0
         self._shown_at = -math.inf

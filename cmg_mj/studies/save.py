@@ -17,7 +17,6 @@ from cmg_mj.results.run_folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
 from cmg_mj.results.terminal_tables import run_title
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.results.wire import BOARD_LOG, WIRE, WireReport, WireSettings
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.compare.comparison import ComparedObserver
 from cmg_mj.studies.compare.statistics import standings, worlds_table
@@ -38,7 +37,6 @@ class RunReport:
         summary: The summary as `--json` prints it.
         trajectory: All ticks, with the outcome, world, driver and scenario as metadata.
         runs: The run for a recording and for plots; of several axes a run each.
-        wire: Exchange with a real board, if one decided.
     """
 
     experiment: Experiment
@@ -48,7 +46,6 @@ class RunReport:
     summary: Summary
     trajectory: Trajectory
     runs: Sequence[Run]
-    wire: WireReport | None = None
 
 
 def report_run(experiment: Experiment, result: Result, *, several: bool = False) -> RunReport:
@@ -70,10 +67,7 @@ def report_run(experiment: Experiment, result: Result, *, several: bool = False)
     origin: Summary = {"driver": result.driver} if result.driver == "board" else {}
     if world:
         origin["world"] = world
-    if result.wire is not None:
-        origin["port"] = result.wire.settings.port
     reason: Summary = {"reason": outcome.reason} if outcome.reason else {}
-    wire: Summary = {WIRE: result.wire.figures} if result.wire is not None else {}
     summary = finite(
         {
             "scenario": scenario.title,
@@ -86,7 +80,6 @@ def report_run(experiment: Experiment, result: Result, *, several: bool = False)
             "differs": experiment.differences,
             **reason,
             **result.summaries[0],
-            **wire,
         }
     )
     ending = {"kind": outcome.kind, "time_s": outcome.time_s, "reason": outcome.reason}
@@ -100,18 +93,17 @@ def report_run(experiment: Experiment, result: Result, *, several: bool = False)
             Run(f"{observer}, {axis}" if several else axis, trajectory.along(axis), {**common, **part}, outcome, axis)
             for axis, part in section(summary, AXES).items()
         ]
-    return RunReport(experiment, result.driver, world, outcome, summary, trajectory, runs, result.wire)
+    return RunReport(experiment, result.driver, world, outcome, summary, trajectory, runs)
 
 
-def files_of_run(experiment: Experiment, *, plot: bool = False, wired: bool = False) -> list[str]:
-    """List the files that a run writes, on a real board its log too; for a plant of several axes a plot each."""
+def files_of_run(experiment: Experiment, *, plot: bool = False) -> list[str]:
+    """List the files that a run writes; for a plant of several axes a plot each."""
     plots = [f"plot-{name}.png" for name in experiment.plant.axis_names] if len(experiment.axes) > 1 else ["plot.png"]
     return [
         "trajectory.parquet",
         "summary.json",
         "scenario.toml",
         "recording.rrd",
-        *([BOARD_LOG] if wired else []),
         *(plots if plot else []),
     ]
 
@@ -133,15 +125,13 @@ def save_run(folder: RunFolder | Path, report: RunReport, *, plot: bool = False)
     """
     from cmg_mj.visualization.recording import write_recording
 
-    names = files_of_run(report.experiment, plot=plot, wired=report.wire is not None)
-    log, wire = (b"", None) if report.wire is None else (report.wire.log, report.wire.settings)
-    header = recording_header(report.experiment, report.driver, report.world, wire)
+    names = files_of_run(report.experiment, plot=plot)
+    header = recording_header(report.experiment, report.driver, report.world)
     writers = (
         report.trajectory.save,
         lambda path: _write_json(path, report.summary),
         lambda path: write_text(path, header.scenario_toml),
         lambda path: write_recording(path, header, report.runs),
-        *([] if report.wire is None else [lambda path: path.write_bytes(log)]),
         *(partial(_plot, run=run, experiment=report.experiment) for run in report.runs),
     )
     with claimed(folder) as place:
@@ -229,9 +219,7 @@ def _plot(path: Path, run: Run, experiment: Experiment) -> None:
     )
 
 
-def recording_header(
-    experiment: Experiment, driver: Driver = "native", world: int = 0, wire: WireSettings | None = None
-) -> RecordingHeader:
+def recording_header(experiment: Experiment, driver: Driver = "native", world: int = 0) -> RecordingHeader:
     """Collect what a recording shows of an experiment; the title says if it ran on the board."""
     from cmg_mj.visualization.recording import RecordingHeader
 
@@ -243,7 +231,7 @@ def recording_header(
         swings=scenario.swing,
         settings=scenario.metrics,
         rate_limit_rad_s=experiment.law.rate_limit,
-        scenario_toml=experiment.as_toml(driver, world, wire),
+        scenario_toml=experiment.as_toml(driver, world),
     )
 
 

@@ -289,36 +289,6 @@ def test_every_column_is_of_a_key_there_is(quick: str) -> None:
     assert (len(table.columns), table.row_count) == (1 + len(columns), 1 + len(REFERENCES))
 
 
-# --- bench ---------------------------------------------------------------------------------------------------
-
-
-def test_bench(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in (("REPEATS", 1), ("ONE_WORLD_S", 0.1), ("MANY_WORLDS_S", 0.1), ("CONTROL_RATES_HZ", (200.0,))):
-        monkeypatch.setattr(f"cmg_mj.studies.benchmark.{name}", value)
-    said = cmg_mj("bench", "loop", "--observers", "linear", "--worlds", 2, "--json")
-    assert (said.status, said.err) == (0, "")
-    (figures,) = json.loads(said.out)["figures"]
-    # Of one repeat. How large the ratios are is for a quiet machine: .ci/speed.py.
-    assert figures["closed_loop_over_bare"] == pytest.approx(figures["closed_loop_ms"] / figures["bare_ms"])
-    share = figures["batch_ms"] / figures["closed_loop_batch_ms"]
-    assert figures["closed_loop_share_of_batch"] == pytest.approx(share)
-    assert figures["timestep_ms"] == 5.0
-    assert "linear" in cmg_mj("bench", "loop", "--observers", "linear", "--worlds", 2).out
-    assert cmg_mj("bench").complaint == "bench: name what to time: loop, board, sweep, plugin"
-
-
-@pytest.mark.slow
-def test_bench_of_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmg_mj.studies.sweeps.cost.DURATION_S", 3.0)
-    monkeypatch.setattr("cmg_mj.studies.sweeps.cost.PLANTS", {"plant.equilibrium_bias_deg": "-0.5:0.5"})
-    outcome = cmg_mj("bench", "sweep", "--observers", "linear", "--worlds", 8, "--json")
-    assert (outcome.status, outcome.err) == (0, "")
-    one, many = json.loads(outcome.out)["figures"]
-    assert (one["rigs"], one["trials"], many["rigs"], many["trials"]) == (1, 8, 2, 8)
-    assert min(one["cpu_over_batch"], many["cpu_over_batch"]) > 1.0
-    assert "linear" in cmg_mj("bench", "sweep", "--observers", "linear", "--worlds", 8).out
-
-
 # --- terminals, pipes ----------------------------------------------------------------------------------------
 
 

@@ -140,7 +140,7 @@ def test_a_duration_in_python() -> None:
         simulate(experiment.plant, experiment.controller(), 1e306, observers=["homogeneous"])
 
 
-@pytest.mark.parametrize("command", [("compare", "push_recovery"), ("tune", "push_recovery"), ("bench", "loop")])
+@pytest.mark.parametrize("command", [("compare", "push_recovery"), ("tune", "push_recovery")])
 def test_more_worlds_than_memory(command: tuple[str, str]) -> None:
     assert "is not in the range" in cmg_mj(*command, "--worlds", 10**12).complaint
 

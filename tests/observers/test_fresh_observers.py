@@ -82,12 +82,3 @@ def test_floats_and_arrays_are_not_mixed() -> None:
         "compare", "push_recovery", "--observers", f"{__name__}:Allocates", "--worlds", 2, *SHORT, "--out", "it"
     )
     assert outcome.status == 0, outcome.err
-
-
-@pytest.mark.usefixtures("elsewhere")
-def test_bench_says_what_it_can_of_an_observer_that_raises(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in (("REPEATS", 1), ("ONE_WORLD_S", 0.1), ("MANY_WORLDS_S", 0.1), ("CONTROL_RATES_HZ", (200.0,))):
-        monkeypatch.setattr(f"cmg_mj.studies.benchmark.{name}", value)
-    outcome = cmg_mj("bench", "loop", "--observers", f"{__name__}:RaisesLate", "--worlds", 2)
-    assert outcome.status == 0, outcome.err
-    assert outcome.out.splitlines()[-1].split()[-2:] == ["-", "-"]

@@ -1,4 +1,4 @@
-"""`.ci/speed.py` judges the figures of `cmg-mj bench loop`: neither too slow nor quicker than the physics in it."""
+"""`.ci/speed.py` judges the figures of `benchmarks/loop.py`: neither too slow nor quicker than the physics in it."""
 
 from __future__ import annotations
 

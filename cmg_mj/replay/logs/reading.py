@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cmg_mj.codegen.board.log_file import BoardLog
 from cmg_mj.errors import InputError
 from cmg_mj.replay.logs.acceleration_checks import TiltMotion, implausible_acceleration
 from cmg_mj.replay.logs.checks import (
@@ -23,7 +22,6 @@ from cmg_mj.replay.logs.checks import (
     windows_inside,
 )
 from cmg_mj.replay.logs.columns import ACCELEROMETERS, ONE_ACCELEROMETER, Column, columns_of
-from cmg_mj.replay.logs.from_board import board_log_at, board_log_options
 from cmg_mj.replay.logs.from_run import log_of_trajectory
 from cmg_mj.replay.logs.log import REFERENCE, Log, ReadOptions
 from cmg_mj.replay.logs.one_accelerometer import remarks_on_one, tilt_of_one
@@ -55,8 +53,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     """Read a log.
 
     Args:
-        path: A CSV with a heading, a Parquet file, or what has known columns: a run's folder, its
-            `trajectory.parquet`, or a board's log.
+        path: A CSV with a heading, a Parquet file, or what has known columns: a run's folder or its
+            `trajectory.parquet`.
         options: The columns of the file, and how to convert and sample them; none for a run's own recording.
 
     Returns:
@@ -68,12 +66,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     path, options = Path(path), options or ReadOptions()
     if path.is_dir() and (path / "trajectory.parquet").is_file():
         path = path / "trajectory.parquet"
-    board_log = board_log_at(path)
     if not options.columns:
-        if board_log is None:
-            return _read_run(path, options)
-        options = board_log_options(board_log, options)
-    rows = _convert(path, options, board_log)
+        return _read_run(path, options)
+    rows = _convert(path, options)
     if options.time_range_s is not None:
         rows = _cut(path, rows, options.time_range_s, options.rate_hz)
     sampler = Sampler(str(path), options.rate_hz, options.max_gap_s, rows.notes, held=("u_rad_s",))
@@ -145,7 +140,7 @@ class _Rows:
         return self.signals["rate"]
 
 
-def _convert(path: Path, options: ReadOptions, board_log: BoardLog | None) -> _Rows:
+def _convert(path: Path, options: ReadOptions) -> _Rows:
     """Read the columns of a file, convert them, and check them one by one."""
     columns = columns_of(options.columns, options.units, options.scale, options.offset)
     tilt = accelerometer_geometry(columns, options.radii_m)
@@ -154,7 +149,7 @@ def _convert(path: Path, options: ReadOptions, board_log: BoardLog | None) -> _R
     if options.delay_s and "rate" not in columns:
         raise InputError("--delay: there is no reference to shift; name it, --columns rate=...")
     headings = [column.name for column in columns.values()]
-    table, notes, dated = read_table(path, headings, columns["time"].name if "time" in columns else None, board_log)
+    table, notes, dated = read_table(path, headings, columns["time"].name if "time" in columns else None)
     if dated:  # seconds already, whatever the heading ends in
         clock = columns["time"]
         columns["time"] = replace(clock, unit="s", factor=clock.factor / in_si("time", clock.unit), unit_known=True)

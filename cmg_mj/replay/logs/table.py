@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmg_mj.codegen.board.log_file import BoardLog
 from cmg_mj.errors import InputError, nearest, shown
 from cmg_mj.replay.logs.cells import MISSING, Clock, is_number, numbers
 from cmg_mj.replay.logs.columns import HOW_TO_QUOTE
@@ -36,16 +35,13 @@ PARQUET = b"PAR1"
 COMMENTS = ("#", "%", "//")
 
 
-def read_table(
-    path: Path, headings: Sequence[str], time: str | None, board_log: BoardLog | None = None
-) -> tuple[StoredColumns, list[str], bool]:
+def read_table(path: Path, headings: Sequence[str], time: str | None) -> tuple[StoredColumns, list[str], bool]:
     """Read columns of a log; a long one's go to a file, a piece at a time, unless they have text.
 
     Args:
-        path: A CSV (with a heading), a Parquet file or a board's log.
+        path: A CSV (with a heading) or a Parquet file.
         headings: Headings of the columns.
         time: The heading among them that may also hold dates, which become seconds from the first.
-        board_log: The board's log, if the file is one.
 
     Returns:
         Heading -> numbers, (n_rows,), NaN where there is none; changes that were not requested; whether the time
@@ -59,9 +55,7 @@ def read_table(
         raise InputError(f"{path}: empty")
     notes: list[str] = []
     dated: list[str] = []
-    if board_log is not None:
-        columns = _of_board(path, board_log, headings, notes)
-    elif head.startswith(PARQUET):
+    if head.startswith(PARQUET):
         columns = _of_parquet(path, headings, time, dated)
     else:
         columns = _of_csv(path, head, headings, time, notes, dated)
@@ -86,13 +80,7 @@ def head_of(path: Path) -> bytes:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:  # such as a name with a zero byte
         raise InputError(f"{str(path)!r}: cannot be read: {error}") from error
-    raise InputError(f"{path}: {what}; name a CSV or Parquet file, a board's log, or the folder of a run")
-
-
-def _of_board(path: Path, log: BoardLog, headings: Sequence[str], notes: list[str]) -> Mapping[str, np.ndarray]:
-    _check_columns(path, headings, list(log.columns))
-    notes += log.remarks()
-    return {name.strip(): log.columns[name.strip()] for name in headings}
+    raise InputError(f"{path}: {what}; name a CSV or Parquet file, or the folder of a run")
 
 
 def _of_parquet(path: Path, headings: Sequence[str], time: str | None, dated: list[str]) -> Mapping[str, np.ndarray]:

@@ -11,7 +11,6 @@ NAMES = (
     r"summary\.json",
     r"worlds\.parquet",
     r"recording\.rrd",
-    r"board\.frames",
     rf"scenario(-{PART})?\.toml",
     rf"trajectory(-{PART})?\.parquet",
     rf"plot(-{PART})?\.png",
@@ -30,9 +29,6 @@ NAMES = (
 """Patterns of the names, but for those of an export and of a plugin."""
 EXPORT = ("{}.h", "{}.c", "{}_example.c", "{}_test_vector.h")
 """The files of an export, which the user names; all four are always written together."""
-FIRMWARE = ("board.c", "its.h", "port.h", "startup.c", "Makefile")
-PORT_LAYERS = (("mps2.c", "mps2.ld"), ("stm32f746.c", "stm32f746.ld"))
-"""The files of a firmware around an export; all of them, and a port layer's, are always written together."""
 PLUGIN = ("libcmg_mj_{}.so", "{}.xml", "{}_example.c", "{}_example.py", "Makefile", "plugin.c", "rig.c")
 """Files of an engine plugin, which the user names; all but the library, the first, are always written together."""
 PLUGIN_CODE = r"(noise|sensors|gyros|controller|state|setup)\.[ch]|(ziggurat|rig)\.h|{}(_\w+)?(\.h|\.c|_controller\.c)"
@@ -57,10 +53,6 @@ def foreign_names(names: Iterable[str]) -> list[str]:
         if set(files) <= set(names)
         for file in files
     }
-    if code:
-        for layer in PORT_LAYERS:
-            if set(FIRMWARE + layer) <= set(names):
-                code |= {*FIRMWARE, *layer}
     code |= {file for name in names for file in _plugin_files(name, names)}
     return [name for name in names if name not in code and not _is_listed(name)]
 

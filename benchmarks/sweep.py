@@ -1,17 +1,24 @@
-"""The cost of a sweep relative to its physics: processor time of the whole loop by that of MuJoCo's batch alone."""
+"""The cost of a sweep relative to its physics: processor time of the whole loop by that of MuJoCo's batch alone.
+
+python benchmarks/sweep.py [--observers homogeneous] [--worlds 512] [--json] (a minute an observer)
+"""
 
 from __future__ import annotations
 
+import argparse
+import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import ParamSpec, TypedDict, TypeVar
 
 from mujoco.batch import Batch
+from rich import box
+from rich.console import Console
 from rich.table import Table
 
+from cmg_mj.observers import OBSERVERS
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.studies.benchmark import figures_table
 from cmg_mj.studies.sweeps.axes import parse_axis
 from cmg_mj.studies.sweeps.chunk import compute
 from cmg_mj.studies.sweeps.study import SweepStudy
@@ -44,14 +51,14 @@ class ChunkCost(TypedDict):
 
 
 class SweepCost(TypedDict):
-    """The cost of a sweep, as `cmg-mj bench sweep --json` prints it."""
+    """The cost of a sweep, as `--json` prints it."""
 
     scenario: str
     duration_s: float
     figures: list[ChunkCost]
 
 
-def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float], None]) -> SweepCost:
+def measure(observers: Sequence[str], worlds: int) -> SweepCost:
     """Time a chunk of two sweeps for each observer: many worlds of one plant, and many plants.
 
     A chunk runs on one thread: threads of a pool that wait for work take processor time as well, which is nobody's.
@@ -59,7 +66,6 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
     Args:
         observers: Names of the observers.
         worlds: Trials of a chunk.
-        on_progress: Called with the share done.
 
     Returns:
         The figures, as `--json` prints them.
@@ -69,12 +75,12 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
     """
     cases = [(observer, many_plants) for observer in observers for many_plants in (False, True)]
     figures: list[ChunkCost] = []
-    for i, (observer, many_plants) in enumerate(cases):
+    for observer, many_plants in cases:
         study = _study(observer, worlds, many_plants=many_plants)
         chunk = study.chunks[0]
         with _clocked() as clock:
             start = time.process_time()
-            rows = compute(study, chunk, lambda share, i=i: on_progress((i + share) / len(cases)), threads=1)
+            rows = compute(study, chunk, lambda share: None, threads=1)
             whole = time.process_time() - start
         figures.append(
             {
@@ -91,11 +97,14 @@ def measure(observers: Sequence[str], worlds: int, on_progress: Callable[[float]
 
 
 def table(cost: SweepCost) -> Table:
-    """Make the table that `cmg-mj bench sweep` prints."""
-    rows = figures_table(
-        f"{cost['scenario']}, {cost['duration_s']:g} s, on one thread: processor time of all by that in MuJoCo's batch",
-        ("rigs", "trials", "stood", "all [s]", "batch [s]", "ratio", "trials\na second"),
+    """Make the table that is printed."""
+    title = (
+        f"{cost['scenario']}, {cost['duration_s']:g} s, on one thread: processor time of all by that in MuJoCo's batch"
     )
+    rows = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
+    rows.add_column("observer", vertical="bottom")
+    for heading in ("rigs", "trials", "stood", "all [s]", "batch [s]", "ratio", "trials\na second"):
+        rows.add_column(heading, justify="right", vertical="bottom")
     for row in cost["figures"]:
         counts = (str(row[key]) for key in ("rigs", "trials", "stood"))
         rate = row["trials"] / row["cpu_s"]
@@ -136,3 +145,16 @@ def _clocked() -> Iterator[list[float]]:
     finally:
         for name, call in plain.items():
             setattr(Batch, name, call)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--observers", default=",".join(OBSERVERS), metavar="NAMES")
+    parser.add_argument("--worlds", type=int, default=512)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    figures = measure(options.observers.split(","), options.worlds)
+    if options.json:
+        print(json.dumps(figures, indent=2))
+    else:
+        Console().print(table(figures))
