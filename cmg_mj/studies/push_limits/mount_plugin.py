@@ -9,8 +9,7 @@ from pathlib import Path
 
 from cmg_mj.codegen.engine_plugin.build import COMMON_HEADERS, COMMON_SOURCES
 from cmg_mj.codegen.engine_plugin.generate import NAMES_IN_USE
-from cmg_mj.codegen.export.c_identifiers import RESERVED
-from cmg_mj.codegen.export.names import LONGEST
+from cmg_mj.codegen.export.names import LONGEST, RESERVED
 from cmg_mj.errors import InputError, listed
 from cmg_mj.inputs.includes import check_files
 from cmg_mj.results.run_folder import RunFolder
