@@ -11,6 +11,7 @@ judged in the loop of `gyro_free`.
 """
 
 import argparse
+import runpy
 import sys
 from pathlib import Path
 
@@ -60,9 +61,7 @@ def tolerated(limit: np.ndarray) -> str:
 
 def instructions(observer: str) -> str:
     """Return the instructions of a whole update on the board, or a dash."""
-    sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-    from board import measure
-
+    measure = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "board.py"))["measure"]
     try:
         (figures,) = measure([observer])["figures"]
     except InputError as error:
