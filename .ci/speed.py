@@ -1,4 +1,4 @@
-"""Speed limits of the closed loop: `cmg-mj bench loop --observers homogeneous --json | python .ci/speed.py`.
+"""Speed limits of the closed loop: `python benchmarks/loop.py --observers homogeneous --json | python .ci/speed.py`.
 
 Beyond a limit is said; beyond it by more than what other work on a shared machine does to these ratios fails. So does
 a closed loop that would be quicker than the physics in it: nothing was timed.

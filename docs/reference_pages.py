@@ -765,19 +765,12 @@ COMMANDS: dict[str, Notes] = {
         ("cmg-mj reproduce dao2023",),
         "reproduced.md",
     ),
-    "bench loop": Notes(
-        "about a minute and a quarter for one observer.", ("cmg-mj bench loop --observers homogeneous",)
-    ),
-    "bench board": Notes(
-        "about three seconds for one observer.", ("cmg-mj bench board --observers gyro_free",), "board.md"
-    ),
 }
 """Command -> examples and durations."""
 NEEDS = {
     "export": 'This command needs the extra `export`: `python -m pip install ".[export]"`.',
     "plugin": 'This command needs a C compiler and the extra `export`: `python -m pip install ".[export]"`.',
     "reproduce": 'This command needs the extra `papers`: `python -m pip install ".[papers]"`.',
-    "bench board": "This command needs the emulator and the cross-compiler of [board.md](board.md).",
 }
 """Command -> what must be installed."""
 COMMAND_PAGES = {

@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from cmg_mj.cli import bench, boards, logs, mount, plugin, reproduce, scenarios, studio, sweeps, tune
+from cmg_mj.cli import boards, logs, mount, plugin, reproduce, scenarios, studio, sweeps, tune
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
 from cmg_mj.errors import InputError, RunStopped, raised
 
@@ -81,7 +81,6 @@ for command in (
     scenarios.check,
     studio.studio,
     sweeps.sweep,
-    bench.bench,
     reproduce.reproduce,
     tune.tune,
     tune.tune_log,

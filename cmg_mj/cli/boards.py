@@ -8,7 +8,6 @@ import click
 
 from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
 from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, show, users_code
-from cmg_mj.errors import InputError
 
 
 @click.command(short_help="Write an observer and the control law around it as C code.")
@@ -17,12 +16,9 @@ from cmg_mj.errors import InputError
 @click.option(
     "--precision",
     type=click.Choice(["double", "single"]),
-    help="Precision of all numbers in the C code.  [default: double; with --firmware single]",
-)
-@click.option(
-    "--firmware",
-    type=click.Choice(["mps2", "stm32f746"]),
-    help="Also write a firmware to build and flash: for QEMU's mps2-an500, or for ST's 32F746GDISCOVERY.",
+    default="double",
+    show_default=True,
+    help="Precision of all numbers in the C code.",
 )
 @click.option("--name", metavar="NAME", help="Prefix of files, types and functions.  [default: OBSERVER's name]")
 @click.option(
@@ -38,8 +34,7 @@ from cmg_mj.errors import InputError
 def export(
     observer: str,
     out: str | None,
-    precision: Literal["double", "single"] | None,
-    firmware: str | None,
+    precision: Literal["double", "single"],
     name: str | None,
     scenario: str,
     settings: tuple[str, ...],
@@ -54,11 +49,9 @@ def export(
       NAME.h, NAME.c      init, step: the observer; update: the controller, sensors to gimbal rate
       NAME_example.c      program that compares the C code with the test vector
       NAME_test_vector.h  test vector
-      Makefile, ...       with --firmware: the firmware around these (docs/board.md)
 
     The C code is compared with Python on random signals before it is written.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.codegen.board.project import NEVER_RUN, PORTS, project, then
     from cmg_mj.codegen.export import check_installed, generate_code, write_code
     from cmg_mj.codegen.export.names import name_of
     from cmg_mj.codegen.export.pipeline import export_table
@@ -67,11 +60,6 @@ def export(
     from cmg_mj.simulation.experiment import prepare
 
     check_installed()
-    if firmware is not None and precision == "double":
-        raise InputError("--precision double: the firmware's controller is in single precision; leave it out")
-    if firmware is not None and name is not None:
-        raise InputError(f"--name {name}: the firmware's controller has the observer's own name; leave it out")
-    precision = precision or ("double" if firmware is None else "single")
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
     experiment.require_single_axis("export")
     if isinstance(experiment.law, StateFeedback):
@@ -79,18 +67,8 @@ def export(
     note_hints(experiment.hints)
     controller = experiment.axis_controller()
     name = name_of(controller.observer, name)
-    label = f"export-{name}-{firmware or precision}"
-    with claim_output(out, label) as folder:
+    with claim_output(out, f"export-{name}-{precision}") as folder:
         code = generate_code(controller, precision, name)
-        run_it = ""
-        if firmware is not None:
-            options = [word for setting in settings for word in ("--set", setting)]
-            run_it = shell_command(
-                *["cmg-mj", "run", scenario, "--driver", "board", "--observer", observer, *options],
-                *["--port", PORTS[firmware]],
-            )
-            around = project(controller, name, code.files[f"{name}.c"], firmware, run_it)
-            code = code._replace(files={**code.files, **around})
         files = write_code(folder, code)
     figures = code.figures
     show(figures, export_table(figures), as_json)
@@ -102,10 +80,5 @@ def export(
         off = (figures["c_off_by"] or {})[part]
         note(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer amplifies last digits")
     at = files[0].parent
-    if firmware is not None:
-        if firmware in NEVER_RUN:
-            note("the firmware compiles for this board, and has never run on one (docs/board.md)")
-        say_written(folder, at, then(firmware, f"{shell_command('make', '-C', at)} ", run_it), as_json)
-        return
     compile_it = shell_command("cc", "-std=c99", at / f"{name}.c", at / f"{name}_example.c", "-lm")
     say_written(folder, at, f"Try it: {compile_it} && ./a.out", as_json)

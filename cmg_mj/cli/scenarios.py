@@ -36,7 +36,6 @@ from cmg_mj.cli.terminal import (
     show,
     users_code,
 )
-from cmg_mj.cli.wire import WireOptions, wire_options
 from cmg_mj.errors import InputError, RunStopped
 
 if TYPE_CHECKING:
@@ -60,7 +59,6 @@ if TYPE_CHECKING:
     largest=2**63 - 1,  # tables hold it in 64 bits
     default=0,
 )
-@wire_options
 @click.option("--plot", is_flag=True, help="Also write plot.png.")
 @click.option("--live", is_flag=True, help="Show the run in a rerun viewer as it happens.")
 @users_code()
@@ -69,7 +67,6 @@ def run(
     observer: str | None,
     driver: Driver,
     world: int,
-    wire: WireOptions,
     plot: bool,
     live: bool,
 ) -> None:
@@ -80,7 +77,6 @@ def run(
       trajectory.parquet  all signals, a row for each control tick
       recording.rrd       rerun recording
       scenario.toml       scenario with all defaults, which reruns to the same numbers
-      board.frames        with --port: the traffic of the wire, as a log for cmg-mj replay
 
     A rerun needs the same --driver board and --world, if they were given.
     """  # noqa: D301  (click wants the character itself)
@@ -90,12 +86,10 @@ def run(
     from cmg_mj.studies import save as runs
 
     scenario = arguments.scenario(observer)
-    wire.check(driver)
     experiment = prepare(scenario)
     note_hints(experiment.hints)
     if scenario.compare:
         note("[compare] is for cmg-mj compare; this is one run")
-    board = wire.connect(experiment)
     label = runs.file_name(scenario.observer.kind)
     folder = arguments.folder(label, experiment, driver, world)
     live_view = runs.live_view(experiment) if live else None
@@ -104,10 +98,7 @@ def run(
             options: SimulationOptions = {"on_progress": on_progress}
             if live_view is not None:
                 options |= live_view.options(on_progress)
-            if board is None:
-                result = experiment.run(driver=driver, world=world, **options)
-            else:
-                result = experiment.run_on(board, world, **options)
+            result = experiment.run(driver=driver, world=world, **options)
         if live_view is not None:
             live_view.show()
         report = runs.report_run(experiment, result)

@@ -15,7 +15,6 @@ from cmg_mj.errors import InputError, nearest
 from cmg_mj.results.intervals import finite_values
 from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, as_table, open_loop_figures
 from cmg_mj.results.trajectory import NamedColumns, Trajectory, frame_of
-from cmg_mj.results.wire import WireReport
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,7 +61,6 @@ class Result(NamedColumns):
         seed: Seed of the sensors' noise.
         worlds: The worlds' numbers, (n_worlds,).
         driver: Who called the controller, or was it.
-        wire: Exchange with a real board, if one decided.
     """
 
     outcomes: list[Outcome]
@@ -73,7 +71,6 @@ class Result(NamedColumns):
     seed: int = 0
     worlds: Sequence[int] = ()
     driver: Driver = "native"
-    wire: WireReport | None = None
 
     @property
     def stood(self) -> np.ndarray:

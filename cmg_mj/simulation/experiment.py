@@ -23,7 +23,6 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.rerun_head import rerun_head
 from cmg_mj.results.result import Driver, Result
-from cmg_mj.results.wire import WireSettings
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.linear_loop import linear_closed_loop, require_model, require_rigid
 from cmg_mj.scenario.linear_rig import reduced_rig
@@ -136,7 +135,7 @@ class Experiment:
 
             self.require_single_axis("the board")
             with on_a_board(self.axis_controller()) as board:
-                return self.run_on(board, world, **options)
+                return dataclasses.replace(self.run_on(board, world, **options), driver="board")
         if driver == "plugin":
             from cmg_mj.simulation.make import run_with_plugin
 
@@ -145,9 +144,7 @@ class Experiment:
 
     def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
-        from cmg_mj.codegen.board import result_of
-
-        return result_of(processor, self.simulate(self.plant, self.axis_controller(int(world), processor), **options))
+        return self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
 
     def run_many(
         self,
@@ -365,9 +362,9 @@ class Experiment:
             bundled = prepare(base)
         return law_change | differences(bundled.resolved(), self.resolved())
 
-    def as_toml(self, driver: Driver = "native", world: int = 0, wire: WireSettings | None = None) -> str:
+    def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
         """Return the resolved scenario: running it again gives the same run; its head says if that needs options."""
-        return rerun_head(driver, world, wire) + tomli_w.dumps(self.resolved())
+        return rerun_head(driver, world) + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path) -> None:
         """Write it as TOML."""

@@ -17,7 +17,6 @@ from cmg_mj.results.reports import run_title
 from cmg_mj.results.result import Driver, Outcome, Result
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.results.wire import BOARD_LOG, WIRE, WireReport, WireSettings
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.compare.comparison import ComparedObserver
 from cmg_mj.studies.compare.statistics import standings, worlds_table
@@ -39,7 +38,6 @@ class RunReport:
         summary: The summary as `--json` prints it.
         trajectory: All ticks, with the outcome, world, driver and scenario as metadata.
         runs: The run for a recording and for plots; of several axes a run each.
-        wire: Exchange with a real board, if one decided.
     """
 
     experiment: Experiment
@@ -49,7 +47,6 @@ class RunReport:
     summary: Summary
     trajectory: Trajectory
     runs: Sequence[Run]
-    wire: WireReport | None = None
 
 
 def report_run(experiment: Experiment, result: Result, *, several: bool = False) -> RunReport:
@@ -71,10 +68,7 @@ def report_run(experiment: Experiment, result: Result, *, several: bool = False)
     origin: Summary = {"driver": result.driver} if result.driver == "board" else {}
     if world:
         origin["world"] = world
-    if result.wire is not None:
-        origin["port"] = result.wire.settings.port
     reason: Summary = {"reason": outcome.reason} if outcome.reason else {}
-    wire: Summary = {WIRE: result.wire.figures} if result.wire is not None else {}
     summary = finite(
         {
             "scenario": scenario.title,
@@ -87,7 +81,6 @@ def report_run(experiment: Experiment, result: Result, *, several: bool = False)
             "differs": experiment.differences,
             **reason,
             **result.summaries[0],
-            **wire,
         }
     )
     ending = {"kind": outcome.kind, "time_s": outcome.time_s, "reason": outcome.reason}
@@ -101,7 +94,7 @@ def report_run(experiment: Experiment, result: Result, *, several: bool = False)
             Run(f"{observer}, {axis}" if several else axis, trajectory.along(axis), {**common, **part}, outcome, axis)
             for axis, part in section(summary, AXES).items()
         ]
-    return RunReport(experiment, result.driver, world, outcome, summary, trajectory, runs, result.wire)
+    return RunReport(experiment, result.driver, world, outcome, summary, trajectory, runs)
 
 
 @quiet()
@@ -121,15 +114,13 @@ def save_run(folder: RunFolder | Path, report: RunReport, *, plot: bool = False)
     """
     from cmg_mj.visualization.recording import write_recording
 
-    header = recording_header(report.experiment, report.driver, report.world, report.wire and report.wire.settings)
+    header = recording_header(report.experiment, report.driver, report.world)
     files: dict[str, Callable[[Path], object]] = {
         "trajectory.parquet": report.trajectory.save,
         "summary.json": lambda path: _write_json(path, report.summary),
         "scenario.toml": lambda path: write_text(path, header.scenario_toml),
         "recording.rrd": lambda path: write_recording(path, header, report.runs),
     }
-    if report.wire is not None:
-        files[BOARD_LOG] = partial(Path.write_bytes, data=report.wire.log)
     for run in report.runs if plot else ():
         name = "plot" if run.axis is None else f"plot-{run.axis}"
         files[f"{name}.png"] = partial(_plot, run=run, experiment=report.experiment)
@@ -213,9 +204,7 @@ def _plot(path: Path, run: Run, experiment: Experiment) -> None:
     )
 
 
-def recording_header(
-    experiment: Experiment, driver: Driver = "native", world: int = 0, wire: WireSettings | None = None
-) -> RecordingHeader:
+def recording_header(experiment: Experiment, driver: Driver = "native", world: int = 0) -> RecordingHeader:
     """Collect what a recording shows of an experiment; the title says if it ran on the board."""
     from cmg_mj.visualization.recording import RecordingHeader
 
@@ -227,7 +216,7 @@ def recording_header(
         swings=scenario.swing,
         settings=scenario.metrics,
         rate_limit_rad_s=experiment.law.rate_limit,
-        scenario_toml=experiment.as_toml(driver, world, wire),
+        scenario_toml=experiment.as_toml(driver, world),
     )
 
 

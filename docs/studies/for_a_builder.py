@@ -5,13 +5,15 @@ python docs/studies/for_a_builder.py [--worlds 20] [--observers linear,gyro_free
 About two minutes on two quiet cores, eight on busy ones; a bar shows the progress.
 
 Errors are those of `cmg-mj compare push_recovery`: the same worlds and noise for every observer, each in its own loop.
-The bias range that a loop tolerates is `bias_limits.py`'s, under the same push. Instructions are those of `cmg-mj bench
-board`; without the programs that this command needs, their column is empty. Estimates that close no loop are judged in
-the loop of `gyro_free`.
+The bias range that a loop tolerates is `bias_limits.py`'s, under the same push. Instructions are those of
+`benchmarks/board.py`; without the programs that it needs, their column is empty. Estimates that close no loop are
+judged in the loop of `gyro_free`.
 """
 
 import argparse
+import runpy
 import sys
+from pathlib import Path
 
 import numpy as np
 from bias_limits import Case, limits
@@ -19,7 +21,6 @@ from rich.console import Console
 from rich.progress import track
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.codegen.board.cost import cost_scenario, measure
 from cmg_mj.errors import InputError
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, needs
 from cmg_mj.results import markdown
@@ -60,8 +61,9 @@ def tolerated(limit: np.ndarray) -> str:
 
 def instructions(observer: str) -> str:
     """Return the instructions of a whole update on the board, or a dash."""
+    measure = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "board.py"))["measure"]
     try:
-        (figures,) = measure([prepare(cost_scenario(observer))], lambda share: None)["figures"]
+        (figures,) = measure([observer])["figures"]
     except InputError as error:
         print(f"no instructions of {observer}: {error}", file=sys.stderr)
         return "-"

@@ -289,24 +289,6 @@ def test_every_column_is_of_a_key_there_is(quick: str) -> None:
     assert (len(table.columns), table.row_count) == (1 + len(columns), 1 + len(REFERENCES))
 
 
-# --- bench ---------------------------------------------------------------------------------------------------
-
-
-def test_bench(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in (("REPEATS", 1), ("ONE_WORLD_S", 0.1), ("MANY_WORLDS_S", 0.1), ("CONTROL_RATES_HZ", (200.0,))):
-        monkeypatch.setattr(f"cmg_mj.studies.benchmark.{name}", value)
-    said = cmg_mj("bench", "loop", "--observers", "linear", "--worlds", 2, "--json")
-    assert (said.status, said.err) == (0, "")
-    (figures,) = json.loads(said.out)["figures"]
-    # Of one repeat. How large the ratios are is for a quiet machine: .ci/speed.py.
-    assert figures["closed_loop_over_bare"] == pytest.approx(figures["closed_loop_ms"] / figures["bare_ms"])
-    share = figures["batch_ms"] / figures["closed_loop_batch_ms"]
-    assert figures["closed_loop_share_of_batch"] == pytest.approx(share)
-    assert figures["timestep_ms"] == 5.0
-    assert "linear" in cmg_mj("bench", "loop", "--observers", "linear", "--worlds", 2).out
-    assert cmg_mj("bench").complaint == "bench: name what to time: loop, board"
-
-
 # --- terminals, pipes ----------------------------------------------------------------------------------------
 
 

@@ -61,12 +61,6 @@ def test_options(command: str, wrong_input: list[str], fragments: list[str]) -> 
         ["compare", "push_recovery", "--observers", "ltv", "--set", "observer.k1=3"],
         "--set observer.k1=3: is a setting of homogeneous, which is not among --observers ltv",
     ),
-    ("bench", ["bench", "loop", "--observers", "ltvv"], "--observers 'ltvv': no such observer; did you mean 'ltv'?"),
-    (
-        "bench on the board",
-        ["bench", "board", "--worlds", "5"],
-        "No such option",
-    ),
     ("no scenario", ["run"], "Missing argument 'SCENARIO'"),
     ("command", ["rnu", "push_recovery"], "No such command 'rnu'"),
     ("list", ["list", "observer"], "'observer' is not one of 'scenarios', 'observers'"),

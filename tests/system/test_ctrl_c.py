@@ -72,14 +72,6 @@ def test_ends_a_run_at_the_next_clean_point(driver: str) -> None:
 
 
 @pytest.mark.slow
-def test_ends_a_measurement_of_speed() -> None:
-    """The run that hears it ends as a result; no other is started."""
-    write(OBSERVER, "pressing.py")
-    outcome = cmg_mj_process("bench", "loop", "--observers", "pressing:Interrupts", "--worlds", "2", cwd=Path())
-    assert (outcome.status, outcome.out, outcome.err) == (130, "", "cmg-mj: interrupted\n")
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_what_ends_a_process_from_outside_counts_as_ctrl_c(name: str) -> None:
     """Started by nohup a process ignores SIGHUP, and so do those that it starts: not here."""

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from cmg_mj.codegen.board.tools import COMPILER, SIZE
 from cmg_mj.errors import InputError
 
+COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
+PACKAGES = {
+    COMPILER: "gcc-arm-none-eabi",
+    SIZE: "gcc-arm-none-eabi",
+    "nano.specs": "libnewlib-arm-none-eabi",
+    EMULATOR: "qemu-system-arm",
+}
+"""Program or file -> its Debian package."""
+
 FIRMWARE = Path(__file__).parent / "firmware"
+EMPTY = FIRMWARE / "empty.c"
+"""A controller that does nothing."""
 
 CORE = ("-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard")
 """Flags of the STM32F746: a Cortex-M7 whose floating-point unit has single precision alone."""
@@ -32,32 +44,6 @@ FLAGS = (
 )
 
 
-class Machine(NamedTuple):
-    """A board that the firmware has a port layer for.
-
-    Attributes:
-        title: The board's name for people.
-        sources: The port layer, a file in the firmware's folder.
-        script: The linker script there.
-        macros: Definitions for the compiler.
-    """
-
-    title: str
-    sources: str
-    script: str
-    macros: tuple[str, ...] = ()
-
-
-MACHINES = {
-    "mps2": Machine("QEMU's mps2-an500", "mps2.c", "mps2.ld", ("QUIET_US=180000000u", "GAP_US=1000000u")),
-    "stm32f746": Machine("ST's 32F746GDISCOVERY", "stm32f746.c", "stm32f746.ld"),
-}
-"""Machine -> its board. The emulated one ends when nobody talks to it for about three minutes.
-
-Its line loses nothing, and its host may be busy: it waits a second for the rest of a message before it drops it.
-"""
-
-
 class Image(NamedTuple):
     """A program for the board.
 
@@ -70,17 +56,43 @@ class Image(NamedTuple):
     flash: int
 
 
-def build(
-    observer: str, folder: Path, controller: Path | None = None, machine: str = "mps2", identity: str = ""
-) -> Image:
+def missing() -> list[str]:
+    """List the Debian packages that are not installed."""
+    return list(dict.fromkeys(package for name, package in PACKAGES.items() if not _is_installed(name)))
+
+
+def available() -> bool:
+    """Return whether a controller can be exported, built and emulated here."""
+    return not missing() and find_spec("casadi") is not None
+
+
+def require() -> None:
+    """Require all Debian packages.
+
+    Raises:
+        InputError: Some are not installed; the message names them.
+    """
+    packages = missing()
+    if packages:
+        raise InputError(f"the emulated board: packages are not installed: apt install {' '.join(packages)}")
+
+
+def _is_installed(name: str) -> bool:
+    if not name.endswith(".specs"):
+        return shutil.which(name) is not None
+    if shutil.which(COMPILER) is None:
+        return False
+    command = [COMPILER, f"-print-file-name={name}"]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip() != name
+
+
+def build(observer: str, folder: Path, controller: Path | None = None) -> Image:
     """Build an exported controller for the board.
 
     Args:
         observer: The observer's name in C.
         folder: Folder of the .h and .c files, to which the image is written.
         controller: Another file in place of the .c file, such as `EMPTY`.
-        machine: The board, one of `MACHINES`.
-        identity: The text with which it introduces itself: see `Identity`.
 
     Returns:
         The image.
@@ -89,25 +101,13 @@ def build(
         InputError: The compiler reports errors.
     """
     source = controller or folder / f"{observer}.c"
-    board = MACHINES[machine]
-    path = folder / f"{observer}-{source.stem}-{machine}.elf"
-    firmware = [FIRMWARE / name for name in ("startup.c", board.sources, "board.c")]
-    macros = [f"-D{macro}" for macro in macros_of(observer, machine, identity)]
-    command: list[str | Path] = [COMPILER, *FLAGS, *macros, "-I", folder, "-I", FIRMWARE]
-    command += ["-T", FIRMWARE / board.script, *firmware, source, "-lm", "-o", path]
-    _run(command, observer)
+    path = folder / f"{observer}-{source.stem}.elf"
+    firmware = [FIRMWARE / name for name in ("startup.c", "mps2.c", "board.c")]
+    sizes = [f"-D{size}={observer.upper()}_{size}" for size in ("ESTIMATES", "ENCODERS")]
+    command: list[str | Path] = [COMPILER, *FLAGS, f"-DOBSERVER={observer}", *sizes, "-I", folder, "-I", FIRMWARE]
+    _run([*command, "-T", FIRMWARE / "mps2.ld", *firmware, source, "-lm", "-o", path], observer)
     text, data, *_ = _run([SIZE, path], observer).splitlines()[1].split()
     return Image(path, int(text) + int(data))
-
-
-def macros_of(observer: str, machine: str, identity: str) -> list[str]:
-    """List the definitions that the firmware is compiled with; `identity` has no character that C quotes."""
-    sizes = [f"{size}={observer.upper()}_{size}" for size in ("ESTIMATES", "ENCODERS")]
-    return [f"OBSERVER={observer}", *sizes, f'IDENTITY="{identity}"', *MACHINES[machine].macros]
-
-
-EMPTY = FIRMWARE / "empty.c"
-"""A controller that does nothing."""
 
 
 def flash_of(observer: str, folder: Path) -> int:
@@ -129,7 +129,8 @@ def _run(command: list[str | Path], observer: str) -> str:
     except OSError as error:
         raise InputError(f"{observer}: {command[0]} cannot be run: {error.strerror}") from error
     if process.returncode:
-        lines = [line for line in process.stderr.splitlines() if "error" in line or "undefined" in line]
-        reason = (lines or process.stderr.splitlines() or [f"status {process.returncode}"])[0]
+        lines = process.stderr.splitlines()
+        errors = [line for line in lines if "error" in line or "undefined" in line]
+        reason = (errors or lines or [f"status {process.returncode}"])[0]
         raise InputError(f"{observer}: {command[0]} refuses it: {reason.strip()}")
     return process.stdout

@@ -9,21 +9,20 @@ import subprocess
 import sys
 import threading
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple, ParamSpec, TypeVar
+from typing import NamedTuple
 
-from cmg_mj.codegen.board.serial_line import Closed, SerialLine
-from cmg_mj.codegen.board.tools import EMULATOR
+from cmg_mj.codegen.board.image import EMULATOR
 from cmg_mj.controllers.processor import Decision
 from cmg_mj.errors import RunStopped
 
-P = ParamSpec("P")
-Answer = TypeVar("Answer")
-
 PATIENCE_S = 30.0
 """Longest wait for an answer, which takes a fraction of a millisecond unless the machine is busy [s]."""
+
+OPTIONS = "-M mps2-an500 -nodefaults -nographic -monitor none -semihosting-config enable=on,target=native -serial stdio"
+"""Options of the emulator; the serial line is its standard input and output."""
 
 STATUSES = {
     0: "nobody has talked to it for three minutes, and it has switched itself off",
@@ -78,7 +77,7 @@ class Board:
 
     def __init__(self, image: Path, *, counting: bool = False, patience_s: float = PATIENCE_S) -> None:
         host, board = socket.socketpair()
-        command = [*_parent_death_prefix(), *emulator_command(image)]
+        command = [*_parent_death_prefix(), EMULATOR, *OPTIONS.split(), "-kernel", str(image)]
         if counting:
             command += ["-icount", f"shift={NANOSECONDS_AN_INSTRUCTION.bit_length() - 1}"]
         with board:
@@ -92,9 +91,10 @@ class Board:
                 raise RunStopped(f"{EMULATOR} cannot be run: {error.strerror}") from error
         self.close = weakref.finalize(self, _end, self._process, host)
         self.costs: list[Cost] = []
-        self._line = SerialLine(host, patience_s)
+        self._line = host
+        self._line.settimeout(patience_s)
         try:
-            self._call_line(self._line.await_ready)
+            self._receive("!", "<")
             self.sizes = Sizes(*self._ask("i", b"", "<4I"))
             self._reals = "f" if self.sizes.real == 4 else "d"
             self._per_instruction, self._empty = self._calibrated() if counting else (0.0, {})
@@ -136,7 +136,9 @@ class Board:
         payload = self._packed(*accelerations, *encoders)
         counts, stack, status, u, x_e, *estimate = self._ask("u", payload, f"<3I{numbers}{self._reals}")
         self.costs.append(self._cost("u", counts, stack))
-        return decision_of(status, u, x_e, estimate)
+        if status:
+            raise RunStopped(f"the controller on the board has stopped: {NOT_FINITE.get(status, f'status {status}')}")
+        return Decision(u, x_e, tuple(estimate))
 
     def init(self, y1: float, y2: float, acceleration: float) -> Cost:
         """Start the separate observer, which is not the controller's."""
@@ -170,13 +172,28 @@ class Board:
         return Cost(round((counts - empty) / self._per_instruction), stack)
 
     def _ask(self, kind: str, payload: bytes, layout: str) -> tuple:
-        return self._call_line(self._line.ask, kind, payload, layout)
-
-    def _call_line(self, function: Callable[P, Answer], *args: P.args, **kwargs: P.kwargs) -> Answer:
+        """Send a message, as firmware/board.c describes it, and receive the numbers of its answer."""
         try:
-            return function(*args, **kwargs)
-        except Closed as error:
+            self._line.sendall(kind.encode() + payload)
+        except OSError as error:
             raise RunStopped(f"the board is gone: {self._exit_message()}") from error
+        return self._receive(kind, layout)
+
+    def _receive(self, kind: str, layout: str) -> tuple:
+        answer, size = b"", 1 + struct.calcsize(layout)
+        while len(answer) < size:
+            try:
+                part = self._line.recv(size - len(answer))
+            except TimeoutError as error:
+                raise RunStopped(f"the board has not answered for {self._line.gettimeout():g} s") from error
+            except OSError:
+                part = b""
+            if not part:
+                raise RunStopped(f"the board is gone: {self._exit_message()}")
+            answer += part
+        if answer[:1] != kind.encode():
+            raise RunStopped(f"the board answered something else than what {kind!r} asked")
+        return struct.unpack(layout, answer[1:])
 
     def _exit_message(self) -> str:
         with suppress(subprocess.TimeoutExpired):
@@ -190,23 +207,6 @@ class Board:
                 return f"{EMULATOR} was ended by signal {-status}"
             return STATUSES.get(status, f"{EMULATOR} has ended with status {status}")
         return "it has closed the line"
-
-
-def decision_of(status: int, u: float, x_e: float, estimate: Sequence[float]) -> Decision:
-    """Return the decision of an update's answer.
-
-    Raises:
-        RunStopped: Its status says that a number was not finite.
-    """
-    if status:
-        raise RunStopped(f"the controller on the board has stopped: {NOT_FINITE.get(status, f'status {status}')}")
-    return Decision(u, x_e, tuple(estimate))
-
-
-def emulator_command(image: Path) -> list[str]:
-    """Return the command that runs an image with its serial line on standard input and output."""
-    options = "-M mps2-an500 -nodefaults -nographic -monitor none -semihosting-config enable=on,target=native"
-    return [EMULATOR, *options.split(), "-serial", "stdio", "-kernel", str(image)]
 
 
 def _parent_death_prefix() -> list[str]:

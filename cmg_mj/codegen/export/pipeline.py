@@ -10,9 +10,8 @@ from typing import NamedTuple, TypedDict, TypeVar
 
 from cmg_mj.codegen.export import check
 from cmg_mj.codegen.export.c_code import Precision, operations
-from cmg_mj.codegen.export.c_files import CodePrinter
+from cmg_mj.codegen.export.c_files import CodePrinter, format_example, format_test_vector
 from cmg_mj.codegen.export.constants import constants_of
-from cmg_mj.codegen.export.example import format_example, format_test_vector
 from cmg_mj.codegen.export.law_code import LawPrinter
 from cmg_mj.codegen.export.names import export_files, name_of
 from cmg_mj.codegen.export.refusals import refuse_unexported

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import casadi
 
-from cmg_mj.codegen.export.c_identifiers import identifiers
 from cmg_mj.codegen.export.constants import Constants
 from cmg_mj.codegen.export.formulas import (
     MEASURED,
@@ -17,6 +16,7 @@ from cmg_mj.codegen.export.formulas import (
     needed_numbers,
     symbols_named,
 )
+from cmg_mj.codegen.export.names import identifiers
 from cmg_mj.codegen.export.pytree import form, numbers, rebuild
 from cmg_mj.codegen.export.source_location import LawNotExportable, NotExportable
 from cmg_mj.codegen.export.symbol import Symbol, expression

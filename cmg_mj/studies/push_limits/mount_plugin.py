@@ -7,8 +7,7 @@ import re
 from pathlib import Path
 
 from cmg_mj.codegen.engine_plugin.tables import NAMES_IN_USE
-from cmg_mj.codegen.export.c_identifiers import RESERVED
-from cmg_mj.codegen.export.names import LONGEST
+from cmg_mj.codegen.export.names import LONGEST, RESERVED
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.files import model_files
 from cmg_mj.results.folder import RunFolder, is_own

@@ -13,17 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.codegen.board import Board, on_a_board
-from cmg_mj.codegen.board.deploy import temporary_export
-from cmg_mj.codegen.board.image import build
-from cmg_mj.codegen.board.tools import available
+from cmg_mj.codegen.board import Board, on_a_board, temporary_export
+from cmg_mj.codegen.board.image import available, build
 from cmg_mj.controllers.processor import Decision
 from cmg_mj.errors import InputError, RunStopped
 from cmg_mj.observers import OBSERVERS, Measurement
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
-from tests.codegen.board.toy import SHORT, short, toy
+from tests.codegen.board.toy import SHORT, short
 from tests.command import cmg_mj
 from tests.tiers import slow_but
 
@@ -96,8 +94,8 @@ def test_lockstep_on_the_same_inputs(observer: str) -> None:
     experiment = prepare(load_scenario("push_recovery", PUSH_SETTINGS if observer in ARE_PUSHED else SHORT, observer))
     host = Recorder(experiment)
     experiment.run_on(host)
-    with temporary_export(experiment.axis_controller()) as files:
-        image = build(files.observer, files.folder).path
+    with temporary_export(experiment.axis_controller()) as (name, folder):
+        image = build(name, folder).path
         assert double_precision_names(image) == []
         board = Board(image)
     with board:
@@ -166,8 +164,8 @@ def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
 def test_another_law_closes_the_loop(law: str) -> None:
     """Its integrator too, which of one of them does not begin at zero, and which another one does not have."""
     experiment = short("kalman", *NO_COUNTS, f"controller.kind={law}")
-    with temporary_export(experiment.axis_controller()) as files:
-        assert double_precision_names(build(files.observer, files.folder).path) == []
+    with temporary_export(experiment.axis_controller()) as (name, folder):
+        assert double_precision_names(build(name, folder).path) == []
     host, board = experiment.run(), experiment.run(driver="board")
     assert board.outcomes == host.outcomes
     assert host.trajectory is not None
@@ -204,26 +202,6 @@ def test_a_reading_that_is_not_finite_stops_the_board_until_start() -> None:
 def test_what_the_board_cannot_do_is_refused() -> None:
     with pytest.raises(InputError, match=r"^controller\.feedback = 'truth': a board has no such sensor"):
         short("linear", "controller.feedback=truth").run(driver="board")
-
-
-@pytest.mark.parametrize(
-    "update",
-    ["*u = (float)((double)e[0] * 0.1);", "extern double pow(double, double); *u = (float)pow((double)e[0], 0.5);"],
-)
-def test_what_is_would_be_seen(tmp_path: Path, update: str) -> None:
-    assert double_precision_names(toy(tmp_path, update=update + " return TOY_OK;"))
-
-
-@pytest.mark.slow
-def test_the_commands(tmp_path: Path) -> None:
-    out = tmp_path / "on_board"
-    outcome = cmg_mj(
-        *f"run push_recovery --driver board --observer gyro_free --json --out {out}".split(), *set_options(SHORT)
-    )
-    assert (outcome.status, outcome.err) == (0, "")
-    assert json.loads(outcome.out) == json.loads((out / "summary.json").read_text())
-    assert json.loads(outcome.out)["outcome"] == "done"
-    assert cmg_mj("bench", "loop", "--markdown").complaint.startswith("No such option")
 
 
 @pytest.mark.slow

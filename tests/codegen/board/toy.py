@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cmg_mj.codegen.board.image import build
-from cmg_mj.codegen.board.tools import missing
+from cmg_mj.codegen.board.image import build, missing
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 
@@ -67,19 +66,17 @@ toy_status toy_update(toy_controller *c, const toy_real a[4], const toy_real e[2
 """
 
 
-def toy(folder: Path, update: str = "", step: str = "", machine: str = "mps2", identity: str = "") -> Path:
+def toy(folder: Path, update: str = "", step: str = "") -> Path:
     """Build it.
 
     Args:
         folder: Where.
         update: C at the beginning of an update; `e[0]` is what the first encoder shows.
         step: C at the beginning of a step of the observer.
-        machine: For which board.
-        identity: With which it introduces itself.
 
     Returns:
         The image.
     """
     (folder / "toy.h").write_text(HEADER)
     (folder / "toy.c").write_text(SOURCE % {"update": update, "step": step})
-    return build("toy", folder, machine=machine, identity=identity).path
+    return build("toy", folder).path

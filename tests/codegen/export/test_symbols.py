@@ -21,7 +21,7 @@ import casadi  # isort: skip  (skipped above where it is missing)
 from cmg_mj.codegen.export.symbol import Symbol  # isort: skip
 from cmg_mj.codegen.export.formulas import as_written  # isort: skip
 from cmg_mj.codegen.export.names import name_of  # isort: skip
-from cmg_mj.codegen.export.c_identifiers import identifiers  # isort: skip
+from cmg_mj.codegen.export.names import identifiers  # isort: skip
 from cmg_mj.codegen.export.pipeline import generate_code  # isort: skip
 
 

@@ -1,4 +1,4 @@
-/* The port layer of the board that QEMU calls mps2-an500: ARM's MPS2 with a Cortex-M7. Its UART and timers are those of ARM's
+/* The board that QEMU calls mps2-an500: ARM's MPS2 with a Cortex-M7. Its UART and timers are those of ARM's
  * CMSDK (Cortex-M System Design Kit). The emulated line has no baud rate. */
 #include "port.h"
 
@@ -20,12 +20,8 @@
 #define PENDING_NO_MORE WORD(0xe000e280u)
 
 enum { UART_RECEIVED = 1u << 0, WATCH = 1u << 9 }; /* numbers of the interrupts */
-enum { CLOCK_MHZ = 25 };
 
-const char port_name[] = "mps2-an500";
-const uint32_t port_cycles_a_second = 0; /* QEMU knows no cycles: the timer counts the host's time, or instructions */
-
-int port_init(void)
+void port_init(void)
 {
     UART_DIVIDER = 16;
     UART_CONTROL = 0xb; /* send, receive, interrupt when something has come */
@@ -34,15 +30,12 @@ int port_init(void)
     TIMER_CONTROL = 1;
     __asm volatile("cpsid i" ::: "memory"); /* interrupts only end a wait: nothing comes between two instructions */
     INTERRUPTS = UART_RECEIVED | WATCH;
-    return 0;
 }
 
-int port_read(uint8_t *byte, uint32_t wait_us)
+uint8_t port_read(void)
 {
-    const uint32_t longest = 0xffffffffu / CLOCK_MHZ;
-
     WATCH_CONTROL = 0;
-    WATCH_RELOAD = WATCH_VALUE = CLOCK_MHZ * (wait_us < longest ? wait_us : longest);
+    WATCH_RELOAD = WATCH_VALUE = 0xffffffffu; /* 172 s at 25 MHz */
     WATCH_CONTROL = 0x9; /* count, interrupt */
     for (;;) {
         uint32_t over;
@@ -52,12 +45,10 @@ int port_read(uint8_t *byte, uint32_t wait_us)
         over = WATCH_STATUS & 1u;
         WATCH_STATUS = 1;
         PENDING_NO_MORE = UART_RECEIVED | WATCH;
-        if (UART_STATE & 2u) {
-            *byte = (uint8_t)UART_DATA;
-            return 1;
-        }
+        if (UART_STATE & 2u)
+            return (uint8_t)UART_DATA;
         if (over)
-            return 0;
+            port_reset(NOBODY_TALKS);
         __asm volatile("wfi" ::: "memory");
     }
 }
@@ -75,18 +66,6 @@ void port_write(const uint8_t *bytes, uint32_t count)
 uint32_t port_cycles(void)
 {
     return ~TIMER_VALUE; /* it counts down */
-}
-
-uint32_t port_time(void)
-{
-    static uint32_t last, rest, time; /* the timer comes round after 172 s, and somebody asks more often */
-    const uint32_t now = port_cycles();
-
-    rest += now - last;
-    last = now;
-    time += rest / CLOCK_MHZ;
-    rest %= CLOCK_MHZ;
-    return time;
 }
 
 void port_reset(int why)

@@ -1,24 +1,33 @@
-"""Measures the cost of an update on a Cortex-M7: instructions, stack, memory, flash."""
+"""Measures the cost of an update on an emulated Cortex-M7: instructions, stack, memory, flash.
+
+python benchmarks/board.py [--observers gyro_free] [--markdown] [--json] (three seconds an observer)
+python benchmarks/board.py --paper    writes what papers/aranovskiy2020 reads
+"""
 
 from __future__ import annotations
 
+import argparse
+import json
 import statistics
-from collections.abc import Callable, Sequence
-from typing import Protocol, TypedDict
+from collections.abc import Sequence
+from typing import TypedDict
 
 from rich import box
+from rich.console import Console
 from rich.table import Table
 
-from cmg_mj.codegen.board.deploy import temporary_export
-from cmg_mj.codegen.board.image import build, flash_of
-from cmg_mj.codegen.board.qemu import Board, Cost
-from cmg_mj.codegen.board.tools import require
-from cmg_mj.controllers.processor import Processor
+from cmg_mj.codegen.board import Board, Cost, temporary_export
+from cmg_mj.codegen.board.image import build, flash_of, require
 from cmg_mj.core.controller import Controller
+from cmg_mj.observers import OBSERVERS
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain
+from cmg_mj.papers.aranovskiy2020.on_the_board import PLAIN, RECORDED
+from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS as PAPER_OBSERVERS
 from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
-from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from cmg_mj.scenario.schema import Scenario
+from cmg_mj.simulation.experiment import Experiment, prepare
 
 SECONDS = 2.5
 """Time of push_recovery over which costs are measured at every tick; its push begins at 2 s [s]."""
@@ -69,34 +78,16 @@ class CostFigures(TypedDict):
     figures: list[ObserverCost]
 
 
-class ProcessorExperiment(Protocol):
-    """The part of `experiment.Experiment`, a package below this one, that runs a processor in the loop."""
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario."""
-        ...
-
-    def axis_controller(self) -> Controller:
-        """Make a fresh controller."""
-        ...
-
-    def run_on(self, processor: Processor, /) -> Result:
-        """Run one world with the control decisions of a processor."""
-        ...
-
-
 def cost_scenario(observer: str) -> Scenario:
     """Load the scenario on which an observer's cost is measured."""
     return load_scenario("push_recovery", [f"duration_s={SECONDS}", "open_loop_observers=[]"], observer)
 
 
-def measure(runs: Sequence[ProcessorExperiment], on_progress: Callable[[float], None]) -> CostFigures:
+def measure(observers: Sequence[str]) -> CostFigures:
     """Measure the costs of observers, each in a run with the board.
 
     Args:
-        runs: An `Experiment` for each observer, such as `prepare(cost_scenario("linear"))`.
-        on_progress: Called with the share done.
+        observers: Names of the observers.
 
     Returns:
         The figures.
@@ -106,9 +97,8 @@ def measure(runs: Sequence[ProcessorExperiment], on_progress: Callable[[float], 
     """
     require()
     rows: list[ObserverCost] = []
-    for i, run in enumerate(runs):
+    for run in [prepare(cost_scenario(observer)) for observer in observers]:
         rows.append({"observer": run.scenario.observer.kind, **cost_of(run, run.axis_controller())})
-        on_progress((i + 1.0) / len(runs))
     return {
         "processor": "Cortex-M7, single precision, emulated",
         "clock_mhz": CLOCK_MHZ,
@@ -117,19 +107,19 @@ def measure(runs: Sequence[ProcessorExperiment], on_progress: Callable[[float], 
     }
 
 
-def cost_of(run: ProcessorExperiment, controller: Controller) -> UpdateCost:
+def cost_of(run: Experiment, controller: Controller) -> UpdateCost:
     """Measure the cost of a controller on the board.
 
     Args:
-        run: An `Experiment`; the controller on the board closes its loop, and all ticks count.
+        run: The experiment; the controller on the board closes its loop, and all ticks count.
         controller: The controller of the experiment, or one that estimates the same signals.
 
     Returns:
         The cost.
     """
-    with temporary_export(controller) as files:
-        flash = flash_of(files.observer, files.folder)
-        board = Board(build(files.observer, files.folder).path, counting=True)
+    with temporary_export(controller) as (observer, folder):
+        flash = flash_of(observer, folder)
+        board = Board(build(observer, folder).path, counting=True)
     with board:
         result = run.run_on(board)
         updates = board.costs[1:]  # the first only starts the observer
@@ -169,7 +159,7 @@ def _instructions(costs: Sequence[Cost]) -> tuple[float, int]:
 
 
 def cost_table(figures: CostFigures) -> Table:
-    """Make the table that `cmg-mj bench board` prints."""
+    """Make the table that is printed."""
     printed = Table(
         title="An update on a Cortex-M7 in single precision: instructions counted by QEMU, median and most over "
         f"{SECONDS:g} s of push_recovery;\nmicroseconds at {CLOCK_MHZ:g} MHz are an estimate: one cycle an instruction",
@@ -191,3 +181,37 @@ def cost_markdown(figures: CostFigures) -> str:
 def _cells(figures: CostFigures) -> list[list[str]]:
     rows = [dict(row) for row in figures["figures"]]
     return [[pattern.format(row[key]) for key, pattern in COLUMNS.values()] for row in rows]
+
+
+def count_for_paper() -> dict[str, float]:
+    """Count aranovskiy2020's observers, along half a second in which the rig comes back from one degree."""
+    runs = {
+        name: prepare(
+            parse_scenario({"duration_s": 0.5, "plant": {"initial_tilt_deg": 1.0}, "observer": {"kind": name}})
+        )
+        for name in PAPER_OBSERVERS
+    }
+    counts = {name: cost_of(run, run.axis_controller())["step_instructions"] for name, run in runs.items()}
+    of_10 = runs["ltv"]
+    for name, method in PLAIN.items():
+        counts[name] = cost_of(of_10, of_10.axis_controller(observer=Plain(method)))["step_instructions"]
+    return counts
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--observers", default=",".join(OBSERVERS), metavar="NAMES")
+    parser.add_argument("--markdown", action="store_true")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--paper", action="store_true")
+    options = parser.parse_args()
+    if options.paper:
+        RECORDED.write_text(json.dumps(count_for_paper(), indent=2) + "\n", encoding="utf-8")
+    else:
+        figures = measure(options.observers.split(","))
+        if options.json:
+            print(json.dumps(figures, indent=2))
+        elif options.markdown:
+            print(cost_markdown(figures))
+        else:
+            Console().print(cost_table(figures))
