@@ -20,6 +20,7 @@ from cmg_mj.codegen.export import check_installed
 from cmg_mj.codegen.export.names import name_of
 from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.errors import InputError
+from cmg_mj.linear.verdict import require_stable_period
 from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.plugin_model import plugin_mjcf
@@ -28,7 +29,6 @@ from cmg_mj.results.run_folder.folder import claimed, write_text
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.omissions import IN_THE_MODEL, omissions
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.scenario.stability_check import require_stable_period
 
 LIBRARY_MODE = 0o755
 

@@ -8,36 +8,26 @@ from collections.abc import Iterable, Iterator, Mapping
 from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.controllers.laws.protocol import needs
 from cmg_mj.errors import TomlValue
-from cmg_mj.scenario.bend_cures import NEAR, Trial, cure_among, trials, try_loop
+from cmg_mj.linear.bend import bend_hints, bend_rows, judge_bend
+from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_gains, sliding_words
+from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
-from cmg_mj.scenario.linear_plant import rk4_energy_loss
 from cmg_mj.scenario.omissions import omissions
 from cmg_mj.scenario.pivot_track import read_track
-from cmg_mj.scenario.plant_parameters import PlantParameters
-from cmg_mj.scenario.plant_settings import BendBeyond
 from cmg_mj.scenario.resolve import resolved
-from cmg_mj.scenario.schema import ControllerSettings, Scenario
-from cmg_mj.scenario.sliding_pivot import IN_THE_MODEL, NOT_IN_THE_MODEL, sliding_words
-from cmg_mj.scenario.stability_check import bend_hint, closed_loop, hints, plant_hints
-
-BEYOND: dict[BendBeyond, str] = {
-    "sensors": "with the sensors; the modules, whose tilt and rate count as true, are before it",
-    "modules": "with the modules, whose tilt and rate count as true; the sensors are before it",
-    "both": "with the modules, whose tilt and rate count as true, and the sensors",
-}
+from cmg_mj.scenario.schema import ControllerSettings
+from cmg_mj.simulation.experiment import Experiment
 
 
-def description(name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "") -> str:
+def description(name: str, part: Experiment) -> str:
     """Describe a scenario in the lines that `cmg-mj check` prints.
 
     Args:
         name: The scenario as the user called it.
-        scenario: The scenario of one axis.
-        design: The law and the observers.
-        rig: The parameters of the plant.
-        axis: The name of the axis, if it has one.
+        part: One axis of it.
     """
+    scenario, design, rig, axis = part.scenario, part.design, part.design.rig, part.plant.axis.name
     settings = scenario.plant
     timestep = rig.timestep
     fields = resolved(scenario, {axis: design})
@@ -55,7 +45,7 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
         ("plant", f"{fields['plant']['model']}, modules: {', '.join(rig.modules)}"),
         *([("", assignments(changes))] if changes else []),
         ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
-        *_law_rows(scenario, design, rig, fields["controller"]),
+        *_law_rows(design, fields["controller"]),
         ("observer", f"{scenario.observer.kind}  {assignments(observer)}".rstrip()),
         *(
             [("", "your own code, which was imported and tried on two samples")]
@@ -73,13 +63,13 @@ def description(name: str, scenario: Scenario, design: Design, rig: PlantParamet
         rows.append(("pivot", pivot.words))
         if pivot.file is not None:
             rows.append(("", read_track(pivot.file, pivot.column).words))
-    rows += _pivot_rows(rig)
+    rows += _pivot_rows(part.plant)
     missing = list(omissions(scenario).values())
     if missing:
         rows.append(("omitted", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
-    trial = try_loop(scenario, rig)
-    rows += _bend_rows(scenario, rig, trial)
-    clauses = [*plant_hints(scenario, design, rig), *bend_hint(rig, trial)]
+    bend = judge_bend(design, part.plant)
+    rows += bend_rows(design, part.plant, bend)
+    clauses = [*hints(design, part.plant), *bend_hints(part.plant, bend)]
     return lines(
         f"{name}{f', axis {axis}' if axis else ''}: valid",
         [*rows, *(("hint", hint) for hint in clauses)],
@@ -90,65 +80,26 @@ def _about(torque: Push | Swing) -> str:
     return "" if torque.axis is None else f" about {torque.axis}"
 
 
-def _pivot_rows(rig: PlantParameters) -> Iterator[tuple[str, str]]:
+def _pivot_rows(plant: Plant) -> Iterator[tuple[str, str]]:
     """Describe a sliding pivot: the point that the tilt is taken about, and the model's share of the sliding."""
-    if rig.reduced.pivot_arm:
-        yield "pivot", sliding_words(rig)
+    if plant.reduced.pivot_arm:
+        yield "pivot", sliding_words(plant)
         yield "", f"in the reduced model: {IN_THE_MODEL}"
         yield "", f"not in it: {NOT_IN_THE_MODEL}"
 
 
-def _bend_rows(scenario: Scenario, rig: PlantParameters, trial: Trial | None) -> Iterator[tuple[str, str]]:
-    """Return the mode of a frame that bends, the loop around it, and a cure for that if it needs one."""
-    if rig.bend is None:
-        return
-    plant, bend = scenario.plant, rig.bend
-    loss, numerical = bend.energy_loss, rk4_energy_loss(bend.frequency_hz, rig.timestep)
-    mode = f"{bend.frequency_hz:g} Hz, damping ratio {bend.damping_ratio:g}"
-    yield "bend", f"{mode}, beyond it {plant.bend_share:g} of the inertia"
-    yield "", BEYOND[plant.bend_beyond]
-    yield "", f"loses {100.0 * loss:.3g} % of its energy a second, and {100.0 * numerical:.2g} % to the physics steps"
-    if trial is None:
-        yield "", "its loop is not computed for code of your own"
-        return
-    yield "", f"the loop with it, feedback from the {scenario.controller.feedback}: {trial.words}"
-    if not trial.is_stable_rigid:
-        yield "cure", "none is tried: law, observer and notch have to hold a rigid frame first"
-    if not trial.is_near:
-        return
-    others = trials(scenario, rig)
-    for other in others:
-        yield "tried", f"{' '.join(other.settings)}: {other.words}"
-    cure = cure_among(others)
-    if cure is None or (trial.is_stable and cure.distance <= trial.distance):
-        yield (
-            "cure",
-            "none of these: the mode is too near the loop's bandwidth; a stiffer frame or another observer may",
-        )
-        return
-    little = "" if cure.distance >= NEAR else ", with little margin"
-    yield "cure", f"{' '.join(f'--set {_quoted(setting)}' for setting in cure.settings)}{little}"
-
-
-def _quoted(setting: str) -> str:
-    return f"'{setting}'" if " " in setting else setting
-
-
-def _law_rows(
-    scenario: Scenario, design: Design, rig: PlantParameters, fields: Mapping[str, TomlValue]
-) -> Iterator[tuple[str, str]]:
+def _law_rows(design: Design, fields: Mapping[str, TomlValue]) -> Iterator[tuple[str, str]]:
     """Return the law, its inputs, and of the papers' law the closed loop on the reduced model."""
-    controller, law = scenario.controller, design.law
+    controller, law = design.scenario.controller, design.law
     limits = f"at {controller.rate_hz:g} Hz, at most {controller.rate_limit_rad_s:g} rad/s"
     inputs = f"tilt rate from the {controller.feedback}, {controller.angle_source} angles"
     notch = f"notch at {controller.notch_hz:g} Hz on the command" if controller.notch_hz else ""
     if isinstance(law, StateFeedback):
-        loop = closed_loop(scenario, law, rig.reduced)
+        loop = judge_gains(design).loop
         yield "law", f"K_e = {number(law.gains)} {limits}"
         yield "", inputs
         if notch:
-            fast = f", not in the next lines: beyond {0.5 / loop.period:g} Hz the sensors show nothing"
-            yield "", notch if loop.notch_hz else f"{notch}{fast}"
+            yield "", notch
         yield "", f"{loop.words} with the reduced model and its true state, slowest pole {loop.slowest:.3g} 1/s,"
         yield "", f"least damping ratio {loop.damping:.2g}, nearest to -1 {loop.distance:.2g}"
         return
@@ -163,23 +114,19 @@ def _law_rows(
         yield "", "your own code, which was imported and tried on two samples"
 
 
-def rig_description(
-    name: str, scenario: Scenario, design: Design, rig: PlantParameters, axis: str = "", own: str = ""
-) -> str:
+def rig_description(name: str, part: Experiment, own: str = "") -> str:
     """Describe a model file in the lines that `cmg-mj check` prints.
 
     Args:
         name: The file as the user called it.
-        scenario: A scenario with this model and all defaults.
-        design: The law and the observers by default.
-        rig: The parameters of the plant.
-        axis: The name of the axis, if it has one.
+        part: One axis of a scenario with this model and all defaults.
         own: The model's own scenario file, if it has one, whose gains are then not judged here.
     """
+    rig, axis = part.design.rig, part.plant.axis.name
     about = f" --set push.0.axis={axis}" if axis else ""
     push_it = f"cmg-mj run push_recovery --set {shlex.quote(f'plant.model={name}')}{about}"
     law = f"gains are a scenario's; here Table 2's, K_e = {number(TABLE_2_GAINS)}"
-    clauses: Iterable[str] = hints(scenario, design, rig)
+    clauses: Iterable[str] = part.hints
     if own:
         clauses = (f"{rig.path}: {hint}" for hint in rig.hints)
         push_it = f"cmg-mj run {shlex.quote(own)}"
@@ -190,7 +137,7 @@ def rig_description(
         ("modules", ", ".join(rig.modules)),
         ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
         ("", f"omega_d = {reduced.omega_d:.6g} rad/s, m g l/sqrt(2) = {reduced.gravity_torque:.6g} N m"),
-        *_pivot_rows(rig),
+        *_pivot_rows(part.plant),
         ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),
         ("law", law),
         *(("hint", hint) for hint in clauses),
