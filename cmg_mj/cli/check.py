@@ -11,6 +11,7 @@ from cmg_mj.errors import TomlValue
 from cmg_mj.linear.bend import bend_hints, bend_rows, judge_bend
 from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_gains, sliding_words
 from cmg_mj.plant.plant import Plant
+from cmg_mj.scenario.description import assignments, lines, number
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.disturbances import Push, Swing
 from cmg_mj.scenario.omissions import omissions
@@ -144,22 +145,3 @@ def rig_description(name: str, part: Experiment, own: str = "") -> str:
         ("run it", push_it),
     ]
     return lines(f"{name}: a rig{f', axis {axis}' if axis else ''}", rows)
-
-
-def lines(title: str, rows: Iterable[tuple[str, str]]) -> str:
-    """Join a title, and rows of a label and a text."""
-    return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows)])
-
-
-def assignments(values: Mapping[str, TomlValue]) -> str:
-    """Parameters and their values, as `--set` takes them."""
-    return "  ".join(f"{name}={number(value)}" for name, value in values.items())
-
-
-def number(value: TomlValue) -> str:
-    """Return a value as TOML writes it, to six digits."""
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(number(item) for item in value)}]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -11,7 +11,7 @@ from cmg_mj.errors import InputError
 from cmg_mj.linear.loop import ClosedLoop
 from cmg_mj.linear.march import MOTION_WORDS, Motion, march
 from cmg_mj.linear.plant import linearise
-from cmg_mj.linear.verdict import Verdict, judge
+from cmg_mj.linear.verdict import Verdict, judge, margins
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
@@ -92,9 +92,10 @@ def _is_stable(verdict: Verdict | Motion) -> bool:
 def _words(verdict: Verdict | Motion) -> str:
     if not isinstance(verdict, Verdict):
         return MOTION_WORDS[verdict]
-    if verdict.margins is None:
-        return verdict.words + (f", nearest to -1 {verdict.distance:.2g}" if verdict.is_stable else "")
-    return f"{verdict.words}, nearest to -1 {verdict.distance:.2g}; {verdict.margins.words}"
+    words = verdict.words + (f", nearest to -1 {verdict.distance:.2g}" if verdict.is_stable else "")
+    if verdict.transfer is None or verdict.omega is None:
+        return words
+    return f"{words}; {margins(verdict.transfer, verdict.omega).words}"
 
 
 def bend_hints(plant: Plant, verdict: BentVerdict | None) -> list[str]:

@@ -58,13 +58,15 @@ class Verdict(NamedTuple):
         poles: Its poles, as of a continuous loop, (n,) complex [1/s].
         damping: The least damping ratio of its modes, but for those that have faded within the loop's own lag.
         distance: The least distance from -1 of the loop transfer, opened at the command; 0 of an unstable loop.
-        margins: Of a stable loop whose sensors are not slower than the controller.
+        transfer: The loop transfer L of a stable loop whose sensors are not slower than the controller.
+        omega: Its frequencies [rad/s].
     """
 
     poles: np.ndarray
     damping: float
     distance: float
-    margins: Margins | None
+    transfer: np.ndarray | None = None
+    omega: np.ndarray | None = None
 
     @property
     def slowest(self) -> float:
@@ -100,18 +102,19 @@ def judge(loop: ClosedLoop, lag: float = 0.0) -> Verdict:
     poles = _continuous(loop, system.A, system.C[commands], z)
     swinging = poles[(-poles.real * lag < 1.0) & (np.abs(poles) > MARGIN)]
     damping = float(np.min(-swinging.real / np.abs(swinging), initial=1.0))
-    verdict = Verdict(poles, damping, 0.0, None)
+    verdict = Verdict(poles, damping, 0.0)
     if verdict.slowest >= MARGIN:
         return verdict
     near = [abs(np.angle(pole)) + abs(1.0 - abs(pole)) * np.linspace(-3.0, 3.0, 31) for pole in z if abs(pole) > 0.5]
-    angles = np.unique(np.concatenate([np.geomspace(1e-4, math.pi, FREQUENCIES // ticks + 50), *near]))
+    angles = np.concatenate([np.geomspace(1e-4, math.pi, FREQUENCIES // ticks + 50), *near])
+    angles = np.unique(np.round(angles, 9))
     angles = angles[(angles >= 1e-4) & (angles <= math.pi)]
     unit = np.eye(len(z))
     H = [C @ solve_triangular(point * unit - triangle, B) for point in np.exp(1j * angles)]
     sensitivity = np.eye(ticks) + np.array(H) + system.D[np.ix_(commands, rates)]  # 1 + H = 1/(1 + L)
     distance = 1.0 / float(np.linalg.norm(sensitivity, 2, axis=(1, 2)).max())
-    margins = _margins(1.0 / sensitivity[:, 0, 0] - 1.0, angles / loop.period) if ticks == 1 else None
-    return verdict._replace(distance=distance, margins=margins)
+    transfer = 1.0 / sensitivity[:, 0, 0] - 1.0 if ticks == 1 else None
+    return verdict._replace(distance=distance, transfer=transfer, omega=angles / loop.period)
 
 
 def _continuous(loop: ClosedLoop, A: np.ndarray, C: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -126,7 +129,7 @@ def _continuous(loop: ClosedLoop, A: np.ndarray, C: np.ndarray, z: np.ndarray) -
     return (np.log(np.maximum(np.abs(z), np.finfo(float).tiny)) + 1j * turned) / loop.period
 
 
-def _margins(transfer: np.ndarray, omega: np.ndarray) -> Margins:
+def margins(transfer: np.ndarray, omega: np.ndarray) -> Margins:
     """Compute a stable loop's margins from its transfer at frequencies [rad/s]."""
     import control
 
