@@ -82,7 +82,7 @@ def judge_bend(design: Design, plant: Plant) -> BentVerdict | None:
         controller, observer = design.scenario.controller.kind, design.scenario.observer.kind
         if controller not in LAWS or observer not in OBSERVERS:
             return None
-        return BentVerdict(*(march(design, each) for each in (bending, rigid)))
+        return BentVerdict(march(design, bending), march(design, rigid))
 
 
 def _is_stable(verdict: Verdict | Motion) -> bool:

@@ -273,13 +273,18 @@ class ClosedLoop:
         place = self._on_the_way[name].index((taken % self._steps, -(taken // self._steps)))
         return start[f"{name}_{place + 1}"]
 
-    def _decide(self, motion: np.ndarray, readings: dict[str, np.ndarray]) -> tuple[np.ndarray, Sequence[np.ndarray]]:
+    def _decide(self, motion: np.ndarray, readings: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Return the command of a tick, and the estimate, as `Controller.decide` makes them."""
         rows, settings = self._rows, self._design.scenario.controller
         before, y2 = rows["u_before"], readings["encoder"] + rows["y2_noise_rad"]
         if self._true_state:
             y1, acceleration, x3 = readings["tilt"], 0.0 * before, y2
-            measured, estimate, x1, x2 = [y1, y2, acceleration, before], (), y1, readings.get("rate", motion[1])
+            measured, estimate, x1, x2 = (
+                [y1, y2, acceleration, before],
+                np.array([]),
+                y1,
+                readings.get("rate", motion[1]),
+            )
         else:
             y1, acceleration = self._y1_slopes @ np.array([readings["inner"], readings["outer"]])
             y1, acceleration = y1 + rows["y1_noise_rad"], acceleration + rows["acceleration_noise_rad_s2"]

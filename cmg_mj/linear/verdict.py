@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -93,15 +93,16 @@ def judge(loop: ClosedLoop, lag: float = 0.0) -> Verdict:
     """
     from scipy.linalg import schur, solve_triangular
 
-    system, ticks = loop.system(), loop.ticks
+    system: Any = loop.system()  # python-control has no types
+    ticks = loop.ticks
     rates = [i for i, name in enumerate(system.input_labels) if name.startswith("gimbal_rate_noise")]
     commands = [i for i, name in enumerate(system.output_labels) if name.startswith("u_rad_s")]
-    triangle, basis = schur(system.A, output="complex")
+    triangle, basis = schur(system.A, output="complex")[:2]
     C, B = system.C[commands] @ basis, basis.conj().T @ system.B[:, rates]
     z = np.diag(triangle)
     poles = _continuous(loop, system.A, system.C[commands], z)
-    swinging = poles[(-poles.real * lag < 1.0) & (np.abs(poles) > MARGIN)]
-    damping = float(np.min(-swinging.real / np.abs(swinging), initial=1.0))
+    swinging = poles[(-np.real(poles) * lag < 1.0) & (np.abs(poles) > MARGIN)]
+    damping = float(np.min(-np.real(swinging) / np.abs(swinging), initial=1.0))
     verdict = Verdict(poles, damping, 0.0)
     if verdict.slowest >= MARGIN:
         return verdict
