@@ -249,7 +249,8 @@ class ClosedLoop:
         from scipy.signal import butter
 
         bandwidth = self._design.scenario.sensors.accelerometer.bandwidth_hz
-        return self._second_order(f"{name}_filter", *np.array(butter(2, bandwidth, fs=INSIDE_HZ)), value)
+        numerator, denominator = np.array(butter(2, bandwidth, fs=INSIDE_HZ))
+        return self._second_order(f"{name}_filter", numerator, denominator, value)
 
     def _second_order(self, name: str, numerator: Sequence, denominator: Sequence, value: np.ndarray) -> np.ndarray:
         """Advance a filter of second order, whose states are a name's 1 and 2."""
@@ -279,12 +280,8 @@ class ClosedLoop:
         before, y2 = rows["u_before"], readings["encoder"] + rows["y2_noise_rad"]
         if self._true_state:
             y1, acceleration, x3 = readings["tilt"], 0.0 * before, y2
-            measured, estimate, x1, x2 = (
-                [y1, y2, acceleration, before],
-                np.array([]),
-                y1,
-                readings.get("rate", motion[1]),
-            )
+            measured, estimate = [y1, y2, acceleration, before], np.array([])
+            x1, x2 = y1, readings.get("rate", motion[1])
         else:
             y1, acceleration = self._y1_slopes @ np.array([readings["inner"], readings["outer"]])
             y1, acceleration = y1 + rows["y1_noise_rad"], acceleration + rows["acceleration_noise_rad_s2"]
