@@ -26,7 +26,7 @@ UPPER_PACKAGES, LOWER_PACKAGES = (
 )
 """The packages from top to bottom, as docs/architecture.md lists them."""
 ORDER = [*UPPER_PACKAGES, *LOWER_PACKAGES]
-MOST_ENTRIES = 20
+MOST_ENTRIES = 21
 
 HEAVY = dict(re.findall(r"^\| ([\w.]+) \| `([\w/]+)` \|$", ARCHITECTURE, re.MULTILINE))
 """Library -> the only sub-package or module that imports it, because it costs time."""
@@ -104,7 +104,7 @@ def test_the_top_is_small() -> None:
 
 
 def test_every_package_is_in_the_table_once() -> None:
-    assert len(ORDER) == 18
+    assert len(ORDER) == 19
     assert sorted(ORDER) == sorted({package_of(name) for name in modules()} - {""})
 
 

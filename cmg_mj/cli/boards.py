@@ -56,7 +56,7 @@ def export(
     from cmg_mj.codegen.export.names import name_of
     from cmg_mj.codegen.export.pipeline import export_table
     from cmg_mj.controllers.laws import StateFeedback
-    from cmg_mj.scenario.stability_check import require_stable_period
+    from cmg_mj.linear.verdict import require_stable_period
     from cmg_mj.simulation.experiment import prepare
 
     check_installed()

@@ -219,7 +219,7 @@ def list_names(what: str | None) -> None:
 @users_code()
 def check(file: str, settings: tuple[str, ...]) -> None:
     """Check a scenario file, or a model file (.xml), without running it, and print its main parameters."""
-    from cmg_mj.scenario.description import description, rig_description
+    from cmg_mj.cli.check import description, rig_description
     from cmg_mj.scenario.loading import load_scenario, parse_scenario
     from cmg_mj.simulation.experiment import prepare
 
@@ -229,8 +229,7 @@ def check(file: str, settings: tuple[str, ...]) -> None:
     scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file, settings)
     describe = partial(rig_description, own=_scenario_beside(Path(file))) if is_model else description
     parts = prepare(scenario).parts
-    texts = [describe(file, part.scenario, part.design, part.plant.parameters, part.plant.axis.name) for part in parts]
-    click.echo("\n".join(texts), file=own_stdout())
+    click.echo("\n".join(describe(file, part) for part in parts), file=own_stdout())
 
 
 def _scenario_beside(model: Path) -> str:

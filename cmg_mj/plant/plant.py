@@ -6,7 +6,7 @@ import copy
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Unpack
@@ -28,13 +28,11 @@ from cmg_mj.inputs.messages import complaints
 from cmg_mj.observers import Observer
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
-from cmg_mj.plant.bend_model import bend_model
 from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.coupling import turning
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse_drawn
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
 from cmg_mj.plant.parts import EQUILIBRIUM_KEY, JOINT_KINDS, element_id
-from cmg_mj.plant.sliding_model import sliding_model
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
@@ -342,9 +340,7 @@ class Plant:
         """Parameters from which a scenario's controller and observers are made."""
         names = tuple(module.name for module in self.axis.modules)
         numbers = self.reduced, self.radial_tilt, self.gravity, self.timestep, self.largest_step
-        bend = bend_model(self.model, self.key, self.axis, self.settings)
-        slide = partial(sliding_model, self.model, self.key, self.axis) if self.reduced.pivot_arm else None
-        return PlantParameters(self.path, names, *numbers, self.hints, bend, slide)
+        return PlantParameters(self.path, names, *numbers, self.hints)
 
     def initialise(self, data: mujoco.MjData) -> None:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from cmg_mj.core.tilt import RadialTilt, TiltNoise
 from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.scenario.linear_plant import BendModel, LinearPlant
 from cmg_mj.sensors.sampled import Sensors
 
 
@@ -26,9 +24,6 @@ class PlantParameters(NamedTuple):
         timestep: The physics step [s].
         largest_step: The largest physics step that is accurate enough [s].
         hints: Clauses on what the reduced model does not know of the plant.
-        bend: The plant with its bend, linearised; None if its frame is rigid.
-        slide: Linearises a plant whose pivot slides freely, with its servos and the tilt taken about the pivot; None
-            for a pivot at rest.
     """
 
     path: Path
@@ -39,8 +34,6 @@ class PlantParameters(NamedTuple):
     timestep: float
     largest_step: float
     hints: tuple[str, ...]
-    bend: BendModel | None = None
-    slide: Callable[[], LinearPlant] | None = None
 
     def noise(self, sensors: Sensors) -> TiltNoise:
         """Return the noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""

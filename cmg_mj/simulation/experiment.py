@@ -17,20 +17,19 @@ from cmg_mj.core.axes import AnyController, MultiAxisController
 from cmg_mj.core.controller import Controller
 from cmg_mj.errors import InputError
 from cmg_mj.inputs.overrides import assign
+from cmg_mj.linear.bend import bend_hints, judge_bend
+from cmg_mj.linear.loop import linear_closed_loop
+from cmg_mj.linear.verdict import hints
 from cmg_mj.observers import Observer
-from cmg_mj.plant.linear_rig import linear_rig
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.rerun_head import rerun_head
 from cmg_mj.results.result import Driver, Result
 from cmg_mj.scenario.design import Design, design
-from cmg_mj.scenario.linear_loop import linear_closed_loop, require_model, require_rigid
-from cmg_mj.scenario.linear_rig import reduced_rig
 from cmg_mj.scenario.loading import base_of
 from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
-from cmg_mj.scenario.stability_check import hints
 from cmg_mj.scenario.time_grid import time_grid
 from cmg_mj.simulation.batch import (
     AxisPart,
@@ -325,17 +324,14 @@ class Experiment:
         """
         part = self.require_single_axis("linear_closed_loop")
         with part.scenario.named_in_errors():
-            require_model(plant)
-            if plant == "rig":
-                return linear_closed_loop(part.design, linear_rig(part.plant))
-            require_rigid(part.design)
-            return linear_closed_loop(part.design, reduced_rig(part.plant.reduced))
+            return linear_closed_loop(part.design, part.plant, plant)
 
     @property
     def hints(self) -> list[str]:
         """Clauses on what is no mistake and yet likely to make the plant fall."""
         if not self.axes:
-            return hints(self.scenario, self.design, self.plant.parameters)
+            bend = judge_bend(self.design, self.plant)
+            return [*hints(self.design, self.plant), *bend_hints(self.plant, bend)]
         return [f"{part.plant.axis.name}: {hint}" for part in self.axes for hint in part.hints]
 
     def resolved(self) -> dict[str, Any]:

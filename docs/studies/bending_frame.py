@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.scenario.bend_cures import try_loop
+from cmg_mj.linear.bend import judge_bend
 
 WORLDS = 20
 RATES = {
@@ -97,13 +97,13 @@ def border() -> None:
         for hz in frequencies:
             changes = [f"plant.bend_frequency_hz={hz:g}", *(setting.replace("{hz}", f"{hz:g}") for setting in settings)]
             experiment = prepare(load_scenario("push_recovery", ["duration_s=12.0", "seed=23", *changes]))
-            trial = try_loop(experiment.scenario, experiment.plant.parameters)
+            trial = judge_bend(experiment.design, experiment.plant)
             assert trial is not None
             result = experiment.run_many(3)
             falls, rms = int(sum(result.fell)), result.mean("command_rms_rad_s")
             motion = f"{falls} fall" if falls else f"{rms:.2f}"
             verdict = "stable" if trial.is_stable else "unstable"
-            distance = f"{trial.distance:.2f}" if trial.loop else "-"
+            distance = "-" if trial.distance is None else f"{trial.distance:.2f}"
             print(f"| {name} | {hz:g} | {verdict} | {distance} | {motion} |", flush=True)
 
 

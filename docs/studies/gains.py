@@ -17,8 +17,8 @@ from tabulate import tabulate
 import cmg_mj
 from cmg_mj.controllers.laws.state_feedback import StateFeedback
 from cmg_mj.inputs.files import folder
+from cmg_mj.linear.verdict import judge_gains
 from cmg_mj.observers.scaling import scaled_parameters, scales_of
-from cmg_mj.scenario.stability_check import closed_loop
 
 WEIGHTS = "controller.lqr.state_cost=[405.6,2.26,0.223,0.096]"
 """The weights with which an LQR has Table 2's gains on the papers' rig."""
@@ -85,7 +85,7 @@ def main() -> None:
                 experiment = prepared("gyro_free", [*assignments, *choice])
                 law = experiment.law
                 assert isinstance(law, StateFeedback)
-                loop = closed_loop(experiment.scenario, law, model)
+                loop = judge_gains(experiment.design).loop
                 margins = [f"{loop.slowest:.2f}", f"{loop.damping:.2f}", f"{distance(experiment):.2f}"]
                 gains = ", ".join(f"{gain:.3g}" for gain in law.gains)
                 gains_rows.append([rig, name, gains, *margins, *pushed(experiment, worlds)])

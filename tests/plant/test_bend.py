@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from cmg_mj.errors import InputError
+from cmg_mj.linear.bend import rk4_energy_loss
 from cmg_mj.plant.bend import STEP_SHARE
 from cmg_mj.plant.parts import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import section
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.scenario.linear_plant import rk4_energy_loss
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import Experiment, prepare
 from tests.codegen.engine_plugin.made import needs_compiler

@@ -12,6 +12,7 @@ import pytest
 
 from cmg_mj import mount
 from cmg_mj.errors import InputError
+from cmg_mj.linear.plant import linearise
 from cmg_mj.plant.parts import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.scenario.plant_settings import BendBeyond
@@ -74,9 +75,8 @@ def test_it_is_the_common_mass_centre_that_stays(plant: Plant) -> None:
 
 
 def test_the_linearisation_is_mujocos(plant: Plant) -> None:
-    model, slide = plant.reduced, plant.parameters.slide
-    assert slide is not None
-    rig, nv = slide(), plant.model.nv
+    model = plant.reduced
+    rig, nv = linearise(plant, rigid=True, height=0.0), plant.model.nv
     slider, hinge = (int(plant.model.joint(name).dofadr[0]) for name in ("slider", "hinge"))
     gimbals = [nv + module.gimbal_dof for module in plant.axis.modules]
     both = np.array([module.direction for module in plant.axis.modules])
@@ -86,7 +86,7 @@ def test_the_linearisation_is_mujocos(plant: Plant) -> None:
     assert sliding[hinge] == pytest.approx(-model.pivot_arm * tilting[hinge], rel=1e-6)
     assert sliding[gimbals] @ both == pytest.approx(-model.pivot_arm * (tilting[gimbals] @ both), rel=1e-6)
     c1, d = model.measured_tilt(0.0, plant.gravity)
-    assert (rig.C[0, hinge], rig.C[0, gimbals] @ both) == pytest.approx((c1, d), rel=1e-6)
+    assert (rig.C[3, hinge], rig.C[3, gimbals] @ both) == pytest.approx((c1, d), rel=1e-6)
 
 
 @pytest.mark.parametrize("slides", [True, pytest.param(False, marks=pytest.mark.slow)])
@@ -105,9 +105,8 @@ def test_y1_of_a_frame_that_bends_on_a_cart_is_mujocos(
     settings = dataclasses.replace(plant.settings, pivot_slides=slides, tilt_damping_n_m_s=0.0)
     bend = {"bend_frequency_hz": 20.0, "bend_beyond": beyond, "bend_share": share, "bend_damping_ratio": 0.0}
     bending = load_plant(dataclasses.replace(settings, **bend))
-    model, linear = bending.model, bending.parameters.bend
-    assert linear is not None
-    y1 = linear.bending.C[0]
+    model = bending.model
+    y1 = linearise(bending).C[3]
 
     def y1_at(state: np.ndarray) -> float:
         data = bending.new_data()
@@ -120,10 +119,8 @@ def test_y1_of_a_frame_that_bends_on_a_cart_is_mujocos(
     slopes = [(y1_at(SMALL * column) - y1_at(-SMALL * column)) / (2.0 * SMALL) for column in np.eye(len(y1))]
     np.testing.assert_allclose(slopes, y1, rtol=1e-5, atol=1e-4)
     # The words on sliding are those of a rigid frame.
-    slide = bending.parameters.slide
-    assert slide is not None
     dof = int(model.joint(BEND_JOINT).dofadr[0])
-    assert not slide().A[model.nv + dof].any()
+    assert not linearise(bending, rigid=True).A[model.nv + dof].any()
     assert frequency(ring(bending)[0], bending.timestep) == pytest.approx(20.0, rel=1e-3)
 
 
@@ -136,9 +133,8 @@ def test_damping_is_in_the_linearisation(tmp_path: Path, damping: float) -> None
     inverse = np.linalg.inv([[J, mh], [mh, M]])
     right = np.array([[weight, 0.0, 0.0], [0.0, 0.0, -damping]])
     A = np.vstack([[0.0, 1.0, 0.0], inverse @ right])
-    expected, slide = max(np.linalg.eigvals(A).real), damped.parameters.slide
-    assert slide is not None
-    assert max(np.linalg.eigvals(slide().A).real) == pytest.approx(expected, rel=1e-6)
+    expected = max(np.linalg.eigvals(A).real)
+    assert max(np.linalg.eigvals(linearise(damped, rigid=True).A).real) == pytest.approx(expected, rel=1e-6)
     reduced = math.sqrt(damped.reduced.A[1, 0])
     assert expected < 0.97 * reduced if damping else expected == pytest.approx(reduced, rel=1e-6)
 
@@ -189,7 +185,7 @@ def test_a_pivot_at_rest_is_what_it_was(model: str) -> None:
         assert axis.reduced.pivot_arm == 0.0
         assert axis.radial_tilt is filed.radial_tilt
         assert axis.reduced.measured_tilt(0.0, plant.gravity) == (1.0, 0.0)
-    assert plant.parameters.slide is None
+    assert not plant.reduced.pivot_arm
     with pytest.raises(InputError, match=r"plant.pivot_slides = true: .*the pivot.* does not slide freely; leave it"):
         load_plant(model=model, pivot_slides=True)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, loop_words, measured_words, sliding_words
 from cmg_mj.plant.tilt_line import HingeLine
-from cmg_mj.scenario.sliding_pivot import IN_THE_MODEL, NOT_IN_THE_MODEL, loop_words, measured_words, sliding_words
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
 from cmg_mj.studies.push_limits.mount_files import MountResult
 from cmg_mj.studies.push_limits.prospects import LOW_LIMIT_DEG
@@ -58,7 +58,7 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
 
 def _pivot(result: MountResult) -> Iterator[str]:
     """Say what a pivot that slides freely does to the tilt, and what the loop would be if the tilt did not know it."""
-    rig = result.plant.parameters
+    rig = result.plant
     if rig.reduced.pivot_arm:
         yield f"  its pivot {sliding_words(rig)}"
         poles = result.prospects.sliding_poles

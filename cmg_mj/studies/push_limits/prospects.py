@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from cmg_mj.errors import InputError
+from cmg_mj.linear.verdict import SlidingPoles, sliding_poles
 from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.mounting.fall_check import overlap, simulated_pole
 from cmg_mj.plant.mounting.request import SCALES
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.scenario.sliding_pivot import SlidingPoles, sliding_poles
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, PushMargin, push_margin
 from cmg_mj.studies.push_limits.recoverable_states import RecoverableLimit, ceiling
@@ -133,7 +133,7 @@ def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = Tru
         pole = simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias)
         touching = overlap(plant.model, plant.key, plant.axis.line, pole)
     margin = push_margin(experiment.scenario, experiment.design) if with_margin else PushMargin(0.0, 0.0)
-    poles = sliding_poles(experiment.law, plant.parameters)
+    poles = sliding_poles(experiment.law, plant)
     return Prospects(plant.reduced, limit, margin, pole, touching, poles)
 
 

@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from cmg_mj.linear.verdict import hints
 from cmg_mj.plant.mounting import mount
 from cmg_mj.results.summary_keys import section
-from cmg_mj.scenario.stability_check import hints
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.studies.push_limits import simulated_push
 from cmg_mj.studies.push_limits.largest_push import PUSH_S, WORLDS
@@ -101,7 +101,7 @@ def test_a_motion_across_moves_what_the_cart_slides_on_alone(light_cart: Experim
     assert abs(tilts(across) - still).max() < 0.05 * abs(tilts(vertical) - still).max()
     for pivot, count in ((across, 1), (vertical, 0), ({**across, "acceleration_m_s2": 0.0}, 0)):
         experiment = light_cart.with_settings({"pivot": [pivot]})
-        clauses = hints(experiment.scenario, experiment.design, experiment.plant.parameters)
+        clauses = hints(experiment.design, experiment.plant)
         assert sum("pivot.0: accelerates across what the pivot slides on" in hint for hint in clauses) == count
 
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.types import Law, Measurement, Observer, extra_signals, feedback_state
+from cmg_mj.core.types import Law, Measurement, Observer, feedback_state
 from cmg_mj.errors import InputError, raised, shortened
 
 STEPS = {1e-8: 1e-3, 1e-7: 1e-2, 1e-3: 0.6}
@@ -69,12 +69,12 @@ def observer_slopes(observer: Observer) -> Slopes:
     return _slopes(lambda: observer.init(Measurement(0.0, 0.0, 0.0)), step, 4)
 
 
-def law_slopes(law: Law, observer: Observer) -> Slopes:
+def law_slopes(law: Law, extra_signals: int = 0) -> Slopes:
     """Find the slopes of a law. Inputs: y1, y2, acceleration, u before, x1, x2, x3, extra signals. Output: u.
 
     Args:
         law: The law.
-        observer: The observer in the loop, whose extra signals are fed back too.
+        extra_signals: The number of the observer's extra signals, which are fed back too.
 
     Returns:
         The slopes at rest.
@@ -88,7 +88,7 @@ def law_slopes(law: Law, observer: Observer) -> Slopes:
         state, command = law.step(state, Measurement(y1, y2, acceleration), feedback_state(x1, x2, x3, tuple(extra)), u)
         return state, (command,)
 
-    return _slopes(lambda: law.init(Measurement(0.0, 0.0, 0.0)), step, 7 + len(extra_signals(observer)))
+    return _slopes(lambda: law.init(Measurement(0.0, 0.0, 0.0)), step, 7 + extra_signals)
 
 
 def needed_states(A: np.ndarray, C: np.ndarray) -> np.ndarray:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.controllers.laws.state_feedback import StateFeedback
-from cmg_mj.scenario.bend_decay import Decay, decay
+from cmg_mj.linear.march import Motion, march
+from cmg_mj.linear.plant import linearise
 from cmg_mj.simulation.experiment import Experiment
 
 
@@ -17,11 +19,14 @@ def experiment(*settings: str) -> Experiment:
     return prepare(load_scenario("push_recovery", settings))
 
 
-def decay_of(*settings: str) -> Decay:
-    subject = experiment(*settings)
-    bend = subject.plant.parameters.bend
-    assert bend is not None
-    return decay(subject.design, bend)
+class Decay(NamedTuple):
+    bending: Motion
+    rigid: Motion
+
+
+def decay_of(*settings: str, scenario: str = "push_recovery") -> Decay:
+    subject = prepare(load_scenario(scenario, settings))
+    return Decay(*(march(subject.design, linearise(subject.plant, rigid=rigid)) for rigid in (False, True)))
 
 
 def test_a_rig_without_gains_falls() -> None:
@@ -36,15 +41,14 @@ def test_with_the_true_rate_it_is_the_spectral_radius(hz: float, gain: float) ->
     gains = [gain * k for k in (35.0, 4.0, -1.0, 0.3)]
     settings = [f"plant.bend_frequency_hz={hz}", "controller.feedback=truth", f"controller.gains={gains}"]
     subject = experiment(*settings)
-    bend, law = subject.plant.parameters.bend, subject.law
-    assert bend is not None
+    bend, law = linearise(subject.plant), subject.law
     assert isinstance(law, StateFeedback)
-    F, G = bend.bending.hold(law.dt)
-    C, n = bend.bending.C[[0, 3, 2]], len(F)
+    F, G = bend.hold(law.dt)
+    C, n = bend.C[[3, 1, 2]], len(F)
     closed = np.zeros((n + 1, n + 1))
     command = -np.append(np.array(law.gains[:3]) @ C, law.gains[3])
     closed[:n, :n], closed[n, :n], closed[n, n] = F, -law.dt * C[2], 1.0
-    closed[:n] += G @ command[None]
+    closed[:n] += G[:, :1] @ command[None]
     growth = math.log(np.abs(np.linalg.eigvals(closed)).max()) / law.dt
     # The wheels' own angles and speeds neither grow nor decay.
     assert (decay_of(*settings).bending in ("swings", "falls")) == (growth > 1e-3)
@@ -130,7 +134,5 @@ def test_a_swing_far_below_the_noise_is_rest() -> None:
     """`homogeneous` ends in one of 0.004 rad/s there; noise causes 0.05 rad/s."""
     settings = ["plant.bend_frequency_hz=20", "plant.bend_beyond=both", "plant.bend_share=0.5"]
     subject = prepare(load_scenario("single_gimbal", settings))
-    bend = subject.plant.parameters.bend
-    assert bend is not None
-    assert decay(subject.design, bend) == ("decays", "decays")
+    assert decay_of(*settings, scenario="single_gimbal") == ("decays", "decays")
     assert (subject.run_many(2).mean("command_rms_rad_s") or 0.0) < 0.5

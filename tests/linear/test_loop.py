@@ -16,11 +16,10 @@ import pytest
 from scipy.linalg import expm
 
 from cmg_mj import Experiment, InputError, Measurement, Scenario, load_scenario, mount, parse_scenario, prepare
+from cmg_mj.linear.loop import INPUTS, WITH_A_SLOPE
+from cmg_mj.linear.plant import linearise
+from cmg_mj.linear.slopes import observer_slopes
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.plant.linear_rig import linear_rig
-from cmg_mj.plant.linearisation import state_and_input
-from cmg_mj.scenario.linear_loop import INPUTS, WITH_A_SLOPE
-from cmg_mj.scenario.rest_slopes import observer_slopes
 from cmg_mj.studies.push_limits.mount_files import write_scenario
 from tests.command import ROOT
 from tests.studies.push_limits.robots import cart_pole
@@ -233,18 +232,6 @@ def test_a_robot_on_contacts_has_the_loop_of_its_reduced_model(tmp_path: Path) -
     assert np.max(np.abs(standing.linear_closed_loop("reduced").poles())) < 1.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("bend_hz", [8.0, 20.0, 40.0])
-def test_a_bend_is_stable_where_the_march_of_check_says_so(bend_hz: float) -> None:
-    """`check` marches the controller on the same linear plant."""
-    from cmg_mj.scenario.bend_decay import decay
-
-    of = experiment("linear", plant__bend_frequency_hz=bend_hz)
-    bend = of.plant.parameters.bend
-    assert bend is not None
-    assert is_stable(of) == decay(of.design, bend).bending.startswith("decays")
-
-
 def test_the_loop_transfer_follows_from_the_disturbed_gimbals() -> None:
     of = experiment(controller__feedback="truth")
     F, G = sampled_model(of)
@@ -322,11 +309,12 @@ def test_axes_have_a_loop_each() -> None:
 
 def test_the_minimal_rig_answers_as_the_whole_one() -> None:
     plant = experiment().plant
-    A, B = state_and_input(plant.model, plant.key, plant.axis)
-    rig = linear_rig(plant)
+    A, B, C, _, _ = linearise(plant)
+    rig = linearise(plant).minimal()
     assert len(rig.A) < len(A)
     tilt = np.zeros(len(A))
     tilt[: plant.model.nv] = plant.axis.line.motion(plant.model, plant.new_data())
+    np.testing.assert_array_equal(C[0], tilt)
     for omega in (0.3, 4.0, 90.0):
         s = 1j * omega
         whole = tilt @ np.linalg.solve(s * np.eye(len(A)) - A, B[:, 0])
@@ -384,6 +372,6 @@ def test_states_of_all_kinds_are_taken() -> None:
     ],
 )
 def test_an_observer_that_cannot_be_linear_says_why(monkeypatch: pytest.MonkeyPatch, fault: str, message: str) -> None:
-    monkeypatch.setattr("cmg_mj.scenario.rest_slopes.MOST_SAMPLES", 1000)
+    monkeypatch.setattr("cmg_mj.linear.slopes.MOST_SAMPLES", 1000)
     with pytest.raises(InputError, match=message):
         observer_slopes(_Odd(fault))

@@ -1,0 +1,148 @@
+"""A scenario and its plant in words."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Iterator, Mapping
+
+from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
+from cmg_mj.core.types import law_needs
+from cmg_mj.errors import TomlValue
+from cmg_mj.linear.bend import bend_hints, bend_rows, judge_bend
+from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_gains, sliding_words
+from cmg_mj.plant.plant import Plant
+from cmg_mj.scenario.description import assignments, lines, number
+from cmg_mj.scenario.design import Design
+from cmg_mj.scenario.omissions import omissions
+from cmg_mj.scenario.pivot_track import read_track
+from cmg_mj.scenario.resolve import resolved
+from cmg_mj.scenario.schema import ControllerSettings
+from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.swing import Swing
+
+
+def description(name: str, part: Experiment) -> str:
+    """Describe a scenario in the lines that `cmg-mj check` prints.
+
+    Args:
+        name: The scenario as the user called it.
+        part: One axis of it.
+    """
+    scenario, design, rig, axis = part.scenario, part.design, part.design.rig, part.plant.axis.name
+    settings = scenario.plant
+    timestep = rig.timestep
+    fields = resolved(scenario, {axis: design})
+    steps = f"{round(scenario.duration_s / timestep)} physics steps of {timestep:g} s"
+    coarse = (
+        f"; figures are accurate up to {rig.largest_step:g} s" if timestep > rig.largest_step * (1.0 + 1e-9) else ""
+    )
+    observer = {key: value for key, value in fields["observer"].items() if key != "kind"}
+    compare = scenario.compare
+    rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
+    imperfections = scenario.sensors.accelerometer.imperfections
+    changes = settings.changes()
+    rows = [
+        ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
+        ("plant", f"{fields['plant']['model']}, modules: {', '.join(rig.modules)}"),
+        *([("", assignments(changes))] if changes else []),
+        ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
+        *_law_rows(design, fields["controller"]),
+        ("observer", f"{scenario.observer.kind}  {assignments(observer)}".rstrip()),
+        *(
+            [("", "your own code, which was imported and tried on two samples")]
+            if ":" in scenario.observer.kind
+            else []
+        ),
+        ("open loop", ", ".join(scenario.open_loop_names()) or "none"),
+        ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
+        *([("", f"accelerometer: {assignments(imperfections)}")] if imperfections else []),
+        *([("compare", f"{', '.join(compare.names())}; {compare.worlds} worlds")] if compare else []),
+        *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
+    ]
+    rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
+    for pivot in scenario.pivot:
+        rows.append(("pivot", pivot.words))
+        if pivot.file is not None:
+            rows.append(("", read_track(pivot.file, pivot.column).words))
+    rows += _pivot_rows(part.plant)
+    missing = list(omissions(scenario).values())
+    if missing:
+        rows.append(("omitted", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
+    bend = judge_bend(design, part.plant)
+    rows += bend_rows(design, part.plant, bend)
+    clauses = [*hints(design, part.plant), *bend_hints(part.plant, bend)]
+    return lines(
+        f"{name}{f', axis {axis}' if axis else ''}: valid",
+        [*rows, *(("hint", hint) for hint in clauses)],
+    )
+
+
+def _about(torque: Push | Swing) -> str:
+    return "" if torque.axis is None else f" about {torque.axis}"
+
+
+def _pivot_rows(plant: Plant) -> Iterator[tuple[str, str]]:
+    """Describe a sliding pivot: the point that the tilt is taken about, and the model's share of the sliding."""
+    if plant.reduced.pivot_arm:
+        yield "pivot", sliding_words(plant)
+        yield "", f"in the reduced model: {IN_THE_MODEL}"
+        yield "", f"not in it: {NOT_IN_THE_MODEL}"
+
+
+def _law_rows(design: Design, fields: Mapping[str, TomlValue]) -> Iterator[tuple[str, str]]:
+    """Return the law, its inputs, and of the papers' law the closed loop on the reduced model."""
+    controller, law = design.scenario.controller, design.law
+    limits = f"at {controller.rate_hz:g} Hz, at most {controller.rate_limit_rad_s:g} rad/s"
+    inputs = f"tilt rate from the {controller.feedback}, {controller.angle_source} angles"
+    notch = f"notch at {controller.notch_hz:g} Hz on the command" if controller.notch_hz else ""
+    if isinstance(law, StateFeedback):
+        loop = judge_gains(design).loop
+        yield "law", f"K_e = {number(law.gains)} {limits}"
+        yield "", inputs
+        if notch:
+            yield "", notch
+        yield "", f"{loop.words} with the reduced model and its true state, slowest pole {loop.slowest:.3g} 1/s,"
+        yield "", f"least damping ratio {loop.damping:.2g}, nearest to -1 {loop.distance:.2g}"
+        return
+    yield "law", f"{controller.kind} {limits}"
+    parameters = {name: value for name, value in fields.items() if name not in ControllerSettings.model_fields}
+    if parameters:
+        yield "", assignments(parameters)
+    yield "", inputs if law_needs(law) else "takes nothing of the observer, which is judged only"
+    if notch:
+        yield "", notch
+    if controller.kind not in LAWS:
+        yield "", "your own code, which was imported and tried on two samples"
+
+
+def rig_description(name: str, part: Experiment, own: str = "") -> str:
+    """Describe a model file in the lines that `cmg-mj check` prints.
+
+    Args:
+        name: The file as the user called it.
+        part: One axis of a scenario with this model and all defaults.
+        own: The model's own scenario file, if it has one, whose gains are then not judged here.
+    """
+    rig, axis = part.design.rig, part.plant.axis.name
+    about = f" --set push.0.axis={axis}" if axis else ""
+    push_it = f"cmg-mj run push_recovery --set {shlex.quote(f'plant.model={name}')}{about}"
+    law = f"gains are a scenario's; here Table 2's, K_e = {number(TABLE_2_GAINS)}"
+    clauses: Iterable[str] = part.hints
+    if own:
+        clauses = (f"{rig.path}: {hint}" for hint in rig.hints)
+        push_it = f"cmg-mj run {shlex.quote(own)}"
+        law = f"the gains are its scenario's: cmg-mj check {shlex.quote(own)}"
+    reduced = rig.reduced
+    share = f", for one of {reduced.gimbals} gimbals" if reduced.gimbals > 1 else ""
+    rows = [
+        ("modules", ", ".join(rig.modules)),
+        ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
+        ("", f"omega_d = {reduced.omega_d:.6g} rad/s, m g l/sqrt(2) = {reduced.gravity_torque:.6g} N m"),
+        *_pivot_rows(part.plant),
+        ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),
+        ("law", law),
+        *(("hint", hint) for hint in clauses),
+        ("run it", push_it),
+    ]
+    return lines(f"{name}: a rig{f', axis {axis}' if axis else ''}", rows)

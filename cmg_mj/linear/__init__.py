@@ -1,0 +1,1 @@
+"""The plant linearised, its closed loop sampled, and the verdict on it."""

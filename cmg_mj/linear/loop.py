@@ -1,0 +1,373 @@
+"""The closed loop as one linear system, sampled at the least time that holds whole periods of control and sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cmg_mj.core.sensor import steps_until, whole_steps
+from cmg_mj.core.types import extra_signals
+from cmg_mj.errors import InputError, nearest, shortened
+from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
+from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes
+from cmg_mj.plant.plant import Plant
+from cmg_mj.scenario.design import Design
+from cmg_mj.stages.low_pass import INSIDE_HZ
+from cmg_mj.stages.notch import Notch
+
+if TYPE_CHECKING:
+    import control
+
+INPUTS = (
+    "push_n_m",
+    "y1_noise_rad",
+    "acceleration_noise_rad_s2",
+    "y2_noise_rad",
+    "fog_noise_rad_s",
+    "gimbal_rate_noise_rad_s",
+)
+"""Inputs of the system: a torque on the rig, noise of the four measurements, a gimbal rate that nobody commanded."""
+OUTPUTS = ("x1_rad", "x2_rad_s", "x3_rad", "u_rad_s")
+"""Outputs before those of the observer: true tilt, tilt rate and gimbal angle, and the command."""
+MODELS = ("rig", "reduced")
+"""Plants of the system: the rig linearised as it is simulated, or the reduced model."""
+WITH_A_SLOPE = (
+    *("adaptive", "finite_difference", "free_pivot", "gyro_free", "high_gain", "kalman", "linear"),
+    *("linear_high_gain", "ltv", "luenberger"),
+)
+"""Observers of the package that have a slope at rest."""
+
+
+class _Channel(NamedTuple):
+    """A measurement on its way to the controller, in physics steps.
+
+    Attributes:
+        name: The sensor.
+        period: Time between two readings.
+        latency: Time until a reading is delivered.
+        raw: Period of the samples that the part's low-pass takes; 0 without one.
+        older: Steps by which these samples precede those of the pair's inner part.
+    """
+
+    name: str
+    period: int
+    latency: int
+    raw: int = 0
+    older: int = 0
+
+    def taken(self, tick: int) -> int:
+        """Return the step at which the newest reading at a tick was taken."""
+        return (tick - self.latency) // self.period * self.period - self.older
+
+    def is_filtered_at(self, step: int) -> bool:
+        """Return whether the low-pass takes a sample at a step."""
+        return bool(self.raw) and (step + self.older) % self.raw == 0
+
+
+def linear_closed_loop(design: Design, plant: Plant, model: str = "rig") -> control.StateSpace:
+    """Make the linear system of a scenario's closed loop: see `Experiment.linear_closed_loop`.
+
+    Args:
+        design: The law and the observers.
+        plant: The plant.
+        model: One of `MODELS`.
+
+    Returns:
+        The system.
+
+    Raises:
+        InputError: Something in the loop is not linear, or not covered.
+    """
+    if model not in MODELS:
+        raise InputError(f"linear_closed_loop: plant = {shortened(repr(model))}: {nearest(str(model), MODELS)}")
+    if model == "rig":
+        linear = linearise_alone(plant)
+    else:
+        _require_rigid(plant)
+        linear = linear_reduced(plant.reduced)
+    _require_covered(design)
+    return ClosedLoop(design, linear).system()
+
+
+def _require_rigid(plant: Plant) -> None:
+    """Refuse a plant that the reduced model does not describe."""
+    settings, cure = plant.settings, 'linear_closed_loop(plant="rig")'
+    if settings.bends:
+        raise InputError(
+            f"plant.bend_frequency_hz = {settings.bend_frequency_hz:g}: the reduced model is rigid; take {cure}, or "
+            "set plant.bend_frequency_hz=0"
+        )
+    if plant.reduced.pivot_arm:
+        raise InputError(f"plant.model = {settings.model!r}: its pivot slides; take {cure}")
+
+
+def _require_covered(design: Design) -> None:
+    """Refuse what a linear system of one control period does not cover."""
+    plant, dt = design.scenario.plant, design.law.dt
+    if plant.gimbal_backlash_arcmin:
+        raise InputError(
+            f"plant.gimbal_backlash_arcmin = {plant.gimbal_backlash_arcmin:g}: backlash is not linear; set "
+            "plant.gimbal_backlash_arcmin=0"
+        )
+    for name in sensors_used(design):
+        rate = getattr(design.scenario.sensors, name).rate_hz
+        if abs(rate * dt - round(rate * dt)) > 1e-9 or round(rate * dt) < 1:
+            raise InputError(
+                f"sensors.{name}.rate_hz = {rate:g}: linear_closed_loop takes the control rate, {1.0 / dt:g} Hz, or a "
+                "whole multiple of it"
+            )
+
+
+def sensors_used(design: Design) -> list[str]:
+    """List the sensors in the loop, by their section."""
+    return ["accelerometer", "encoder", *(["fog"] if design.scenario.controller.feedback == "fog" else [])]
+
+
+class ClosedLoop:
+    """The loop over a common period. Each signal is a row: its weights on all states, then on all inputs.
+
+    Args:
+        design: The law and the observers.
+        plant: The plant, linearised.
+        true_state: Whether the law gets the plant's state, as late as the sensors are, in place of an observer's.
+
+    Attributes:
+        ticks: The number of control periods in a common one.
+        period: The common period [s].
+        states: Name of each state.
+
+    Raises:
+        InputError: Observer or law have no slope.
+    """
+
+    def __init__(self, design: Design, plant: LinearPlant, *, true_state: bool = False) -> None:
+        self._design, self._plant, self._true_state = design, plant, true_state
+        law, controller, self._timestep = design.law, design.scenario.controller, design.rig.timestep
+        self._estimating, self._deciding, self._extra = _slopes(design, true_state)
+        self._channels = _channels(design, true_state)
+        control_steps = whole_steps(law.dt, self._timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
+        self._steps = math.lcm(control_steps, *(channel.period for channel in self._channels))
+        self._tick_steps = range(0, self._steps, control_steps)
+        self.ticks, self.period = len(self._tick_steps), self._steps * self._timestep
+        # Readings on their way: sensor, step of a common period at which it is taken, periods ago.
+        self._on_the_way = {
+            channel.name: [
+                (taken % self._steps, age)
+                for taken in sorted({channel.taken(tick) for tick in self._tick_steps if channel.taken(tick) < 0})
+                for age in range(1, -(taken // self._steps) + 1)
+            ]
+            for channel in self._channels
+        }
+        self._notch = Notch(controller.notch_hz, law.dt, math.inf) if controller.notch_hz else None
+        self.states = [
+            *plant.names,
+            *(f"{channel.name}_filter_{i}" for channel in self._channels if channel.raw for i in (1, 2)),
+            *(f"{name}_{i + 1}" for name, waiting in self._on_the_way.items() for i in range(len(waiting))),
+            *_prefixed("observer", self._estimating),
+            *_prefixed("law", self._deciding),
+            *(["notch_1", "notch_2"] if self._notch else []),
+            "u_before",
+        ]
+        self._inputs = [*INPUTS, *(f"{INPUTS[-1]}_{tick}" for tick in range(1, self.ticks))]
+        rows = np.eye(len(self.states) + len(self._inputs))
+        self._rows = dict(zip((*self.states, *self._inputs), rows, strict=True))
+        self._y1_slopes = _measured_slopes(design)
+
+    def system(self) -> control.StateSpace:
+        """Compute the system. With several ticks in a period their commands and gimbal rates are further signals."""
+        import control
+
+        names = [*OUTPUTS, *(f"estimated_{name}" for name in (*OUTPUTS[:3], *self._extra))]
+        outputs = [*names[: None if not self._true_state else 4], *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
+        A, B, C, D = self._matrices()
+        kept = needed_states(A, C)
+        return control.StateSpace(
+            *(A[kept][:, kept], B[kept], C[:, kept], D, self.period if self.ticks > 1 else self._design.law.dt),
+            inputs=self._inputs,
+            outputs=outputs,
+            states=[name for name, is_kept in zip(self.states, kept, strict=True) if is_kept],
+            name="closed_loop",
+            remove_useless_states=False,
+        )
+
+    def _matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Compute A, B, C, D over a common period."""
+        rows, plant = self._rows, self._plant
+        start = dict(rows)
+        x, turned, push = np.array([rows[name] for name in plant.names]), rows["u_before"], rows["push_n_m"]
+        taken = {
+            (channel.name, channel.taken(tick) % self._steps) for channel in self._channels for tick in self._tick_steps
+        }
+        instants = {*self._tick_steps, *(step for _, step in taken)}
+        instants |= {step for channel in self._channels for step in range(self._steps) if channel.is_filtered_at(step)}
+        holds = {}
+        latched: dict[tuple[str, int], np.ndarray] = {}
+        shown, commands = [], []
+        for step, after in zip(sorted(instants), [*sorted(instants)[1:], self._steps], strict=True):
+            motion = plant.C @ x + plant.D @ np.array([turned, push])
+            ideal = self._ideal(motion)
+            for channel in self._channels:
+                value = ideal[channel.name]
+                if channel.is_filtered_at(step):
+                    value = self._filter(channel.name, value)
+                if (channel.name, step) in taken:
+                    latched[channel.name, step] = value
+            if step in self._tick_steps:
+                readings = {channel.name: self._read(channel, step, latched, start) for channel in self._channels}
+                u, estimate = self._decide(motion, readings)
+                turned = u + rows[[INPUTS[-1], *self._inputs[len(INPUTS) :]][len(commands)]]
+                commands.append(u)
+                shown = shown or [*motion[:3], u, *estimate]
+            if after - step not in holds:
+                holds[after - step] = plant.hold((after - step) * self._timestep)
+            F, G = holds[after - step]
+            x = F @ x + G @ np.array([turned, push])
+        rows |= dict(zip(plant.names, x, strict=True))
+        for name, waiting in self._on_the_way.items():
+            for i, (step, age) in enumerate(waiting):
+                rows[f"{name}_{i + 1}"] = latched[name, step] if age == 1 else start[f"{name}_{i}"]
+        n = len(self.states)
+        ahead, out = np.array([rows[name] for name in self.states]), np.array([*shown, *commands[1:]])
+        return ahead[:, :n], ahead[:, n:], out[:, :n], out[:, n:]
+
+    def _ideal(self, motion: np.ndarray) -> dict[str, np.ndarray]:
+        """Return what perfect sensors show of the plant's outputs, to first order: tangential forces, y2, the gyro."""
+        known, settings = self._design.rig, self._design.scenario.plant
+        x1, x2, x3, y1, acceleration, gyro = motion
+        radii = {
+            "inner": known.tilt.r_inner + 1e-3 * settings.accelerometer_inner_misplaced_mm,
+            "outer": known.tilt.r_outer + 1e-3 * settings.accelerometer_outer_misplaced_mm,
+        }
+        forces = {name: radius * acceleration - known.gravity * y1 for name, radius in radii.items()}
+        return forces | {"encoder": x3, "fog": gyro, "tilt": x1, "rate": x2}
+
+    def _filter(self, name: str, value: np.ndarray) -> np.ndarray:
+        """Advance a part's low-pass by a sample."""
+        from scipy.signal import butter
+
+        bandwidth = self._design.scenario.sensors.accelerometer.bandwidth_hz
+        numerator, denominator = np.array(butter(2, bandwidth, fs=INSIDE_HZ))
+        return self._second_order(f"{name}_filter", numerator, denominator, value)
+
+    def _second_order(self, name: str, numerator: Sequence, denominator: Sequence, value: np.ndarray) -> np.ndarray:
+        """Advance a filter of second order, whose states are a name's 1 and 2."""
+        (b0, b1, b2), (_, a1, a2), rows = numerator, denominator, self._rows
+        passed = b0 * value + rows[f"{name}_1"]
+        rows[f"{name}_1"] = b1 * value - a1 * passed + rows[f"{name}_2"]
+        rows[f"{name}_2"] = b2 * value - a2 * passed
+        return passed
+
+    def _read(
+        self,
+        channel: _Channel,
+        tick: int,
+        latched: dict[tuple[str, int], np.ndarray],
+        start: dict[str, np.ndarray],
+    ) -> np.ndarray:
+        """Return the reading that has been delivered by a tick."""
+        taken, name = channel.taken(tick), channel.name
+        if taken >= 0:
+            return latched[name, taken]
+        place = self._on_the_way[name].index((taken % self._steps, -(taken // self._steps)))
+        return start[f"{name}_{place + 1}"]
+
+    def _decide(self, motion: np.ndarray, readings: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the command of a tick, and the estimate, as `Controller.decide` makes them."""
+        rows, settings = self._rows, self._design.scenario.controller
+        before, y2 = rows["u_before"], readings["encoder"] + rows["y2_noise_rad"]
+        if self._true_state:
+            y1, acceleration, x3 = readings["tilt"], 0.0 * before, y2
+            measured, estimate = [y1, y2, acceleration, before], np.array([])
+            x1, x2 = y1, readings.get("rate", motion[1])
+        else:
+            y1, acceleration = self._y1_slopes @ np.array([readings["inner"], readings["outer"]])
+            y1, acceleration = y1 + rows["y1_noise_rad"], acceleration + rows["acceleration_noise_rad_s2"]
+            measured = [y1, y2, acceleration, before]
+            estimate = self._advance("observer", self._estimating, measured)
+            x1, x2, x3 = (y1, estimate[1], y2) if settings.angle_source == "measured" else estimate[:3]
+            if settings.feedback == "truth":
+                x2 = motion[1]
+        if settings.feedback == "fog":
+            x2 = readings["fog"] + rows["fog_noise_rad_s"]
+        (u,) = self._advance("law", self._deciding, [*measured, x1, x2, x3, *estimate[3:]])
+        if self._notch is not None:
+            u = self._second_order("notch", self._notch.numerator, self._notch.denominator, u)
+        rows["u_before"] = u
+        return u, estimate
+
+    def _advance(self, owner: str, slopes: Slopes, inputs: Sequence[np.ndarray]) -> np.ndarray:
+        """Advance the observer or the law by a sample; return its outputs."""
+        names, width = _prefixed(owner, slopes), len(self._rows["u_before"])
+        state = np.array([self._rows[name] for name in names]).reshape(-1, width)
+        self._rows |= dict(zip(names, slopes.A @ state + slopes.B @ np.array(inputs), strict=True))
+        return slopes.C @ state + slopes.D @ np.array(inputs)
+
+
+NO_SLOPES = Slopes((), *np.zeros((4, 0, 0)))
+
+
+def _slopes(design: Design, true_state: bool) -> tuple[Slopes, Slopes, Sequence[str]]:
+    """Find the slopes of observer and law, and the names of the observer's extra signals."""
+    kind, law_kind = design.scenario.observer.kind, design.scenario.controller.kind
+    estimating, extra = NO_SLOPES, ()
+    if not true_state:
+        observer = design.observer()
+        extra = extra_signals(observer)
+        try:
+            estimating = observer_slopes(observer)
+        except InputError as error:
+            raise InputError(
+                f"observer.kind = {kind!r}: {error}; linear_closed_loop takes {', '.join(WITH_A_SLOPE)}, or one of "
+                "your own"
+            ) from error
+    try:
+        return estimating, law_slopes(design.fresh_law(), len(extra)), extra
+    except InputError as error:
+        raise InputError(f"controller.kind = {law_kind!r}: {error}; linear_closed_loop takes state_feedback") from error
+
+
+def _prefixed(owner: str, slopes: Slopes) -> list[str]:
+    """Name the states of the observer or the law; one that is a single number has the owner's name."""
+    return [f"{owner}_{name}" if name else owner for name in slopes.names]
+
+
+def _channels(design: Design, true_state: bool) -> list[_Channel]:
+    """Return the measurements in the loop, with the times of each."""
+    timestep, sensors, channels = design.rig.timestep, design.scenario.sensors, []
+    for name in sensors_used(design):
+        sensor = getattr(sensors, name)
+        period = whole_steps(1.0 / sensor.rate_hz, timestep, f"sensors.{name}.rate_hz", f"{sensor.rate_hz:g} Hz")
+        times = period, steps_until(sensor.latency_s, timestep)
+        if name != "accelerometer":
+            channels.append(_Channel(name, *times))
+        elif true_state:
+            is_estimated = design.scenario.controller.feedback == "observer"
+            channels += [_Channel(signal, *times) for signal in ("tilt", *(["rate"] if is_estimated else []))]
+        else:
+            pair = sensors.accelerometer
+            inside = f"{pair.bandwidth_hz:g} Hz, sampled at {INSIDE_HZ:g} Hz inside the part"
+            where = "sensors.accelerometer"
+            raw = whole_steps(1.0 / INSIDE_HZ, timestep, f"{where}.bandwidth_hz", inside) if pair.bandwidth_hz else 0
+            skew = whole_steps(pair.skew_s, timestep, f"{where}.skew_s", f"{pair.skew_s:g} s")
+            channels += [_Channel("inner", *times, raw), _Channel("outer", *times, raw, skew)]
+    return channels
+
+
+def _measured_slopes(design: Design) -> np.ndarray:
+    """Return y1 and the angular acceleration by the tangential forces of inner and outer part, (2, 2).
+
+    Differences of the code that runs, constant errors of the parts among it.
+    """
+    tilt, gravity = design.rig.tilt, design.rig.gravity
+    erring = design.scenario.sensors.accelerometer.constant_errors()
+
+    def measured(inner: float, outer: float) -> np.ndarray:
+        forces = erring((inner, gravity, outer, gravity))
+        return np.array([tilt(*forces), tilt.acceleration(forces[0], forces[2])])
+
+    h = 1e-5 * gravity
+    inner, outer = measured(h, 0.0) - measured(-h, 0.0), measured(0.0, h) - measured(0.0, -h)
+    return np.array([inner, outer]).T / (2.0 * h)
