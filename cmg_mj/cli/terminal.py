@@ -21,7 +21,6 @@ from cmg_mj.errors import shortened
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from cmg_mj.cli.progress_rate import ProgressRate
     from cmg_mj.results.folder import RunFolder
 
     Handler = Callable[[int, FrameType | None], None] | signal.Handlers
@@ -160,16 +159,13 @@ def show(value: Any, table: RenderableType, as_json: bool) -> None:
 
 
 @contextmanager
-def progress(
-    label: str, total: float, ctrl_c: CtrlC | None = None, pace: ProgressRate | None = None
-) -> Iterator[OnProgress]:
-    """Show a progress bar on standard error until the end; without a terminal, a line a minute if there is a pace.
+def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[OnProgress]:
+    """Show a progress bar on standard error until the end.
 
     Args:
         label: Description of the task.
         total: Total of the progress.
         ctrl_c: Checked on every call.
-        pace: Formats the rate.
 
     Yields:
         Function that moves the bar.
@@ -182,10 +178,10 @@ def progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
-        TimeRemainingColumn() if pace is None else TextColumn("{task.fields[pace]}", markup=False),
+        TimeRemainingColumn(),
     )
     bar = Progress(*columns, console=console, transient=True)
-    task = bar.add_task(label, total=total, pace="")
+    task = bar.add_task(label, total=total)
 
     position = -total
 
@@ -193,16 +189,10 @@ def progress(
         nonlocal position
         if ctrl_c is not None:
             ctrl_c.check()
-        if pace is not None and not console.is_terminal:
-            if line := pace.line(done):
-                note(line)
-            return
         if now is None and done - position < total / 2000.0:
             return  # called after every tick, of which one in many is worth drawing
         position = done
         bar.update(task, completed=done, description=now)  # None leaves the description as it is
-        if pace is not None:
-            bar.update(task, pace=pace.text(done))
 
     with bar if console.is_terminal else nullcontext():  # below rich 15, a disabled bar leaves an empty line
         yield on_progress

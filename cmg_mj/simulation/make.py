@@ -26,7 +26,7 @@ from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.omissions import IN_THE_MODEL, omissions
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.scenario.stability_check import require_stable_period
+from cmg_mj.linear.verdict import require_stable_period
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.simulate import SimulationOptions
 
