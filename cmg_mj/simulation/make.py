@@ -20,13 +20,13 @@ from cmg_mj.codegen.export import check_installed
 from cmg_mj.codegen.export.names import name_of
 from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.errors import InputError
+from cmg_mj.linear.verdict import require_stable_period
 from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.plant.plugin_model import plugin_mjcf
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.result import Result
 from cmg_mj.scenario.omissions import IN_THE_MODEL, omissions
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.linear.verdict import require_stable_period
 from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.simulation.simulate import SimulationOptions
 
