@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.papers.beyond.floor import kalman_filter, velocity_floor
+from beyond.floor import kalman_filter, velocity_floor
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.simulation.experiment import prepare
 from tests.observers.reference import PAPER
