@@ -1,4 +1,4 @@
-"""Which test catches which wrong parameter, and which wrong report? Writes docs/mutations.md.
+"""Which test catches which wrong parameter, and which wrong report? Prints both tables.
 
 Each parameter of the law, the observers and the reduced model is multiplied by 0.8 and by 1.2 in a copy of the sources,
 and the tests are run until the first failure: those of the daily tier, and if none of them fails the slow ones. Each
@@ -273,8 +273,6 @@ def main() -> None:
             parts += ["## Wrong reports", wrapped(REPORTS_SAY), table]
             survivors += survived
     text = "\n\n".join(parts) + "\n"
-    if not selection:
-        (ROOT / "docs" / "mutations.md").write_text(text, encoding="utf-8")
     print(text)
     if survivors:
         sys.exit(f"survived: {', '.join(survivors)}")

@@ -16,8 +16,6 @@ from cmg_mj.errors import InputError, nearest
 def reproduce(paper: str, out: str | None, as_json: bool) -> None:
     """Reproduce PAPER (aranovskiy2020, sokolov2019, dao2023, andrieu2009), or all of them.
 
-    PAPER may also be beyond: a table of every observer over 100 seeds, which is in no paper and takes some minutes.
-
     Writes a folder: report.md, its plots, and figures.json. The report compares every claim of the paper with the
     figures obtained here. One rule decides the verdict of a claim:
 
@@ -30,11 +28,11 @@ def reproduce(paper: str, out: str | None, as_json: bool) -> None:
 
     The exit status is 0 whatever the verdicts are.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.papers import BEYOND, PAPERS, check_installed
+    from cmg_mj.papers import PAPERS, check_installed
     from cmg_mj.papers import reproduce as reproduce_papers
     from cmg_mj.papers.report import figures_of, save_report, verdict_table
 
-    names = (*PAPERS, *BEYOND, "all")
+    names = (*PAPERS, "all")
     if paper not in names:
         raise InputError(f"{paper!r}: no such paper; {nearest(paper, names)}")
     papers = list(PAPERS) if paper == "all" else [paper]

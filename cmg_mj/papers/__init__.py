@@ -24,9 +24,6 @@ PAPERS = {
 }
 """Paper -> its title."""
 
-BEYOND = {"beyond": "A step beyond the papers"}
-"""The studies reproduced only when asked for by name, because they take long."""
-
 NEEDS = {"aranovskiy2020": ("sympy",), "sokolov2019": ("sympy",)}
 """Paper -> the packages that it needs beyond the bench's; the extra `[papers]` has them all."""
 
@@ -74,7 +71,7 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
     """Obtain every claim of the papers.
 
     Args:
-        papers: Their short names, of `PAPERS` and `BEYOND`.
+        papers: Their short names, of `PAPERS`.
         on_progress: Called now and then with what is being done and the share done.
 
     Returns:

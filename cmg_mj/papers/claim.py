@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from cmg_mj.visualization.plots.figure_spec import Picture
 
@@ -12,16 +12,15 @@ Verdict = Literal[
     "reproduced", "reproduced within stated conditions", "illustrated", "cannot be tested", "not reproduced"
 ]
 
-MEANINGS: dict[Verdict, str] = {
+VERDICTS: dict[Verdict, str] = {
     "reproduced": "the claim holds, and the paper prints all that the claim depends on",
     "reproduced within stated conditions": "the claim holds with an assumption of ours (a push, a bias e, noise, a "
-    "drive), with a misprint mended, or in part. These conditions stand below the claim",
+    "drive), with a misprint mended, or in part, as its row says",
     "illustrated": "the claim is a general statement and holds for the systems on which it was tried. This is no proof",
-    "cannot be tested": "the outcome depends on something that the paper does not give, such as a recording, a gain or "
-    "a threshold. A result with our choice speaks neither for the claim nor against it",
-    "not reproduced": "the claim does not hold, and the reason stands below it",
+    "cannot be tested": "the outcome depends on something that the paper does not give, such as a recording or a gain",
+    "not reproduced": "the claim does not hold, for the reason in its row",
 }
-"""The rule by which `Claim.verdict` decides, in words."""
+"""Verdict -> its meaning: the rule of `Claim.verdict` in words."""
 
 Assumption = Literal[
     "push",
@@ -55,8 +54,6 @@ class Claim:
     Attributes:
         place: Place in the paper: `Fig. 2`, `Remark 1`, `Section V`.
         statement: Statement of the paper there, in our words.
-        result: Result obtained, with its figures, in words.
-        table: A Markdown table of further figures, below the words.
         holds: True if the figures confirm the claim, computed from them; or such a value for each of several
             measures, all of which must hold.
         assumes: Assumptions of ours that the claim depends on, each with its size in a few words.
@@ -64,7 +61,7 @@ class Claim:
         missing_data: Data that the paper does not give and that decide the outcome, a whole sentence; empty if none.
         conditions: The misprint that was mended, or for which part it holds, a whole sentence; empty if neither.
         otherwise: Explanation where it does not hold, a whole sentence.
-        figures: The numbers behind `result`, by names that end in their unit, as JSON can hold them.
+        figures: The numbers found, by names that end in their unit, as JSON can hold them.
         pictures: Plots.
         is_ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
         measures: Measure -> true if the claim holds by it; empty if `holds` is one value.
@@ -72,41 +69,25 @@ class Claim:
 
     place: str
     statement: str
-    result: str
-    table: str = ""
     holds: bool | Mapping[str, bool]
     assumes: Mapping[Assumption, str] = field(default_factory=dict)
     is_general: bool = False
     missing_data: str = ""
     conditions: str = ""
-    otherwise: str = "The figures above contradict the claim."
+    otherwise: str = "The figures contradict the claim."
     figures: Mapping[str, Any] = field(default_factory=dict)
     pictures: Sequence[Picture] = ()
     is_ours: bool = False
     measures: Mapping[str, bool] = field(init=False)
 
     def __post_init__(self) -> None:
-        for name in ("conditions", "otherwise", "missing_data"):
-            text = getattr(self, name)
-            if text and not (" " in text and text.endswith(".")):
-                raise ValueError(f"{self.place}: {name} = {text!r}: must be a whole sentence, which the report prints")
-        if not self.otherwise:
-            raise ValueError(f"{self.place}: otherwise: say what to make of it where it does not hold")
-        if self.is_general and not (self.conditions or self.assumes):
-            raise ValueError(f"{self.place}: conditions: say on which systems a general statement was tried")
-        unknown_names = sorted(set(self.assumes) - set(get_args(Assumption)))
-        if unknown_names:
-            raise ValueError(f"{self.place}: assumes: {', '.join(unknown_names)}: no `Assumption`")
         measures = self.holds if isinstance(self.holds, Mapping) else {}
-        if isinstance(self.holds, Mapping) and not measures:
-            raise ValueError(f"{self.place}: holds: name a measure")
-        holds = all(measures.values()) if measures else self.holds
         object.__setattr__(self, "measures", {name: bool(value) for name, value in measures.items()})
-        object.__setattr__(self, "holds", bool(holds))  # numpy's truth is no JSON
+        object.__setattr__(self, "holds", all(measures.values()) if measures else bool(self.holds))
 
     @property
     def verdict(self) -> Verdict:
-        """The comparison of the paper with what was obtained: the one rule, whose words are `MEANINGS`."""
+        """The comparison of the paper with what was obtained: the one rule, whose words are `VERDICTS`."""
         if self.missing_data:
             return "cannot be tested"
         if not self.holds:

@@ -55,12 +55,6 @@ def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[
     return np.linalg.solve(closed, -B[:, 0] * K[0] * e), np.linalg.eigvals(closed)
 
 
-def poles_in_words(poles: np.ndarray) -> str:
-    """List poles, (n,), from the fastest to the slowest; each pair once."""
-    upper = sorted((p for p in poles if p.imag >= -1e-9), key=lambda p: p.real)
-    return ", ".join(f"{p.real:.3g}+-{p.imag:.3g}j" if p.imag > 1e-9 else f"{p.real:.3g}" for p in upper)
-
-
 def poles_as_pairs(poles: np.ndarray) -> list[list[float]]:
     """List poles, (n,), as [real part, imaginary part], which JSON can hold."""
     return [[float(p.real), float(p.imag)] for p in poles]

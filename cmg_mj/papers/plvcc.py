@@ -207,8 +207,6 @@ def claim(paper: Paper) -> Claim:
     """Judge the appendix of aranovskiy2020, or Proposition 1 of sokolov2019, whose proof is not printed there."""
     result = proof(paper)
     symbolic, numeric = result.decisions
-    constant, *other_decisions = result.checks
-    condition_values = ", ".join(f"{value} at q2 = {angle}" for angle, value in symbolic.values.items())
     gap, factor, printed_factor = not zero_d_is_singular(), inertia_factor(paper), PRINTED[paper].factor
     remarks = {
         "The printed proof has a gap: d = 0 alone does not make Psi singular (m1 = 1, Psi = [[0, 1], [1, 0]]). The "
@@ -223,13 +221,6 @@ def claim(paper: Paper) -> Claim:
         place=PRINTED[paper].place,
         statement="No full-rank Psi(q) makes B_(1) and B_(2) skew-symmetric: the system is not partially linearisable "
         "via coordinate changes.",
-        result=f"No such Psi exists: m1 (m1'/m1)' is {condition_values} (I_cd = I_c + I_d), which differ for every J2 "
-        f"other than 0. The checker can say yes: constant m1 has Psi = {_text(constant.Psi)}, "
-        + ", ".join(f"m1 = {decision.m1} has Psi = {_text(decision.Psi)}" for decision in other_decisions)
-        + ". Substituted in the definition, these Psi make the B_(i) skew-symmetric. The paper's necessary condition "
-        "is also sufficient: a column of Psi serves exactly if it is a Killing field of M. An m1 > 0 on the whole line "
-        "has two independent ones exactly if m1 = (A exp(k q2) + D exp(-k q2))^2 with A, D >= 0."
-        + (" The paper prints no proof; this is one." if paper == "sokolov2019" else ""),
         holds=not result.failures,
         conditions=on_printed_proof if paper == "aranovskiy2020" else "",
         otherwise=f"Not found so: {'; '.join(result.failures)}.",

@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import platform
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from cmg_mj.papers import BEYOND, PAPERS, Reproduction
-from cmg_mj.papers.claim import MEANINGS, Claim, Verdict
-from cmg_mj.papers.sentences import SentenceLog
+import numpy as np
+
+from cmg_mj.papers import PAPERS, Reproduction
+from cmg_mj.papers.claim import VERDICTS, Claim
 from cmg_mj.results import markdown
 from cmg_mj.results.folder import RunFolder, Writers, claimed, write_text
 from cmg_mj.visualization.plots.figure_spec import draw
@@ -38,8 +39,7 @@ def _figures_of_claim(claim: Claim) -> dict[str, Any]:
     return {
         "place": claim.place,
         "says": claim.statement,
-        "found": claim.result,
-        "table": claim.table,
+        "found": found(claim),
         "verdict": claim.verdict,
         "measures": dict(claim.measures),
         "assumes": dict(claim.assumes),
@@ -52,113 +52,72 @@ def _figures_of_claim(claim: Claim) -> dict[str, Any]:
     }
 
 
+SHOWN = 8
+"""A row of the report shows at most so many figures; figures.json has all."""
+
+
+def _flat(name: str, value: Any) -> Iterator[tuple[str, str]]:
+    """List a figure, or what is nested in it, by name: numbers to four digits, of a long list only the ends."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _flat(f"{name} {key}".strip(), inner)
+    elif not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
+        yield name, f"{value:.4g}" if isinstance(value, float) else "none" if value is None else str(value)
+    elif len(value) and isinstance(value[0], Mapping):
+        for i, inner in enumerate(value):
+            yield from _flat(f"{name} {i + 1}", inner)
+    else:
+        shown = [text for inner in value for _, text in _flat("", inner)]
+        yield name, ", ".join(shown if len(shown) <= 4 else [*shown[:2], "...", shown[-1]])
+
+
+def found(claim: Claim) -> str:
+    """Write a claim's figures in one line, with the measures by which it holds."""
+    flat = [f"{name} = {text}" for name, text in _flat("", claim.figures)]
+    more = [f"{len(flat) - SHOWN} more in figures.json"] if len(flat) > SHOWN else []
+    measures = [f"{name}: {'holds' if holds else 'fails'}" for name, holds in claim.measures.items()]
+    return "; ".join([*measures, *flat[:SHOWN], *more])
+
+
 def verdict_table(entries: Sequence[Reproduction]) -> str:
     """Write every claim and its verdict as a Markdown table."""
-    rows = [
-        (entry.paper, claim.place + _owner_note(claim), claim.statement, verdict_words(claim))
-        for entry in entries
-        for claim in entry.claims
-    ]
+    rows = [(entry.paper, _place(claim), claim.statement, claim.verdict) for entry in entries for claim in entry.claims]
     return markdown.table(("paper", "place", "claim", "verdict"), rows, text_columns=4)
 
 
-OURS: dict[Verdict, str] = {
-    "reproduced": "holds",
-    "reproduced within stated conditions": "holds within stated conditions",
-    "illustrated": "illustrated",
-    "cannot be tested": "cannot be tested",
-    "not reproduced": "does not hold",
-}
-"""The verdicts' words where there is no paper to reproduce."""
-
-
-def verdict_words(claim: Claim) -> str:
-    """Say a claim's verdict in the words for those of a paper or for ours."""
-    return OURS[claim.verdict] if claim.is_ours else claim.verdict
-
-
 def report_text(entries: Sequence[Reproduction]) -> str:
-    """Write the whole report in Markdown."""
-    parts = [f"# {_title(entries)}", *_opening(entries), "## All claims", verdict_table(entries)]
+    """Write the whole report in Markdown: a table a paper, a row a claim."""
+    parts = [
+        "# The papers, claim by claim",
+        "One rule computes a verdict from the claim's figures and from the assumptions that it declares. No parameter "
+        "was tuned to bring a verdict about. If a claim has several measures, all must hold. docs/assumptions.md lists "
+        "the assumptions about the rig that every claim shares.",
+        "\n".join(f"- *{verdict}*: {meaning}." for verdict, meaning in VERDICTS.items()),
+    ]
+    claims = [claim for entry in entries for claim in entry.claims]
+    for is_ours, whose in ((False, "claims of the papers"), (True, "claims beside them, not the papers'")):
+        counts = Counter(claim.verdict for claim in claims if claim.is_ours is is_ours)
+        if counts:
+            counted = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+            parts.append(f"{sum(counts.values())} {whose}: {counted}.")
     for entry in entries:
-        parts.append(f"## {entry.paper}: {(PAPERS | BEYOND)[entry.paper]}")
+        parts.append(f"## {entry.paper}: {PAPERS[entry.paper]}")
         if not entry.complete:
             parts.append("**Interrupted: not all of this paper's claims are here.**")
-        log = SentenceLog()
-        parts += [part for claim in entry.claims for part in _parts_of_claim(claim, log)]
+        headings = ("place", "claim", "found", "verdict", "conditions")
+        parts.append(markdown.table(headings, [_row(claim) for claim in entry.claims], text_columns=5))
     return "\n\n".join(markdown.wrap(part) for part in parts) + "\n"
 
 
-def _opening(entries: Sequence[Reproduction]) -> list[str]:
-    """List the meanings of the verdicts, their counts, and the claims that do not hold or cannot be tested."""
-    parts = [
-        "Each claim stands beside the result of this software. One rule computes the verdict from the claim's figures "
-        "and from the assumptions that the claim declares. No parameter was tuned to bring a verdict about.",
-        "\n".join(f"- *{verdict}*: {meaning}." for verdict, meaning in MEANINGS.items()),
-        "If a claim has several measures, all must hold. docs/assumptions.md lists the assumptions about the rig that "
-        "every claim shares.",
-        _count_of_verdicts(entries),
-    ]
-    for verdict in ("not reproduced", "cannot be tested"):
-        places = [
-            f"- {entry.paper}, {claim.place}{_owner_note(claim)}: {claim.statement}"
-            for entry in entries
-            for claim in entry.claims
-            if claim.verdict == verdict
-        ]
-        parts += [f"{verdict.capitalize()}:", "\n".join(places)] if places else []
-    return parts
+def _place(claim: Claim) -> str:
+    return f"{claim.place} (not the paper's)" if claim.is_ours else claim.place
 
 
-def _owner_note(claim: Claim) -> str:
-    return " (not the paper's)" if claim.is_ours else ""
-
-
-def _title(entries: Sequence[Reproduction]) -> str:
-    first = entries[0].paper
-    title = BEYOND.get(first, f"{first}, reproduced") if len(entries) == 1 else "Four papers, reproduced"
-    return title if all(entry.complete for entry in entries) else f"{title} (interrupted: not all of it)"
-
-
-def _parts_of_claim(claim: Claim, log: SentenceLog) -> list[str]:
-    """Write a claim's paragraphs, without the conditions that an earlier claim of the paper had."""
-    parts = [
-        f"### {claim.place}: {verdict_words(claim)}",
-        f"**{'Ours' if claim.is_ours else 'The paper'}:** {claim.statement}",
-        f"**Here:** {claim.result}",
-    ]
-    if claim.table:
-        parts.append(claim.table)
-    if claim.measures:
-        words = "; ".join(f"{name}: {'holds' if holds else 'does not hold'}" for name, holds in claim.measures.items())
-        parts.append(f"**By measure:** {words}.")
-    if claim.assumes:
-        parts.append(f"**Assumed by us:** {'; '.join(f'{name}: {size}' for name, size in claim.assumes.items())}.")
-    if claim.reason:
-        label = "Conditions" if claim.holds else "Why not"
-        label = "Why" if claim.verdict == "cannot be tested" else label
-        parts.append(f"**{label}:** {log.omit_repeats(claim.reason, claim.place)}")
-    return parts + [f"![{picture.title}]({picture.name}.png)" for picture in claim.pictures]
-
-
-def _count_of_verdicts(entries: Sequence[Reproduction]) -> str:
-    """Count the claims by verdict, the papers' and ours apart, and say how long they took; a paragraph each."""
-    claims = [claim for entry in entries for claim in entry.claims]
-    sentences = []
-    for is_ours, words in ((False, "claims of the papers"), (True, "beside them, not the papers'")):
-        counts = Counter(verdict_words(claim) for claim in claims if claim.is_ours is is_ours)
-        if counts:
-            order = [OURS[v] if is_ours else v for v in OURS]
-            counts_text = ", ".join(_counted(counts[v], v) for v in order if counts[v])
-            sentences.append(f"{sum(counts.values())} {words}: {counts_text}.")
-    return "\n\n".join([*sentences, f"Took {sum(entry.seconds for entry in entries):.0f} s."])
-
-
-def _counted(count: int, verdict: str) -> str:
-    """Write a verdict's count: `1 holds`, `6 hold`."""
-    plural = {"holds": "hold", "does": "do"}
-    first, *others = verdict.split(" ")
-    return " ".join([str(count), first if count == 1 else plural.get(first, first), *others])
+def _row(claim: Claim) -> tuple[str, str, str, str, str]:
+    pictures = [f"[picture]({picture.name}.png)" for picture in claim.pictures]
+    assumed = "; ".join(f"{name}: {size}" for name, size in claim.assumes.items())
+    conditions = " ".join(filter(None, (f"Assumed: {assumed}." if assumed else "", claim.reason)))
+    return " ".join([_place(claim), *pictures]), claim.statement, found(claim), claim.verdict, conditions
 
 
 REPORT_FILES = ["report.md", "figures.json"]

@@ -23,11 +23,6 @@ def plus_minus(interval: Interval | None, digits: int = 4, *, with_sign: bool = 
     return f"{interval.mean:{'+' if with_sign else ''}.{digits}f} +- {interval.half:.{digits}f}"
 
 
-def with_ends(interval: Interval) -> str:
-    """Write a mean and the ends of its interval, `0.985 (0.970 to 1.001)`."""
-    return f"{interval.mean:.3f} ({interval.low:.3f} to {interval.high:.3f})"
-
-
 def join_with_and(words: Sequence[str]) -> str:
     """Join one or several things as a sentence lists them: `a`, `a and b`, `a, b and c`."""
     *first, last = words

@@ -28,9 +28,9 @@ from functools import cache
 from itertools import pairwise, product
 
 import numpy as np
+from beyond.floor import velocity_floor
 
 from cmg_mj.observers import OBSERVERS as BUNDLED
-from cmg_mj.papers.beyond.floor import velocity_floor
 from cmg_mj.results.error_bounds import TiltFloor
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.markdown import table

@@ -14,7 +14,7 @@ def test_every_mutant_can_be_made() -> None:
     for mutant in MUTANTS:
         text = (ROOT / PAPERS / mutant.file).read_text(encoding="utf-8")
         assert mutant.apply(text) != text
-    assert len({(mutant.file, mutant.old, mutant.new) for mutant in MUTANTS}) == len(MUTANTS) >= 30
+    assert len({(mutant.file, mutant.old, mutant.new) for mutant in MUTANTS}) == len(MUTANTS) >= 20
 
 
 def test_every_mutant_has_its_test() -> None:

@@ -16,9 +16,8 @@ from cmg_mj.papers.andrieu2009.simulation import (
     window_means,
     window_spreads,
 )
-from cmg_mj.papers.andrieu2009.study import ASSUMED, LOUD, Study, rms_by_kind
+from cmg_mj.papers.andrieu2009.study import ASSUMED, Study, rms_by_kind
 from cmg_mj.papers.claim import Claim
-from cmg_mj.results import markdown
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 LEAST_SEEDS = 0.95
@@ -39,7 +38,6 @@ def figure_2(study: Study) -> Claim:
     """Judge the estimation errors."""
     rms, loud = rms_by_kind(study.run, study.nominal), rms_by_kind(study.run, study.loud)
     share, share_loud = share_in_order(rms), share_in_order(loud)
-    n = rms.shape[1]
     means, loud_means = rms.mean(axis=1), loud.mean(axis=1)
     remark = (
         "Initial values are not given: the plant's and the observers' are drawn from M_eta for each seed, and the "
@@ -50,10 +48,6 @@ def figure_2(study: Study) -> Claim:
         place="Fig. 2",
         statement="The observer with Omega_2 and homogeneity gives the best estimate of eta2, the updated gain with "
         "Omega_1 the second, the constant gain the worst.",
-        result=f"RMS error of eta2 after t = 5, mean of {n} seeds: {means[0]:.3f}, {means[1]:.3f}, {means[2]:.3f} "
-        f"(constant, updated, updated and homogeneous); in this order in {round(share * n)} of {n} seeds. With noise "
-        f"of 10 % of the domain ({LOUD}): {loud_means[0]:.3f}, {loud_means[1]:.3f}, {loud_means[2]:.3f}; "
-        f"{round(share_loud * n)} of {n}.",
         assumes=ASSUMED,
         holds=share >= LEAST_SEEDS,
         conditions=remark,
@@ -104,17 +98,9 @@ def bias(study: Study) -> Claim:
     """Judge the order of the biases in Fig. 2."""
     noisy, quiet = biases(study.run, study.nominal), biases(study.quiet_run, study.quiet)
     in_order = [(np.diff(values, axis=0) <= 0.0).all(axis=0) for values in (noisy, quiet)]
-    rows = [
-        (kind, noise, *(f"{value:.4f}" for value in row))
-        for noise, values in (("as in Fig. 2", noisy), ("without", quiet))
-        for kind, row in zip(KINDS, values, strict=True)
-    ]
     return Claim(
         place="Section 3.1, bias in Fig. 2",
         statement="The larger an observer's estimate of the rate, the larger the bias of its error.",
-        result="A larger estimate goes with a larger mean error of eta2 in "
-        f"{in_order[0].sum()} of 4 windows with noise, {in_order[1].sum()} of 4 without.",
-        table=markdown.table(("observer", "noise", *WINDOW_NAMES), rows, text_columns=2),
         assumes=ASSUMED,
         holds=bool(np.all(in_order)),
         otherwise="The means are not in order in every window.",
@@ -133,7 +119,6 @@ def bias_of_constant_gain(study: Study) -> Claim:
     return Claim(
         place="Section 3.1, bias of the constant gain",
         statement="The bias of the observer with constant gain in Fig. 2 is due to the error in hbar.",
-        result=f"With hbar exact {shares_left.min():.0%} to {shares_left.max():.0%} of it remain in the four windows.",
         assumes={**ASSUMED, "threshold": "due to it if less than half is left"},
         holds=dict(zip(WINDOW_NAMES, (shares_left < HALF).tolist(), strict=True)),
         otherwise="It is made by the noise, which sends the estimate from end to end of the domain, where the limits "
@@ -151,12 +136,6 @@ def bias_of_updated_gains(study: Study) -> Claim:
     return Claim(
         place="Section 3.1, bias of the updated gains",
         statement="The biases of the observers with updated gain in Fig. 2 are due to the error in hbar.",
-        result="With hbar exact there remain "
-        + "; ".join(
-            f"{', '.join(f'{value:.0%}' for value in row)} ({kind})"
-            for kind, row in zip(KINDS[1:], shares_left, strict=True)
-        )
-        + ".",
         assumes={**ASSUMED, "threshold": "due to it if less than half is left"},
         holds=dict(zip(WINDOW_NAMES, due, strict=True)),
         otherwise=f"Less than half remains for both in {', '.join(windows)}; not in {', '.join(other_windows)}, where "
@@ -195,12 +174,6 @@ def spread(study: Study) -> Claim:
     return Claim(
         place="Section 3.1, standard deviation in Fig. 2",
         statement="The larger an observer's estimate of the rate, the more its error scatters.",
-        result="Standard deviation about a straight line in each window. Its rank correlation with the estimate is at "
-        f"least {in_window:.2f} over the observers of a window, {overall:.2f} over all twelve.",
-        table=markdown.table(
-            ("observer", *WINDOW_NAMES),
-            [(kind, *(f"{value:.4f}" for value in row)) for kind, row in zip(KINDS, spreads, strict=True)],
-        ),
         assumes=ASSUMED,
         holds=in_window >= STRONG and overall > 0.0,
         conditions="" if overall >= STRONG else remark,

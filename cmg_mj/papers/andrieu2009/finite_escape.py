@@ -111,17 +111,10 @@ def no_observer_beyond_1() -> Claim:
         "started at the measured x1 and x2_hat = 0. The statement is about all observers and is proved "
         "elsewhere (Astolfi and Praly 2006). This example shows the obstacle, and is no proof."
     )
-    first = f" From x2(0) = {STARTS[misses.index(True)]:g} on it is missed." if count else ""
     return Claim(
         place="Section 2.1",
         statement="Once p exceeds 1, and with u = 0, no observer whatever can be sure to find x2 before the solution "
         "of (1) ends.",
-        result=f"With p = {BEYOND} a solution from x2(0) = {STARTS[0]:g} to {STARTS[-1]:g} escapes at t = "
-        f"{runs[BEYOND][0].end_time:.2g} to {runs[BEYOND][-1].end_time:.2g}, by when y has moved by "
-        f"{moved[0]:.2g} to {moved[-1]:.2g} only. A millionth of that time before the end the relative error of x2 is "
-        f"above {MISSED} in {count} of {len(STARTS)}, {max(ends[BEYOND]):.2f} at worst.{first} With p = {INSIDE} "
-        "solutions escape as well, but y with them: the same observer then finds x2 from every start, to "
-        f"{max(ends[INSIDE]):.0e}.",
         is_general=True,
         holds=max(ends[INSIDE]) < FOUND and misses[-1],
         conditions=one_observer,

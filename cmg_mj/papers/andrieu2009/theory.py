@@ -17,7 +17,6 @@ from cmg_mj.papers.andrieu2009.increments import exponent_of_6, increments, line
 from cmg_mj.papers.andrieu2009.paper import B, P
 from cmg_mj.papers.andrieu2009.theorem_1 import theorem_1
 from cmg_mj.papers.claim import Claim, OnShare, obtain
-from cmg_mj.results import markdown
 
 
 def claims(on_share: OnShare) -> list[Claim]:
@@ -49,13 +48,6 @@ def scaling_conditions() -> Claim:
     return Claim(
         place="Section 4.3, (21), (22)",
         statement="Every small enough b satisfies (21) and (22), whichever d_inf and v_j Theorem 1 allows.",
-        result="Multiplied out, (21) is (i + 1 - j)(1 - d_inf (n - 1) - b d_inf) > 0: it asks for b < 1/d_inf - (n - "
-        "1), which is above 0 for every d_inf below 1/(n - 1). So is (22)'s bound 1/v_j - (j - 1) for every v_j below "
-        f"1/(j - 1). For n = 2 and p = {P} both ask for b < (1 - p)/p = {bound:.4f}. Section 3.1 has b = {B}, with "
-        f"which {len(lines)} inequalities do not hold; the paper does not say there that they do. It does no harm: "
-        "the argument of the correction is so small that b and p have no effect (see the claim on the correction). "
-        "With the limited x2_hat Omega_2 is bounded, so that (22) could be dropped, but not (21).",
-        table=markdown.table(("inequality", "is not so"), [line.split(": ", 1) for line in lines], text_columns=2),
         holds=is_a_bound_on_b() and agrees,
         otherwise="(21) is no bound on b, or not this one.",
         figures={"b": B, "largest_b": bound, "violated_count": len(lines)},
@@ -87,9 +79,6 @@ def gain_tracking() -> Claim:
         place="Section 2.2, (13)",
         statement="L tracks phi2 + (phi3/phi1) Omega up to an error proportional to |Omega'|, and from L(0) >= phi2 "
         "stays at or above phi2.",
-        result=f"For Omega = 2 + sin(w t) the largest error falls from {errors[0]:.3f} at w = {rates[0]} by factors "
-        f"{', '.join(f'{quotient:.2f}' for quotient in quotients)} as w is halved; the least L - phi2 is "
-        f"{min(least):.2g}.",
         is_general=True,
         assumes={"signal": "Omega = 2 + sin(w t)", "gains": "phi1 = 0.5, phi2 = 1, phi3 = 1"},
         holds=proportional and stays_above,

@@ -13,7 +13,7 @@ from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.result import Result
-from cmg_mj.results.summary_keys import KEYS, format_figure
+from cmg_mj.results.summary_keys import KEYS
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 Numbers = Mapping[str, np.ndarray]
@@ -92,7 +92,6 @@ def orders(measures: list[Measure]) -> list[Claim]:
 
 
 def _order(measure: Measure, pictures: list[Picture]) -> Claim:
-    worlds = len(next(iter(measure.numbers.values()))["linear"])
     label = KEYS[measure.key].label
     turns = (
         "At low noise or large bias the order turns round, because (11) mistakes the bias for a rate most: the map "
@@ -102,10 +101,6 @@ def _order(measure: Measure, pictures: list[Picture]) -> Claim:
         place=f"Section V, the comparison: {label}",
         statement="The homogeneous differentiator performs best, the time-varying observer second, the linear one "
         f"last; judged by the {label}.",
-        result=(
-            f"Means over {worlds} seeds of (11), (10), (9); an order is one if both steps of it are beyond chance, "
-            f"world by world. The paper names no measure. {_in_words(measure)}"
-        ),
         assumes=PUSH_RECOVERY,
         holds={f"{angles} angles": order == "holds" for angles, order in measure.orders.items()},
         conditions=turns if measure.key == JUDGED else "",
@@ -117,17 +112,6 @@ def _order(measure: Measure, pictures: list[Picture]) -> Claim:
         },
         pictures=pictures,
     )
-
-
-def _in_words(measure: Measure) -> str:
-    """Write one measure's means and order on each kind of angles."""
-    parts = []
-    for angles, numbers in measure.numbers.items():
-        means = [known_interval(numbers[name]) for name in ("homogeneous", "ltv", "linear")]
-        means_text = ", ".join(format_figure(measure.key, None if mean is None else mean.mean) for mean in means)
-        parts.append(f"{means_text} with the law on {angles} angles, where the order {measure.orders[angles]}")
-    label = KEYS[measure.key].heading
-    return f"{label[0].upper()}{label[1:]}: {'; '.join(parts)}."
 
 
 def _in_which_order(measure: Measure) -> str:

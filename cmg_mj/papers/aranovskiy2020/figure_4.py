@@ -11,7 +11,7 @@ from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
-from cmg_mj.papers.words import join_with_and, plus_minus
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import load_scenario
@@ -78,10 +78,6 @@ def _comparable(span: str, rms_errors: Mapping[str, np.ndarray], suffix: str, pi
         place=f"Fig. 4, {span}",
         statement="With the loop closed on the gyro and a push at 2 s, the three tuned observers are comparable open "
         "loop.",
-        result=(
-            f"RMS of the estimated rate less the gyro's {span}, {len(rms_errors['zero'])} seeds, with 95 % intervals "
-            f"[rad/s]: {_list_errors(errors)}. The largest is {spread:.2f} times the smallest."
-        ),
         assumes={**PUSH_RECOVERY, "threshold": f"comparable is within a factor of {COMPARABLE:g}"},
         missing_data="The paper gives neither this recording, with its push, e and noise, nor a limit for comparable.",
         holds=spread < COMPARABLE,
@@ -111,11 +107,6 @@ def _describe_zero(errors: Mapping[str, Interval]) -> str:
 def _zero_sentence(errors: Mapping[str, Interval]) -> str:
     sentence = _describe_zero(errors)
     return f"{sentence[0].upper()}{sentence[1:]}."
-
-
-def _list_errors(errors: Mapping[str, Interval]) -> str:
-    labels = OBSERVERS | {"zero": "an estimate of zero"}
-    return ", ".join(f"{label} {plus_minus(errors[name])}" for name, label in labels.items())
 
 
 def _picture(example: Trajectory) -> Picture:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.retuned import DEFAULT_NOISE, Studies, beats_zero, level_at
 from cmg_mj.papers.claim import Assumption, Claim
-from cmg_mj.papers.words import join_with_and, with_ends
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.studies.tuning import NoiseLevelResult
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
@@ -87,20 +87,10 @@ def joint_claim(studies: Studies) -> Claim:
     """Judge whether one experiment has all three lines of Table 2."""
     nearest, candidates = nearest_joint(studies), list(experiments(studies))
     tunable = [experiment for experiment in candidates if experiment.beats_zero]
-    least = min(candidates, key=lambda experiment: experiment.largest_ratio)
-    ratios = "; ".join(f"{OBSERVERS[name]} {with_ends(level.ratio)}" for name, level in nearest.levels.items())
     misfits = [OBSERVERS[name] for name in nearest.levels if name not in nearest.best_observers]
     return Claim(
         place="Table 2, the three together",
         statement="The three observers were tuned on the same collected data: Fig. 4's one experiment.",
-        result=(
-            f"{len(studies)} pushes at several noises, {len(candidates)} experiments, each recorded once for all "
-            f"three. In {len(tunable)} of them all three can be tuned to follow the gyro better than an estimate of "
-            f"zero does. Among these, Table 2's lines come nearest to being the best together at {nearest.words}. "
-            f"There Table 2's error by that of the tuned is {ratios}. Without the comparison to zero it is "
-            f"{least.words}, where the worst has {least.largest_ratio:.2f} times the error of the tuned. "
-            f"{_describe_separate_optima(studies)}"
-        ),
         assumes=assumed(nearest),
         missing_data=UNRECORDED,
         holds=nearest.beats_zero and not misfits,
@@ -116,16 +106,6 @@ def joint_claim(studies: Studies) -> Claim:
         },
         pictures=[_picture(studies)],
     )
-
-
-def _describe_separate_optima(studies: Studies) -> str:
-    """Name the noise at which each line is best by itself."""
-    push = next(iter(studies))
-    parts = []
-    for name, study in studies[push].items():
-        level = min(study.levels, key=lambda level: level.ratio.mean)
-        parts.append(f"{OBSERVERS[name]} at {level.noise_ug_rthz:g}")
-    return f"By itself, under {push}, each loses least at another noise: {', '.join(parts)} ug/rtHz."
 
 
 def _picture(studies: Studies) -> Picture:

@@ -67,14 +67,6 @@ def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
     return Claim(
         place="After (10)",
         statement="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
-        result=(
-            "[C; C A'; C A'^2] has rank 3 for every u and y2: its rows hold e1, e3 and e2, whatever a = -u J2 sin(2 "
-            f"y2)/D is. The least singular value is at least {margin:.2f} of the largest; without the tilt measured it "
-            f"is {margin_without_tilt:.0e} of it. Uniformity also needs a bounded a, which the rate limit gives: |a| "
-            f"<= {max(map(abs, dampings)):.4f} 1/s. Over every {span_s:g} s of a closed-loop run the Gramian's "
-            f"eigenvalues lie between {least:.5f} and {largest:.5f}; for any a within the bound, between "
-            f"{bound[0]:.5f} and {bound[1]:.5f}."
-        ),
         assumes={"servo": f"at most {StateFeedback.rate_limit:g} rad/s"},
         holds=margin > 0.1 and margin_without_tilt < 1e-12 and bound[0] > 0.0 and math.isfinite(bound[1]),
         conditions=(

@@ -132,28 +132,9 @@ def lqr_gains() -> Claim:
     K = np.array(K_E)
     inverse = inverse_optimality(model.A_e, model.B_e, K)
     nearest = nearest_diagonal(model.A_e, model.B_e, K, np.array(K_E_ROUNDING), inverse.diagonal)
-    negative = [f"q{i + 1} = {q:.3g}" for i, q in enumerate(inverse.diagonal) if q < 0.0]
-    digits = (
-        f"No diagonal Q does it exactly: the only candidate has {', '.join(negative)}. "
-        if negative
-        else "A diagonal Q does it exactly: " + ", ".join(f"{q:.3g}" for q in inverse.diagonal) + ". "
-    )
-    recovery = (
-        f"and a Q >= 0 of rank 1 returns K_e from the Riccati equation to {inverse.recovered:.0e}"
-        if inverse.optimal
-        else "so no Q >= 0 has it"
-    )
-    weights = ", ".join(f"{q:.3g}" for q in nearest.Q)
-    gains = ", ".join(f"{gain:.4g}" for gain in nearest.gain)
     return Claim(
         place="Table 2, K_e",
         statement="K_e = [35, 4, -1, 0.3] are LQR gains; the weights are not given.",
-        result=(
-            f"The return difference |1 + K_e (jw - A_e)^-1 B_e| is nowhere below {inverse.least:.6f}: K_e "
-            f"{'is' if inverse.optimal else 'is not'} optimal for some quadratic cost, {recovery}. {digits}"
-            f"To the digits printed Q = diag({weights}), R = 1 {'does' if nearest.off < 1.0 else 'comes nearest'}: it "
-            f"gives ({gains}), off K_e by at most {nearest.off:.2f} of half a unit of the last digit."
-        ),
         holds=inverse.optimal and inverse.recovered < 1e-6,
         conditions=(
             ""

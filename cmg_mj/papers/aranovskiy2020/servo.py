@@ -106,24 +106,11 @@ def servo_claim(servos: Servos) -> Claim:
         d for d in falls if falls[d] == 0.0 and max(abs(velocity[d].mean - 1.0), abs(tilt[d].mean - 1.0)) < WITHIN
     ]
     errors = {d: measure_tracking(result) for d, result in servos.velocity.items()}
-    safe_deadbands = [d for d in falls if falls[d] == 0.0]
-    ratios_text = ", ".join(f"{d:g}: {velocity[d].mean:.2f} and {tilt[d].mean:.2f}" for d in safe_deadbands if d > 0.0)
-    falling = [f"{d:g}" for d in falls if falls[d] > 0.0]
     fine_error = errors[RESOLUTION]
     bench = ratio_interval(*(r.values("velocity_rms_error_rad_s") for r in (servos.position, smooth)))
     return Claim(
         place="After (2), the servos",
         statement="The gimbals' servos ensure velocity tracking, so that omega_c can be taken for an input.",
-        result=(
-            f"Servos in velocity mode with a lag of {1e3 * LAG_S:g} ms and a deadband, (11) in the loop, "
-            f"{len(smooth.outcomes)} seeds, the push of Figs 5 to 7. Over {MEANS_S:g} s the gimbal is off its command "
-            f"by {_share(errors[0.0])} of it (RMS) without a deadband, by {_share(fine_error)} with "
-            f"the resolution of the MX-106, {RESOLUTION:g} rad/s. With a lag of {1e3 * SOFT_LAG_S:g} ms, and so less "
-            f"torque against the flywheel's, it is {_share(measure_tracking(servos.soft))}. By deadband [rad/s], "
-            f"velocity RMS error and tilt RMS by those without: {ratios_text}. The rig falls with "
-            f"{', '.join(falling) or 'none'}. The bench's own servo, which integrates its command, has "
-            f"{bench.mean:.2f} times the velocity error."
-        ),
         assumes={**PUSH_RECOVERY, "servo": f"a lag of {1e3 * LAG_S:g} ms", "friction": "a deadband"},
         holds=RESOLUTION in harmless and fine_error is not None and fine_error.mean < WITHIN,
         conditions=(
@@ -142,10 +129,6 @@ def servo_claim(servos: Servos) -> Claim:
         },
         pictures=[_picture(servos)],
     )
-
-
-def _share(interval: Interval | None) -> str:
-    return "-" if interval is None else f"{interval.mean:.0%}"
 
 
 def _picture(servos: Servos) -> Picture:

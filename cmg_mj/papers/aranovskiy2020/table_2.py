@@ -21,7 +21,6 @@ from cmg_mj.papers.aranovskiy2020.retuned import (
 )
 from cmg_mj.papers.aranovskiy2020.tuning_procedure import LOOP_SHARE, procedure_claim, run_trials
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.words import with_ends
 from cmg_mj.studies.tuning import NoiseLevelResult
 
 
@@ -32,13 +31,6 @@ def table_2_claim(case: Tuning, studies: Studies, experiment: JointExperiment) -
     return Claim(
         place=f"Table 2, {case.equation}",
         statement=f"{case.table_line}, tuned to fit the gyro best.",
-        result=(
-            f"Fitted on {len(level.rms)} seeds, scored on as many others, from the push to a second after it. At "
-            f"{experiment.words}, where the three lines come nearest to being the best together, the best is "
-            f"{_sizes(level)}. Table 2's error is {level.given_rms.mean():.4f} rad/s, that of the tuned "
-            f"{level.rms.mean():.4f}, the ratio {with_ends(level.ratio)}. An estimate of zero has an "
-            f"error of {level.zero_rms:.4f}. {_describe_all_pushes(case, studies)}"
-        ),
         assumes=assumed(experiment),
         missing_data=UNRECORDED,
         holds=is_best(level) and is_tunable,
@@ -64,19 +56,6 @@ def table_2_claim(case: Tuning, studies: Studies, experiment: JointExperiment) -
     )
 
 
-def _describe_all_pushes(case: Tuning, studies: Studies) -> str:
-    """Table 2's error by that of the tuned, under every push."""
-    sentences = []
-    for push, by_name in studies.items():
-        levels = by_name[case.observer].levels
-        noises, ratios = (
-            ", ".join(f"{level.noise_ug_rthz:g}" for level in levels),
-            ", ".join(f"{level.ratio.mean:.2f}" for level in levels),
-        )
-        sentences.append(f"Under {push} at {noises} ug/rtHz the ratio is {ratios}.")
-    return " ".join(sentences)
-
-
 def _describe_first_push(case: Tuning, studies: Studies) -> str:
     """Describe the loss under the push of Figs 5 to 7, at the noise at which it is least there."""
     push = next(iter(studies))
@@ -98,10 +77,6 @@ def _describe_single_line(case: Tuning, studies: Studies) -> str:
 def least_lost(case: Tuning, studies: Studies) -> NoiseLevelResult:
     """Return the level at which Table 2's line loses least under the first push, that of Figs 5 to 7."""
     return min(next(iter(studies.values()))[case.observer].levels, key=lambda level: level.ratio.mean)
-
-
-def _sizes(level: NoiseLevelResult) -> str:
-    return ", ".join(f"{name} = {size:.4g}" for name, size in level.sizes.items())
 
 
 def claims(on_share: OnShare) -> list[Claim]:

@@ -11,7 +11,6 @@ from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import join_with_and
-from cmg_mj.results.summary_keys import format_figure
 from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
@@ -151,16 +150,6 @@ def remark(experiment: Factorial) -> Claim:
     return Claim(
         place="Section V, the time-invariant observer",
         statement="A linear time-invariant observer, which is a particular case of (10), could not stabilise the rig.",
-        result=(
-            f"{len(GAINS)} constant gains by 2 models by {len(experiment.whole)} biases, {WORLDS} seeds each, the "
-            "push of Figs 5 to 7, the law on measured angles. "
-            f"{' '.join(_describe_model(experiment, model) for model in MODELS)} {_describe_safe_gains(safe_gains)} "
-            f"Velocity RMS error of the frozen gain with gravity at y1 at {JUDGED_DEG:g} deg "
-            f"{_error(experiment.cells[FROZEN, MEASURED][JUDGED_DEG])} rad/s, of (10) itself "
-            f"{_error(experiment.whole[JUDGED_DEG])}. At rest e biases the estimated rate by "
-            f"{rate_bias((PREDECESSOR, LINEAR)):.1f} e/s with the predecessor's gain on the linear model, by "
-            f"{rate_bias((FROZEN, MEASURED)):.1f} e/s with the frozen one and gravity at y1."
-        ),
         assumes={
             "push": PUSH_RECOVERY["push"],
             "e": f"{min(experiment.whole):g} to {max(experiment.whole):g} deg",
@@ -193,22 +182,6 @@ def remark(experiment: Factorial) -> Claim:
     )
 
 
-def _describe_model(experiment: Factorial, model: str) -> str:
-    """Name the bias from which each gain falls in every world."""
-    parts = []
-    for gain, (_, l2) in GAINS.items():
-        falls = experiment.falls_at((gain, model))
-        fate = f"from {min(falls):g} deg" if falls else "at none"
-        parts.append(f"{gain} ({math.sqrt(l2):.0f} rad/s) {fate}")
-    return f"With {model} it falls in every world: {', '.join(parts)}."
-
-
-def _describe_safe_gains(gains: Sequence[str]) -> str:
-    if not gains:
-        return "No gain stands at every bias with both models."
-    return f"At every bias and with both models it stands with the gains {join_with_and(gains)}."
-
-
 def _conditions(experiment: Factorial, safe_gains: Sequence[str]) -> str:
     """Name the cells that fall, and say that the constancy of the gain is not the cause."""
     cells = [f"the {gain} gain and {model}" for gain, model in experiment.failing]
@@ -226,10 +199,6 @@ def _conditions(experiment: Factorial, safe_gains: Sequence[str]) -> str:
             f"with {LINEAR}, from {first[MEASURED]:g} deg with {MEASURED}."
         )
     return " ".join(sentences)
-
-
-def _error(fate: Fate) -> str:
-    return format_figure("velocity_rms_error_rad_s", fate.error)
 
 
 def _picture(experiment: Factorial) -> Picture:

@@ -9,7 +9,7 @@ from cmg_mj.papers.aranovskiy2020.joint import JointExperiment, experiments, lis
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.retuned import CASES, DEFAULT_NOISE, PUSHES, SEED, STRONG, Studies, loop_ratios
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.words import join_with_and, with_ends
+from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval
 
 LOOP_WORLDS = 10
@@ -64,10 +64,6 @@ def procedure_claim(studies: Studies, loops: list[Trial]) -> Claim:
         place="Section V, tuning",
         statement="Fitting an observer to the gyro's rate, recorded with the loop closed on the gyro and a push, tunes "
         "it.",
-        result=(
-            f"{' '.join(_in_words(trial) for trial in loops)} Over {len(ratios)} fits the error on other seeds is "
-            f"{min(ratios):.3f} to {max(ratios):.3f} times that on the fitted ones."
-        ),
         assumes={
             "push": f"{join_with_and(list(studies))}",
             "noise": f"{min(e.noise_ug_rthz for e in candidates):g} to {max(e.noise_ug_rthz for e in candidates):g} "
@@ -93,17 +89,6 @@ def procedure_claim(studies: Studies, loops: list[Trial]) -> Claim:
                 for trial in loops
             },
         },
-    )
-
-
-def _in_words(trial: Trial) -> str:
-    levels = trial.experiment.levels
-    tuned_errors = ", ".join(f"{OBSERVERS[name]} {level.rms.mean():.4f}" for name, level in levels.items())
-    zero = next(iter(levels.values())).zero_rms
-    loop = ", ".join(f"{OBSERVERS[name]} {with_ends(ratio)}" for name, ratio in trial.loop.items())
-    return (
-        f"At {trial.experiment.words} the tuned are off the gyro by {tuned_errors} rad/s RMS, an estimate of zero by "
-        f"{zero:.4f}. In the loop under the same push and noise Table 2's error by that of the tuned is {loop}."
     )
 
 

@@ -192,16 +192,9 @@ def axes_claim(couplings: dict[float, Coupling]) -> Claim:
     """Judge each axis alone."""
     separate_pushes = [push for push, c in couplings.items() if c.share < SMALL]
     first = next(iter(couplings))
-    tilts_text = ", ".join(f"{push:g} N m: {c.largest_deg:.1f} deg, {c.share:.2%}" for push, c in couplings.items())
     return Claim(
         place="Section I, one axis at a time",
         statement="With two scissored pairs at right angles each tilt axis of the robot can be stabilised by itself.",
-        result=(
-            "Four cubes on a body that tilts about two axes, each with a law of its own that knows only its own state. "
-            "A push on both axes at once beside the same push on either alone: largest tilt, and how much of it the "
-            f"other axis changes. {tilts_text}. The torque about the vertical is "
-            f"{', '.join(f'{c.vertical_n_m:.2f}' for c in couplings.values())} N m at most."
-        ),
         holds=first in separate_pushes,
         assumes={
             "body": "four cubes on a body that tilts about two axes",

@@ -48,18 +48,6 @@ def cost() -> Claim:
         place="Remark 1, cost",
         statement="The observer (10) is computationally heavy in embedded systems: its gain takes differential "
         "equations solved online.",
-        result=(
-            "On the class of the rig's processor, a Cortex-M7, an update takes "
-            f"{board['linear']:.0f} instructions by (9), {board['homogeneous']:.0f} by (11) and {board['ltv']:.0f} by "
-            "(10), with the exact step on the 2x2 block that is left of H. Written out with 3x3 matrices (10) takes "
-            f"{board['ltv, plain Euler']:.0f} with Euler and {board['ltv, plain Runge-Kutta 4']:.0f} with Runge-Kutta "
-            f"4. (C in single precision, instructions counted by an emulator; recorded.) "
-            f"The dearest of these is {100.0 * share:.1g} % of the control period at {CLOCK_MHZ:g} MHz, if an "
-            f"instruction takes a cycle. In Python, by the time of (9): (11) {ratios['homogeneous']:.1f}, (10) "
-            f"{ratios['ltv']:.1f}, written out {ratios['ltv, plain Euler']:.0f} and "
-            f"{ratios['ltv, plain Runge-Kutta 4']:.0f}. The arithmetic alone, on {worlds} worlds at once: (11) "
-            f"{arithmetic['homogeneous']:.1f}, (10) {arithmetic['ltv']:.1f}."
-        ),
         holds=dearest > board["homogeneous"] > board["linear"],
         otherwise="On this processor it turns round: the powers in (11) cost more than a step of the equations of H, "
         "whichever way that is taken.",

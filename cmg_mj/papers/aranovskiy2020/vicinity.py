@@ -108,19 +108,6 @@ def vicinity_claim(seed: int = SEED) -> Claim:
     return Claim(
         place="After (11), the vicinity",
         statement="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
-        result=(
-            "k1, k2 of Table 2, at rest. Without bias and noise a first error of 1 rad/s has fallen after 2.5 s, by "
-            f"alpha, to {_list_by_alpha(errors, '.0e')} rad/s at 200 Hz. At 2000 Hz it is "
-            f"{_list_by_alpha(fine_errors, '.0e')}: near 1/2 the rest is chatter between samples. With a "
-            "bias e the rate rests off by k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), for e from "
-            f"{BIASES_DEG[0]:g} to {BIASES_DEG[-1]:g} deg: to {relative_difference:.0e} of it where that is above "
-            f"{SEEN_RAD_S:g} rad/s, else to {difference:.0e} rad/s. At 0.5 deg it is "
-            f"{_list_by_alpha({a: values[2] for a, values in measures.by_bias.items()}, '.4f')} rad/s. With noise in "
-            "y1 and e = 0 its RMS rises with the noise to the power "
-            f"{_list_by_alpha(slopes, '.2f')}: the vicinity shrinks to the origin "
-            f"with either. For {len(gains)} random pairs of gains, of any sign, the two polynomials are "
-            f"{'always' if is_equivalent else 'not always'} Hurwitz together."
-        ),
         is_general=True,
         assumes={
             "e": f"{BIASES_DEG[0]:g} to {BIASES_DEG[-1]:g} deg",
@@ -151,10 +138,6 @@ def vicinity_claim(seed: int = SEED) -> Claim:
         },
         pictures=[_picture(measures)],
     )
-
-
-def _list_by_alpha(by_alpha: Mapping[float, float], form: str) -> str:
-    return ", ".join(f"{alpha:g}: {value:{form}}" for alpha, value in by_alpha.items())
 
 
 def _by_name(by_alpha: Mapping[float, Any]) -> dict[str, Any]:

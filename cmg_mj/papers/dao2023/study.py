@@ -74,11 +74,6 @@ def exogenous_settle_times(errors: robot.Errors, band: float = SETTLED) -> np.nd
     return robot.settle_times(np.linalg.norm(errors.exogenous, axis=-1), errors.t, band)
 
 
-def words_of_time(time: float) -> str:
-    """Write a settling time in words."""
-    return f"{time:.0f} s" if math.isfinite(time) else "not within 200 s"
-
-
 def finite_times(times: np.ndarray) -> list[float | None]:
     """Return settling times as JSON can hold them."""
     return [float(time) if math.isfinite(time) else None for time in times]

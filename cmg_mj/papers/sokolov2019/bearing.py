@@ -18,7 +18,6 @@ from cmg_mj.papers.linear_check import poles_as_pairs
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, experiment
 from cmg_mj.papers.sokolov2019.vertical_torque import Locked, locked_run, vertical_torque
-from cmg_mj.papers.words import plus_minus
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.results.intervals import mean_interval
 from cmg_mj.results.result import Result
@@ -115,23 +114,9 @@ def claim(runs: Study) -> Claim:
         case: mean_interval([trajectory_of(result).world(i)["time_s"][-1] for i in range(worlds)])
         for case, result in runs.free.items()
     }
-    falls_text = "; ".join(
-        f"{case} {share:.0%} fall" + (f", at {ends[case].mean:.2f} s" if share == 1.0 else "")
-        for case, share in falls.items()
-    )
     return Claim(
         place="Fig. 2, the bearing",
         statement="The pendulum has one degree of freedom, its tilt: there is no yaw in (1).",
-        result=(
-            "One gimbal leaves a torque about the vertical, dH/dt with H = J_d w_d cos x3 cos q_b and smaller terms; "
-            f"MuJoCo's inverse dynamics confirm it to {error:.0e} N m. A locked bearing carries up to "
-            f"{plus_minus(peak, 3)} N m at a push ({worlds} seeds; {peak_of_mean:.3f} in their mean). Noise makes "
-            f"{plus_minus(noise_torque, 3)} N m RMS of it before; a scissored pair's bearing carries {pair:.0e} N m. A "
-            f"free bearing, with the exact rate in the law: {falls_text}. There the yaw takes up the tilt: (J_d "
-            f"w_d)^2/(2 I_z) is {k.gyroscopic:.2f} N m/rad against gravity's {k.gravity:.2f}. The rest that "
-            "brings the gimbal back is small and has the wrong sign: the linearised law has a pole at "
-            f"{np.real(k.poles).max():+.3f} 1/s. A start off the upright makes the gimbal run away."
-        ),
         assumes={**PUSH_AND_NOISE, "bearing": "locked"},
         holds=error < 1e-9 and pair < 1e-6 * peak.mean,
         conditions=(

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 
 from cmg_mj.papers.claim import Assumption, Claim
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
-from cmg_mj.papers.sokolov2019.loops import BIASES_DEG, Loops, format_interval, is_better, numbers
+from cmg_mj.papers.sokolov2019.loops import BIASES_DEG, Loops, is_better, numbers
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE
-from cmg_mj.results import markdown
-from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.result import Result
 
 KEYS = {"velocity_rms_error_rad_s": "velocity RMS error [rad/s]", "tilt_rms_deg": "tilt RMS [deg]"}
@@ -20,19 +18,6 @@ ASSUMED: Mapping[Assumption, str] = {
     "e": f"up to {max(BIASES_DEG):g} deg",
     "backlash": f"0 and {GAP_ARCMIN:g} arcmin",
 }
-
-
-def _cell(result: Result, key: str) -> str:
-    falls_note = f" ({result.fell.mean():.0%} fell)" if result.fell.any() else ""
-    return format_interval(known_interval(result.values(key))) + falls_note
-
-
-def _table(loops: Loops, key: str) -> str:
-    rows = [
-        (setting, KEYS[key], *(_cell(by_name[name], key) for name in OBSERVERS))
-        for setting, by_name in loops.all_settings.items()
-    ]
-    return markdown.table(("where", "what", *OBSERVERS.values()), rows, text_columns=2)
 
 
 def _label(key: str) -> str:
@@ -60,11 +45,6 @@ def _best(loops: Loops, key: str) -> Claim:
         place=f"Section V, the comparison: {_label(key)}",
         statement="The nonlinear differentiator (10) offers the best behaviour of the three; judged by the "
         f"{_label(key)}.",
-        result=(
-            f"{loops.worlds} seeds, world by world, 95 % intervals. (10) has the smallest {_label(key)}, or stands "
-            f"where another falls, in {sum(wins.values())} of {len(wins)} settings. The paper names no measure."
-        ),
-        table=_table(loops, key),
         assumes=ASSUMED,
         holds=wins,
         otherwise=f"{'. '.join(others) or 'It is not the best beyond chance everywhere'}.",
@@ -94,10 +74,6 @@ def _model_based(loops: Loops, key: str) -> Claim:
         place=f"Section VI: {_label(key)}",
         statement="The designs with a model outperform the one without; of them the nonlinear one has the smaller "
         f"error; judged by the {_label(key)}.",
-        result=(
-            f"By {_label(key)}, {loops.worlds} seeds, world by world beyond chance, (10) is better than (9) and "
-            f"(9) than (8), with no fall, at {'; '.join(holds_at) or 'none'}."
-        ),
         assumes=ASSUMED,
         holds=bool(holds_at),
         conditions=(

@@ -12,7 +12,6 @@ from cmg_mj.controllers.laws import StateFeedback
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.release import (
-    LAGS_S,
     LARGEST_LATENCY_STEPS,
     Sweep,
     Threshold,
@@ -22,7 +21,6 @@ from cmg_mj.papers.sokolov2019.release import (
 )
 from cmg_mj.papers.sokolov2019.rig import FINE, estimator, experiment, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
-from cmg_mj.results import markdown
 from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
@@ -136,20 +134,10 @@ def in_ms(seconds: float | None, otherwise: str = "none") -> str:
 def claim(results: Lags) -> Claim:
     """Judge section V: the differentiator's lag."""
     own_lag, lags, latencies = results.own_lag_s, results.thresholds, results.latencies
-    linear = results.predictions["linear"]
     begin, least = lags["linear"], min(lags[name].low for name in ("luenberger", "homogeneous"))
     return Claim(
         place="Section V, the lag",
         statement="Finite differences lag, and the lag brings the loop into sustained oscillations.",
-        result=(
-            "Let go without noise, the rig oscillates by itself from the lags and latencies of the table on. With the "
-            f"model's servo, {in_ms(own_lag)}, the loop of (8) has poles {linear.pole.real:.1f} +- "
-            f"{linear.pole.imag:.1f}j 1/s, a damping ratio of {linear.damping:.2f} at {linear.frequency_hz:.1f} Hz. "
-            f"From tau = {in_ms(results.tau)} on it would oscillate as it is. A servo that lags because it is soft "
-            f"never makes it oscillate ({in_ms(linear.softened_lag_s, f'none up to {1e3 * LARGEST_S:.0f} ms')}): the "
-            "flywheel then turns the gimbal back, which damps the tilt."
-        ),
-        table=_table(results),
         assumes={"servo": f"a lag of up to {1e3 * LARGEST_S:.0f} ms"},
         holds=begin.high is not None and begin.high < least,
         conditions=(
@@ -177,27 +165,6 @@ def claim(results: Lags) -> Claim:
         },
         pictures=[_picture(results)],
     )
-
-
-def _table(lags: Lags) -> str:
-    rows = []
-    for name, equation in (OBSERVERS | {"truth": "true rate in the law"}).items():
-        lag, latency, forecast = (
-            lags.thresholds.get(name),
-            lags.latencies.get(name),
-            lags.predictions.get(name),
-        )
-        rows.append(
-            (
-                equation,
-                "-" if lag is None else in_ms(lag.middle, f"none up to {1e3 * LAGS_S[-1]:.0f} ms"),
-                "-" if forecast is None else in_ms(forecast.servo_lag_s),
-                "-" if latency is None else in_ms(latency.high, f"none up to {LARGEST_LATENCY_STEPS} ms"),
-                "-" if forecast is None or name == "truth" else in_ms(forecast.latency_s),
-            )
-        )
-    headings = ("", "servo lag, MuJoCo", "by eigenvalues", "latency of y1, MuJoCo", "by eigenvalues")
-    return markdown.table(headings, rows)
 
 
 def _growth(observer: str, lags_s: np.ndarray) -> list[float]:

@@ -8,7 +8,6 @@ from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.papers.words import join_with_and
-from cmg_mj.results import markdown
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.studies.tuning import NoiseLevelResult, Recorded, halves, recorder, tune
 
@@ -87,24 +86,14 @@ def claim(results: Levels) -> Claim:
         for push, i, noise in settings
         if none_better([levels[i] for levels in results[push].values()])
     ]
-    by_name = {
-        name: [f"{noise:g} ({push})" for push, i, noise in settings if none_better([results[push][name][i]])]
-        for name in OBSERVERS
-    }
     losers = [
         OBSERVERS[name]
         for name in OBSERVERS
         if all(level.rms.mean() > level.zero_rms for studies in results.values() for level in studies[name])
     ]
-    text = "; ".join(f"{OBSERVERS[name]} at {', '.join(places) or 'none'}" for name, places in by_name.items())
     return Claim(
         place="Table II, tuning",
         statement="tau, L and [k1, k2, alpha] were tuned, on one recording, to fit the gyro best.",
-        result=(
-            f"Fitted on {WORLDS} seeds and scored on as many others, from the push's start to a second after it. The "
-            f"printed values are not beaten, by noise in ug/rtHz: {text}."
-        ),
-        table=_table(results),
         assumes={
             "push": join_with_and(list(results)),
             "noise": f"{', '.join(f'{noise:g}' for noise in sorted({noise for *_, noise in settings}))} ug/rtHz",
@@ -134,24 +123,6 @@ def claim(results: Levels) -> Claim:
             for push, studies in results.items()
         },
     )
-
-
-def _table(results: Levels) -> str:
-    rows = [
-        (
-            push,
-            OBSERVERS[name],
-            f"{level.noise_ug_rthz:g}",
-            ", ".join(f"{number} = {size:.4g}" for number, size in level.sizes.items()),
-            f"{level.ratio.mean:.3f} +- {level.ratio.half:.3f}",
-            f"{level.rms.mean() / level.zero_rms:.2f}",
-        )
-        for push, by_observer in results.items()
-        for name, levels in by_observer.items()
-        for level in levels
-    ]
-    headings = ("push", "", "noise [ug/rtHz]", "tuned", "printed by tuned error", "tuned error by zero's")
-    return markdown.table(headings, rows, text_columns=4)
 
 
 def claims(on_share: OnShare) -> list[Claim]:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from cmg_mj.papers.assumed import PUSH_RECOVERY
-from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.words import plus_minus
-from cmg_mj.results import markdown
-from cmg_mj.results.intervals import Interval, known_interval
+from cmg_mj.results.intervals import known_interval
 from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
 
 SEED, WORLDS = 90_002, 100
@@ -63,14 +61,10 @@ def fed_bias_claim(rows: Sequence[dict[str, Any]]) -> Claim:
         or row[f"{TOLD}_fell_fraction"] < row[f"{ALONE}_fell_fraction"]
     ]
     helpful_biases = f"It helps at e = {', '.join(f'{e:g}' for e in helped_biases)} deg of those tried."
-    headings = ("e [deg]", *(f"`{kind}` [1e-3 rad/s]" for kind in KINDS))
-    cells = [(f"{row['bias_deg']:g}", *(_cell(row, kind) for kind in KINDS)) for row in rows]
     return Claim(
         place="homogeneous with the bias fed in from adaptive",
         is_ours=True,
         statement="the rate error of (11) that e causes goes when e is estimated beside it",
-        result="Velocity RMS error in `push_recovery`, 95 % intervals:",
-        table=markdown.table(headings, cells),
         assumes={**PUSH_RECOVERY, "e": ", ".join(f"{row['bias_deg']:g}" for row in rows) + " deg"},
         holds=bool(helped_biases),
         conditions="" if len(helped_biases) == len(rows) else helpful_biases,
@@ -78,12 +72,6 @@ def fed_bias_claim(rows: Sequence[dict[str, Any]]) -> Claim:
         figures={"rows": rows},
         pictures=[_picture(rows)],
     )
-
-
-def _cell(row: dict[str, Any], kind: str) -> str:
-    error, fall_share = row[f"{kind}_rad_s"], row[f"{kind}_fell_fraction"]
-    error_text = plus_minus(None if error is None else Interval(*(1e3 * value for value in error)), 1)
-    return error_text + (f" [{fall_share:.0%} fell]" if fall_share else "")
 
 
 def _picture(rows: Sequence[dict[str, Any]]) -> Picture:

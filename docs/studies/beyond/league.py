@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
+from beyond.character import character, record_motion, update_us
+from beyond.floor import velocity_floor
+from beyond.push_recovery import ERROR, on_rigs, push_recovery
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.papers.beyond.character import character, record_motion, update_us
-from cmg_mj.papers.beyond.floor import velocity_floor
-from cmg_mj.papers.beyond.push_recovery import ERROR, on_rigs, push_recovery
 from cmg_mj.papers.claim import OnShare
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.result import Result

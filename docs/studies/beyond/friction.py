@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from cmg_mj.papers.assumed import PUSH_RECOVERY
-from cmg_mj.papers.beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.results.intervals import Interval, known_interval
-from cmg_mj.results.summary_keys import format_figure
+from cmg_mj.results.intervals import known_interval
 
 SEED, WORLDS = 90_001, 100
 FRICTION_N_M = 0.05
@@ -54,18 +53,10 @@ def friction(worlds: int, seed: int, on_share: OnShare, settings: Sequence[str] 
 
 def friction_claim(figures: dict[str, Any]) -> Claim:
     """Judge the figures of `friction`: knowing the friction helps if it brings more than damping."""
-    smooth, rough, due = (figures[f"gain_{condition}_friction_rad_s"] for condition in (*WITH.values(), "due_to"))
-    errors = (figures[f"with_friction_in_the_plant_{condition}_in_the_observer_rad_s"] for condition in WITH.values())
-    error_without, error_with = (format_figure(ERROR, error) for error in errors)
+    due = figures["gain_due_to_friction_rad_s"]
     return Claim(
         place="Future work of both papers: friction in the observer",
         statement="a friction model in the velocity estimator would reduce its modelling errors",
-        result=(
-            f"On a rig with {FRICTION_N_M:g} N m of dry friction on the tilt axis the same friction in (11) takes "
-            f"{_milli(rough)} off the velocity RMS error ({error_without} to {error_with} rad/s). But on "
-            f"a rig without friction, it takes {_milli(smooth)} off as well: it also damps the estimate of a "
-            f"rate whose true value is small. Knowing the friction is worth the difference, {_milli(due)}."
-        ),
         assumes={**PUSH_RECOVERY, "friction": f"{FRICTION_N_M:g} N m, dry, on the tilt axis"},
         holds=due is not None and due.low > 0.0,
         conditions=(
@@ -74,10 +65,3 @@ def friction_claim(figures: dict[str, Any]) -> Claim:
         otherwise="Its gain on the rig with friction is, within chance, damping that helps without any friction.",
         figures=figures,
     )
-
-
-def _milli(interval: Interval | None) -> str:
-    if interval is None:
-        return "an unknown amount"
-    mean, low, high = (1e3 * value for value in interval)
-    return f"{mean:.2f}e-3 rad/s (95 %: {low:.2f} to {high:.2f})"
