@@ -16,18 +16,18 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cmg_mj.codegen.board import Board, Cost, temporary_export
-from cmg_mj.codegen.board.image import build, flash_of, require
 from cmg_mj.core.controller import Controller
+from cmg_mj.features.board import Board, Cost, temporary_export
+from cmg_mj.features.board.image import build, flash_of, require
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain
 from cmg_mj.papers.aranovskiy2020.on_the_board import PLAIN, RECORDED
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS as PAPER_OBSERVERS
 from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
 
 SECONDS = 2.5
 """Time of push_recovery over which costs are measured at every tick; its push begins at 2 s [s]."""

@@ -21,10 +21,10 @@ from rich.table import Table
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Result
+from cmg_mj.runs.benchmark import REPEATS, time_of_update
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.studies.benchmark import REPEATS, time_of_update
 
 CONTROL_RATES_HZ = (200.0, 1000.0)
 ONE_WORLD_S = 6.0

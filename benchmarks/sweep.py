@@ -17,8 +17,8 @@ from typing import Any
 from mujoco.batch import Batch
 
 from cmg_mj import load_scenario
-from cmg_mj.studies.sweeps.chunk import compute
-from cmg_mj.studies.sweeps.study import SweepStudy, parse_axis
+from cmg_mj.features.sweeps.chunk import compute
+from cmg_mj.features.sweeps.study import SweepStudy, parse_axis
 
 WORLDS_A_PLANT = 4
 PLANTS = {

@@ -11,42 +11,57 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cmg_mj.codegen.export import export as export
-    from cmg_mj.controllers.laws import LAWS as LAWS
-    from cmg_mj.controllers.laws import FeedbackState as FeedbackState
-    from cmg_mj.controllers.laws import Law as Law
-    from cmg_mj.controllers.laws import StateFeedback as StateFeedback
-    from cmg_mj.controllers.laws import lqr_gains as lqr_gains
-    from cmg_mj.controllers.laws import make_law as make_law
     from cmg_mj.core.axes import MultiAxisController as MultiAxisController
     from cmg_mj.core.controller import Controller as Controller
     from cmg_mj.core.controller import Tick as Tick
+    from cmg_mj.core.errors import InputError as InputError
+    from cmg_mj.core.errors import RunStopped as RunStopped
+    from cmg_mj.core.reduced_model import ReducedModel as ReducedModel
     from cmg_mj.core.tilt import RadialTilt as RadialTilt
     from cmg_mj.core.tilt import TiltNoise as TiltNoise
-    from cmg_mj.errors import InputError as InputError
-    from cmg_mj.errors import RunStopped as RunStopped
+    from cmg_mj.features.export import export as export
+    from cmg_mj.features.mounting import MountedRobot as MountedRobot
+    from cmg_mj.features.mounting import mount as mount
+    from cmg_mj.features.pivot.settings import Pivot as Pivot
+    from cmg_mj.features.plugin.make import plugin as plugin
+    from cmg_mj.features.replay.log import Log as Log
+    from cmg_mj.features.replay.log import ReadOptions as ReadOptions
+    from cmg_mj.features.replay.reading import read_log as read_log
+    from cmg_mj.features.replay.replay import ReplayResult as ReplayResult
+    from cmg_mj.features.replay.replay import replay_log as replay_log
+    from cmg_mj.features.sweeps import SweepResult as SweepResult
+    from cmg_mj.features.sweeps import sweep as sweep
+    from cmg_mj.features.tuning import TuningResult as TuningResult
+    from cmg_mj.features.tuning import tune as tune
+    from cmg_mj.laws import LAWS as LAWS
+    from cmg_mj.laws import FeedbackState as FeedbackState
+    from cmg_mj.laws import Law as Law
+    from cmg_mj.laws import StateFeedback as StateFeedback
+    from cmg_mj.laws import lqr_gains as lqr_gains
+    from cmg_mj.laws import make_law as make_law
     from cmg_mj.observers import OBSERVERS as OBSERVERS
     from cmg_mj.observers import Estimate as Estimate
     from cmg_mj.observers import Measurement as Measurement
     from cmg_mj.observers import Observer as Observer
     from cmg_mj.observers import make_observer as make_observer
-    from cmg_mj.observers.reduced_model import ReducedModel as ReducedModel
-    from cmg_mj.plant.mounting import MountedRobot as MountedRobot
-    from cmg_mj.plant.mounting import mount as mount
     from cmg_mj.plant.plant import Plant as Plant
     from cmg_mj.plant.plant import load_plant as load_plant
-    from cmg_mj.replay.log import Log as Log
-    from cmg_mj.replay.log import ReadOptions as ReadOptions
-    from cmg_mj.replay.log_replay import ReplayResult as ReplayResult
-    from cmg_mj.replay.log_replay import replay_log as replay_log
-    from cmg_mj.replay.reading import read_log as read_log
     from cmg_mj.results.metrics import MetricsSettings as MetricsSettings
     from cmg_mj.results.result import Outcome as Outcome
     from cmg_mj.results.result import Result as Result
     from cmg_mj.results.trajectory import Trajectory as Trajectory
+    from cmg_mj.runs.api import Comparison as Comparison
+    from cmg_mj.runs.api import compare as compare
+    from cmg_mj.runs.callback import control as control
+    from cmg_mj.runs.callback import control_callback as control_callback
+    from cmg_mj.runs.comparison import ComparedObserver as ComparedObserver
+    from cmg_mj.runs.experiment import Experiment as Experiment
+    from cmg_mj.runs.experiment import prepare as prepare
+    from cmg_mj.runs.save import RunReport as RunReport
+    from cmg_mj.runs.save import report_run as report_run
+    from cmg_mj.runs.save import save_run as save_run
     from cmg_mj.scenario.loading import load_scenario as load_scenario
     from cmg_mj.scenario.loading import parse_scenario as parse_scenario
-    from cmg_mj.scenario.pivot import Pivot as Pivot
     from cmg_mj.scenario.plant_settings import PlantSettings as PlantSettings
     from cmg_mj.scenario.schema import AxisSettings as AxisSettings
     from cmg_mj.scenario.schema import ControllerSettings as ControllerSettings
@@ -58,24 +73,9 @@ if TYPE_CHECKING:
     from cmg_mj.sensors.fog import Fog as Fog
     from cmg_mj.sensors.mems_gyro import MemsGyro as MemsGyro
     from cmg_mj.sensors.sampled import Sensors as Sensors
-    from cmg_mj.simulation.callback import control as control
-    from cmg_mj.simulation.callback import control_callback as control_callback
-    from cmg_mj.simulation.experiment import Experiment as Experiment
-    from cmg_mj.simulation.experiment import prepare as prepare
-    from cmg_mj.simulation.make import plugin as plugin
     from cmg_mj.stages.push import Push as Push
     from cmg_mj.stages.swing import Swing as Swing
-    from cmg_mj.studies.compare.api import Comparison as Comparison
-    from cmg_mj.studies.compare.api import compare as compare
-    from cmg_mj.studies.compare.comparison import ComparedObserver as ComparedObserver
-    from cmg_mj.studies.save import RunReport as RunReport
-    from cmg_mj.studies.save import report_run as report_run
-    from cmg_mj.studies.save import save_run as save_run
-    from cmg_mj.studies.sweeps import SweepResult as SweepResult
-    from cmg_mj.studies.sweeps import sweep as sweep
-    from cmg_mj.studies.tuning import TuningResult as TuningResult
-    from cmg_mj.studies.tuning import tune as tune
-    from cmg_mj.visualization.recording.stream import show_recording as show_recording
+    from cmg_mj.view.recording.stream import show_recording as show_recording
 
 
 def _listed_names() -> dict[str, str]:

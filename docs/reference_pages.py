@@ -22,14 +22,14 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from cmg_mj.cli import HELP, cli
-from cmg_mj.codegen.export.header_comment import attribute_descriptions
-from cmg_mj.controllers.laws import LAW_CLASSES
+from cmg_mj.features.export.header_comment import attribute_descriptions
+from cmg_mj.features.pivot.settings import FIELDS_OF, Pivot
 from cmg_mj.inputs.files import bundled, folder
 from cmg_mj.inputs.messages import fields_of
 from cmg_mj.inputs.types import OnAllAxes, OnGrid, PerAxis, marked_fields
 from cmg_mj.inputs.user_classes import UserClassKind
+from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import OBSERVER_CLASSES
-from cmg_mj.scenario.pivot import FIELDS_OF, Pivot
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.scenario.schema import CompareSettings, ControllerSettings, LqrSettings, MetricsSettings, Scenario
 from cmg_mj.sensors.accelerometer import Accelerometer

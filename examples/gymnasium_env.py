@@ -6,9 +6,9 @@ import gymnasium
 import numpy as np
 
 import cmg_mj
-import cmg_mj.simulation.gymnasium_env
+import cmg_mj.features.gymnasium
 
-env = gymnasium.make(cmg_mj.simulation.gymnasium_env.ID, scenario="push_recovery", settings=["duration_s=4.0"])
+env = gymnasium.make(cmg_mj.features.gymnasium.ID, scenario="push_recovery", settings=["duration_s=4.0"])
 rig = cmg_mj.load_plant(model="scissored_pair.xml")
 law = cmg_mj.StateFeedback(dt=0.005)
 observer = cmg_mj.make_observer("homogeneous", law.dt, rig.reduced)

@@ -9,7 +9,7 @@ import control
 import numpy as np
 
 import cmg_mj
-from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS
+from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 
 model = cmg_mj.load_plant(model="scissored_pair.xml").reduced
 linear, nonlinear = model.linear_system(), model.nonlinear_system()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import cmg_mj
-from cmg_mj.studies.tuning import tune, tuned_scenario
+from cmg_mj.features.tuning import tune, tuned_scenario
 
 scenario = cmg_mj.load_scenario("observer_tuning", ["open_loop_observers=[]"], observer="linear")
 study = tune(scenario, worlds=5, parameters=["tau"], noise_ug_rthz=[400.0])

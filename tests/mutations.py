@@ -37,7 +37,7 @@ WIDTH = 100
 NUMBER = r"(-?[0-9][0-9.e+-]*)"
 # Equations first: they name the culprit; the closed loop last.
 TESTS = [
-    "tests/controllers/test_controller.py",
+    "tests/core/test_controller.py",
     "tests/observers",
     "tests/scenario/test_loading.py",
     "tests/plant/test_paper_mass_matrix.py",
@@ -62,8 +62,8 @@ def element(parameter: str, file: str, opening: str, index: int) -> Mutation:
 
 OBSERVERS = "cmg_mj/observers/"
 MUTATIONS = [
-    *(element(f"law: K_e[{i}]", "cmg_mj/controllers/laws/state_feedback.py", "TABLE_2_GAINS = (", i) for i in range(4)),
-    Mutation("law: rate limit", "cmg_mj/controllers/laws/state_feedback.py", r"rate_limit: float = " + NUMBER),
+    *(element(f"law: K_e[{i}]", "cmg_mj/laws/state_feedback.py", "TABLE_2_GAINS = (", i) for i in range(4)),
+    Mutation("law: rate limit", "cmg_mj/laws/state_feedback.py", r"rate_limit: float = " + NUMBER),
     Mutation("scenario: rate limit", "cmg_mj/scenario/schema.py", r"rate_limit_rad_s: Annotated\[.*?\] = " + NUMBER),
     Mutation("linear: tau", OBSERVERS + "linear.py", r"tau: Positive = " + NUMBER),
     *(element(f"ltv: Q[{i}]", OBSERVERS + "ltv.py", "Q: tuple[Positive, Positive, Positive] = (", i) for i in range(3)),

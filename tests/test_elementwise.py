@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cmg_mj.elementwise import atan2, clip, cos, digitise, exp, sign, signed_power, signed_powers, sin, sqrt, where
+from cmg_mj.core.arrays import atan2, clip, cos, digitise, exp, sign, signed_power, signed_powers, sin, sqrt, where
 
 SPECIAL = [0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 1e-300, -1e-300, 5e-324, 1e-9, -1e-9, 4.7, -4.7, 1e6, -1e6]
 

@@ -30,7 +30,7 @@ MOST_ENTRIES = 21
 
 HEAVY = dict(re.findall(r"^\| ([\w.]+) \| `([\w/]+)` \|$", ARCHITECTURE, re.MULTILINE))
 """Library -> the only sub-package or module that imports it, because it costs time."""
-EAGER = ("cmg_mj.visualization.recording", "cmg_mj.replay.recording", "cmg_mj.simulation.gymnasium_env")
+EAGER = ("cmg_mj.view.recording", "cmg_mj.features.replay.recording", "cmg_mj.features.gymnasium")
 """These import theirs when they are imported; the others when they need it."""
 
 
@@ -149,7 +149,7 @@ def test_the_loop_loads_the_core_alone() -> None:
     code = "import sys, cmg_mj.core.loop; print(*sys.modules)"
     loaded = run_in_a_fresh_interpreter(code)
     ours = {name for name in loaded if name.startswith("cmg_mj.") and not name.startswith("cmg_mj.core")}
-    assert ours == {"cmg_mj.elementwise", "cmg_mj.errors"}
+    assert ours == {"cmg_mj.core.arrays", "cmg_mj.core.errors"}
     assert not {"pydantic", "mujoco", "scipy"} & set(loaded)
 
 
@@ -180,7 +180,7 @@ def test_nothing_above_the_line_imports_mujoco() -> None:
 
 
 def uses_casadi(module: str) -> bool:
-    return module.startswith("cmg_mj.codegen.export.")
+    return module.startswith("cmg_mj.features.export.")
 
 
 @pytest.mark.parametrize("package", UPPER_PACKAGES)
@@ -199,7 +199,7 @@ def test_every_observer_works_without_mujoco() -> None:
     code = f"""
 import sys
 from cmg_mj.observers import OBSERVERS, Measurement, make_observer
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
 model = {PAPER!r}
 for kind in OBSERVERS:
@@ -223,7 +223,7 @@ def test_only_one_place_knows_a_heavy_library(library: str) -> None:
 @pytest.mark.slow
 def test_heavy_libraries_are_imported_where_they_are_used() -> None:
     """All modules but these leave them out: nothing imports matplotlib before a plot is drawn."""
-    inner = ("cmg_mj.codegen.export.", "cmg_mj.visualization.studio.", "cmg_mj.studies.sweeps.cluster", *EAGER)
+    inner = ("cmg_mj.features.export.", "cmg_mj.features.studio.", "cmg_mj.features.sweeps.cluster", *EAGER)
     code = "import importlib, sys\n"
     for name in modules():
         if not name.startswith(inner):

@@ -12,9 +12,17 @@ from typing import Any
 
 import click
 
-from cmg_mj.cli import boards, logs, mount, plugin, reproduce, scenarios, studio, sweeps, tune
+from cmg_mj.cli import scenarios
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
-from cmg_mj.errors import InputError, RunStopped, raised
+from cmg_mj.core.errors import InputError, RunStopped, raised
+from cmg_mj.features.export import command as boards
+from cmg_mj.features.mounting import command as mount
+from cmg_mj.features.plugin import command as plugin
+from cmg_mj.features.replay import command as logs
+from cmg_mj.features.studio import command as studio
+from cmg_mj.features.sweeps import command as sweeps
+from cmg_mj.features.tuning import command as tune
+from cmg_mj.papers import command as reproduce
 
 OBJECTS_A_COLLECTION = 50_000
 """New objects after which Python looks for cycles. Imports make many objects and few cycles: Python's default of 700

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.core.errors import InputError, nearest
 
 if TYPE_CHECKING:
     from cmg_mj.results.folder import RunFolder
     from cmg_mj.results.result import Driver
+    from cmg_mj.runs.experiment import Experiment
     from cmg_mj.scenario.schema import Scenario
-    from cmg_mj.simulation.experiment import Experiment
 
 
 Command = Callable[..., None]

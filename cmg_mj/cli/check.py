@@ -5,19 +5,19 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
 
-from cmg_mj.controllers.laws import LAWS, TABLE_2_GAINS, StateFeedback
+from cmg_mj.cli.description import assignments, lines, number
+from cmg_mj.core.errors import TomlValue
 from cmg_mj.core.types import law_needs
-from cmg_mj.errors import TomlValue
-from cmg_mj.linear.bend import bend_hints, bend_rows, judge_bend
+from cmg_mj.features.bend.verdict import bend_hints, bend_rows, judge_bend
+from cmg_mj.features.pivot.pivot_track import read_track
+from cmg_mj.laws import LAWS, TABLE_2_GAINS, StateFeedback
+from cmg_mj.linear.omissions import omissions
 from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_gains, sliding_words
 from cmg_mj.plant.plant import Plant
-from cmg_mj.scenario.description import assignments, lines, number
+from cmg_mj.runs.experiment import Experiment
 from cmg_mj.scenario.design import Design
-from cmg_mj.scenario.omissions import omissions
-from cmg_mj.scenario.pivot_track import read_track
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings
-from cmg_mj.simulation.experiment import Experiment
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
 

@@ -36,7 +36,7 @@ from cmg_mj.cli.terminal import (
     show,
     users_code,
 )
-from cmg_mj.errors import InputError, RunStopped
+from cmg_mj.core.errors import InputError, RunStopped
 
 if TYPE_CHECKING:
     from cmg_mj.results.result import Driver
@@ -81,9 +81,9 @@ def run(
     A rerun needs the same --driver board and --world, if they were given.
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.results import reports as tables
-    from cmg_mj.simulation.experiment import prepare
-    from cmg_mj.simulation.simulate import SimulationOptions
-    from cmg_mj.studies import save as runs
+    from cmg_mj.runs import save as runs
+    from cmg_mj.runs.experiment import prepare
+    from cmg_mj.runs.simulate import SimulationOptions
 
     scenario = arguments.scenario(observer)
     experiment = prepare(scenario)
@@ -145,11 +145,11 @@ def compare(
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.core.types import law_needs
     from cmg_mj.results import reports as report
+    from cmg_mj.runs import comparison
+    from cmg_mj.runs import save as runs
+    from cmg_mj.runs.statistics import standings
     from cmg_mj.scenario.differences import describe_differences
     from cmg_mj.scenario.schema import CompareSettings
-    from cmg_mj.studies import save as runs
-    from cmg_mj.studies.compare import comparison
-    from cmg_mj.studies.compare.statistics import standings
 
     scenario = arguments.scenario()
     settings = scenario.compare or CompareSettings()
@@ -201,7 +201,7 @@ def list_names(what: str | None) -> None:
 
     Parameters are shown with their defaults; change them with --set observer.NAME=VALUE or controller.NAME=VALUE.
     """
-    from cmg_mj.controllers.laws import LAW_CLASSES
+    from cmg_mj.laws import LAW_CLASSES
     from cmg_mj.observers import OBSERVER_CLASSES
     from cmg_mj.results import reports as report
 
@@ -220,8 +220,8 @@ def list_names(what: str | None) -> None:
 def check(file: str, settings: tuple[str, ...]) -> None:
     """Check a scenario file, or a model file (.xml), without running it, and print its main parameters."""
     from cmg_mj.cli.check import description, rig_description
+    from cmg_mj.runs.experiment import prepare
     from cmg_mj.scenario.loading import load_scenario, parse_scenario
-    from cmg_mj.simulation.experiment import prepare
 
     is_model = Path(file).suffix.lower() in (".xml", ".mjb")
     if is_model and settings:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TextIO
 
 import click
 
-from cmg_mj.errors import shortened
+from cmg_mj.core.errors import shortened
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

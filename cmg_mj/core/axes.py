@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from cmg_mj.core.controller import Controller
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import MultiAxisReading
-from cmg_mj.errors import InputError
 
 
 class AxesStage(Protocol):

@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, NamedTuple, Protocol, TypedDict
 
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.runners import LawRunner, ObserverRunner
 from cmg_mj.core.sensor import SampledSensor, whole_steps
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, State, feedback_state
-from cmg_mj.elementwise import Scalar
 
 Feedback = Literal["observer", "fog", "truth"]
 AngleSource = Literal["measured", "estimated"]

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.axes import AnyController
 from cmg_mj.core.controller import Tick
 from cmg_mj.core.outside import Disturbance, Outside, instants
 from cmg_mj.core.types import IdealReading, MultiAxisReading
-from cmg_mj.elementwise import Scalar
 
 Joints = Sequence[Scalar] | np.ndarray
 """Joint angles or rates: a list of floats, or an array (n, n_worlds)."""

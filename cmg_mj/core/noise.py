@@ -8,7 +8,7 @@ from enum import IntEnum, unique
 
 import numpy as np
 
-from cmg_mj.elementwise import Scalar
+from cmg_mj.core.arrays import Scalar
 
 STREAMS_PER_AXIS = 16
 

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
-from cmg_mj.elementwise import Scalar
+from cmg_mj.core.arrays import Scalar
 
 
 class Outside(NamedTuple):

@@ -11,9 +11,9 @@ from typing import NoReturn
 
 import numpy as np
 
+from cmg_mj.core.arrays import Scalar, clip
+from cmg_mj.core.errors import RunStopped
 from cmg_mj.core.types import Estimate, FeedbackState, Law, Measurement, Observer, State, extra_signals
-from cmg_mj.elementwise import Scalar, clip
-from cmg_mj.errors import RunStopped
 
 _PACKAGE = str(Path(__file__).parents[1])
 

@@ -9,10 +9,10 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from cmg_mj.core.arrays import Scalar, digitise
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import NoiseStream
 from cmg_mj.core.types import Forces, IdealReading
-from cmg_mj.elementwise import Scalar, digitise
-from cmg_mj.errors import InputError
 
 Reading = TypeVar("Reading")
 """A sensor's reading: a number, a number for each gimbal, or the forces of the accelerometers."""

@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from cmg_mj.core.arrays import Scalar, atan2, dot
 from cmg_mj.core.types import Forces
-from cmg_mj.elementwise import Scalar, atan2, dot
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.errors import InputError
 
 
 class _Angles(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.core.errors import InputError, nearest
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)

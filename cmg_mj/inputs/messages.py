@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, get_args, get_origin
 
-from cmg_mj.errors import TomlValue, nearest, shortened, shown
+from cmg_mj.core.errors import TomlValue, nearest, shortened, shown
 
 SMALLEST, LARGEST = 1e-30, 1e30
 """Sizes of numbers. Products of a few numbers within them stay finite, and nothing a person can lift needs more."""

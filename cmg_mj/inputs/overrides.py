@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from typing import Any
 
-from cmg_mj.errors import InputError, TomlValue
+from cmg_mj.core.errors import InputError, TomlValue
 
 
 def override(fields: dict[str, TomlValue], setting: str) -> None:

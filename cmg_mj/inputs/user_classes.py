@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from cmg_mj.errors import InputError, TomlValue, nearest, raised
+from cmg_mj.core.errors import InputError, TomlValue, nearest, raised
 from cmg_mj.inputs.messages import complaints, fields_of
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.errors import InputError, nearest, shortened
 from cmg_mj.core.sensor import steps_until, whole_steps
 from cmg_mj.core.types import extra_signals
-from cmg_mj.errors import InputError, nearest, shortened
 from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
 from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes
 from cmg_mj.plant.plant import Plant

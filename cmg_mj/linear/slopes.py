@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.errors import InputError, raised, shortened
 from cmg_mj.core.types import Law, Measurement, Observer, feedback_state
-from cmg_mj.errors import InputError, raised, shortened
 
 STEPS = {1e-8: 1e-3, 1e-7: 1e-2, 1e-3: 0.6}
 """Length of a difference -> the share of a row's largest slope by which the slopes to both sides may be off.

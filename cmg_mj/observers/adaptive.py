@@ -14,10 +14,10 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar, cos, dot
+from cmg_mj.core.reduced_model import MARGIN, ReducedModel, is_hurwitz
 from cmg_mj.core.types import BIAS, TORQUE, Measurement
-from cmg_mj.elementwise import Scalar, cos, dot
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
-from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
 
 SINUSOID = "disturbance_n_m"
 

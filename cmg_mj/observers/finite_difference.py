@@ -6,10 +6,10 @@ from typing import ClassVar
 
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.types import Estimate, Measurement
-from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.types import STRICT, Positive
-from cmg_mj.observers.reduced_model import ReducedModel
 
 
 @dataclass(frozen=True, config=STRICT)

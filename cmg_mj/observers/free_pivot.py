@@ -12,11 +12,11 @@ from typing import ClassVar, NamedTuple, TypeAlias
 
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar, where
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import Estimate, Measurement
-from cmg_mj.elementwise import Scalar, where
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
-from cmg_mj.observers.reduced_model import ReducedModel
 
 Scalars: TypeAlias = tuple[Scalar, ...]
 

@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar, clip, exp, signed_power
+from cmg_mj.core.reduced_model import ReducedModel, Terms
 from cmg_mj.core.types import Estimate, Measurement
-from cmg_mj.elementwise import Scalar, clip, exp, signed_power
 from cmg_mj.inputs.types import STRICT, Positive
 from cmg_mj.observers.model_copy import follow, require_stable_step, stages
-from cmg_mj.observers.reduced_model import ReducedModel, Terms
 
 GIMBAL_RATE = 0.4
 """Gimbal rate at which L must still be small enough for the sample period [rad/s]. A slow one: at a faster one a

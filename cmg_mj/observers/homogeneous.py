@@ -8,11 +8,11 @@ from typing import Annotated
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar, signed_powers, sqrt
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.types import Estimate, Measurement
-from cmg_mj.elementwise import Scalar, signed_powers, sqrt
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.model_copy import LARGEST_RATE, CopyState, follow, stages
-from cmg_mj.observers.reduced_model import ReducedModel
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -8,14 +8,14 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.types import BIAS, Measurement
-from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.types import STRICT, Positive
 from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.observers.adaptive import State as AdaptiveState
 from cmg_mj.observers.homogeneous import Homogeneous
 from cmg_mj.observers.model_copy import CopyState
-from cmg_mj.observers.reduced_model import ReducedModel
 
 
 class State(NamedTuple):

@@ -9,11 +9,11 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import TORQUE, Measurement
-from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.types import STRICT, Positive
-from cmg_mj.observers.reduced_model import ReducedModel
 
 TERMS = 6
 """Number of terms of the transition's series. The rest of phi, psi and chi is below 4e-12 of each while the rig's pole

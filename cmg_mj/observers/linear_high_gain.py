@@ -12,11 +12,11 @@ from typing import ClassVar
 import numpy as np
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.types import Estimate, Measurement
-from cmg_mj.elementwise import Scalar
+from cmg_mj.core.zero_order_hold import Coefficients, FilterState, second_order_rows, second_order_step
 from cmg_mj.inputs.types import STRICT, Positive
-from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.observers.zero_order_hold import Coefficients, FilterState, second_order_rows, second_order_step
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar, clip
+from cmg_mj.core.reduced_model import ReducedModel, Terms
 from cmg_mj.core.types import Estimate, Measurement
-from cmg_mj.elementwise import Scalar, clip
 from cmg_mj.inputs.types import STRICT, Positive
 from cmg_mj.observers.model_copy import LARGEST_RATE, follow, stages
-from cmg_mj.observers.reduced_model import ReducedModel, Terms
 from cmg_mj.observers.riccati import exact_step, map_of_one
 
 MOST_PIECES = 1000

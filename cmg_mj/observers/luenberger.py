@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.reduced_model import MARGIN, ReducedModel, is_hurwitz
 from cmg_mj.core.types import Estimate, Measurement
-from cmg_mj.elementwise import Scalar
+from cmg_mj.core.zero_order_hold import hold_matrices
 from cmg_mj.inputs.types import STRICT, Positive
-from cmg_mj.observers.reduced_model import MARGIN, ReducedModel, is_hurwitz
-from cmg_mj.observers.zero_order_hold import hold_matrices
 
 
 class State(NamedTuple):

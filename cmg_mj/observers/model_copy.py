@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel, Terms
 from cmg_mj.core.types import Measurement
-from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError
-from cmg_mj.observers.reduced_model import ReducedModel, Terms
 
 LARGEST_RATE = 2.5
 """Times the step: a rate at which the error fades that the Runge-Kutta step follows well. It is stable up to 2.78."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import Observer
-from cmg_mj.errors import InputError
 from cmg_mj.inputs.user_classes import UserClassKind
-from cmg_mj.observers.reduced_model import ReducedModel
 
 OBSERVERS = {
     "linear": "cmg_mj.observers.linear:LinearDifferentiator",

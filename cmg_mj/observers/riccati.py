@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from cmg_mj.elementwise import Scalar
+from cmg_mj.core.arrays import Scalar
 
 TERMS = 7
 """Number of terms of the series, which converges to rounding while N times the step is below 1/2."""

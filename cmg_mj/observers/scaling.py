@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import NamedTuple, TypeAlias
 
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers.registry import OBSERVER_CLASSES
 
 PAPERS_GRAVITY = 3.4531 / 0.061841

@@ -9,10 +9,10 @@ from typing import ClassVar, NamedTuple
 
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar, clip, sign, sqrt, where
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.types import Estimate, Measurement
-from cmg_mj.elementwise import Scalar, clip, sign, sqrt, where
 from cmg_mj.inputs.types import STRICT, Positive
-from cmg_mj.observers.reduced_model import ReducedModel
 
 
 class State(NamedTuple):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from cmg_mj.visualization.plots.figure_spec import Picture
+from cmg_mj.view.plots.figure import Picture
 
 Verdict = Literal[
     "reproduced", "reproduced within stated conditions", "illustrated", "cannot be tested", "not reproduced"

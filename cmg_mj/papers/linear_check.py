@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import ReducedModel
 
 
 def rank_margin(matrix: np.ndarray) -> float:

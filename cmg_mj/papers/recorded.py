@@ -6,7 +6,7 @@ import numpy as np
 
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.visualization.plots.figure_spec import Line, Panel
+from cmg_mj.view.plots.figure import Line, Panel
 
 
 def trajectory_of(result: Result) -> Trajectory:

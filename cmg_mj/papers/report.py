@@ -16,7 +16,7 @@ from cmg_mj.papers import PAPERS, Reproduction
 from cmg_mj.papers.claim import VERDICTS, Claim
 from cmg_mj.results import markdown
 from cmg_mj.results.folder import RunFolder, Writers, claimed, write_text
-from cmg_mj.visualization.plots.figure_spec import draw
+from cmg_mj.view.plots.figure import draw
 
 
 def figures_of(entries: Sequence[Reproduction]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import math
 import numbers
 from typing import Any
 
-from cmg_mj.errors import InputError, shown
+from cmg_mj.core.errors import InputError, shown
 
 
 def require_number(name: str, value: Any) -> float:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from cmg_mj.papers.claim import Claim
-from cmg_mj.visualization.plots.figure_spec import Panel
+from cmg_mj.view.plots.figure import Panel
 
 ROOM = 0.05
 """Left above and below, as a share of the range."""

@@ -11,13 +11,13 @@ from operator import itemgetter
 import mujoco
 import numpy as np
 
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
-from cmg_mj.elementwise import Scalar
-from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.plant.effective_inertia import inertia_about
+from cmg_mj.plant.elements import TILT_ELEMENT, Module, element_id
+from cmg_mj.plant.inertia import inertia_about
 from cmg_mj.plant.mujoco_state import at_keyframe
-from cmg_mj.plant.parts import TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_at_site, line_of_joint
 from cmg_mj.sensors.accelerometer import Accelerometer
 

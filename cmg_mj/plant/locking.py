@@ -9,9 +9,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from cmg_mj.errors import InputError, nearest, shown
+from cmg_mj.core.errors import InputError, nearest, shown
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, ON_A_JOINT, TILT_ELEMENT, element_id, joint_sizes
 from cmg_mj.plant.mujoco_state import at_keyframe
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, ON_A_JOINT, TILT_ELEMENT, element_id, joint_sizes
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 
 YAW = "yaw"

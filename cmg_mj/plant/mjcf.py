@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import mujoco
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
+from cmg_mj.features.bend.edit import bend_frame
 from cmg_mj.inputs.files import model_files
-from cmg_mj.plant.bend import bend_frame
 from cmg_mj.plant.checks import RigChecker, invalid_numbers
+from cmg_mj.plant.elements import REQUIRED_PARTS, axes_of, missing_parts
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
-from cmg_mj.plant.parts import REQUIRED_PARTS, axes_of, missing_parts
 from cmg_mj.plant.without_plugins import OWN, parse_without_plugins
 from cmg_mj.scenario.plant_settings import PlantSettings
 

@@ -15,27 +15,27 @@ import mujoco
 import numpy as np
 from pydantic import ValidationError
 
-from cmg_mj.controllers.laws import Law, StateFeedback
-from cmg_mj.controllers.make_controller import StageOptions, make_controller
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.axes import MultiAxisController
 from cmg_mj.core.controller import Controller, PlantInterface
+from cmg_mj.core.errors import InputError, TomlValue, nearest
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import MultiAxisReading
-from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError, TomlValue, nearest
 from cmg_mj.inputs.files import find
 from cmg_mj.inputs.messages import complaints
+from cmg_mj.laws import Law, StateFeedback
 from cmg_mj.observers import Observer
-from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
 from cmg_mj.plant.checks import survives_first_steps
-from cmg_mj.plant.coupling import turning
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, JOINT_KINDS, element_id
 from cmg_mj.plant.mjcf import compile_model, load_rig, parse_drawn
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.plant.parts import EQUILIBRIUM_KEY, JOINT_KINDS, element_id
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
+from cmg_mj.plant.turning import turning
 from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
+from cmg_mj.scenario.make_controller import StageOptions, make_controller
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.plant_settings import COMPILED_FIELDS, FINEST_STEP_S, PlantSettings
 from cmg_mj.scenario.schema import ObserverSettings

@@ -10,7 +10,7 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
-from cmg_mj.elementwise import Scalar, atan2
+from cmg_mj.core.arrays import Scalar, atan2
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import RadialTilt
-from cmg_mj.errors import InputError
+from cmg_mj.features.bend.edit import step_for_bend
 from cmg_mj.plant.axis import Axis
-from cmg_mj.plant.bend import step_for_bend
+from cmg_mj.plant.elements import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.mujoco_state import at_keyframe
-from cmg_mj.plant.parts import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.noise import NoiseStream, normals
-from cmg_mj.elementwise import Scalar
-from cmg_mj.results.error_bounds import FLOORS
+from cmg_mj.results.floors import FLOORS
 from cmg_mj.sensors.mems_gyro import MemsGyro
 
 ZERO = "zero"

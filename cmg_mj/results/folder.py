@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
-from cmg_mj.errors import InputError, raised
+from cmg_mj.core.errors import InputError, raised
 from cmg_mj.results.files import is_plain_file
 
 Writers = Mapping[str, Callable[[Path], object]]

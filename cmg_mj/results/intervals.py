@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 
 CONFIDENCE = 0.95
 LOPSIDED = 0.1

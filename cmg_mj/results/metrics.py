@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.results.error_bounds import Floors
+from cmg_mj.results.floors import Floors
 from cmg_mj.results.summary_keys import Figures, Summary
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push, inside, push_windows

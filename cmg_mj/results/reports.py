@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 
 from rich.console import Group
 
+from cmg_mj.cli.description import assignments
 from cmg_mj.inputs.files import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
-from cmg_mj.results.error_bounds import FLOOR_ACCELERATION, FLOORS, NO_ACCELERATION_FLOOR, NOISE_ALONE
+from cmg_mj.results.floors import FLOOR_ACCELERATION, FLOORS, NO_ACCELERATION_FLOOR, NOISE_ALONE
 from cmg_mj.results.intervals import Interval, format_interval
 from cmg_mj.results.summary_keys import (
     AXES,
@@ -25,7 +26,6 @@ from cmg_mj.results.summary_keys import (
     section,
 )
 from cmg_mj.results.tables import Row, Table
-from cmg_mj.scenario.description import assignments
 from cmg_mj.scenario.differences import describe_differences
 from cmg_mj.scenario.loading import load_scenario
 

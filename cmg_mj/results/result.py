@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.results.intervals import finite_values
 from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, as_table, open_loop_figures
 from cmg_mj.results.trajectory import NamedColumns, Trajectory, frame_of

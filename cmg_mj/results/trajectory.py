@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import TypeAdapter
 
-from cmg_mj.errors import InputError, nearest
+from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.results.files import METADATA_KEY, write_row_groups
 
 if TYPE_CHECKING:

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from cmg_mj.controllers.laws import LAWS, Law
-from cmg_mj.controllers.laws.registry import LAW_CLASSES
-from cmg_mj.controllers.make_controller import make_controller
-from cmg_mj.controllers.processor import Processor
 from cmg_mj.core.controller import Controller, PlantInterface
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
-from cmg_mj.errors import InputError
+from cmg_mj.features.board.processor import Processor
+from cmg_mj.laws import LAWS, Law
+from cmg_mj.laws.registry import LAW_CLASSES
 from cmg_mj.observers import Observer, make_observer
-from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.observers.registry import OBSERVER_CLASSES
+from cmg_mj.scenario.make_controller import make_controller
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.sensors.sampled import Sensors

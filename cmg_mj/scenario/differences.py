@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import PurePath
 
-from cmg_mj.errors import TomlValue
+from cmg_mj.core.errors import TomlValue
 
 LONGEST_NAME = 60
 """Longest text of the differences in a folder's name [characters]."""

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.files import bundled, find, folder, read_text
 from cmg_mj.inputs.overrides import override
 from cmg_mj.scenario.schema import ControllerSettings, ObserverSettings, Scenario, parse_scenario

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import RadialTilt, TiltNoise
-from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.sensors.sampled import Sensors
 
 

@@ -11,10 +11,10 @@ from typing import Any, TypeGuard
 
 import tomli_w
 
-from cmg_mj.controllers.laws import LAW_CLASSES
-from cmg_mj.errors import TomlValue
+from cmg_mj.core.errors import TomlValue
 from cmg_mj.inputs.files import folder
 from cmg_mj.inputs.types import NoEffect, marked_fields
+from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_settings import PlantSettings

@@ -11,11 +11,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, create_model, model_validator
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.controllers.laws import LAWS, Law, lqr_gains, make_law, scaled_gains
-from cmg_mj.controllers.laws.registry import LAW_CLASSES
 from cmg_mj.core.controller import AngleSource, Feedback
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
-from cmg_mj.errors import InputError
+from cmg_mj.features.pivot.settings import Pivot
 from cmg_mj.inputs.messages import complaints, fields_of, out_of_size
 from cmg_mj.inputs.types import (
     STRICT,
@@ -34,9 +34,9 @@ from cmg_mj.inputs.types import (
     marked_fields,
 )
 from cmg_mj.inputs.user_classes import as_json
+from cmg_mj.laws import LAWS, Law, lqr_gains, make_law, scaled_gains
+from cmg_mj.laws.registry import LAW_CLASSES
 from cmg_mj.observers import OBSERVERS, Observer, make_observer
-from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.scenario.pivot import Pivot
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.stages.push import Push

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.sensor import whole_steps
-from cmg_mj.errors import InputError
 from cmg_mj.inputs.types import OnGrid, marked_values
 from cmg_mj.scenario.schema import Scenario
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.sensor import SampledSensor, Shown, Site
-from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.types import STRICT, Instant, NonNegative, Rate
 
 

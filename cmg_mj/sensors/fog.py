@@ -7,10 +7,10 @@ from typing import Annotated
 
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar, clip, radians
 from cmg_mj.core.noise import NoiseStream
 from cmg_mj.core.sensor import SampledSensor, Site
 from cmg_mj.core.types import IdealReading
-from cmg_mj.elementwise import Scalar, clip, radians
 from cmg_mj.inputs.types import STRICT, Batched, Instant, NonNegative, Positive, Rate
 
 

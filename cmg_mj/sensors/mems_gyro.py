@@ -11,8 +11,8 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import digitise
 from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise
-from cmg_mj.elementwise import digitise
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 
 PIECE = 1000

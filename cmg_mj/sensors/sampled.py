@@ -8,10 +8,10 @@ from dataclasses import replace
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.core.sensor import SampledSensor, Site
 from cmg_mj.core.types import Forces
-from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.types import STRICT
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder

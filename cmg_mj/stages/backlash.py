@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from cmg_mj.elementwise import Scalar, clip, where
+from cmg_mj.core.arrays import Scalar, clip, where
 
 ARCMIN_A_DEGREE = 60.0
 

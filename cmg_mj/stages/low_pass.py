@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar, clip
 from cmg_mj.core.sensor import SensorStage, Site, Timing
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
-from cmg_mj.elementwise import Scalar, clip
 from cmg_mj.inputs.types import STRICT
 from cmg_mj.stages.pair import PairSettings
 

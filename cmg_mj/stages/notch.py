@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from functools import partial
 
+from cmg_mj.core.arrays import Scalar, clip
 from cmg_mj.core.controller import ControllerSite
-from cmg_mj.elementwise import Scalar, clip
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 
 DEPTH_DAMPING, WIDTH_DAMPING = 0.02, 0.5
 """Damping ratios of the notch's zeros and poles: a 25th of the command remains at its middle."""

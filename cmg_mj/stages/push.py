@@ -8,9 +8,9 @@ from typing import Annotated
 import numpy as np
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar, where
 from cmg_mj.core.outside import Outside
 from cmg_mj.core.sensor import whole_steps
-from cmg_mj.elementwise import Scalar, where
 from cmg_mj.inputs.types import STRICT, Batched, GridDuration, GridInstant
 
 AFTER_PUSH_S = 1.0

@@ -9,8 +9,8 @@ from typing import Annotated
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.outside import Outside
-from cmg_mj.elementwise import Scalar
 from cmg_mj.inputs.types import STRICT, Duration, Instant
 
 

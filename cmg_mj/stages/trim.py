@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.controller import Controller, ControllerSite
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.sensor import steps_until
 from cmg_mj.core.types import BIAS, Law, State
-from cmg_mj.elementwise import Scalar
-from cmg_mj.errors import InputError
 
 
 class Trim(NamedTuple):

@@ -8,10 +8,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from cmg_mj.core.arrays import Scalar, clip, cos, dot, sin, where
 from cmg_mj.core.controller import Controller, Feedback, Tick
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.core.types import IdealReading, MultiAxisReading
-from cmg_mj.elementwise import Scalar, clip, cos, dot, sin, where
 
 
 class TurnGyro(Protocol):

@@ -11,10 +11,10 @@ import numpy as np
 from pydantic import Field, field_validator
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import Scalar, atan2, cos, sin
 from cmg_mj.core.noise import NoiseStream
 from cmg_mj.core.sensor import SensorStage, Site
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
-from cmg_mj.elementwise import Scalar, atan2, cos, sin
 from cmg_mj.inputs.types import STRICT, Batched, NoiseSize, NonNegative
 from cmg_mj.stages.pair import PairSettings
 

@@ -17,10 +17,10 @@ from dataclasses import replace
 import numpy as np
 
 from cmg_mj.results.baselines import MEMS_FUSED, MEMS_GYRO, RATE_START, FusedGyro, References
-from cmg_mj.results.error_bounds import acceleration_floor
+from cmg_mj.results.floors import acceleration_floor
 from cmg_mj.results.markdown import table
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
 
 PARTS_S = ((0.0, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 15.0), (0.0, 15.0))
 PLACES_M = ((0.0672, 0.2015), (0.05, 0.25), (0.05, 0.15), (0.1, 0.25), (0.1, 0.2), (0.1, 0.15))

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.linear.bend import judge_bend
+from cmg_mj.features.bend.verdict import judge_bend
 
 WORLDS = 20
 RATES = {

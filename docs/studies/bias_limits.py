@@ -15,7 +15,7 @@ import numpy as np
 from cmg_mj import load_scenario, prepare
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results import markdown
-from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
+from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
 
 SEED, WORLDS, LARGEST_DEG, CUTS, PARTS = 30_000, 5, 4.0, 2, 8
 

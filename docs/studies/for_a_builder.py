@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.progress import track
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, needs
 from cmg_mj.results import markdown
 from cmg_mj.results.baselines import GYROS, MEMS_FUSED, REFERENCES

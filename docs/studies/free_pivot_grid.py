@@ -55,8 +55,8 @@ from cmg_mj.observers.free_pivot import FreePivot
 from cmg_mj.observers.gyro_free import GyroFree
 from cmg_mj.observers.registry import OBSERVERS, make_observer
 from cmg_mj.results.markdown import table
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
 
 Row = list[list[str]]
 SEED = 130_000

@@ -15,8 +15,8 @@ import numpy as np
 from tabulate import tabulate
 
 import cmg_mj
-from cmg_mj.controllers.laws.state_feedback import StateFeedback
 from cmg_mj.inputs.files import folder
+from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.linear.verdict import judge_gains
 from cmg_mj.observers.scaling import scaled_parameters, scales_of
 

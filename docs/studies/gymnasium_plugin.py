@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj.cli import main as cmg_mj
 from cmg_mj.results.markdown import table
-from tests.plant.mounting.robots import ROBOTS, Robot, gymnasium_asset
+from tests.features.mounting.robots import ROBOTS, Robot, gymnasium_asset
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "gymnasium_plugin.py"
 SEEDS = 10

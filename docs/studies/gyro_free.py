@@ -31,12 +31,12 @@ import numpy as np
 from beyond.floor import velocity_floor
 
 from cmg_mj.observers import OBSERVERS as BUNDLED
-from cmg_mj.results.error_bounds import TiltFloor
+from cmg_mj.results.floors import TiltFloor
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.stages.push import inside, push_windows
 
 SEED, TUNING_SEED, TUNING_WORLDS = 70_000, 71_000, 10

@@ -22,7 +22,7 @@ from rich.progress import track
 from cmg_mj import load_scenario, prepare
 from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
-from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import run_of, run_side_by_side
 
 SEED = 160_000
 OBSERVERS = ("gyro_free", "free_pivot", "adaptive", "homogeneous", "kalman")

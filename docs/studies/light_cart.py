@@ -20,11 +20,11 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import mujoco
 
 from cmg_mj import mount
+from cmg_mj.features.mounting.mount_files import write_scenario
+from cmg_mj.features.mounting.prospects import Prospects, prospects
 from cmg_mj.results.markdown import table
-from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.studies.push_limits.mount_files import write_scenario
-from cmg_mj.studies.push_limits.prospects import Prospects, prospects
-from tests.studies.push_limits.robots import cart_pole
+from cmg_mj.runs.experiment import Experiment
+from tests.features.mounting.push_robots import cart_pole
 
 WORLDS = 10
 SECONDS = 20.0

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.replay.log import Log, ReadOptions
-from cmg_mj.replay.reading import read_log
-from cmg_mj.replay.reference import MISFIT, model_misfit
+from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.features.replay.log import Log, ReadOptions
+from cmg_mj.features.replay.reading import read_log
+from cmg_mj.features.replay.reference import MISFIT, model_misfit
 
 DENSITY = "sensors.accelerometer.noise_density_ug_rthz"
 CONDITIONS = {

@@ -17,9 +17,9 @@ mpl.use("agg")
 import matplotlib.pyplot as plt
 
 from cmg_mj import mount
-from cmg_mj.studies.push_limits.mount_files import PUSHED_AT_S, write_scenario
-from cmg_mj.studies.push_limits.prospects import prospects
-from cmg_mj.visualization.plots.style import colour, hexadecimal
+from cmg_mj.features.mounting.mount_files import PUSHED_AT_S, write_scenario
+from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.view.plots.style import colour, hexadecimal
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "torso.xml"
 SIZE = 1200

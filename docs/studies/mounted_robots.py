@@ -5,7 +5,7 @@ python docs/studies/mounted_robots.py --commands (with what each is mounted)
 python docs/studies/mounted_robots.py --homogeneous [ROBOT ...] (`homogeneous` in the loop, beside `gyro_free`)
 python docs/studies/mounted_robots.py --public FOLDER [ROBOT ...] (robots whose repositories are cloned into FOLDER)
 
-The robots are those of tests/plant/mounting/robots.py; ROBOT is a part of a name. The sensors of the datasheets,
+The robots are those of tests/features/mounting/robots.py; ROBOT is a part of a name. The sensors of the datasheets,
 `gyro_free`. The push that a robot stands is what `cmg-mj mount` prints, without the limit of a minute. It, and 1.8
 times it, is tried on ten worlds of another seed, to both sides, at 2 s from upright; and 30 s from the tilt that the
 scenario starts with, alone, are tried on that seed too. With --homogeneous both observers are pushed with the E
@@ -20,14 +20,14 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj import mount
+from cmg_mj.features.mounting.largest_push import PUSH_S
+from cmg_mj.features.mounting.mount_files import write_scenario
+from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.features.mounting.push import TimeLimit, simulated_push
 from cmg_mj.results.markdown import table
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.schema import ObserverSettings
-from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.studies.push_limits.largest_push import PUSH_S
-from cmg_mj.studies.push_limits.mount_files import write_scenario
-from cmg_mj.studies.push_limits.prospects import prospects
-from cmg_mj.studies.push_limits.simulated_push import TimeLimit, simulated_push
-from tests.plant.mounting.robots import ROBOTS, Robot
+from tests.features.mounting.robots import ROBOTS, Robot
 
 WORLDS = 10
 SEED = 1

@@ -20,9 +20,9 @@ from matplotlib.colors import to_rgb
 
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import prepare
-from cmg_mj.visualization.plots.style import colour, hexadecimal
+from cmg_mj.view.plots.style import colour, hexadecimal
 
 SIZE, DPI = (7.6, 3.4), 100
 """Size of a frame [inch], and its resolution."""

@@ -24,20 +24,20 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj import mount
+from cmg_mj.core.zero_order_hold import hold_matrices
+from cmg_mj.features.mounting.largest_push import push_margin
+from cmg_mj.features.mounting.mount_files import write_scenario
+from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.features.tuning import Recorded, halves, recorder, tune
+from cmg_mj.features.tuning.simulations import WARM_UP_S
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.observers.scaling import scaled_names, scaled_parameters, scales_of
-from cmg_mj.observers.zero_order_hold import hold_matrices
-from cmg_mj.results.error_bounds import FLOOR_Y1, TiltFloor, acceleration_floor
+from cmg_mj.results.floors import FLOOR_Y1, TiltFloor, acceleration_floor
 from cmg_mj.results.markdown import table
 from cmg_mj.results.summary_keys import SummaryValue, section
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.studies.push_limits.largest_push import push_margin
-from cmg_mj.studies.push_limits.mount_files import write_scenario
-from cmg_mj.studies.push_limits.prospects import prospects
-from cmg_mj.studies.tuning import Recorded, halves, recorder, tune
-from cmg_mj.studies.tuning.on_simulations import WARM_UP_S
-from tests.plant.mounting.robots import ROBOTS
+from tests.features.mounting.robots import ROBOTS
 
 WORLDS, LOOP_WORLDS = 6, 4
 TUNING_S = 5.0

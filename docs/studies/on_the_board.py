@@ -16,14 +16,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmg_mj.codegen.board import Board, on_a_board
-from cmg_mj.controllers.processor import Decision
 from cmg_mj.core.controller import Controller
+from cmg_mj.features.board import Board, on_a_board
+from cmg_mj.features.board.processor import Decision
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.intervals import format_interval, in_line, known_interval
 from cmg_mj.results.markdown import table
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
 
 FIGURES = {"velocity_rms_error_rad_s": "{:.5f}", "settle_time_s": "{:.3f}"}
 

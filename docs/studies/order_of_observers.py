@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from cmg_mj.studies.sweeps.cells import fell_interval
-from cmg_mj.studies.sweeps.sobol import indices
+from cmg_mj.features.sweeps.cells import fell_interval
+from cmg_mj.features.sweeps.sobol import indices
 
 FIGURES = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "tilt_rms_deg")
 

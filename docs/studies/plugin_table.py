@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.markdown import table
-from tests.codegen.engine_plugin.made import SENSORS, Comparison, Made, compare, make, variant
-from tests.codegen.engine_plugin.robots import ROBOTS, is_missing, write_robot
+from tests.features.plugin.made import SENSORS, Comparison, Made, compare, make, variant
+from tests.features.plugin.robots import ROBOTS, is_missing, write_robot
 
 PARTS = ("rig", "axes", "worlds", "robots")
 INTEGRATORS = ("RK4", "implicitfast", "Euler")

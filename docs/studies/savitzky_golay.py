@@ -21,12 +21,12 @@ from typing import ClassVar
 import numpy as np
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.elementwise import Scalar
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.features.tuning.simulations import record
 from cmg_mj.observers import Estimate, Measurement, make_observer
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.runs.side_by_side import run_of, run_side_by_side
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
-from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
-from cmg_mj.studies.tuning.on_simulations import record
 
 NAME = "docs.studies.savitzky_golay:SavitzkyGolay"
 FITTED, JUDGED = 1000, 2000

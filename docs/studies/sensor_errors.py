@@ -27,7 +27,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cmg_mj import OBSERVERS, Accelerometer, load_plant, load_scenario, prepare
-from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS
+from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.results.intervals import known_interval, ratio_interval
 from cmg_mj.results.markdown import table
 

@@ -21,9 +21,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.codegen.export import export
-from cmg_mj.codegen.export.check import FLAGS, find_compiler
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
+from cmg_mj.features.export import export
+from cmg_mj.features.export.check import FLAGS, find_compiler
 from cmg_mj.observers import OBSERVERS, Measurement
 from cmg_mj.results.intervals import mean_interval
 from cmg_mj.results.markdown import table

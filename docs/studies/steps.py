@@ -16,12 +16,12 @@ import time
 
 import numpy as np
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import NESTED
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
 
 INTEGRATORS = ("RK4", "implicit", "implicitfast", "Euler", "discrete")
 STEPS_MS = (0.25, 0.5, 1.0, 2.5, 5.0)

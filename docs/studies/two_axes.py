@@ -21,8 +21,8 @@ import numpy as np
 from cmg_mj.inputs.files import folder
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.markdown import table
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import prepare
 
 TILTS = ("yaw", "roll", "pitch")
 SLOW = {"0 0 0 0 314 0 -314": "0 0 0 0 282.6 0 -314", "0 0 314 0 -314": "0 0 282.6 0 -314"}

@@ -13,12 +13,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmg_mj.features.mounting.recoverable_states import ceiling
 from cmg_mj.results import markdown
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import section
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.studies.push_limits.recoverable_states import ceiling
 
 AXES = ("roll", "pitch")
 ERROR = "velocity_rms_error_rad_s"

@@ -8,8 +8,8 @@ from typing import Any
 
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Result
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import prepare
 
 STANDING = {
     # observer -> settings in which it stands: the headline push at 0.5 degrees of bias, unless it cannot

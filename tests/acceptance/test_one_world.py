@@ -10,8 +10,8 @@ import math
 
 import pytest
 
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import prepare
 from tests.acceptance.cases import BAND, GROUP, STANDING, closed_loop_figures
 from tests.acceptance.test_acceptance import BOUNDS, SEED
 

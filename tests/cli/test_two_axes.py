@@ -10,9 +10,9 @@ import pytest
 from cmg_mj import InputError, load_plant
 from cmg_mj.results.summary_keys import AXES, KEYS
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.runs.save import report_run, save_run
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.studies.save import report_run, save_run
 from tests.command import CommandOutcome, cmg_mj
 
 SHORT = ("duration_s=2", "push.0.start_s=1", "push.1.start_s=1")

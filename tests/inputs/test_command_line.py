@@ -66,9 +66,7 @@ def test_options(command: str, wrong_input: list[str], fragments: list[str]) -> 
     ("list", ["list", "observer"], "'observer' is not one of 'scenarios', 'observers'"),
 )
 def test_commands(wrong_input: list[str], fragments: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        "cmg_mj.simulation.experiment.simulate", pytest.fail
-    )  # all this is found before anything is run
+    monkeypatch.setattr("cmg_mj.runs.experiment.simulate", pytest.fail)  # all this is found before anything is run
     assert_in_order(fragments, cmg_mj(*wrong_input).complaint)
     assert list(Path().iterdir()) == []
 
@@ -83,7 +81,7 @@ def test_commands(wrong_input: list[str], fragments: list[str], monkeypatch: pyt
 def test_an_output_folder_that_cannot_be_written(
     command: str, wrong_input: str, fragments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cmg_mj.simulation.experiment.simulate", pytest.fail)
+    monkeypatch.setattr("cmg_mj.runs.experiment.simulate", pytest.fail)
     Path("taken").write_text("mine")
     assert_in_order(fragments, cmg_mj(command, "push_recovery", "--out", wrong_input).complaint)
     assert Path("taken").read_text() == "mine"

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from cmg_mj import load_plant
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.files import folder
 from tests.command import CommandOutcome, cmg_mj
 from tests.inputs.complaints import assert_in_order, check, table

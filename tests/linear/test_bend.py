@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import Experiment, load_scenario, prepare
-from cmg_mj.linear.bend import BentVerdict, judge_bend
+from cmg_mj.features.bend.verdict import BentVerdict, judge_bend
 from cmg_mj.linear.plant import linearise
 from cmg_mj.linear.verdict import Verdict, margins
 from cmg_mj.plant.plant import load_plant

@@ -16,13 +16,13 @@ import pytest
 from scipy.linalg import expm
 
 from cmg_mj import Experiment, InputError, Measurement, Scenario, load_scenario, mount, parse_scenario, prepare
+from cmg_mj.features.mounting.mount_files import write_scenario
 from cmg_mj.linear.loop import INPUTS, WITH_A_SLOPE
 from cmg_mj.linear.plant import linearise
 from cmg_mj.linear.slopes import observer_slopes
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.studies.push_limits.mount_files import write_scenario
 from tests.command import ROOT
-from tests.studies.push_limits.robots import cart_pole
+from tests.features.mounting.push_robots import cart_pole
 
 DT = 0.005
 QUIET = {

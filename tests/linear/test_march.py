@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.controllers.laws.state_feedback import StateFeedback
+from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.linear.march import Motion, march
 from cmg_mj.linear.plant import linearise
-from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.runs.experiment import Experiment
 
 
 def experiment(*settings: str) -> Experiment:

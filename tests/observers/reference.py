@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.observers import Measurement, Observer, make_observer
-from cmg_mj.observers.reduced_model import ReducedModel
 from tests.plant import paper_model as paper
 
 DT = 0.005

@@ -12,11 +12,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm, solve_continuous_lyapunov
 
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.types import extra_signals
-from cmg_mj.errors import InputError
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.observers.adaptive import Adaptive
-from cmg_mj.observers.reduced_model import ReducedModel
 from tests.observers.reference import DT, PAPER, Signal
 
 PAIR = dataclasses.replace(PAPER, gimbals=2)

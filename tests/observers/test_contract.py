@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement
 from tests.observers.reference import DT, PAPER, observer, rough_signals
 from tests.plant import paper_model as paper

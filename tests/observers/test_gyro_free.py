@@ -11,10 +11,10 @@ from scipy.linalg import solve_discrete_are
 from scipy.stats import chi2
 
 import cmg_mj
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.gyro_free import GyroFree, State
-from cmg_mj.observers.reduced_model import ReducedModel
 from tests.observers.double_integrator import integrator_rows
 from tests.observers.reference import DT, NOISE, PAPER
 

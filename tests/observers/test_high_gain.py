@@ -10,10 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.high_gain import HighGain
-from cmg_mj.observers.reduced_model import ReducedModel
 from tests.observers.reference import DT, HEAVY, PAPER, Slope, integrate, observer, power, rough_signals, run
 
 DEFAULTS = {"l1": 29.5, "l2": 12.4, "d_inf": 0.6, "b": 0.333, "phi1": 0.03, "phi2": 1.0, "phi3": 3.0}

@@ -12,9 +12,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import Measurement, Observer
-from cmg_mj.observers.reduced_model import ReducedModel
 from tests.observers.reference import (
     DT,
     GRAVITY_TORQUE,

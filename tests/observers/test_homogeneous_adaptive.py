@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.observers import Measurement
 from tests.observers.reference import DT, GRAVITY_TORQUE, J1, observer, rough_signals
 

@@ -13,9 +13,9 @@ from scipy.linalg import expm, solve_discrete_are
 from scipy.stats import chi2
 
 from cmg_mj import load_scenario, prepare
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.kalman import COLUMNS, PAIRS, Covariance, Kalman, State
-from cmg_mj.observers.reduced_model import ReducedModel
 from tests.observers.reference import DT, HEAVY, PAPER, observer, rough_signals
 
 C = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.errors import InputError
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel
 from tests.observers.reference import (
     GRAVITY_TORQUE,
     HEAVY,

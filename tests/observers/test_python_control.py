@@ -13,7 +13,7 @@ import pytest
 from control import input_output_response, linearize
 from scipy.integrate import solve_ivp
 
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import ReducedModel
 from tests.observers.reference import GRAVITY_TORQUE, HEAVY, J1, PAPER
 
 MODELS = pytest.mark.parametrize("model", [PAPER, HEAVY, dataclasses.replace(HEAVY, gimbals=2)])

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement, make_observer
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import parse_scenario
-from cmg_mj.simulation.experiment import prepare
 from tests.observers.reference import DT, NOISE, PAPER, observer
 
 

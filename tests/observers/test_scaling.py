@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.controllers.laws import scaled_gains
-from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.types import extra_signals
+from cmg_mj.laws import scaled_gains
+from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
-from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.observers.scaling import PURE, TORQUE, UNITS, Owner, Scales, Unit, scale_value, scaled_parameters, scales_of
 from tests.observers.reference import DT, HEAVY, NOISE, PAPER, rough_signals
 
@@ -107,6 +107,6 @@ def test_a_slow_robot_gets_slow_gains() -> None:
 
 
 def test_the_sensors_observers_and_a_users_own_stay_as_they_are() -> None:
-    for kind in ("gyro_free", "free_pivot", "finite_difference", "tests.studies.tuning.user_observer:UserObserver"):
+    for kind in ("gyro_free", "free_pivot", "finite_difference", "tests.features.tuning.user_observer:UserObserver"):
         assert scaled_parameters(kind, HEAVY) == {}
     assert {unit.owner for unit in UNITS["gyro_free"].values() if isinstance(unit, Unit)} == {Owner.SENSORS}

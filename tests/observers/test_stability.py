@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS, closed_loop_poles, lqr_gains
-from cmg_mj.errors import InputError
-from cmg_mj.observers.reduced_model import MARGIN, is_hurwitz
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import MARGIN, is_hurwitz
+from cmg_mj.laws.state_feedback import TABLE_2_GAINS, closed_loop_poles, lqr_gains
 from tests.command import cmg_mj
 from tests.observers.reference import PAPER
 

@@ -8,8 +8,8 @@ import pytest
 from cmg_mj.papers.dao2023 import adaptive_rig as rig
 from cmg_mj.papers.dao2023.on_the_rig import OTHERS, share_within
 from cmg_mj.results.intervals import mean_interval
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import prepare
 
 TOLERANCE_FACTOR = 2.53
 """So many standard deviations above the mean of 16 lie 95 % of a normal population, with 95 % confidence."""

@@ -38,7 +38,7 @@ from cmg_mj.papers.andrieu2009.simulation import (
 )
 from cmg_mj.papers.andrieu2009.study import Study, rms_by_kind, study
 from cmg_mj.papers.claim import Claim
-from cmg_mj.visualization.plots.figure_spec import Picture
+from cmg_mj.view.plots.figure import Picture
 from tests.papers.worlds import make_result
 
 SEEDS, FIRST = 6, 500

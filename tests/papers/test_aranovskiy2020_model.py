@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS
+from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020 import linearisation, model, paper
 from cmg_mj.papers.linear_check import controllability_margin, equilibrium

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.controllers.laws.state_feedback import lqr_gains
+from cmg_mj.laws.state_feedback import lqr_gains
 from cmg_mj.papers.aranovskiy2020 import optimality
 from cmg_mj.papers.aranovskiy2020.optimality import inverse_optimality, nearest_diagonal
 from cmg_mj.papers.aranovskiy2020.paper import K_E, K_E_ROUNDING, printed_model

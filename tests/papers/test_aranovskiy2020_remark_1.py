@@ -11,12 +11,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
+from cmg_mj.features.replay import replay
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.papers.aranovskiy2020 import by_euler, delicacy, forms_of_10, misprint, on_the_board, update_cost
 from cmg_mj.papers.aranovskiy2020.delicacy import transient
 from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, printed_model, riccati_slope, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
-from cmg_mj.replay import replay
 from cmg_mj.results.trajectory import Trajectory
 
 SEED = 910_000

@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+from cmg_mj.features.tuning import NoiseLevelResult, TuningResult
 from cmg_mj.papers.aranovskiy2020 import joint, retuned, table_2
 from cmg_mj.papers.aranovskiy2020.joint import nearest_joint
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, TABLE_2
 from cmg_mj.papers.aranovskiy2020.tuning_procedure import Trial, procedure_claim, run_trials
 from cmg_mj.results.intervals import Interval
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.studies.tuning import NoiseLevelResult, TuningResult
 
 SEED = 910_001
 SCENARIO = load_scenario("observer_tuning")

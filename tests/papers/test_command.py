@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from cmg_mj import papers
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.papers.claim import Claim, OnShare, Section
 from cmg_mj.papers.report import report_text
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 from tests.command import cmg_mj
 
 PICTURE = Picture("sokolov2019-fig-1", "a Fig. 1", [Panel("tilt [deg]", [Line([0.0, 1.0], [0.0, 2.0], "true")])])

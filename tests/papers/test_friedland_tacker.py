@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, State, System
 from cmg_mj.papers.dao2023.pendulum_robot import make_single

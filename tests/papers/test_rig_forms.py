@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.adaptive import Adaptive
-from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, list_violations
 from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
 from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, System

@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.sokolov2019 import equations, paper
 from cmg_mj.papers.sokolov2019.rig import estimator, experiment
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import prepare
 from tests.plant import paper_model
 
 SEED = 5_000

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmg_mj.features.replay import replay
 from cmg_mj.papers.sokolov2019 import figure_3
 from cmg_mj.papers.sokolov2019.rig import estimator
-from cmg_mj.replay import replay
 from cmg_mj.results.intervals import Interval
 from cmg_mj.results.trajectory import Trajectory
 

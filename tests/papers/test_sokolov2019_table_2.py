@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from cmg_mj.features.replay import replay
+from cmg_mj.features.tuning import NoiseLevelResult
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019 import table_2
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import estimator, experiment
-from cmg_mj.replay import replay
-from cmg_mj.studies.tuning import NoiseLevelResult
 
 SEED = 5_000
 

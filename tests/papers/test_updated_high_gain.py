@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection
 from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.plant.plant import Plant, load_plant
 from tests.plant import paper_model as paper
 from tests.plant.full_model import mass_matrices, passive, states

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from cmg_mj import mount
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
+from cmg_mj.features.mounting.largest_push import ReducedPhysics
 from cmg_mj.linear.plant import linearise
-from cmg_mj.plant.parts import BEND_JOINT
+from cmg_mj.plant.elements import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.scenario.plant_settings import BendBeyond
-from cmg_mj.studies.push_limits.largest_push import ReducedPhysics
-from tests.plant.test_bend import frequency, ring
-from tests.studies.push_limits.robots import cart_pole
+from tests.features.bend.test_bend import frequency, ring
+from tests.features.mounting.push_robots import cart_pole
 
 SMALL = 1e-6
 """A tilt [rad] and a gimbal rate [rad/s] of which the square does not count."""

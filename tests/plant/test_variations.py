@@ -13,14 +13,14 @@ import mujoco
 import numpy as np
 import pytest
 
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import RadialTilt
-from cmg_mj.errors import InputError
 from cmg_mj.inputs.files import folder
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.plant_settings import PlantSettings
-from cmg_mj.simulation.experiment import prepare
 from tests.plant import paper_model as paper
 
 KP, KV = 60.0, 1.1

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.observers import Measurement, make_observer
-from cmg_mj.results.error_bounds import ROWS_A_TAP, TiltFloor, acceleration_floor
+from cmg_mj.results.floors import ROWS_A_TAP, TiltFloor, acceleration_floor
 from tests.observers.reference import DT, NOISE, PAPER
 
 WHOLE = 2000

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.results.folder import MARKER, RunFolder, is_own, write_text
 from tests.run_folders import names, write
 

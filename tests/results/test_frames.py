@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import cmg_mj
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.results.trajectory import Trajectory
 
 SHORT = ["duration_s=0.4", "push=[]"]

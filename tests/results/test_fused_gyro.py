@@ -12,9 +12,9 @@ from scipy.linalg import solve_discrete_are
 from cmg_mj.observers.gyro_free import GyroFree
 from cmg_mj.results.baselines import GYROS, RATE_START, FusedGyro
 from cmg_mj.results.summary_keys import open_loop_figures, section
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.mems_gyro import MemsGyro
-from cmg_mj.simulation.experiment import prepare
 from tests.observers.reference import DT, NOISE
 
 GYRO = MemsGyro()

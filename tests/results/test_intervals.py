@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
+from cmg_mj.features.sweeps.cells import fell_interval
 from cmg_mj.results.intervals import (
     FEWEST,
     Interval,
@@ -18,7 +19,6 @@ from cmg_mj.results.intervals import (
     positive_mean_interval,
     ratio_interval,
 )
-from cmg_mj.studies.sweeps.cells import fell_interval
 
 
 def test_mean_interval_is_scipys() -> None:

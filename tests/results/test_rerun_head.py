@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmg_mj.results.rerun_head import rerun_head
+from cmg_mj.runs.rerun_head import rerun_head
 
 
 def test_the_line_that_runs_it_again_has_the_options() -> None:

@@ -13,14 +13,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import open_loop_figures
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
 
 ROWS = 2 + len(REFERENCES)  # of a world: two observers, and what they are judged beside
 BIASES = [0.5, 0.5, 40.0, 40.0]  # two worlds that stand, two that fall

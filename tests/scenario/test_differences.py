@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from cmg_mj import load_scenario, parse_scenario, prepare
-from cmg_mj.errors import TomlValue
+from cmg_mj.core.errors import TomlValue
 from cmg_mj.scenario.differences import LONGEST_NAME, describe_differences, folder_suffix, safe_name
 from cmg_mj.scenario.resolve import differences
 from tests.command import cmg_mj

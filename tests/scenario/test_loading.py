@@ -13,8 +13,8 @@ import pytest
 import tomli_w
 
 from cmg_mj import Estimate, InputError, Measurement, load_scenario, parse_scenario, prepare
-from cmg_mj.controllers.laws.state_feedback import TABLE_2_GAINS, StateFeedback
 from cmg_mj.inputs.files import bundled, folder
+from cmg_mj.laws.state_feedback import TABLE_2_GAINS, StateFeedback
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.scenario.loading import Scenario
 from tests.run_folders import write

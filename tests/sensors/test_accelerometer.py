@@ -16,15 +16,15 @@ import pytest
 from scipy.signal import butter, lfilter, welch
 
 from cmg_mj.core.controller import Controller
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import NoiseStream
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
-from cmg_mj.errors import InputError
 from cmg_mj.plant.plant import load_plant
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.simulation.experiment import prepare
 from cmg_mj.stages.low_pass import noise_gain
 from tests.sensors.test_sampled import G, assert_sigma, measuring
 

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.core.types import STANDARD_GRAVITY, IdealReading
-from cmg_mj.errors import InputError
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.simulation.experiment import Experiment, prepare
 from cmg_mj.stages.vibration import BroadbandVibration, WheelTones
 
 MG = 1e-3 * STANDARD_GRAVITY
@@ -213,7 +213,7 @@ def test_what_does_not_vibrate_is_refused(setting: str, message: str) -> None:
 
 
 def test_the_plugin_refuses_it_by_name() -> None:
-    from cmg_mj.simulation.make import describe_rig
+    from cmg_mj.features.plugin.make import describe_rig
 
     for field in ("vibration_mg=4.0", "wheel_harmonics_mg=[2.0]"):
         with pytest.raises(InputError, match=rf"sensors\.accelerometer\.{field.partition('=')[0]}: the "):

@@ -89,7 +89,7 @@ def kill_at_every_event() -> None:
 def kill_at_random(times: int) -> None:
     """Kill whole runs being saved over one another: every file is of one and the same run."""
     from cmg_mj import parse_scenario, prepare
-    from cmg_mj.studies import save as runs
+    from cmg_mj.runs import save as runs
 
     reports = []
     for seed in (1, 2):

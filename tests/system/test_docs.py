@@ -100,8 +100,8 @@ def test_the_field_of_contributing_is_one(tmp_path: Path) -> None:
     insert("scenario/schema.py", field, "    feedback: Annotated[Feedback", 4)
     insert("scenario/schema.py", use, "        return make_law(", 8)
     (law_field,) = re.findall(r"`(dead_band_rad_s: float = 0\.0)`", recipe)
-    insert("controllers/laws/state_feedback.py", law_field + "\n", "\n    @property\n    def trim_gain", 4)
-    insert("controllers/laws/state_feedback.py", effect, "        if u is not demanded:", 8)
+    insert("laws/state_feedback.py", law_field + "\n", "\n    @property\n    def trim_gain", 4)
+    insert("laws/state_feedback.py", effect, "        if u is not demanded:", 8)
 
     def command(*arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(

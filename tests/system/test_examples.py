@@ -34,7 +34,7 @@ OUTPUT = {
 }
 """Example -> a part of what it prints."""
 WITH_A_ROBOT = ["gymnasium_own_robot", "gymnasium_plugin"]
-"""Take a robot that has a plugin: they run in tests/codegen/engine_plugin/test_mount.py."""
+"""Take a robot that has a plugin: they run in tests/features/plugin/test_mount.py."""
 OPTIONS = {"mujoco_viewer": ["--headless"]}
 """The same loop where there is no screen."""
 

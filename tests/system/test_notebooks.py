@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import cmg_mj
-from cmg_mj.visualization.recording import stream
+from cmg_mj.view.recording import stream
 from tests.command import ROOT
 
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))

@@ -15,8 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cmg_mj.elementwise import Scalar, signed_power
-from cmg_mj.errors import InputError
+from cmg_mj.core.arrays import Scalar, signed_power
+from cmg_mj.core.errors import InputError
 from cmg_mj.papers.require import require_number, require_positive
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from cmg_mj.elementwise import signed_power
+from cmg_mj.core.arrays import signed_power
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, weights
 from cmg_mj.papers.claim import Claim
 

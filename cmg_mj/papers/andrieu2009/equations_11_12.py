@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.elementwise import signed_power
+from cmg_mj.core.arrays import signed_power
 from cmg_mj.papers.andrieu2009.theorem_1 import HOMOGENEOUS, system_1
 from cmg_mj.papers.claim import Claim
 

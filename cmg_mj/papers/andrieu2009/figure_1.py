@@ -8,7 +8,7 @@ from cmg_mj.papers.andrieu2009.paper import PHI1, PHI2, PHI3
 from cmg_mj.papers.andrieu2009.simulation import HOMOGENEOUS, KINDS, TIME, UPDATED, WINDOWS, window_means
 from cmg_mj.papers.andrieu2009.study import ASSUMED, Study
 from cmg_mj.papers.claim import Claim
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 RATES = ("df2_max", "Omega_1", "Omega_2", "df2/dx2")
 

@@ -18,7 +18,7 @@ from cmg_mj.papers.andrieu2009.simulation import (
 )
 from cmg_mj.papers.andrieu2009.study import ASSUMED, Study, rms_by_kind
 from cmg_mj.papers.claim import Claim
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 LEAST_SEEDS = 0.95
 """Share of the seeds in which an order must hold."""

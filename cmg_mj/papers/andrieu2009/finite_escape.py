@@ -13,7 +13,7 @@ from cmg_mj.papers.andrieu2009 import paper
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b
 from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
 from cmg_mj.papers.claim import Claim
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 INSIDE, BEYOND = 0.5, 1.5
 """One p on each side of 1."""

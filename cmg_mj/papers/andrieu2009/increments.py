@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cmg_mj.elementwise import signed_power
+from cmg_mj.core.arrays import signed_power
 from cmg_mj.papers.andrieu2009 import paper
 from cmg_mj.papers.claim import Claim
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.elementwise import signed_power
+from cmg_mj.core.arrays import signed_power
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection
 
 SCALES = np.geomspace(1e-8, 1e8, 65)

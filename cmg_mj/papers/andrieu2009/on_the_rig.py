@@ -13,10 +13,10 @@ from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.result import Result
+from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.runs.side_by_side import run_of, run_side_by_side
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
-from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 WORLDS, SEED = 20, 82_000
 KINDS = {

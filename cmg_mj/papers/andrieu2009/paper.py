@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmg_mj.elementwise import Scalar, signed_power
+from cmg_mj.core.arrays import Scalar, signed_power
 
 
 def f2(g: Scalar, x2: Scalar, u: Scalar, p: float) -> Scalar:

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.elementwise import signed_power
+from cmg_mj.core.arrays import signed_power
 from cmg_mj.papers.andrieu2009 import paper
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b
 from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
 from cmg_mj.papers.claim import Claim
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 START_ERRORS = (-1e3, -1e2, -10.0, -1.0, 1.0, 10.0, 1e2, 1e3)
 NOISE_AMPLITUDES = (1e-1, 1e-2, 1e-3)

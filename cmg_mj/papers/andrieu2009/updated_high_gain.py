@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.elementwise import Scalar, signed_power
-from cmg_mj.errors import InputError, shown
+from cmg_mj.core.arrays import Scalar, signed_power
+from cmg_mj.core.errors import InputError, shown
 from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.observers.model_copy import require_stable_step
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b, list_violations

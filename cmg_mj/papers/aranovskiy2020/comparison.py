@@ -14,7 +14,7 @@ from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import KEYS
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 Numbers = Mapping[str, np.ndarray]
 """Observer -> a measure in the loop, (n_worlds,); NaN for a world that did not stand. Less is better."""

@@ -15,7 +15,7 @@ from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 RATES_HZ = tuple(float(rate) for rate in np.geomspace(20.0, 2000.0, 41))
 

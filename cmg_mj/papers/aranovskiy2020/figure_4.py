@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.features.tuning.simulations import window_of
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
@@ -14,10 +15,9 @@ from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.papers.words import join_with_and
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import prepare
-from cmg_mj.studies.tuning.on_simulations import window_of
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED = 72_000
 WORLDS = 20

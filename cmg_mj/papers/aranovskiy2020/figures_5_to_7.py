@@ -17,8 +17,8 @@ from cmg_mj.papers.scales import on_common_scales
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 FIGURES = {"linear": "Fig. 5", "ltv": "Fig. 6", "homogeneous": "Fig. 7"}
 ANGLES: tuple[AngleSource, AngleSource] = ("measured", "estimated")

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.elementwise import signed_power
+from cmg_mj.core.arrays import signed_power
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 ALPHAS = (0.55, 0.7, 0.85, 1.0)
 DECADES = 12

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmg_mj.features.replay import replay
 from cmg_mj.observers import Measurement, Observer
 from cmg_mj.observers.ltv import LinearTimeVarying, State
 from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, printed_model, riccati_slope
 from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
 from cmg_mj.papers.recorded import rms
-from cmg_mj.replay import replay
 
 Method = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 """(H, A', step) -> H one step later."""

@@ -14,7 +14,7 @@ from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.results.intervals import Interval, ratio_interval
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED = 75_000
 WORLDS = 4

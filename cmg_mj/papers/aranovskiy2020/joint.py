@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from cmg_mj.features.tuning import NoiseLevelResult
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.retuned import DEFAULT_NOISE, Studies, beats_zero, level_at
 from cmg_mj.papers.claim import Assumption, Claim
 from cmg_mj.papers.words import join_with_and
-from cmg_mj.studies.tuning import NoiseLevelResult
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 ROUNDED = 1.05
 """The cost of printing a parameter to one digit: tau = 0.02 stands for 0.015 to 0.025."""

@@ -10,7 +10,7 @@ from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT, replay_at_rest
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED = 76_000
 TAUS_S = (0.01, 0.015, 0.02, 0.03, 0.05, 0.08)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.papers.aranovskiy2020.paper import gimbal_torque, printed_model
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.linear_check import model_difference

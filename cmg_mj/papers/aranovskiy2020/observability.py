@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cmg_mj.controllers.laws.state_feedback import StateFeedback
+from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.papers.aranovskiy2020.paper import A_prime, C, damping
 from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
 from cmg_mj.papers.claim import Claim, OnShare

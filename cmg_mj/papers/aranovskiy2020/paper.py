@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import ReducedModel
 
 TABLE_1 = {
     "m": 2.62,

@@ -16,8 +16,8 @@ from cmg_mj.papers.claim import Assumption, Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED = 73_000
 WORLDS = 6

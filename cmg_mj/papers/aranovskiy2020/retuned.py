@@ -6,13 +6,13 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from cmg_mj.features.tuning import NoiseLevelResult, Recorded, TuningResult, halves, recorder, tune
 from cmg_mj.papers.aranovskiy2020.rig import push_recovery
 from cmg_mj.papers.claim import OnShare
 from cmg_mj.results.intervals import Interval, ratio_interval
+from cmg_mj.runs.side_by_side import run_of, run_side_by_side
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
-from cmg_mj.studies.tuning import NoiseLevelResult, Recorded, TuningResult, halves, recorder, tune
 
 SEED = 74_000
 WORLDS = 12

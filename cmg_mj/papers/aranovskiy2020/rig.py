@@ -7,14 +7,14 @@ from functools import cache
 
 import numpy as np
 
+from cmg_mj.features.replay import replay
 from cmg_mj.observers import Estimate, Observer
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.plant.plant import Plant
-from cmg_mj.replay import replay
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
 
 DT = 0.005
 """The bench's control period [s]; the paper does not give its own."""

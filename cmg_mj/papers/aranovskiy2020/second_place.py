@@ -10,7 +10,7 @@ from cmg_mj.papers.aranovskiy2020.rig import push_recovery
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim
 from cmg_mj.results.intervals import Interval, known_interval
-from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import run_of, run_side_by_side
 
 _HERE = "cmg_mj.papers.aranovskiy2020.by_euler"
 TEN, ELEVEN = "(10)", "(11)"

@@ -15,7 +15,7 @@ from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.intervals import Interval, known_interval, ratio_interval
 from cmg_mj.results.result import Result
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED = 78_000
 WORLDS = 4

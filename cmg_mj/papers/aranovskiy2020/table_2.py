@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cmg_mj.features.tuning import NoiseLevelResult
 from cmg_mj.papers.aranovskiy2020.joint import (
     UNRECORDED,
     JointExperiment,
@@ -21,7 +22,6 @@ from cmg_mj.papers.aranovskiy2020.retuned import (
 )
 from cmg_mj.papers.aranovskiy2020.tuning_procedure import LOOP_SHARE, procedure_claim, run_trials
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.studies.tuning import NoiseLevelResult
 
 
 def table_2_claim(case: Tuning, studies: Studies, experiment: JointExperiment) -> Claim:

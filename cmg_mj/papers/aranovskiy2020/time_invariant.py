@@ -11,8 +11,8 @@ from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.words import join_with_and
-from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED = 72_002
 WORLDS = 5

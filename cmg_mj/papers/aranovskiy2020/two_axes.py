@@ -10,13 +10,13 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.laws.state_feedback import StateFeedback, lqr_gains
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.inputs.files import find
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_1
 from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 AXES = ("pitch", "roll")
 """The tilt axes y and x of the body; the cubes' gimbals lie across them."""

@@ -13,7 +13,7 @@ from cmg_mj.papers.aranovskiy2020.on_the_board import PLAIN, instructions
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.studies.benchmark import time_of_update
+from cmg_mj.runs.benchmark import time_of_update
 
 CLOCK_MHZ = 216.0
 """Clock of the rig's processor, an STM32F746 [MHz]."""

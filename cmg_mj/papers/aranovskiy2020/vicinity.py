@@ -14,7 +14,7 @@ from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT, replay_at_rest
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import rms
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED = 77_000
 ALPHAS = (0.55, 0.7, 0.85, 1.0)

@@ -11,10 +11,10 @@ import numpy as np
 from cmg_mj.papers.recorded import rms, trajectory_of
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import prepare
+from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
-from cmg_mj.simulation.experiment import prepare
 from cmg_mj.stages.push import Push
 
 DURATION_S, LATE_S = 10.0, 5.0

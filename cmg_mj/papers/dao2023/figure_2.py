@@ -9,7 +9,7 @@ from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.pendulum_robot import Errors, settle_times
 from cmg_mj.papers.dao2023.study import ASSUMED, SETTLED, UNSTATED, Study, finite_times
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 QUICK = 10.0
 """Quick: at most this many times as slow as an observer that knows the parameters."""

@@ -17,7 +17,7 @@ from cmg_mj.papers.dao2023.study import (
     exogenous_settle_times,
     finite_times,
 )
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 TESTED = (
     "The paper concludes so from its three weights, for which it holds; as a rule it does not: past some hundreds a "

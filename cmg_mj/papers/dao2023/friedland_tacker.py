@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from cmg_mj.errors import InputError
-from cmg_mj.observers.reduced_model import is_hurwitz
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import is_hurwitz
 from cmg_mj.papers.dao2023.matrices import require_positive_definite, require_shape, solve, times, to_matrix, to_real
 from cmg_mj.papers.require import require_positive
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.errors import InputError, shown
+from cmg_mj.core.errors import InputError, shown
 
 SYMMETRIC = 1e-10
 """Relative asymmetry of a matrix that is symmetric but for rounding."""

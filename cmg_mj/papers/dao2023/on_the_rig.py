@@ -9,7 +9,7 @@ from cmg_mj.papers.dao2023 import adaptive_rig as rig
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.results.intervals import mean_interval
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 OTHERS = ("linear", "ltv", "homogeneous")
 WITHIN_DEG = 0.15

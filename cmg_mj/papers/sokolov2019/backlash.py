@@ -11,8 +11,8 @@ from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.release import RELEASE, is_sustained
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.batched_observers import run_of, run_side_by_side
-from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.runs.experiment import Experiment
+from cmg_mj.runs.side_by_side import run_of, run_side_by_side
 
 GAP_ARCMIN = 20.0
 """Backlash of the Dynamixel MX-106 (Robotis e-Manual, MX-106: 20 arcmin), from one side of the gap to the other."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.controllers.laws import StateFeedback
+from cmg_mj.laws import StateFeedback
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.linear_check import poles_as_pairs
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
@@ -21,7 +21,7 @@ from cmg_mj.papers.sokolov2019.vertical_torque import Locked, locked_run, vertic
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.results.intervals import mean_interval
 from cmg_mj.results.result import Result
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED, WORLDS = 84_000, 20
 BALANCED = "plant.equilibrium_bias_deg=0.0"

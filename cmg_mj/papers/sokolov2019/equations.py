@@ -8,7 +8,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.linear_check import (
     controllability_margin,

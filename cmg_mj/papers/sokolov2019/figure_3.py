@@ -8,18 +8,18 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import lsim, lti
 
+from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.features.replay import replay
 from cmg_mj.observers import Observer
-from cmg_mj.observers.reduced_model import ReducedModel
 from cmg_mj.papers.claim import Assumption, Claim, OnShare
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS, TABLE_II
 from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, estimator, experiment
-from cmg_mj.replay import replay
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.runs.experiment import Experiment
 from cmg_mj.stages.push import Push
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED, WORLDS = 82_000, 20
 AFTER_S = 0.5

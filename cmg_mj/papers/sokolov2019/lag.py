@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.controllers.laws import StateFeedback
+from cmg_mj.laws import StateFeedback
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.release import (
@@ -21,8 +21,8 @@ from cmg_mj.papers.sokolov2019.release import (
 )
 from cmg_mj.papers.sokolov2019.rig import FINE, estimator, experiment, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
-from cmg_mj.simulation.experiment import Experiment
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.runs.experiment import Experiment
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 LARGEST_S = 0.12
 """Lags are searched up to here in the linearised loop [s]."""

@@ -15,7 +15,7 @@ from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment
 from cmg_mj.papers.words import plus_minus
 from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.result import Result
-from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
+from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
 
 SEED, WORLDS = 83_000, 20
 DURATION_S = 15.0

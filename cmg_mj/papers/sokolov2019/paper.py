@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from cmg_mj.elementwise import signed_power
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.arrays import signed_power
+from cmg_mj.core.reduced_model import ReducedModel
 
 TABLE_I = {
     "m": 2.62,

@@ -6,7 +6,7 @@ from cmg_mj.papers.recorded import loop_panels, trajectory_of
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN
 from cmg_mj.papers.sokolov2019.loops import SHOWN_DEG, Loops
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
-from cmg_mj.visualization.plots.figure_spec import Picture
+from cmg_mj.view.plots.figure import Picture
 
 NUMBERS = {"linear": 4, "luenberger": 5, "homogeneous": 6}
 

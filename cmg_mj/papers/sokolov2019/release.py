@@ -12,7 +12,7 @@ from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, experiment, make_rig, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.simulation.batched_observers import BatchJob, run_side_by_side
+from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
 
 RELEASE = (
     *NO_NOISE,

@@ -12,9 +12,9 @@ from cmg_mj.papers.claim import Assumption
 from cmg_mj.papers.sokolov2019.paper import K_E, TABLE_II
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
 from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.plant_settings import PlantSettings
-from cmg_mj.simulation.experiment import Experiment, prepare
 
 NO_NOISE = (
     "sensors.accelerometer.noise_density_ug_rthz=0.0",

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from cmg_mj.features.tuning import NoiseLevelResult, Recorded, halves, recorder, tune
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.papers.words import join_with_and
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.studies.tuning import NoiseLevelResult, Recorded, halves, recorder, tune
 
 SEED, WORLDS = 85_000, 10
 WARM_UP_S = 0.5

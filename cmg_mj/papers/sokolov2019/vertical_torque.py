@@ -17,8 +17,8 @@ import numpy as np
 
 from cmg_mj.papers.sokolov2019.rig import read_servo
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.simulation.callback import control
-from cmg_mj.simulation.experiment import Experiment
+from cmg_mj.runs.callback import control
+from cmg_mj.runs.experiment import Experiment
 
 
 class Motion(NamedTuple):

@@ -15,7 +15,7 @@ from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.results import markdown
 from cmg_mj.results.intervals import Interval
 from cmg_mj.results.summary_keys import format_figure, heading
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED, WORLDS = 90_000, 100
 ORDER = ("homogeneous", "ltv", "linear")

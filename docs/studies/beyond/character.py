@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.features.replay import replay
 from cmg_mj.observers import Measurement, Observer, make_observer
-from cmg_mj.observers.reduced_model import ReducedModel
-from cmg_mj.replay import replay
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.benchmark import time_of_update
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
-from cmg_mj.studies.benchmark import time_of_update
 
 PUSH_N_M, PUSH_S = 1.0, 0.1
 """The push whose lag is found."""

@@ -9,7 +9,7 @@ from beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.results.intervals import known_interval
-from cmg_mj.visualization.plots.figure_spec import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED, WORLDS = 90_002, 100
 BIASES_DEG = (0.25, 0.5, 1.0, 1.5)

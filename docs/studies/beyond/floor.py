@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from cmg_mj.observers.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import ReducedModel
 
 
 def kalman_filter(model: ReducedModel, dt: float, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

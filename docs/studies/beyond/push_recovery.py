@@ -8,8 +8,8 @@ import numpy as np
 
 from cmg_mj.results.intervals import Interval, known_interval
 from cmg_mj.results.result import Result
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
 
 ERROR = "velocity_rms_error_rad_s"
 """The measure that is compared."""

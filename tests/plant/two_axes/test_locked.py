@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from cmg_mj.errors import InputError
+from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.files import folder
 from cmg_mj.plant.locking import remove_hinge
 from cmg_mj.plant.plant import load_plant

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.plant.mounting import mount
+from cmg_mj.features.mounting import mount
 from cmg_mj.plant.tilt_line import SupportLine
+from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.simulation.experiment import Experiment, prepare
-from tests.visualization.studio.session import Session, as_rows
-from tests.visualization.studio.test_session import same
+from tests.features.studio.session import Session, as_rows
+from tests.features.studio.test_session import same
 
 POST = """
 <mujoco model="post">

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from cmg_mj.plant.effective_inertia import inertia_about
+from cmg_mj.plant.inertia import inertia_about
 from cmg_mj.plant.plant import Plant, load_plant
 
 MODELS = ["two_axes.xml", "two_axes_free_base.xml"]

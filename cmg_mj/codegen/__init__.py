@@ -1,1 +1,0 @@
-"""Generates C from a controller, and runs it on an emulated board."""

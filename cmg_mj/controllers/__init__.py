@@ -1,1 +1,0 @@
-"""Runs the controller: sensors, tilt, observer and law once a control period."""

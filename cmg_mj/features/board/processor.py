@@ -1,0 +1,117 @@
+"""A processor that takes the control decision in the controller's place, such as a board that runs all of it in C."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol, Unpack
+
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.controller import Controller, ControllerOptions, PlantInterface, Sensors, Tick
+from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.core.runners import as_estimate
+from cmg_mj.core.types import Forces, Law, Measurement, Observer
+from cmg_mj.stages.trim import trim_of
+
+
+class Decision(NamedTuple):
+    """A processor's decision."""
+
+    u: float
+    """Gimbal rate [rad/s]."""
+    x_e: float
+    """The integrator before it [rad s], which went into it unless it is being trimmed; NaN if the law has none."""
+    estimate: Sequence[float]
+    """The observer's: x1, x2, x3, its extra signals."""
+
+
+class Processor(Protocol):
+    """A processor that takes the control decision in the controller's place, in C or otherwise."""
+
+    def start(self) -> None:
+        """Make the next update the first one."""
+
+    def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
+        """Run one control period on the readings of the sensors.
+
+        Args:
+            accelerations: Inner x, z, outer x, z [m/s^2].
+            encoders: The gimbals' angles [rad].
+
+        Returns:
+            The decision.
+
+        Raises:
+            RunStopped: The processor gives no decision.
+        """
+        ...
+
+
+class _RemoteObserver:
+    """Stands for the observer that a processor runs: what it estimates has just been decided."""
+
+    def __init__(self, observer: Observer) -> None:
+        self.stands_for = observer
+        self.extra_signals: Sequence[str] = getattr(observer, "extra_signals", ())
+        self.estimate: Sequence[float] = ()
+
+    def init(self, y: Measurement) -> None:
+        return None
+
+    def step(self, state: None, y: Measurement, u: Scalar) -> tuple[None, Any]:
+        return None, self.estimate
+
+
+class ProcessorController(Controller):
+    """A controller whose decisions a processor takes, from what the sensors show (one world only).
+
+    Args:
+        processor: Takes the decisions.
+        observer: The observer that the processor runs.
+        law: The law that it runs.
+        sensors: What stands between the ideal readings and the processor.
+        plant: The controller's knowledge of the plant.
+        **options: Those of `Controller`.
+
+    Raises:
+        InputError: There are many worlds, or the rate is not to be the observer's.
+    """
+
+    def __init__(
+        self,
+        processor: Processor,
+        observer: Observer,
+        law: Law,
+        sensors: Sensors,
+        plant: PlantInterface,
+        **options: Unpack[ControllerOptions],
+    ) -> None:
+        self.processor = processor
+        self._remote = _RemoteObserver(observer)
+        super().__init__(self._remote, law, sensors, plant, **options)
+        self.observer = observer
+        if not isinstance(self.worlds, int) or self.feedback != "observer":
+            raise InputError("a processor runs one world, on the observer's rate: no batch, and feedback = 'observer'")
+
+    def reset(self) -> None:
+        """Forget everything, the processor too."""
+        super().reset()
+        self.processor.start()
+
+    def decide(self, step: int, forces: Forces, encoders: Sequence[Scalar], fog: Scalar, rate: Scalar) -> Tick:
+        """Let the processor decide on the samples that have been delivered; see `Controller.decide`."""
+        try:
+            decision = self.processor.update(tuple(forces), encoders)
+        except RunStopped as error:
+            raise RunStopped(f"{error}, at t = {step * self.timestep:g} s") from error
+        self._remote.estimate = decision.estimate
+        is_first = self.tick is None
+        tick = super().decide(step, forces, encoders, fog, rate)
+        trim = trim_of(self)
+        trimmed = step < trim.until
+        x_e = trim.gain * decision.estimate[trim.part] if trimmed else decision.x_e
+        if is_first and not trimmed and tick.x_e:  # the processor's law has begun in this update
+            x_e = tick.x_e
+        self.tick = tick._replace(
+            u=decision.u, x_e=x_e, estimates=[as_estimate(decision.estimate), *tick.estimates[1:]]
+        )
+        return self.tick

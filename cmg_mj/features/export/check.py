@@ -1,0 +1,245 @@
+"""Compares the traced formulas, and the C, with Python on random signals."""
+
+from __future__ import annotations
+
+import copy
+import math
+import os
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import casadi
+import numpy as np
+
+from cmg_mj.core.arrays import clip
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.features.export.c_code import Precision
+from cmg_mj.features.export.constants import Constants
+from cmg_mj.features.export.source_location import LawNotExportable
+from cmg_mj.features.export.trace import Traced
+from cmg_mj.features.export.traced_law import law_arguments
+from cmg_mj.laws import StateFeedback
+
+TICKS = 400
+
+SHARE = {"double": 1e-9, "single": 1e-4}
+"""Share of its largest value by which a number may be off, besides the effect of one rounding of the inputs."""
+
+ROUNDINGS = 4
+"""Multiple of the effect of one rounding by which a number may be off."""
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+GRAVITY = 9.81
+
+
+def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarray:
+    """Simulate sensors of a restless rig: the tilt swings, the gimbals wander, both with noise; then all rest.
+
+    Args:
+        controller: The controller of the sensors.
+        seed: Seed of the random numbers; odd seeds swing little.
+        precision: Precision in which the numbers are exact.
+
+    Returns:
+        Raw accelerations [m/s^2] and encoders [rad], (TICKS, 4 + gimbals).
+    """
+    rng = np.random.default_rng(seed)
+    t = controller.law.dt * np.arange(TICKS)
+    size, noise = (0.2, 0.05) if seed % 2 == 0 else (0.01, 0.002)
+    w, phase = 2.0 * np.pi * rng.uniform(0.2, 1.5, 3), rng.uniform(0.0, 2.0 * np.pi, 3)
+    swings = size / 3.0 * np.sin(np.outer(t, w) + phase)
+    tilt, acceleration = swings.sum(axis=1), (-(w**2) * swings).sum(axis=1)
+    x, z = -GRAVITY * np.sin(tilt), GRAVITY * np.cos(tilt)
+    forces = [part for r in (controller.tilt.r_inner, controller.tilt.r_outer) for part in (x + r * acceleration, z)]
+    gimbal = 5.0 * size * np.sin(w[0] * t)
+    gimbals = zip(controller.gimbal_angle.directions, controller.gimbal_angle.zeros, strict=True)
+    encoders = [zero + direction * gimbal + 1e-3 * rng.normal(size=TICKS) for direction, zero in gimbals]
+    samples = np.array([force + noise * rng.normal(size=TICKS) for force in forces] + encoders).T
+    samples[-TICKS // 4 :] = samples[-TICKS // 4]  # equal readings, as a resolution makes them
+    return samples.astype(np.float32).astype(float) if precision == "single" else samples
+
+
+def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
+    """Compute the estimates and u by the controller, (n, 4 + extra signals)."""
+    fresh = Controller(
+        copy.deepcopy(controller.observer),
+        copy.deepcopy(controller.law),
+        controller.sensors,
+        controller.plant._replace(servos=()),
+        angle_source=controller.angle_source,
+        memories=controller.memories,
+    )
+    rows = []
+    for k, row in enumerate(samples.tolist()):
+        tick = fresh.decide(k * fresh.period, row[:4], row[4:], 0.0, 0.0)
+        rows.append([*tick.estimates[0], tick.u])
+    return np.array(rows)
+
+
+def in_casadi(controller: Controller, traced: Traced, constants: Constants, samples: np.ndarray) -> np.ndarray:
+    """Compute the estimates and u by the traced formulas, in the order of the C, (n, 4 + extra signals).
+
+    Raises:
+        InputError: A number of the state is not finite.
+        LawNotExportable: A number of the law's state is not finite.
+    """
+
+    def values(function: casadi.Function, *arguments: float) -> list[float]:
+        return [float(value) for value in function.call(arguments)]
+
+    measure_constants = [constant.value for constant in constants.of_measure]
+    law, limit = traced.law, constants.of_law[-1].value
+    law_constants = [constant.value for constant in constants.of_law] if law.is_state_feedback else []
+    arguments, law_state = law_arguments(len(controller.extra_signals[0])), [*law.state, "x_e"][: law.numbers]
+    width = 3 + len(controller.extra_signals[0])
+    state: list[float] | None = None
+    memory: list[float] = []
+    u = 0.0
+    rows = []
+    for k, row in enumerate(samples.tolist()):
+        y = values(traced.measure, *row, *measure_constants)
+        if state is None:
+            state, memory = values(traced.init, *y), law.first(y)
+            estimate = [y[0], 0.0, y[1], *[0.0] * (width - 3)]
+        else:
+            result = values(traced.step, *state, *y, u)
+            state, estimate = result[: len(state)], result[len(state) :]
+        for place, value in zip(traced.state, state, strict=True):
+            if not math.isfinite(value):  # and the estimate is: Python has gone on
+                raise InputError(_not_finite(place, value, k))
+        if k < constants.trimmed:
+            memory[-1] = constants.trim_gain.value * estimate[constants.trim_part]
+        x1, x3 = (y[0], y[1]) if controller.angle_source == "measured" else (estimate[0], estimate[2])
+        inputs = dict(zip(arguments, [*y, x1, estimate[1], x3, *estimate[3:], u], strict=True))
+        u, memory = law.decide(inputs, memory, law_constants)
+        u = clip(u, -limit, limit)
+        for place, value in zip(law_state, memory, strict=True):
+            if not math.isfinite(value):
+                raise LawNotExportable(_not_finite(place, value, k))
+        rows.append([*estimate, u])
+    return np.array(rows)
+
+
+def _not_finite(place: str, value: float, sample: int) -> str:
+    return f"its state holds {value} ({place}) at sample {sample}, where the C stops: hold numbers that are finite"
+
+
+def columns(controller: Controller) -> list[str]:
+    """Name the compared columns: the parts of an estimate, and u."""
+    return ["x1_rad", "x2_rad_s", "x3_rad", *controller.extra_signals[0], "u_rad_s"]
+
+
+def rounded(expected: np.ndarray, precision: Precision) -> np.ndarray:
+    """Return how far each column may be off by rounding, (4 + extra signals,)."""
+    return SHARE[precision] * np.abs(expected).max(axis=0)
+
+
+def allowed(controller: Controller, samples: np.ndarray, expected: np.ndarray, precision: Precision) -> np.ndarray:
+    """Return how far each column may be off, by rounding and by its effect in the observer, (4 + extra signals,).
+
+    An observer that switches may amplify little to much: rounding may move whatever a last digit of the inputs moves.
+    """
+    kind = np.float32 if precision == "single" else np.float64
+    near = samples.astype(kind)
+    ends = np.where(np.random.default_rng(0).random(samples.shape) < 0.5, -np.inf, np.inf).astype(kind)
+    moved = np.abs(in_python(controller, np.nextafter(near, ends).astype(float)) - expected)
+    return rounded(expected, precision) + ROUNDINGS * moved.max(axis=0)
+
+
+def check_trace(controller: Controller, traced: Traced, constants: Constants, seeds: Sequence[int]) -> float:
+    """Compare the formulas with Python, in double precision.
+
+    Returns:
+        The largest difference.
+
+    Raises:
+        InputError: The formulas and Python differ by more than is allowed, or the state does not stay finite.
+        LawNotExportable: The law is to blame for that.
+    """
+    largest = 0.0
+    for seed in seeds:
+        samples = signals(controller, seed, "double")
+        try:
+            expected = in_python(controller, samples)
+        except RunStopped as error:
+            fault = LawNotExportable if str(error).startswith("law ") else InputError
+            raise fault(f"it cannot be compared on random signals: {error}") from error
+        differs = in_python(controller, samples) != expected
+        if differs.any():
+            raise _refusal(controller, np.argwhere(differs)[0, 1])(
+                "in Python it is not twice the same on the same signals, so that nothing can be compared"
+            )
+        off = np.abs(in_casadi(controller, traced, constants, samples) - expected)
+        share = off / np.maximum(allowed(controller, samples, expected, "double"), np.finfo(float).tiny)
+        if not np.all(share <= 1.0):
+            tick, part = np.argwhere(~(share <= 1.0))[0]
+            name = columns(controller)[part]
+            raise _refusal(controller, part)(
+                f"traced, it is not what Python runs: on random signals {name} is off by {off[tick, part]:.3g} at "
+                f"sample {tick}. Does it look at the type of a number, or remember something outside of its state?"
+            )
+        largest = max(largest, float(off.max()))
+    return largest
+
+
+def _refusal(controller: Controller, part: int) -> type[InputError]:
+    """Return the error for the first column that is off: u alone is the law's fault, unless that is (8)."""
+    is_command = part == len(columns(controller)) - 1
+    return LawNotExportable if is_command and type(controller.law) is not StateFeedback else InputError
+
+
+def find_compiler() -> list[str] | None:
+    """Find a C compiler: CC, or else cc, gcc or clang."""
+    try:
+        command = shlex.split(os.environ.get("CC", ""))
+    except ValueError as error:
+        raise InputError(f"CC = {os.environ['CC']!r}: {error}") from error
+    if command:
+        return command
+    return next(([path] for path in map(shutil.which, ("cc", "gcc", "clang")) if path), None)
+
+
+def check_c(folder: Path, name: str, compiler: Sequence[str]) -> dict[str, float]:
+    """Compile an export's example, which compares the C with the test vector, and run it.
+
+    Args:
+        folder: Folder of the files.
+        name: Prefix of the files.
+        compiler: Command of the compiler.
+
+    Returns:
+        Part of an estimate, or u -> its largest difference.
+
+    Raises:
+        InputError: The example does not compile, or the C differs from Python.
+    """
+    program = folder / f"{name}_example"
+    sources = [str(folder / f"{name}.c"), str(folder / f"{name}_example.c")]
+    process = _run([*compiler, *FLAGS, *sources, "-o", str(program), "-lm"], f"the C compiler {shlex.join(compiler)}")
+    if process.returncode:
+        hint = " (CC must name a compiler for this machine)" if os.environ.get("CC") else ""
+        raise InputError(f"the C does not compile with {shlex.join(compiler)}{hint}: {_first_line(process)}")
+    process = _run([str(program)], "the compiled example")
+    program.unlink()
+    if process.returncode:
+        raise InputError(f"the C is not what Python runs: {'; '.join(process.stdout.splitlines())}")
+    differences = re.findall(r"^(\w+): off by at most (\S+),", process.stdout, re.MULTILINE)
+    return {part: float(off) for part, off in differences}
+
+
+def _run(command: Sequence[str], what: str) -> subprocess.CompletedProcess[str]:
+    try:
+        return subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=300, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise InputError(f"{what} cannot be run: {getattr(error, 'strerror', None) or error}") from error
+
+
+def _first_line(process: subprocess.CompletedProcess[str]) -> str:
+    lines = process.stderr.strip().splitlines()
+    status = f"it ended with status {process.returncode} and without a message"
+    return next((line for line in lines if "error" in line), lines[0] if lines else status)

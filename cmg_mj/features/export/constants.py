@@ -1,0 +1,77 @@
+"""The constants of a controller's C: names, values and units of what the measurement, the law and the trim take."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from cmg_mj.core.controller import Controller
+from cmg_mj.laws import Law, StateFeedback
+from cmg_mj.stages.trim import trim_of
+
+
+class Constant(NamedTuple):
+    """A constant in the C."""
+
+    name: str
+    value: float
+    meaning: str
+
+
+class Constants(NamedTuple):
+    """The constants that the measurement, the law and the trim take.
+
+    Attributes:
+        of_measure: Radii, then the gimbals' directions, then their zeros.
+        of_law: The period, the gains, the limit; of a law that is not (8) the limit alone.
+        trimmed: Number of updates during which the integrator is trimmed.
+        trim_gain: Gain of the trim; see `integrator_trim`.
+        trim_part: Index of the part of the estimate that trims the integrator.
+        gimbals: Number of gimbals.
+    """
+
+    of_measure: list[Constant]
+    of_law: list[Constant]
+    trimmed: int
+    trim_gain: Constant
+    trim_part: int
+    gimbals: int
+
+    @property
+    def all(self) -> list[Constant]:
+        """The constants at the top of the C file."""
+        return [*self.of_measure, *self.of_law, *([self.trim_gain] if self.trimmed else [])]
+
+
+def constants_of(controller: Controller) -> Constants:
+    """Collect the constants of a controller."""
+    tilt, gimbals, trim = controller.tilt, controller.gimbal_angle, trim_of(controller)
+    centre = "the common mass centre of rig and cart" if tilt.height else "the tilt axis"
+    numbered = list(enumerate(zip(gimbals.directions, gimbals.zeros, strict=True), 1))
+    return Constants(
+        of_measure=[
+            Constant("r_inner", tilt.r_inner, f"inner accelerometer from {centre} [m]"),
+            Constant("r_outer", tilt.r_outer, f"outer accelerometer from {centre} [m]"),
+            *(Constant(f"direction_{i}", sign, f"sign of u that gimbal {i} is given") for i, (sign, _) in numbered),
+            *(Constant(f"zero_{i}", zero, f"encoder {i} at a gimbal angle of 0 [rad]") for i, (_, zero) in numbered),
+        ],
+        of_law=_of_law(controller.law),
+        trimmed=-(-trim.until // controller.period),
+        trim_gain=Constant("trim_gain", trim.gain, "from the bias to the integrator [s]"),
+        trim_part=trim.part,
+        gimbals=len(gimbals.directions),
+    )
+
+
+def _of_law(law: Law) -> list[Constant]:
+    limit = Constant("rate_limit", float(law.rate_limit), "largest gimbal rate [rad/s]")
+    if type(law) is not StateFeedback:  # its other numbers are in its formulas
+        return [limit._replace(meaning=f"{limit.meaning}; the law's formulas have it too, if it knows it")]
+    k1, k2, k3, k4 = law.gains
+    return [
+        Constant("period", law.dt, "from one update to the next [s]"),
+        Constant("gain_x1", k1, "on the tilt [1/s]"),
+        Constant("gain_x2", k2, "on the tilt rate"),
+        Constant("gain_x3", k3, "on the gimbal angle [1/s]"),
+        Constant("gain_x_e", k4, "on the integrator [1/s^2]"),
+        limit,
+    ]

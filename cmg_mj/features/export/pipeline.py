@@ -1,0 +1,140 @@
+"""Generates a controller's C: traces the formulas, compares them with Python, prints them, compares the C."""
+
+from __future__ import annotations
+
+import copy
+import shlex
+import tempfile
+from pathlib import Path
+from typing import NamedTuple, TypedDict, TypeVar
+
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.errors import InputError, raised
+from cmg_mj.core.types import Observer
+from cmg_mj.features.export import check
+from cmg_mj.features.export.c_code import Precision, operations
+from cmg_mj.features.export.c_files import CodePrinter, format_example, format_test_vector
+from cmg_mj.features.export.constants import constants_of
+from cmg_mj.features.export.law_code import LawPrinter
+from cmg_mj.features.export.names import export_files, name_of
+from cmg_mj.features.export.refusals import refuse_unexported
+from cmg_mj.features.export.source_location import LawNotExportable
+from cmg_mj.features.export.trace import trace
+from cmg_mj.laws import Law
+from cmg_mj.results.folder import write_text
+
+Part = TypeVar("Part", Observer, Law)
+
+
+class Figures(TypedDict):
+    """The sizes of an export and its differences from Python, as `--json` prints them."""
+
+    observer: str
+    precision: Precision
+    files: list[str]
+    numbers_in_state: int
+    operations: dict[str, int]
+    trace_off_by: float
+    compiler: str | None
+    c_off_by: dict[str, float] | None
+    beyond_rounding: list[str]
+
+
+class Code(NamedTuple):
+    """A controller as C, compared with Python.
+
+    Attributes:
+        files: Name -> text.
+        figures: The figures of the export.
+        law: The printer of the law's part, for C that is joined to it.
+    """
+
+    files: dict[str, str]
+    figures: Figures
+    law: LawPrinter
+
+
+def generate_code(controller: Controller, precision: Precision, name: str | None = None, suffix: str = "") -> Code:
+    """Generate a controller's C, whose name has a suffix, and compare it with Python; see `export`."""
+    refuse_unexported(controller)
+    cls = type(controller.observer)
+    try:
+        return _generate(controller, precision, name_of(controller.observer, name) + suffix)
+    except LawNotExportable as error:
+        raise InputError(f"law {type(controller.law).__name__}: cannot be exported: {error}") from error
+    except InputError as error:
+        raise InputError(f"{cls.__module__}:{cls.__qualname__} cannot be exported: {error}") from error
+
+
+def _copied(part: Part, refusal: type[InputError]) -> Part:
+    try:
+        return copy.deepcopy(part)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a user's observer or law may hold anything
+        raise refusal(f"it cannot be copied: {raised(error)}") from error
+
+
+def _generate(controller: Controller, precision: Precision, name: str) -> Code:
+    for_trace, law_for_trace = _copied(controller.observer, InputError), _copied(controller.law, LawNotExportable)
+    constants = constants_of(controller)
+    traced = trace(for_trace, law_for_trace, constants)
+    off = check.check_trace(controller, traced, constants, seeds=(1, 2, 3))
+
+    printer = CodePrinter(controller, traced, constants, precision, name)
+    samples = check.signals(controller, 0, precision)
+    expected = check.in_python(controller, samples)
+    allowed = check.allowed(controller, samples, expected, precision)
+    other_files = (
+        format_example(name, precision, check.columns(controller)),
+        format_test_vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist()),
+    )
+    files = dict(zip(export_files(name), (printer.header(), printer.source(), *other_files), strict=True))
+    compiler = check.find_compiler()
+    figures: Figures = {
+        "observer": name,
+        "precision": precision,
+        "files": list(files),
+        "numbers_in_state": len(traced.state),
+        "operations": {
+            "measure": operations(traced.measure),
+            "step": operations(traced.step),
+            "law": operations(traced.law.step),
+        },
+        "trace_off_by": off,
+        "compiler": None if compiler is None else shlex.join(compiler),
+        "c_off_by": None,
+        "beyond_rounding": [],
+    }
+    if compiler is not None:
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = Path(temporary)
+            try:
+                for file, text in files.items():
+                    write_text(folder / file, text)
+            except OSError as error:
+                raise InputError(f"temporary folder {folder}: cannot be written: {error.strerror}") from error
+            off_by = figures["c_off_by"] = check.check_c(folder, name, compiler)
+        bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
+        figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
+    return Code(files, figures, printer.law)
+
+
+def export_table(figures: Figures) -> str:
+    """Print the figures of an export as text."""
+    operations = figures["operations"]
+    lines = [
+        f"{figures['observer']}, {figures['precision']} precision",
+        f"  numbers in the observer's state   {figures['numbers_in_state']}",
+        f"  operations an update              {sum(operations.values())}, of them the observer {operations['step']}",
+        f"  formulas, off from Python by      {_difference(figures['trace_off_by'])}",
+    ]
+    if figures["c_off_by"] is not None:
+        lines.append(f"  C, off from Python, by {figures['compiler']}:")
+        width = max(map(len, figures["c_off_by"]))
+        lines += [f"    {name:<{width}}  {_difference(off)}" for name, off in figures["c_off_by"].items()]
+    return "\n".join(lines)
+
+
+def _difference(size: float) -> str:
+    return f"{size:.2g}" if size else "0 (bit for bit)"

@@ -1,0 +1,187 @@
+"""A symbolic number, which records the operations of an observer's code as CasADi's graph.
+
+NumPy hands its operators and functions over to a class with `__array_ufunc__` (NEP 13) and `__array_function__`
+(NEP 18). Code written for arrays, such as the second branch of `elementwise`, therefore takes symbols unchanged. Code
+that no formula can express, such as `if y1 > 0.1:` or `math.sin(y1)`, asks the symbol for its value. The symbol then
+raises `NotExportable` with the line of the user's file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
+from typing import Any, NoReturn, TypeAlias
+
+import casadi
+import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
+
+from cmg_mj.core.arrays import Symbolic
+from cmg_mj.features.export.source_location import NotExportable, here
+
+Operand: TypeAlias = "Symbol | float | np.generic | np.ndarray"
+
+OPERATIONS: dict[np.ufunc, int] = {
+    np.add: casadi.OP_ADD,
+    np.subtract: casadi.OP_SUB,
+    np.multiply: casadi.OP_MUL,
+    np.divide: casadi.OP_DIV,
+    np.power: casadi.OP_POW,
+    np.float_power: casadi.OP_POW,
+    np.negative: casadi.OP_NEG,
+    np.absolute: casadi.OP_FABS,
+    np.fabs: casadi.OP_FABS,
+    np.sign: casadi.OP_SIGN,
+    np.sqrt: casadi.OP_SQRT,
+    np.exp: casadi.OP_EXP,
+    np.expm1: casadi.OP_EXPM1,
+    np.log: casadi.OP_LOG,
+    np.log1p: casadi.OP_LOG1P,
+    np.sin: casadi.OP_SIN,
+    np.cos: casadi.OP_COS,
+    np.tan: casadi.OP_TAN,
+    np.arcsin: casadi.OP_ASIN,
+    np.arccos: casadi.OP_ACOS,
+    np.arctan: casadi.OP_ATAN,
+    np.arctan2: casadi.OP_ATAN2,
+    np.sinh: casadi.OP_SINH,
+    np.cosh: casadi.OP_COSH,
+    np.tanh: casadi.OP_TANH,
+    np.hypot: casadi.OP_HYPOT,
+    np.copysign: casadi.OP_COPYSIGN,
+    np.maximum: casadi.OP_FMAX,
+    np.minimum: casadi.OP_FMIN,
+    np.floor: casadi.OP_FLOOR,
+    np.ceil: casadi.OP_CEIL,
+    np.fmod: casadi.OP_FMOD,
+    np.less: casadi.OP_LT,
+    np.less_equal: casadi.OP_LE,
+    np.equal: casadi.OP_EQ,
+    np.not_equal: casadi.OP_NE,
+    np.logical_and: casadi.OP_AND,
+    np.bitwise_and: casadi.OP_AND,  # of comparisons
+    np.logical_or: casadi.OP_OR,
+    np.bitwise_or: casadi.OP_OR,
+    np.logical_not: casadi.OP_NOT,
+    np.invert: casadi.OP_NOT,
+}
+"""NumPy's function -> CasADi's operation."""
+
+EXCHANGED = {np.greater: np.less, np.greater_equal: np.less_equal}
+"""NumPy's function -> the function with the same result for exchanged arguments."""
+
+
+class Symbol(Symbolic, NDArrayOperatorsMixin):
+    """A symbolic number.
+
+    Attributes:
+        sx: CasADi's expression of the number.
+    """
+
+    __slots__ = ("sx",)
+
+    def __init__(self, sx: casadi.SX) -> None:
+        self.sx = sx
+
+    def __repr__(self) -> str:
+        return f"Symbol({self.sx})"
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Operand, **kwargs: Operand) -> Operand:
+        if method != "__call__" or kwargs:
+            raise NotExportable(f"numpy.{ufunc.__name__} with {', '.join(kwargs) or method} {here()}")
+        if any(isinstance(x, np.ndarray) and x.ndim for x in inputs):
+            return np.frompyfunc(partial(_apply, ufunc), ufunc.nin, 1)(*map(_boxed, inputs))
+        return _apply(ufunc, *inputs)
+
+    def __array_function__(
+        self,
+        function: Callable[..., Operand],
+        types: Collection[type],
+        args: tuple[Any, ...],
+        kwargs: Mapping[str, Operand],
+    ) -> Operand:
+        if function is np.where and len(args) == 3 and not kwargs:
+            return _where(*args)
+        if function is np.clip and len(args) == 3 and not kwargs:
+            return np.minimum(np.maximum(args[0], args[1]), args[2])
+        raise NotExportable(f"numpy.{function.__name__} {here()}: it is not among the functions that can be exported")
+
+    def __bool__(self) -> bool:
+        raise NotExportable(
+            f"a branch on a value {here()}: the exported C takes the same way always; use cmg_mj.core.arrays "
+            "(where, clip, sign), or numpy.where"
+        )
+
+    def _number(self, *_: int | None) -> NoReturn:
+        raise NotExportable(
+            f"a plain number is asked for {here()}, as by float(), int(), round() or a function of math; use "
+            "cmg_mj.core.arrays, or numpy's functions"
+        )
+
+    __float__ = __int__ = __index__ = __complex__ = __round__ = _number
+
+    # NumPy calls these on every element of an object array.
+    def sin(self) -> Symbol:
+        """Sine."""
+        return np.sin(self)  # pyright: ignore
+
+    def cos(self) -> Symbol:
+        """Cosine."""
+        return np.cos(self)  # pyright: ignore
+
+    def sqrt(self) -> Symbol:
+        """Square root."""
+        return np.sqrt(self)  # pyright: ignore
+
+    def exp(self) -> Symbol:
+        """Exponential."""
+        return np.exp(self)  # pyright: ignore
+
+
+def expression(x: Operand | Symbolic) -> casadi.SX:
+    """Convert a symbol or a plain number to CasADi's expression.
+
+    Raises:
+        NotExportable: The operand is neither.
+    """
+    if isinstance(x, np.ndarray) and x.ndim == 0:
+        x = x[()]
+    if isinstance(x, Symbol):
+        return x.sx
+    if isinstance(x, (bool, int, float, np.bool_, np.integer, np.floating)):
+        return casadi.SX(float(x))
+    raise NotExportable(f"{type(x).__name__} where a real number belongs {here()}")
+
+
+def _boxed(x: Operand) -> Operand:
+    """Wrap a symbol in an object array, which does not hand over again."""
+    if not isinstance(x, Symbol):
+        return x
+    box = np.empty((), dtype=object)
+    box[()] = x
+    return box
+
+
+def _apply(ufunc: np.ufunc, *inputs: Operand) -> Symbol:
+    if ufunc in EXCHANGED:
+        return _apply(EXCHANGED[ufunc], *reversed(inputs))
+    if ufunc is np.square:
+        return _apply(np.multiply, *inputs, *inputs)
+    if ufunc is np.positive:
+        return Symbol(expression(inputs[0]))
+    operation = OPERATIONS.get(ufunc)
+    if operation is None:
+        raise NotExportable(f"numpy.{ufunc.__name__} {here()}: it is not among the functions that can be exported")
+    if ufunc in (np.maximum, np.minimum) and not isinstance(inputs[0], Symbol):
+        inputs = inputs[::-1]  # the operand that may be NaN comes first: see `c_code`
+    make = casadi.SX.unary if len(inputs) == 1 else casadi.SX.binary
+    return Symbol(make(operation, *map(expression, inputs)))
+
+
+def _where(condition: Operand, a: Operand, b: Operand) -> Operand:
+    if any(isinstance(x, np.ndarray) and x.ndim for x in (condition, a, b)):
+        return np.frompyfunc(_where, 3, 1)(*map(_boxed, (condition, a, b)))
+    test, yes, no = map(expression, (condition, a, b))
+    first = casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, test, yes)
+    second = casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, casadi.SX.unary(casadi.OP_NOT, test), no)
+    return Symbol(casadi.SX.binary(casadi.OP_ADD, first, second))

@@ -1,0 +1,250 @@
+"""Finds the largest push that a mounted robot itself stands: all of it in MuJoCo, many worlds, both ways."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cmg_mj.core.loop import ControlLoop
+from cmg_mj.features.mounting.largest_push import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS
+from cmg_mj.features.mounting.prospects import Prospects
+from cmg_mj.plant.mujoco_state import quiet, set_control_callback
+from cmg_mj.plant.physics import ManyWorlds
+from cmg_mj.runs.batch_values import batch_values
+from cmg_mj.runs.experiment import Experiment
+from cmg_mj.stages.push import Push, Pushes
+
+LONGEST_S = 60.0
+"""The search ends after so long, with what it has found [s]."""
+UNPUSHED_S = 20.0
+"""A robot stands if all worlds stand so long without a push [s]."""
+BEFORE_S = 2.0
+"""The loop runs for so long before the push comes [s]."""
+LONGEST_AFTER_S = 12.0
+"""Longest time to wait for a pushed robot to recover or fall [s]."""
+OTHER_WORLDS = 20
+AFTER_LONGER = 3.0
+"""The result is tried on so many other worlds, each way, and so many times longer: where the ceiling is low some
+worlds stand the push and fall of the noise while the gimbals come back."""
+RESOLUTION = 0.05
+"""The search ends where a push that all worlds stand and one that not all stand differ by such a share."""
+LEAST = 0.02
+"""Smallest push that is tried, in shares of the ceiling."""
+FIRST_SHARE, GROWTH = 0.85, 1.4
+"""Share of E that is tried first; where E too is stood, as with damping, each push is so many times the last."""
+MOST_CEILINGS = 8.0
+"""Largest push that is tried, in shares of the ceiling, which springs and damping let a robot exceed."""
+MARGIN = 0.1
+"""The largest push found is reduced by this share, and again until the other worlds stand it."""
+SearchProgress = Callable[[float, str], None]
+"""Called with the time that the search has taken [s], and what it tries."""
+
+
+class OutOfTimeError(Exception):
+    """The search has taken as long as it may."""
+
+
+class TimeLimit:
+    """The time that a search may take.
+
+    Args:
+        longest_s: So long [s].
+        on_progress: Called at every check.
+        clock: Returns the time [s].
+    """
+
+    def __init__(
+        self,
+        longest_s: float = LONGEST_S,
+        on_progress: SearchProgress | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.longest_s, self._on_progress, self._clock = longest_s, on_progress, clock
+        self._start = clock()
+
+    def check(self, now: str) -> None:
+        """Show the progress.
+
+        Raises:
+            OutOfTimeError: The time is over.
+        """
+        passed = self._clock() - self._start
+        if self._on_progress is not None:
+            self._on_progress(min(passed, self.longest_s), now)
+        if passed > self.longest_s:
+            raise OutOfTimeError
+
+
+class SimulatedPush(NamedTuple):
+    """The push that a robot stands in MuJoCo."""
+
+    standing: int | None
+    """Worlds that stand 20 s without a push, from the tilt that the scenario starts with; None if the time did not
+    suffice to see it."""
+    impulse: float = 0.0
+    """Largest impulse about the line, as a push of 0.1 s either way, that all worlds stand, less a tenth [N m s]. If
+    the search is complete, twenty others stand it too. 0 if it does not stand, or not the smallest push tried."""
+    complete: bool = True
+    """True if the search came to its end within its time."""
+    servo_torque: float | None = None
+    """Largest torque of a gimbal servo that this push takes [N m]; None if that was not seen."""
+    servo_rate: float | None = None
+    """Largest rate of a gimbal that it takes [rad/s]."""
+    others_fell: bool = False
+    """True if the time ended after some of the twenty others had fallen with a larger push than `impulse`."""
+    worlds: int = WORLDS
+    """Worlds that were tried without a push: ten, and twenty others where it is `Prospects.noisy`."""
+
+    @property
+    def falls(self) -> bool:
+        """True if a world falls without a push."""
+        return self.standing is not None and self.standing < self.worlds
+
+
+def simulated_push(
+    experiment: Experiment, limits: Prospects, axis: str = "", time_limit: TimeLimit | None = None
+) -> SimulatedPush:
+    """Find the largest push that all worlds of a mounted robot stand, by bisection in MuJoCo.
+
+    Args:
+        experiment: The robot and its controller. Pushes of its scenario are ignored.
+        limits: The limits by the reduced model.
+        axis: Name of the axis, if there are several.
+        time_limit: The time that the search may take; by default a minute.
+
+    Returns:
+        The push.
+    """
+    time_limit = time_limit or TimeLimit()
+    try:
+        standing = standing_unpushed(experiment, limits, axis, time_limit)
+    except OutOfTimeError:
+        return SimulatedPush(None, complete=False)
+    if standing < WORLDS:
+        return SimulatedPush(standing)
+    worlds = WORLDS
+    if limits.noisy:
+        worlds += OTHER_WORLDS
+        try:
+            standing += standing_unpushed(experiment, limits, axis, time_limit, range(WORLDS, worlds))
+        except OutOfTimeError:
+            return SimulatedPush(None, complete=False)
+        if standing < worlds:
+            return SimulatedPush(standing, worlds=worlds)
+    upright = _tilted(experiment, 0.0, axis)
+    poles = [pole for pole in (limits.pole, limits.limit.pole) if pole > 0.0]
+    after = min(AFTER_TIME_CONSTANTS / min(poles), LONGEST_AFTER_S)
+    least = LEAST * limits.limit_push_impulse
+    expected = limits.push_margin.median_impulse or 0.5 * limits.limit_push_impulse
+    low, high = 0.0, FIRST_SHARE * expected
+
+    def attempt(impulse: float, worlds: range, after: float) -> _Attempt:
+        text = f"a push of {impulse / PUSH_S:.3g} N m"
+        pushes = [(world, sign * impulse) for sign in (1.0, -1.0) for world in worlds]
+        return _attempt(upright, pushes, BEFORE_S + PUSH_S + after, axis, time_limit, text)
+
+    def all_stand(impulse: float) -> bool:
+        return attempt(impulse, range(WORLDS), after).all_stand
+
+    found, others_fell = 0.0, False
+    try:
+        if all_stand(high):
+            low, high = high, expected
+            while high < MOST_CEILINGS * limits.limit_push_impulse and all_stand(high):
+                low, high = high, GROWTH * high
+        while high - low > max(RESOLUTION * high, least):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if all_stand(middle) else (low, middle)
+        while (found := (1.0 - MARGIN) * (found or low)) > least:
+            longer = min(AFTER_LONGER * after, LONGEST_AFTER_S)
+            result = attempt(found, range(WORLDS, WORLDS + OTHER_WORLDS), longer)
+            if result.all_stand:
+                return SimulatedPush(standing, found, True, result.servo_torque, result.servo_rate, worlds=worlds)
+            others_fell = True
+    except OutOfTimeError:
+        found = found or (1.0 - MARGIN) * low
+        return SimulatedPush(standing, found, complete=False, others_fell=others_fell, worlds=worlds)
+    return SimulatedPush(standing, worlds=worlds)
+
+
+def standing_unpushed(
+    experiment: Experiment, limits: Prospects, axis: str, time_limit: TimeLimit, numbers: Sequence[int] = range(WORLDS)
+) -> int:
+    """Count the worlds that stand without a push, from the tilt that a scenario starts with.
+
+    Args:
+        experiment: The robot and its controller.
+        limits: The limits by the reduced model.
+        axis: Name of the axis, if there are several.
+        time_limit: The time that the search may take.
+        numbers: The worlds, ten by default.
+
+    Returns:
+        The number of worlds.
+
+    Raises:
+        OutOfTimeError: The time is over.
+    """
+    start = _tilted(experiment, limits.start_tilt_deg, axis)
+    worlds = [(world, 0.0) for world in numbers]
+    return _attempt(start, worlds, UNPUSHED_S, axis, time_limit, "no push", early=False).standing
+
+
+def _tilted(experiment: Experiment, tilt_deg: float, axis: str) -> Experiment:
+    """Return the experiment with another initial tilt of an axis."""
+    return experiment.with_settings({f"{f'axes.{axis}.' if axis else ''}plant.initial_tilt_deg": tilt_deg})
+
+
+class _Attempt(NamedTuple):
+    """The outcome of pushes."""
+
+    worlds: int
+    standing: int
+    servo_torque: float
+    servo_rate: float
+
+    @property
+    def all_stand(self) -> bool:
+        """True if no world fell."""
+        return self.standing == self.worlds
+
+
+@quiet()
+def _attempt(
+    experiment: Experiment,
+    pushes: Sequence[tuple[int, float]],
+    duration_s: float,
+    axis: str,
+    time_limit: TimeLimit,
+    now: str,
+    *,
+    early: bool = True,
+) -> _Attempt:
+    """Push worlds, each with an impulse [N m s]; with `early` only until the first one falls."""
+    plant = experiment.plant
+    controller = experiment.controller([world for world, _ in pushes])
+    push = batch_values([Push(BEFORE_S, PUSH_S, impulse / PUSH_S, axis or None) for _, impulse in pushes])
+    period = controller.period
+    steps = period * math.ceil(duration_s / (period * plant.timestep))
+    pushed = Pushes([push], plant.timestep, plant.axis_names)
+    modules = plant.single_axis(axis).axis.modules
+    servos, gimbals = [module.servo for module in modules], [module.gimbal_dof for module in modules]
+    torque = rate = 0.0
+    with set_control_callback(None), np.errstate(all="ignore"):
+        physics = ManyWorlds([plant] * len(pushes))
+        forces = physics.batch.bind("actuator_force")
+        fall_angle = math.radians(experiment.scenario.metrics.fall_angle_deg)
+        loop = ControlLoop(physics, controller, steps, [pushed], fall_angle)
+        for tick in loop.ticks():
+            time_limit.check(now)
+            if early and loop.endings:
+                break
+            loop.decide()
+            loop.advance()
+            torque = max(torque, float(np.abs(forces[:, servos]).max()))
+            rate = max(rate, float(np.abs(np.asarray(tick.v)[gimbals]).max()))
+    return _Attempt(len(pushes), len(pushes) - len(loop.endings), torque, rate)

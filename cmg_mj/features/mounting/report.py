@@ -1,0 +1,142 @@
+"""The report that `cmg-mj mount` prints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from cmg_mj.features.mounting.largest_push import PUSH_S, WORLDS
+from cmg_mj.features.mounting.mount_files import MountResult
+from cmg_mj.features.mounting.prospects import LOW_LIMIT_DEG
+from cmg_mj.features.mounting.push import LEAST, LONGEST_S, OTHER_WORLDS, UNPUSHED_S, SimulatedPush
+from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, loop_words, measured_words, sliding_words
+from cmg_mj.plant.tilt_line import HingeLine
+
+BUSY = ": run it again while the machine does nothing else, or take E alone by --quick"
+"""Advice where the time did not suffice, in clauses."""
+
+
+def mount_report_lines(result: MountResult) -> Iterator[str]:
+    """Describe a mounted robot and the limits of its pair, line by line.
+
+    Args:
+        result: The mounted robot.
+
+    Yields:
+        Lines.
+    """
+    mounted, plant, figures = result.mounted, result.plant, result.prospects.figures()
+    line = plant.axis.line
+    joint = plant.model.joint(line.joint).name
+    about = f"the hinge {joint!r}" if isinstance(line, HingeLine) else "the line that it stands on"
+    body = plant.model.body(plant.axis.frame).name
+    yield f"{mounted.path}: {len(plant.axis.modules)} modules on {body!r}; tilts about {about}"
+    if mounted.held:
+        yield f"  held where they stand: {', '.join(mounted.held)}"
+    for note in mounted.notes:
+        yield f"  {note}"
+    if result.plugin:
+        yield from _plugin_step(mounted.spec.option.timestep, plant.timestep)
+    yield (
+        f"  inertia {figures['inertia_kg_m2']:.4g} kg m^2, gravity {figures['gravity_torque_n_m']:.4g} N m, momentum "
+        f"{figures['momentum_n_m_s']:.4g} N m s, falls with {figures['pole_1_s']:.3g} 1/s"
+    )
+    yield (
+        f"  any controller, from upright gimbals (linear model): recovers from at most {figures['limit_tilt_deg']:.3g} "
+        f"deg, or a push of {figures['limit_push_torque_n_m']:.3g} N m for {PUSH_S:g} s"
+    )
+    yield from _pivot(result)
+    margin = result.prospects.push_margin.median_impulse
+    reduced = (
+        f"by its reduced model E = {margin:.3g} N m s, a push of {margin / PUSH_S:.3g} N m, "
+        f"{result.prospects.fraction_of_limit:.0%} of any controller's"
+    )
+    yield f"  {result.observer}: {_simulated(result.simulated)}{reduced}"
+    yield from _scale(result)
+    yield from _demands(result)
+
+
+def _pivot(result: MountResult) -> Iterator[str]:
+    """Say what a pivot that slides freely does to the tilt, and what the loop would be if the tilt did not know it."""
+    rig = result.plant
+    if rig.reduced.pivot_arm:
+        yield f"  its pivot {sliding_words(rig)}"
+        poles = result.prospects.sliding_poles
+        if poles:
+            yield (
+                f"    so the loop with the true rate is {loop_words(poles.about_centre)}; about the pivot, where "
+                f"{measured_words(rig)}, it is {loop_words(poles.about_pivot)}"
+            )
+        if result.observer != "free_pivot":
+            yield "    if what it slides on rubs, --observer free_pivot stands more of that"
+        yield f"    in the reduced model: {IN_THE_MODEL}; not: {NOT_IN_THE_MODEL}"
+
+
+def _plugin_step(file: float, runner: float) -> Iterator[str]:
+    """Say that the plugin's model takes the runner's physics steps, where these are not the mounted model's [s]."""
+    if not math.isclose(file, runner):
+        yield (
+            f"  its physics steps of {1e3 * file:.4g} ms are {1e3 * runner:.4g} ms in the plugin's model, as in runs: "
+            "whole steps fit between two samples"
+        )
+
+
+def _simulated(simulated: SimulatedPush | None) -> str:
+    """Describe what the robot stands in MuJoCo, up to the words on the reduced model."""
+    if simulated is None:
+        return "not tried in MuJoCo; "
+    if simulated.standing is None:
+        return f"in MuJoCo nothing found within {LONGEST_S:g} s{BUSY}; "
+    if simulated.falls:
+        fallen = simulated.worlds - simulated.standing
+        return (
+            f"does not stand: in MuJoCo {fallen} of {simulated.worlds} worlds fall within {UNPUSHED_S:g} s, unpushed; "
+        )
+    if not simulated.impulse:
+        reason = f"none found within {LONGEST_S:g} s{BUSY}"
+        if simulated.complete:
+            reason = f"not even {LEAST:.0%} of any controller's push"
+        return f"stands in MuJoCo only unpushed ({reason}); "
+    if simulated.complete:
+        more = f"and all of {OTHER_WORLDS} others"
+    elif simulated.others_fell:
+        more = f"some of {OTHER_WORLDS} others fell with a larger one, and {LONGEST_S:g} s did not suffice to try "
+        more += "this one"
+    else:
+        more = f"{LONGEST_S:g} s did not suffice for others"
+    return (
+        f"stands a push of {simulated.impulse / PUSH_S:.3g} N m for {PUSH_S:g} s either way (MuJoCo, all of {WORLDS} "
+        f"worlds, less a tenth; {more}); "
+    )
+
+
+def _scale(result: MountResult) -> Iterator[str]:
+    """Say whether the pair is too small, and which scale was tried that is not."""
+    simulated, scale = result.simulated, result.sufficient_scale
+    low = math.degrees(result.prospects.limit.tilt) < LOW_LIMIT_DEG
+    if not (low or (simulated and simulated.falls)):
+        return
+    reason = f"any controller recovers less than {LOW_LIMIT_DEG:g} deg" if low else "it does not stand"
+    if scale is not None:
+        yield f"  with a pair of this size {reason}; with --scale {scale:g}, tried in MuJoCo, it stands"
+    elif simulated is None:
+        yield f"  with a pair of this size {reason}; --quick tries no larger --scale"
+    else:
+        yield f"  with a pair of this size {reason}; no larger --scale was found with which it stands"
+
+
+def _demands(result: MountResult) -> Iterator[str]:
+    """Say what the pair weighs, what its servos have to do and what its wheels take."""
+    demands, simulated = result.demands, result.simulated
+    taken = ""
+    if simulated is not None and simulated.servo_torque is not None and simulated.servo_rate is not None:
+        taken = f"; the push takes up to {simulated.servo_torque:.2g} N m and {simulated.servo_rate:.2g} rad/s"
+    yield (
+        f"  the pair weighs {demands.mass_kg:.3g} kg, {demands.mass_kg / demands.robot_mass_kg:.0%} of the robot's "
+        f"{demands.robot_mass_kg:.3g} kg; its servos have {demands.servo_torque_n_m:.3g} N m and "
+        f"{demands.servo_rate_rad_s:.3g} rad/s{taken}"
+    )
+    yield (
+        f"  its wheels hold {demands.spin_up_energy_j:.3g} J, {demands.spin_up_power_w:.2g} W for a minute to spin up, "
+        f"and take {demands.holding_power_w:.2g} W to keep turning (assumed: two 608 bearings each, by SKF's friction)"
+    )

@@ -1,0 +1,1 @@
+"""A pivot that moves."""

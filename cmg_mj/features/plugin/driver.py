@@ -1,0 +1,126 @@
+"""Runs a rig whose model has an engine plugin; and the plugins' state in MuJoCo's data: seeds, worlds, failures."""
+
+from __future__ import annotations
+
+import copy
+import ctypes
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.core.loop import ControlLoop
+from cmg_mj.core.runners import as_estimate
+from cmg_mj.features.plugin.model import INSTANCE
+from cmg_mj.features.plugin.sensors import check_noise
+from cmg_mj.plant.physics import OneWorld
+from cmg_mj.plant.without_plugins import OWN
+
+SEED, WORLD, STATUS, STEPS = range(4)
+"""Places in an instance's state, as state.h numbers them."""
+FAILED = 2.0
+"""A status, as state.h numbers it."""
+
+
+class PluginLoop(ControlLoop):
+    """The loop of a run in which a plugin in the plant's model decides: MuJoCo decides, the loop records.
+
+    The Python controller is led along the plugin's decisions, for what the plugin does not have: the gyro's readings
+    and the open-loop observers.
+    """
+
+    def decide(self) -> None:
+        """Record the plugin's decision, which it takes in every forward pass."""
+        assert isinstance(self.physics, OneWorld)
+        model, data = self.physics.model, self.physics.data
+        if any(state[STATUS] == FAILED for state in instance_states(model, data)):
+            raise RunStopped(f"the plugin has stopped at t = {data.time:g} s")
+        self.controller.control(self.step)
+        for name, part in zip(self.physics.axis_names, self.controller.parts, strict=True):
+            _take_over(part, data, "/".join(filter(None, (INSTANCE, name))))
+
+
+def _take_over(part: Controller, data: mujoco.MjData, prefix: str) -> None:
+    """Give a controller's last tick the plugin's numbers."""
+    assert part.tick is not None
+
+    def shown(quantity: str) -> list[float]:
+        return data.sensor(f"{prefix}/{quantity}").data.tolist()
+
+    (y1,), (y2,), (acceleration,) = shown("tilt"), shown("gimbal_angle"), shown("acceleration")
+    (u,), (x_e,) = shown("command"), shown("integrator")
+    estimates = [as_estimate(shown("estimate")), *part.tick.estimates[1:]]
+    part.tick = part.tick._replace(y1=y1, y2=y2, acceleration=acceleration, u=u, x_e=x_e, estimates=estimates)
+
+
+def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int) -> None:
+    """Choose the noise of the plugins in a simulation that has not yet been stepped since its reset.
+
+    Args:
+        model: A model with plugins of this package.
+        data: Its data.
+        seed: Seed of the noise.
+        world: Number of the world.
+
+    Raises:
+        InputError: The model has no such plugin, a number is outside the plugin's range, or the noise has begun.
+    """
+    check_noise(seed, world)
+    for state in instance_states(model, data):
+        if state[STEPS]:
+            raise InputError("the plugin's noise has begun: choose seed and world right after a reset")
+        state[SEED], state[WORLD] = seed, world
+
+
+def instance_states(model: mujoco.MjModel, data: mujoco.MjData) -> list[np.ndarray]:
+    """Return the states of the plugins of this package, which may be written to.
+
+    Raises:
+        InputError: The model has no such plugin.
+    """
+    starts = zip(_plugin_names(model), model.plugin_stateadr.tolist(), strict=True)
+    states = [data.plugin_state[start:] for name, start in starts if name.startswith(OWN)]
+    if not states:
+        raise InputError("the model has no plugin of cmg_mj's")
+    return states
+
+
+def initial_states(model: mujoco.MjModel, data: mujoco.MjData, seed: int, worlds: int | Sequence[int]) -> np.ndarray:
+    """Make the initial states of many worlds, as `mujoco.rollout` takes them.
+
+    Args:
+        model: A model with plugins of this package.
+        data: Its data in the state that all worlds start from, not yet stepped since its reset. It stays as it is.
+        seed: Seed of the noise.
+        worlds: How many, or their numbers.
+
+    Returns:
+        Full physics states, (n_worlds, n_numbers).
+
+    Raises:
+        InputError: See `set_world`.
+    """
+    kind = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    numbers = range(worlds) if isinstance(worlds, int) else worlds
+    states = np.empty((len(numbers), mujoco.mj_stateSize(model, kind)))
+    data = copy.copy(data)
+    for state, world in zip(states, numbers, strict=True):
+        set_world(model, data, seed, world)
+        mujoco.mj_getState(model, data, state, kind)
+    return states
+
+
+class _Plugin(ctypes.Structure):
+    """The beginning of MuJoCo's mjpPlugin."""
+
+    _fields_ = (("name", ctypes.c_char_p),)
+
+
+def _plugin_names(model: mujoco.MjModel) -> list[str]:
+    """Name the plugin of each instance of a model, which MuJoCo's Python package does not tell."""
+    library = ctypes.CDLL(str(Path(mujoco.__file__).with_name(f"libmujoco.so.{mujoco.__version__}")))
+    library.mjp_getPluginAtSlot.restype = ctypes.POINTER(_Plugin)
+    return [library.mjp_getPluginAtSlot(slot).contents.name.decode() for slot in model.plugin.tolist()]

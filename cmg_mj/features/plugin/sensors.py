@@ -1,0 +1,240 @@
+"""Describes a rig's sensors and clock as the plugin's C takes them: the numbers that `cmg_mj.sensors` computes with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.noise import CORNERS_HZ, NoiseStream, spread_of
+from cmg_mj.core.sensor import steps_until, whole_steps
+from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.sensors.encoder import Encoder
+from cmg_mj.sensors.fog import Fog
+from cmg_mj.sensors.mems_gyro import PIECE, MemsGyro
+from cmg_mj.stages.low_pass import INSIDE_HZ
+from cmg_mj.stages.turning import YawCoupling
+
+MOST_AXES = 4
+MOST_GIMBALS = 8
+MOST_ESTIMATES = 64
+LARGEST_SEED = 2**53
+"""Seeds and worlds lie in the plugin's state, whose numbers are doubles."""
+
+Value = int | float | str | Sequence["Value"] | Mapping[str, "Value"]
+"""A value in C; a mapping is a struct, by its fields."""
+Struct = dict[str, Value]
+
+
+class PluginAxis(NamedTuple):
+    """An axis of a rig, with its controller.
+
+    Attributes:
+        prefix: What its sensors' names begin with: empty, or `AXIS/`.
+        modules: A module's name, the sign of u that its gimbal is given, its flywheel's speed [rad/s], and the angle
+            of its gimbal at which the flywheel's axis is upright [rad].
+        joint: Name of the joint that it tilts about.
+        shares: Of the joint's degrees of freedom in the tilt rate: of a hinge one, of a free joint those of the turn.
+        controller: Its controller, of one world.
+    """
+
+    prefix: str
+    modules: tuple[tuple[str, float, float, float], ...]
+    joint: str
+    shares: tuple[float, ...]
+    controller: Controller
+
+
+class PluginRig(NamedTuple):
+    """A rig with its controllers.
+
+    Attributes:
+        axes: The axes.
+        plugin: Name under which MuJoCo knows the plugin.
+        world: The world whose noise it has.
+        turning: The coupling of the axes in a turn, and the gyro that shows it; None if turns are not compensated.
+    """
+
+    axes: list[PluginAxis]
+    plugin: str
+    world: int
+    turning: tuple[YawCoupling, MemsGyro] | None
+
+
+def refuse_unsupported(rig: PluginRig) -> None:
+    """Refuse by name what the plugin does not have.
+
+    Raises:
+        InputError: It does not have something that is in use.
+    """
+    counts = [(len(rig.axes), "axes", MOST_AXES)]
+    counts += [(len(axis.modules), "modules on an axis", MOST_GIMBALS) for axis in rig.axes]
+    counts += [(3 + len(axis.controller.extra_signals[0]), "estimates", MOST_ESTIMATES) for axis in rig.axes]
+    for count, what, most in counts:
+        if count > most:
+            raise InputError(f"{count} {what}: a plugin takes at most {most}")
+    check_noise(rig.axes[0].controller.seed, rig.world)
+
+
+def check_noise(seed: float, world: float) -> None:
+    """Refuse a seed or world that no plugin's state holds.
+
+    Raises:
+        InputError: It is out of range, or no whole number.
+    """
+    for name, number in (("seed", seed), ("world", world)):
+        if not 0 <= number <= LARGEST_SEED or number != int(number):
+            raise InputError(f"{name} = {number}: a plugin takes {name}s from 0 to 2^53, as whole numbers")
+
+
+def steps_of(duration: float, timestep: float) -> int:
+    """Count the physics steps of a time of a sensor."""
+    return whole_steps(duration, timestep, "a sensor's time", f"{duration:g} s")
+
+
+class Clock(NamedTuple):
+    """Counts times in instants."""
+
+    timestep: float
+    steps: int
+    """Physics steps between two instants."""
+    period: int
+    """Physics steps between two decisions."""
+
+    @property
+    def instant(self) -> float:
+        """The time between two instants [s]."""
+        return self.steps * self.timestep
+
+    def count(self, duration: float) -> int:
+        """Count the instants of a duration that is a multiple of them [s]."""
+        return steps_of(duration, self.timestep) // self.steps
+
+    def delivery(self, width: int, rate_hz: float, latency_s: float) -> Struct:
+        """Describe how a sensor's samples of so many numbers are delivered: `delivery_type` in C."""
+        latency = -(-steps_until(latency_s, self.timestep) // self.steps)
+        on_the_way = latency + self.period // self.steps
+        capacity = on_the_way // max(1, self.count(1.0 / rate_hz)) + 2 if latency else 0
+        return {"width": width, "latency": latency, "capacity": capacity}
+
+
+def clock_of(rig: PluginRig) -> Clock:
+    """Return the clock of a plugin, at whose instants a sensor or the controller may be due."""
+    first = rig.axes[0].controller
+    spacings = [first.period]
+    for axis in rig.axes:
+        sensors = axis.controller.sensors
+        pair = sensors.accelerometer
+        times = [1.0 / pair.rate_hz, 1.0 / sensors.encoder.rate_hz, pair.skew_s]
+        if pair.bandwidth_hz:
+            times.append(1.0 / INSIDE_HZ)
+        if axis.controller.feedback == "fog":
+            times.append(1.0 / sensors.fog.rate_hz)
+        spacings += [steps_of(time, axis.controller.timestep) for time in times]
+    return Clock(first.timestep, math.gcd(*spacings), first.period)
+
+
+def describe_pair(sensor: Accelerometer, axis: int, clock: Clock) -> Struct:
+    """Describe the accelerometers of an axis: `pair_type` in C."""
+    period, skew = clock.count(1.0 / sensor.rate_hz), clock.count(sensor.skew_s)
+    raw = clock.count(1.0 / INSIDE_HZ) if sensor.bandwidth_hz else period
+    uneven = bool(sensor.skew_s or sensor.bandwidth_hz)
+    same, other = _weights(sensor)
+    inner, outer = sensor.bias
+    b, a = _low_pass(sensor)
+    return {
+        "noise_stream": NoiseStream.ACCELEROMETER.on_axis(axis),
+        "flicker_stream": NoiseStream.FLICKER.on_axis(axis),
+        "spacing": math.gcd(period, raw, skew) if uneven else period,
+        "period": period,
+        "raw": raw,
+        "skew": skew,
+        "settling": math.ceil(2.0 * INSIDE_HZ / sensor.bandwidth_hz) if sensor.bandwidth_hz else 0,
+        "outer_capacity": -(-skew // raw) + 2 if skew else 0,
+        "limit": sensor.range_g * STANDARD_GRAVITY,
+        "is_distorted": int(same != [1.0] * 4 or other != [0.0] * 4),
+        "by_same": same,
+        "by_other": other,
+        "offset": [inner, 0.0, outer, 0.0],
+        "is_filtered": int(bool(sensor.bandwidth_hz)),
+        "b": b,
+        "a": a,
+        "has_flicker": int(bool(sensor.bias_instability_ug)),
+        **_flicker(sensor.flicker_floor, 1.0 / sensor.raw_rate_hz),
+        "delivery": clock.delivery(4, sensor.rate_hz, sensor.latency_s),
+    }
+
+
+def _weights(sensor: Accelerometer) -> tuple[list[float], list[float]]:
+    """Compute each channel's weights of its own and the other axis: see `constant_errors`."""
+    same, other = [], []
+    parts = zip(sensor.scale_error, sensor.misalignment_deg, sensor.cross_axis, strict=True)
+    for scale, misalignment, cross in parts:
+        c, s = math.cos(math.radians(misalignment)), math.sin(math.radians(misalignment))
+        same += [(1.0 + scale) * (c + cross * s), (1.0 + scale) * (c - cross * s)]
+        other += [(1.0 + scale) * (cross * c - s), (1.0 + scale) * (cross * c + s)]
+    return same, other
+
+
+def _low_pass(sensor: Accelerometer) -> list[list[float]]:
+    """Compute the coefficients b and a of the low-pass, as `low_pass` has them."""
+    if not sensor.bandwidth_hz:
+        return [[0.0] * 3] * 2
+    from scipy.signal import butter  # 1 s of import, which only a part with a low-pass needs
+
+    return np.array(butter(2, sensor.bandwidth_hz, fs=INSIDE_HZ)).tolist()
+
+
+def describe_encoders(sensor: Encoder, gimbals: int, clock: Clock) -> Struct:
+    """Describe the encoders of an axis: `encoder_type` in C."""
+    delivery = clock.delivery(gimbals, sensor.rate_hz, sensor.latency_s)
+    return {"period": clock.count(1.0 / sensor.rate_hz), "delivery": delivery}
+
+
+def describe_settings(accelerometer: Accelerometer, encoder: Encoder) -> Struct:
+    """Describe what a model's <config> may change: `sensor_settings` in C."""
+    counts, turn = accelerometer.counts_per_g, encoder.counts_per_revolution
+    return {
+        "force_sigma": accelerometer.raw_sigma,
+        "force_step": STANDARD_GRAVITY / counts if counts else 0.0,
+        "angle_step": 2.0 * math.pi / turn if turn else 0.0,
+    }
+
+
+def describe_fog(sensor: Fog, axis: int, clock: Clock) -> Struct:
+    """Describe the fibre-optic gyro of an axis: `fog_type` in C."""
+    return {
+        "stream": NoiseStream.FOG.on_axis(axis),
+        "period": clock.count(1.0 / sensor.rate_hz),
+        "share": 1.0 - math.exp(-2.0 * math.pi * sensor.bandwidth_hz / sensor.rate_hz) if sensor.bandwidth_hz else 1.0,
+        "bias": math.radians(sensor.bias_deg_h) / 3600.0,
+        "sigma": sensor.white_noise_sigma,
+        "limit": math.radians(sensor.range_deg_s),
+        "delivery": clock.delivery(1, sensor.rate_hz, sensor.latency_s),
+    }
+
+
+def describe_turn_gyro(gyro: MemsGyro, dt: float) -> Struct:
+    """Describe the gyro about the vertical, read every dt [s]: `turn_gyro_type` in C."""
+    return {
+        "stream": NoiseStream.TURN_GYRO,
+        "resting": round(gyro.calibration_s / dt),
+        "piece": PIECE,
+        "sigma": gyro.white_noise_sigma(dt),
+        "limit": math.radians(gyro.range_deg_s),
+        "step": math.radians(1.0 / gyro.counts_per_deg_s) if gyro.counts_per_deg_s else 0.0,
+        "scale": 1.0 + gyro.scale_error,
+        "bias": math.radians(gyro.bias_deg_s),
+        **_flicker(gyro.flicker_floor, dt),
+    }
+
+
+def _flicker(floor: float, dt: float) -> Struct:
+    """Compute the numbers of 1/f noise, as `Flicker` does."""
+    sigma, decay = spread_of(floor), np.exp(-2.0 * math.pi * np.array(CORNERS_HZ) * dt)
+    return {"flicker_sigma": sigma, "decay": decay.tolist(), "spread": (sigma * np.sqrt(1.0 - decay**2)).tolist()}

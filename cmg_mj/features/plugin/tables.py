@@ -1,0 +1,290 @@
+"""Generates a plugin's C: exported controllers, what joins them to the plugin, the rig's numbers, the common files."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.features.export import generate_code
+from cmg_mj.features.plugin.build import COMMON_SOURCES, c_text, common_files, extra_files
+from cmg_mj.features.plugin.sensors import (
+    Clock,
+    PluginAxis,
+    PluginRig,
+    Struct,
+    Value,
+    clock_of,
+    describe_encoders,
+    describe_fog,
+    describe_pair,
+    describe_settings,
+    describe_turn_gyro,
+    refuse_unsupported,
+)
+from cmg_mj.stages.backlash import Backlash
+from cmg_mj.stages.trim import trim_of
+
+if TYPE_CHECKING:
+    from cmg_mj.features.export.law_code import LawPrinter
+
+NAMES_IN_USE = frozenset(
+    {
+        "axis",
+        "controller",
+        "decision",
+        "delivery",
+        "encoder",
+        "fog",
+        "gyros",
+        "law",
+        "measure",
+        "module",
+        "noise",
+        "observer",
+        "pair",
+        "plugin",
+        "rig",
+        "sensor",
+        "sensors",
+        "setup",
+        "show",
+        "spin",
+        "state",
+        "turn_gyro",
+        "turning",
+        "ziggurat",
+    }
+)
+"""Names that would clash with the C that all plugins have in common."""
+
+
+class PluginCode(NamedTuple):
+    """A plugin before it is compiled.
+
+    Attributes:
+        name: The plugin's name behind `cmg_mj.`.
+        files: Name -> text; of the C, then of all that stands beside it.
+        sources: The files that are compiled.
+        build: Fingerprint of the C, by which a model knows its library.
+    """
+
+    name: str
+    files: dict[str, str]
+    sources: list[str]
+    build: str
+
+
+def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
+    """Generate a plugin's C.
+
+    Args:
+        rig: The rig with its controllers.
+        name: Prefix of the exported controllers in C; of several axes the axis' number follows.
+
+    Returns:
+        The code.
+
+    Raises:
+        InputError: Something in use cannot be exported, or the name is none for a plugin.
+    """
+    refuse_unsupported(rig)
+    if name in NAMES_IN_USE:
+        raise InputError(f"--name {name}: is a name in every plugin's C; take another, such as {name}_of_mine")
+    files, names = common_files(), []
+    for number, axis in enumerate(rig.axes):
+        suffix = f"_{number}" if len(rig.axes) > 1 else ""
+        own, controller = name + suffix, copy.copy(axis.controller)
+        controller.feedback = "observer"  # which the export takes; the plugin's own C chooses the rate
+        code = generate_code(controller, "double", name, suffix)
+        files |= {file: code.files[file] for file in (f"{own}.h", f"{own}.c")}
+        files[f"{own}_controller.c"] = format_controller(own, axis, code.figures["numbers_in_state"], code.law)
+        names.append(own)
+    files["rig.c"] = format_rig(rig, names, "")
+    build = hashlib.sha256("".join(files.values()).encode()).hexdigest()[:16]
+    files["rig.c"] = format_rig(rig, names, build)
+    sources = [*COMMON_SOURCES, *(f"{own}_controller.c" for own in names), "rig.c"]
+    return PluginCode(name, files | extra_files(name, files, sources, rig.axes[0].prefix), sources, build)
+
+
+def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: LawPrinter) -> str:
+    """Print NAME_controller.c, which joins an exported controller to the plugin.
+
+    Args:
+        name: Name of the export.
+        axis: The axis with the controller.
+        observer_numbers: Numbers in the exported observer's state.
+        law: The printer of its law.
+
+    Returns:
+        The text.
+    """
+    controller = axis.controller
+    n, trim, formulas = name, trim_of(controller), law.law
+    gap = sum(stage.gap for stage in controller.servo_stages if isinstance(stage, Backlash))
+    trimmed = -(-trim.until // controller.period)
+    fields = {
+        "estimates": 3 + len(controller.extra_signals[0]),
+        "observer": max(1, observer_numbers),
+        "law": max(1, formulas.numbers),
+        "integrator": formulas.numbers - 1 if formulas.has_integrator else -1,
+        "trimmed": trimmed,
+        "trim_part": trim.part if trimmed else 0,
+        "trim_gain": trim.gain if trimmed else 0.0,
+        "angles_are_estimated": int(controller.angle_source == "estimated"),
+        "rate_limit": controller.law.rate_limit,
+        "has_backlash": int(gap > 0.0),
+        "half_gap": gap / 2.0,
+        "period": controller.law.dt,
+    }
+    return f"""/* {n} as the plugin calls it. The exported code is included: its functions are static. */
+#include "{n}.c"
+
+#include "controller.h"
+
+#include <string.h>
+
+static void controller_measure(const double *forces, const double *encoders, double y[3])
+{{
+    measure(forces, encoders, &y[0], &y[1], &y[2]);
+}}
+
+static void observer_init(double *memory, const double y[3])
+{{
+    {n}_state state = {{0}};
+    {n}_init(&state, y[0], y[1], y[2]);
+    memcpy(memory, &state, sizeof state);
+}}
+
+static void observer_step(double *memory, const double y[3], double u, double *estimate)
+{{
+    {n}_state state;
+    memcpy(&state, memory, sizeof state);
+    {n}_step(&state, y[0], y[1], y[2], u, estimate);
+    memcpy(memory, &state, sizeof state);
+}}
+
+{_law_functions(law)}
+extern const controller_type {n}_controller_type;
+const controller_type {n}_controller_type = {{
+{_fields(fields)}    .feedback = FEEDBACK_{controller.feedback.upper()},
+    .measure = controller_measure,
+    .observer_init = observer_init,
+    .observer_step = observer_step,
+    .law_init = law_init,
+    .law_step = law_step,
+}};
+"""
+
+
+def _law_functions(law: LawPrinter) -> str:
+    """Print law_init and law_step, which call the exported law."""
+    formulas, memory = law.law, "memory"
+    if formulas.state:
+        memory = f"&memory[{len(formulas.state)}]"
+    places = {name: f"y[{i}]" for i, name in enumerate(("y1", "y2", "acceleration"))}
+    init = "memory[0] = 0.0 * y[0];" if formulas.is_state_feedback else law.init_call(places, "&state", memory)
+    places |= {name: f"x[{i}]" for i, name in enumerate(("x1", "x2", "x3"))} | {"estimate": "x", "held": "held"}
+    step = law.step_call(places, "&state", memory, "u")
+    state, load, store = f"{law.name}_law_state state", "memcpy(&state, memory, sizeof state);", ""
+    if formulas.state:
+        store = "    memcpy(memory, &state, sizeof state);\n"
+        init, step = f"{state} = {{0}};\n    {init}", f"{state};\n    {load}\n    {step}"
+    return f"""static void law_init(double *memory, const double y[3])
+{{
+    (void)memory, (void)y;
+    {init}
+{store}}}
+
+static void law_step(double *memory, const double y[3], const double *x, double held, double *u)
+{{
+    (void)memory, (void)y, (void)x, (void)held;
+    {step}
+{store}}}
+"""
+
+
+def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
+    """Print rig.c.
+
+    Args:
+        rig: The rig.
+        names: Name of the export of each axis' controller.
+        build: Fingerprint of the code.
+
+    Returns:
+        The text.
+    """
+    clock, first = clock_of(rig), rig.axes[0].controller
+    declarations = "".join(f"extern const controller_type {name}_controller_type;\n" for name in names)
+    axes = "".join(
+        f"static const axis_type axis_{i} = {{\n{_fields(_describe_axis(rig.axes[i], clock))}"
+        f"    .controller = &{name}_controller_type,\n}};\n\n"
+        for i, name in enumerate(names)
+    )
+    turning = ""
+    if rig.turning is not None:
+        coupling, gyro = rig.turning
+        matrices = {name: matrix.tolist() for name, matrix in coupling._asdict().items()}
+        described = {"gyro": describe_turn_gyro(gyro, first.law.dt), **matrices}
+        turning = f"static const turning_type turning = {{\n{_fields(described)}}};\n\n"
+    fields = {
+        "plugin": rig.plugin,
+        "build": build,
+        "seed": float(first.seed),
+        "world": float(rig.world),
+        "instant": clock.instant,
+        "period": clock.period // clock.steps,
+        "axes": len(rig.axes),
+    }
+    return f"""/* The rig's numbers. */
+#include "rig.h"
+
+{declarations}
+{axes}{turning}static const axis_type *const axes[] = {{{", ".join(f"&axis_{i}" for i in range(len(names)))}}};
+
+const rig_type rig = {{
+{_fields(fields)}    .axis = axes,
+    .turning = {"&turning" if turning else "0"},
+}};
+"""
+
+
+def _describe_axis(axis: PluginAxis, clock: Clock) -> Struct:
+    """Describe an axis but for its controller: `axis_type` in C."""
+    controller = axis.controller
+    pair, encoder, fog = controller.sensors.accelerometer, controller.sensors.encoder, controller.sensors.fog
+    has_fog = controller.feedback == "fog"
+    return {
+        "prefix": axis.prefix,
+        "gimbals": len(axis.modules),
+        "modules": axis.modules,
+        "pair": describe_pair(pair, controller.axis, clock),
+        "encoder": describe_encoders(encoder, len(axis.modules), clock),
+        "settings": describe_settings(pair, encoder),
+        **({"fog": describe_fog(fog, controller.axis, clock)} if has_fog else {}),
+        "raw_rate": pair.raw_rate_hz,
+        "joint": axis.joint,
+        "dofs": len(axis.shares),
+        "shares": axis.shares,
+    }
+
+
+def _fields(struct: Mapping[str, Value], indent: str = "    ") -> str:
+    """Print the fields of a struct, a line each."""
+    return "".join(f"{indent}.{name} = {_value(value, indent)},\n" for name, value in struct.items())
+
+
+def _value(value: Value, indent: str = "") -> str:
+    """Print a number, a text, a struct, or a row of numbers; every number as C reads it exactly."""
+    if isinstance(value, str):
+        return c_text(value)
+    if isinstance(value, int):
+        return str(int(value))
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, Mapping):
+        return f"{{\n{_fields(value, indent + '    ')}{indent}}}"
+    return f"{{{', '.join(_value(part) for part in value)}}}"

@@ -1,0 +1,222 @@
+"""The command that replays users' logs, and the options of every command that reads one."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cmg_mj.cli.arguments import (
+    Command,
+    Decorator,
+    all_of,
+    claim_output,
+    json_option,
+    markdown_option,
+    observers_option,
+    out_option,
+    settings_option,
+)
+from cmg_mj.cli.terminal import (
+    CtrlC,
+    end_interrupted,
+    final_path,
+    progress,
+    say_written,
+    shell_command,
+    show,
+    users_code,
+)
+from cmg_mj.core.errors import InputError
+from cmg_mj.results.summary_keys import finite
+
+if TYPE_CHECKING:
+    from cmg_mj.features.replay.log import ReadOptions
+
+_OPTIONS = (
+    click.option(
+        "--columns",
+        multiple=True,
+        metavar="ROLE=HEADING,...",
+        help="Roles of the columns: time, tilt, rate (the reference), ax, az, inner_x, inner_z, outer_x, "
+        "outer_z, acceleration, gimbal (or gimbal1, gimbal2), command. Not for a run's own recording.",
+    ),
+    click.option(
+        "--units",
+        multiple=True,
+        metavar="ROLE=UNIT,...",
+        help="Units of columns whose heading does not end in one, as pitch_deg does.",
+    ),
+    click.option("--scale", multiple=True, metavar="ROLE=FACTOR,...", help="Factors, such as rate=-1 or rate=1.015."),
+    click.option("--offset", multiple=True, metavar="ROLE=VALUE,...", help="Addends after the scale, in column units."),
+    click.option(
+        "--rate",
+        "rate_hz",
+        type=click.FloatRange(0.1, 1e6),
+        metavar="HZ",
+        help="Rate of the rows of a log without times; otherwise the rate to resample to.",
+    ),
+    click.option(
+        "--max-gap",
+        "max_gap_s",
+        type=click.FloatRange(0.0),
+        metavar="SECONDS",
+        help="Divide the log at longer gaps.  [default: 5 rows]",
+    ),
+    click.option(
+        "--delay", "delay_s", type=float, default=0.0, metavar="SECONDS", help="Lag of the reference behind the tilt."
+    ),
+    click.option(
+        "--radii", "radii_m", metavar="INNER,OUTER", help="Distances of two accelerometers from the pivot [m]."
+    ),
+    click.option(
+        "--time-range",
+        "time_range_s",
+        metavar="START:END",
+        help="Read only this part, in seconds from the first row on.",
+    ),
+    click.option("--delimiter", default=",", show_default=True, help="Character between the cells of a CSV."),
+    click.option("--encoding", default="utf-8", show_default=True, help="Encoding of a CSV, such as latin-1."),
+    click.option("--decimal", default=".", show_default=True, help="Decimal point in a CSV."),
+)
+
+
+def pendulum_option() -> Decorator:
+    """Make the option `--model`, the pendulum of logs."""
+    return click.option(
+        "--model",
+        metavar="MJCF|NUMBERS",
+        help="Your pendulum: an MJCF file, or inertia=,gravity_torque= [kg m^2, N m], with gimbals also momentum=,"
+        "gimbal_inertia= [N m s, kg m^2].",
+    )
+
+
+def noise_option() -> Decorator:
+    """Make the option `--noise`, the sensor noise of logs."""
+    return click.option(
+        "--noise",
+        default="",
+        metavar="NAME=VALUE,...",
+        help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of "
+        "one sample.  [default: from the log, or else accelerometer=400, or tilt=0.1,acceleration=1]",
+    )
+
+
+def log_options(command: Command) -> Command:
+    """Add the options of every command that reads logs, which it takes as one `ReadOptions`."""
+
+    @functools.wraps(command)
+    def with_options(**given: Any) -> None:
+        from cmg_mj.features.replay.log import ReadOptions
+        from cmg_mj.features.replay.table import assignments
+
+        options = {field.name: given.pop(field.name) for field in fields(ReadOptions) if field.name in given}
+        for name in ("columns", "units", "scale", "offset"):
+            options[name] = assignments(options[name], f"--{name}")
+        for name in ("scale", "offset"):
+            options[name] = {role: _number(text, f"--{name} {role}") for role, text in options[name].items()}
+        if options["radii_m"] is not None:
+            options["radii_m"] = _pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
+        if options["time_range_s"] is not None:
+            options["time_range_s"] = span(options["time_range_s"], "--time-range")
+        command(options=ReadOptions(**options), **given)
+
+    return all_of(*_OPTIONS)(with_options)
+
+
+def _number(text: str, option: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{option}={text}: must be a number") from None
+
+
+def _pair(text: str, separator: str, option: str, example: str) -> tuple[float, float]:
+    first, _, second = text.partition(separator)
+    try:
+        pair = float(first), float(second)
+    except ValueError:
+        pair = math.nan, math.nan
+    if not all(map(math.isfinite, pair)):
+        raise InputError(f"{option} {text!r}: write {example}")
+    return pair
+
+
+def span(text: str, option: str) -> tuple[float, float]:
+    """Parse `10:60` into its ends [s]."""
+    start, end = _pair(text, ":", option, "START:END in seconds, such as 10:60")
+    if not start < end:
+        raise InputError(f"{option} {text}: must end after its start")
+    return start, end
+
+
+@click.command(short_help="Replay your own log through every observer.")
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True)
+@log_options
+@click.option("--window", "windows", multiple=True, metavar="START:END", help="Also score this part separately [s].")
+@pendulum_option()
+@observers_option()
+@settings_option("Set an observer's parameter.", "OBSERVER.NAME=VALUE")
+@noise_option()
+@click.option(
+    "--settle-s",
+    type=float,
+    metavar="SECONDS",
+    help="Seconds to ignore at the start of each part of a log.  [default: 1; 0 for a run's recording]",
+)
+@out_option()
+@markdown_option()
+@json_option()
+@users_code()
+def replay(
+    options: ReadOptions,
+    logs: tuple[str, ...],
+    windows: tuple[str, ...],
+    model: str | None,
+    observers: list[str],
+    settings: tuple[str, ...],
+    noise: str,
+    settle_s: float | None,
+    out: str | None,
+    markdown: bool,
+    as_json: bool,
+) -> None:
+    """Replay each LOG, CSV or Parquet, through every observer.
+
+    \b
+      cmg-mj replay LOG.csv --columns time=t_ms,tilt=pitch_deg,rate=gyro_dps
+      cmg-mj replay runs/push_recovery-homogeneous-0
+
+    Prints a table, and writes plots, a rerun recording and all signals as Parquet. Without a reference the table has
+    the roughness and the reconstruction error, which is the measured tilt less the integral of the estimated rate.
+    Observers that need a model take part only with --model. A run's recording replays to the figures of the run.
+    docs/replay.md has the details.
+    """  # noqa: D301  (click wants the character itself)
+    from cmg_mj.features.replay import report
+    from cmg_mj.features.replay.noise import noise_numbers
+    from cmg_mj.features.replay.save import LogReplays
+    from cmg_mj.inputs.parameter_options import parameters_of
+
+    options = replace(options, windows_s=tuple(span(text, "--window") for text in windows))
+    replays = LogReplays(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)
+    folder = claim_output(out, replays.folder_name)
+    total = len(replays.logs)
+    with CtrlC() as ctrl_c:
+        try:
+            with progress("Replay", float(total), ctrl_c) as on_progress:
+                replays.run(on_progress)
+        except KeyboardInterrupt:
+            if not replays.results:
+                end_interrupted("interrupted before the first log was done; nothing was written")
+        try:
+            place = replays.save(folder)
+        finally:
+            results = replays.results
+            table = report.replay_markdown(results) if markdown else report.replay_tables(results)
+            show(finite(report.replay_figures(results)), table, as_json)
+    say_written(folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", as_json)
+    if ctrl_c.noted or not replays.complete:
+        end_interrupted(f"interrupted; {len(replays.results)} of {total} logs are in {final_path(folder, place)}")

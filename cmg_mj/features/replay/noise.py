@@ -1,0 +1,384 @@
+"""White noise of a log's tilt and angular acceleration, and what observers assume of it.
+
+The spectrum of the file's own rows (Welch's, of rows less their motion) is compared from band to band below half the
+row rate. White noise has the same density in all; a filter, a fusion or a quantiser leaves no such floor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.features.replay.log import Log, LogNoise, WhiteNoise
+from cmg_mj.features.replay.sampling import EVEN, Part
+from cmg_mj.inputs.parameter_options import numbers
+from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.sensors.encoder import Encoder
+
+SEGMENT = 128
+"""Rows of a segment of Welch's spectrum; segments overlap by half, under Hann's window."""
+TAPS = 32
+CUTOFF = 0.29
+"""The motion is a low-pass of so many rows to either side, with this cut-off in shares of half the row rate: 80 dB
+below 0.2, nothing above 0.38."""
+RESPONSE = 16
+"""Rows for which an angular acceleration follows a command."""
+FEWEST_RESPONSES = 20
+"""Fewest rows to fit it, in times that."""
+BANDS = np.arange(0.4, 0.95, 0.1)
+"""Lower ends of the bands, each a tenth of half the row rate wide."""
+FLOORS = ((0, 1.1), (2, 1.05))
+"""First band of a floor, and the ratio of the largest to the smallest noise in it that still counts as white. A floor
+of the upper four alone, above a faster motion, must be flatter: a filter falls least there."""
+WALK = -np.log(np.sin(math.pi / 2.0 * (BANDS + 0.05)))
+"""Logarithm of a random walk's density in the bands. No first-order filter and no fusion falls more steeply, so a floor
+must be flatter than this; and what rises more steeply below a floor is motion."""
+HANN = 0.947
+"""Share of the rows' information that half-overlapping Hann windows keep."""
+FEWEST = 1024
+"""Fewest rows for an estimate, those counted for which `_without_motion` knows the motion."""
+BLOCK = 16384
+MOST_BLOCKS = 8
+"""Blocks of rows, spread evenly, that a longer log gives."""
+OUTLIER = 5.0
+"""Segments with more than so many times the median power hold a spike or a blow, and do not count."""
+FEW_OUTLIERS = 0.3
+"""Largest share of such segments."""
+COARSE = 0.6
+"""Noise below this share of the smallest step between two values is the quantiser's: Sheppard's correction holds from
+half a step on, to which a twelfth of the step's square is added."""
+HARDLY = 1e-6
+"""Noise below this share of the signal is rounding."""
+GROUPS = 16
+"""Groups of segments whose scatter shows the error of the estimate, if it is larger than that of Gaussian noise."""
+
+TILT_NOISE_DEG = 0.1
+"""Assumed noise of a tilt from an unknown sensor: standard deviation of one sample [deg]."""
+ACCELERATION_NOISE_RAD_S2 = 1.0
+"""Assumed noise of an angular acceleration that does not come from two accelerometers [rad/s^2]."""
+NOISE_DENSITY_UG_RTHZ = 400.0
+"""Assumed noise density of two accelerometers, the bench's own [ug/sqrt(Hz)]."""
+NOISES = ("accelerometer", "tilt", "acceleration")
+"""Names of `--noise`."""
+APART = 1.5
+"""Ratio of the noise that is used and the noise that the log shows, from which it is reported."""
+
+
+def white_noise_of(parts: Sequence[Part], period: float) -> LogNoise:
+    """Estimate the white noise of a log's tilt and angular acceleration.
+
+    Args:
+        parts: The log's parts, with the file's own rows.
+        period: Period of these rows [s].
+
+    Returns:
+        The noise of one row.
+    """
+    names = [name for name in ("y1_rad", "acceleration_rad_s2") if name in parts[0].rows]
+    residuals: list[np.ndarray] = []
+    steps, sizes = dict.fromkeys(names, math.inf), dict.fromkeys(names, 0.0)
+    for places, values in _blocks(parts, period):
+        for name in names:
+            steps[name] = min(steps[name], _smallest_step(values[name]))
+            sizes[name] = max(sizes[name], float(np.std(values[name])))
+        if names[-1] == "acceleration_rad_s2" and "u_rad_s" in values:
+            places, values = _without_response(places, values)
+        if len(places) >= 2 * TAPS + SEGMENT:
+            residuals.append(np.stack([_without_motion(places, values[name]) for name in names]))
+    n_rows = sum(residual.shape[1] for residual in residuals)
+    if n_rows < FEWEST:
+        short = f"it takes {FEWEST:,} rows, without the first and the last {TAPS} of each part; there are {n_rows:,}"
+        return LogNoise(short, short if len(names) > 1 else None, 0.0)
+    spectra = np.concatenate([_spectra(residual) for residual in residuals], axis=1)
+    tilt, *others = (
+        _floor(np.abs(one) ** 2, steps[name], sizes[name]) for name, one in zip(names, spectra, strict=True)
+    )
+    acceleration = others[0] if others else None
+    known = isinstance(tilt, WhiteNoise) and isinstance(acceleration, WhiteNoise)
+    return LogNoise(tilt, acceleration, _correlation(spectra) if known else 0.0)
+
+
+def _blocks(parts: Sequence[Part], period: float) -> Iterator[tuple[np.ndarray, Mapping[str, np.ndarray]]]:
+    """Yield blocks of successive rows: their places in periods, and their values."""
+    blocks = [(p, start) for p in parts for start in range(0, len(p.placed), BLOCK)]
+    few = np.unique(np.linspace(0, len(blocks) - 1, MOST_BLOCKS).round().astype(int))
+    for part, start in blocks if len(blocks) <= MOST_BLOCKS else [blocks[i] for i in few]:
+        rows = slice(start, start + BLOCK)
+        placed = part.placed[rows]
+        yield (placed - placed[0]) / period, {name: values[rows] for name, values in part.rows.items()}
+
+
+def _smallest_step(values: np.ndarray) -> float:
+    """Return the smallest distance of two different values."""
+    steps = np.diff(np.sort(values))
+    steps = steps[steps > 1e-9 * np.ptp(values)]
+    return float(steps.min()) if len(steps) else math.inf
+
+
+def _without_response(
+    places: np.ndarray, values: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, Mapping[str, np.ndarray]]:
+    """Subtract what the acceleration owes to the commands of the last rows, which go up to half the row rate too.
+
+    A command knows the noise of rows before, and none of the rows after it: least squares on it alone leave white noise
+    as it is. Gimbals turn a rig by the cosine of their angle.
+    """
+    acceleration, command = values["acceleration_rad_s2"], values["u_rad_s"] * np.cos(values.get("y2_rad", 0.0))
+    n_rows = len(places) - RESPONSE
+    if n_rows < FEWEST_RESPONSES * RESPONSE or np.abs(places - np.arange(len(places))).max() >= EVEN:
+        return places, values
+    before = np.stack([np.ones(n_rows), *(command[RESPONSE - k : -k] for k in range(1, RESPONSE + 1))], axis=1)
+    rest = acceleration[RESPONSE:]
+    for _ in range(2):  # the second time without what is far off, such as a push
+        usual = np.abs(rest - np.median(rest))
+        few = usual <= 8.0 * np.median(usual)
+        response = np.linalg.lstsq(before[few], acceleration[RESPONSE:][few], rcond=None)[0]
+        rest = acceleration[RESPONSE:] - before @ response
+    rest *= math.sqrt(n_rows / (n_rows - RESPONSE))
+    return places[RESPONSE:], {"y1_rad": values["y1_rad"][RESPONSE:], "acceleration_rad_s2": rest}
+
+
+def _without_motion(places: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Subtract what a low-pass leaves of a signal, at the rows' own times; without `TAPS` rows at either end."""
+    ends = np.arange(-TAPS, TAPS + 1)
+    kernel = np.sinc(CUTOFF * ends) * np.kaiser(2 * TAPS + 1, 8.0)
+    kernel /= kernel.sum()
+    if np.abs(places - np.arange(len(places))).max() < EVEN:
+        return values[TAPS:-TAPS] - np.convolve(values, kernel, mode="valid")
+    from scipy.interpolate import CubicSpline
+
+    grid = np.arange(int(places[-1]) + 1)
+    motion = np.convolve(CubicSpline(places, values)(grid), kernel, mode="valid")
+    inside = (places >= TAPS) & (places <= grid[-1] - TAPS)
+    return values[inside] - CubicSpline(grid[TAPS:-TAPS], motion)(places[inside])
+
+
+def _spectra(residual: np.ndarray) -> np.ndarray:
+    """Return the transforms of overlapping segments, (n_signals, n_segments, n_frequencies), 1 of unit white noise."""
+    window = np.sin(math.pi * (np.arange(SEGMENT) + 0.5) / SEGMENT) ** 2
+    segments = np.lib.stride_tricks.sliding_window_view(residual, SEGMENT, axis=1)[:, :: SEGMENT // 2]
+    return np.fft.rfft(segments * (window / math.sqrt(float(np.sum(window**2)))), axis=2)
+
+
+def _columns(first: int) -> slice:
+    """Select the frequencies from a band on, up to half the row rate without it."""
+    return slice(round(BANDS[first] * SEGMENT / 2.0), SEGMENT // 2)
+
+
+def _steady(power: np.ndarray) -> np.ndarray:
+    """Select the segments without a spike, (n_segments,)."""
+    sizes = power[:, _columns(FLOORS[-1][0])].mean(axis=1)
+    return sizes <= OUTLIER * np.median(sizes)
+
+
+def _floor(power: np.ndarray, step: float, size: float) -> WhiteNoise | str:
+    """Return the white floor of a spectrum, or why there is none.
+
+    Args:
+        power: Squares of the transforms, (n_segments, n_frequencies).
+        step: Smallest step between two values of the signal.
+        size: Standard deviation of the signal.
+    """
+    steady = _steady(power)
+    if steady.mean() < 1.0 - FEW_OUTLIERS:
+        return "its size changes too much in the course of the log"
+    power = power[steady]
+    top = math.sqrt(float(power[:, _columns(FLOORS[-1][0])].mean()))
+    if top < HARDLY * size:
+        return "there is hardly any"
+    if top < COARSE * step < math.inf:
+        return f"it is below {COARSE:g} of the signal's smallest step"
+    frequencies = np.arange(power.shape[1]) * 2.0 / SEGMENT
+    bands = [power[:, (frequencies >= low) & (frequencies < low + 0.1) & (frequencies < 1.0)] for low in BANDS]
+    levels = np.array([0.5 * math.log(max(float(band.mean()), 1e-300)) for band in bands])
+    for first, tolerance in FLOORS:
+        whole = power[:, _columns(first)]
+        error = _error(whole, 1.0 - BANDS[first])
+        each = error * math.sqrt(len(BANDS) - first)
+        floor, order = levels[first:], np.arange(len(BANDS) - first)
+        slope, slope_error = np.polyfit(order, floor, 1)[0], each / math.sqrt(len(order) * float(np.var(order)))
+        drift, drift_error = slope * (len(order) - 1), slope_error * (len(order) - 1)
+        allowed = math.log(tolerance)
+        flat = np.ptp(floor) <= allowed + 4.7 * each and abs(drift) <= allowed + 2.6 * drift_error
+        no_filter = -drift < WALK[first] - WALK[-1] - 2.0 * drift_error
+        moves = first == 0 or levels[0] - levels[-1] > WALK[0] - WALK[-1] + 4.0 * each
+        if flat and no_filter and moves:
+            sigma = math.sqrt(float(whole.mean()))
+            low, high = sigma * math.exp(-1.96 * error), sigma * math.exp(1.96 * error)
+            if np.sum((floor - floor.mean()) ** 2) > (len(order) - 1 + 3.3 * math.sqrt(2 * len(order) - 2)) * each**2:
+                low, high = min(low, math.exp(floor.min())), max(high, math.exp(floor.max()))
+            return WhiteNoise(sigma, low, high)
+    return "there is no white floor below half the row rate, as of a filtered or fused signal"
+
+
+def _error(power: np.ndarray, share: float) -> float:
+    """Return the standard error of the noise's logarithm, from a share of the band."""
+    n_rows = len(power) * SEGMENT / 2.0
+    gaussian = 1.0 / math.sqrt(2.0 * HANN * share * n_rows)
+    if len(power) < 4 * GROUPS:
+        return gaussian
+    means = np.array([group.mean() for group in np.array_split(power, GROUPS)])
+    return max(gaussian, 0.5 * float(np.std(means, ddof=1) / means.mean()) / math.sqrt(GROUPS))
+
+
+def _correlation(spectra: np.ndarray) -> float:
+    """Return the correlation of two signals' white noise; 0 where it is not significant."""
+    steady = _steady(np.abs(spectra[0]) ** 2) & _steady(np.abs(spectra[1]) ** 2)
+    first = FLOORS[-1][0]
+    a, b = spectra[:, steady, _columns(first)]
+    power = float(np.sum(np.abs(a) ** 2)) * float(np.sum(np.abs(b) ** 2))
+    correlation = float(np.sum((a * b.conj()).real)) / math.sqrt(power)
+    known = HANN * (1.0 - BANDS[first]) * int(steady.sum()) * SEGMENT / 2.0
+    return correlation if abs(correlation) > 3.0 / math.sqrt(known) else 0.0
+
+
+def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> TiltNoise:
+    """Return the noise of a log's sensors that observers assume: the user's, else the log's own, else a default.
+
+    Args:
+        log: With two accelerometers, both noises follow from a given density, and the resolution is the bench's.
+        noises: Noises from `noise_numbers` that replace the log's.
+
+    Returns:
+        The noise of tilt and acceleration, and their correlation.
+
+    Raises:
+        InputError: A noise belongs to another sensor than the log's.
+    """
+    noises, estimate = noises or {}, noise_in(log)
+    if log.tilt is not None:
+        if {"tilt", "acceleration"} & noises.keys():
+            raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
+        gimbal = Encoder().sample_sigma
+        if isinstance(estimate.tilt, WhiteNoise) and not noises:
+            if isinstance(estimate.acceleration, WhiteNoise):
+                tilt, acceleration = estimate.tilt.sigma, estimate.acceleration.sigma
+                return TiltNoise(tilt, acceleration, estimate.correlation, gimbal)
+            sigma = estimate.tilt.sigma / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
+            return replace(log.tilt.noise(sigma, STANDARD_GRAVITY), gimbal=gimbal)
+        density = noises.get("accelerometer", NOISE_DENSITY_UG_RTHZ)
+        sensor = Accelerometer(rate_hz=_sampling_rate(log), noise_density_ug_rthz=density)
+        return replace(log.tilt.noise(sensor.sample_sigma, STANDARD_GRAVITY), gimbal=gimbal)
+    if "accelerometer" in noises:
+        raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
+    tilt = _told_or_estimated(math.radians(noises.get("tilt", TILT_NOISE_DEG)), "tilt" in noises, estimate.tilt)
+    acceleration = noises.get("acceleration", ACCELERATION_NOISE_RAD_S2)
+    acceleration = _told_or_estimated(acceleration, "acceleration" in noises, estimate.acceleration)
+    correlation = 0.0 if {"tilt", "acceleration"} <= noises.keys() else estimate.correlation
+    return TiltNoise(tilt, acceleration, correlation, Encoder().sample_sigma)
+
+
+def _told_or_estimated(value: float, is_told: bool, estimate: WhiteNoise | str | None) -> float:
+    return estimate.sigma if isinstance(estimate, WhiteNoise) and not is_told else value
+
+
+def noise_in(log: Log) -> LogNoise:
+    """Return the white noise of one sample of a log, as its rows show it.
+
+    Resampling to a quicker rate keeps the density at low frequencies: white noise of that density is larger, sample for
+    sample, than that of the rows. A spline at a slower rate lets all of a row's noise through.
+
+    Args:
+        log: The log. The recording of a run is not looked at: its sensors' noise is known.
+
+    Returns:
+        The noise, or why it cannot be told.
+    """
+    noise = log.white_noise
+    if noise is None:
+        return LogNoise("the sensors are known", None, 0.0)
+    factor = math.sqrt(max(1.0, (log.row_period_s or log.dt) / log.dt))
+
+    acceleration = noise.acceleration and _scaled(noise.acceleration, factor.__mul__)
+    return LogNoise(_scaled(noise.tilt, factor.__mul__), acceleration, noise.correlation)
+
+
+def noise_numbers(text: str) -> dict[str, float]:
+    """Parse `--noise tilt=0.05,acceleration=2` [ug/rtHz, deg, rad/s^2]."""
+    noises = numbers(text, "--noise", NOISES) if text.strip() else {}
+    for name, value in noises.items():
+        if not value > 0.0:
+            raise InputError(f"--noise {name}={value:g}: must be greater than 0")
+    return noises
+
+
+def density_of(log: Log, tilt: float) -> float:
+    """Return the density of two accelerometers that makes a noise of the tilt of one sample [ug/sqrt(Hz)].
+
+    Args:
+        log: A log of two accelerometers.
+        tilt: Standard deviation [rad].
+    """
+    assert log.tilt is not None
+    sigma = tilt / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
+    return sigma / (1e-6 * STANDARD_GRAVITY * math.sqrt(_sampling_rate(log) / 2.0))
+
+
+def _sampling_rate(log: Log) -> float:
+    """Return the rate whose white noise of a density is that of a sample: the rows' own if samples are slower [Hz]."""
+    period = log.row_period_s or log.dt
+    return 1.0 / period if log.dt > 1.000001 * period else 1.0 / log.dt
+
+
+def noise_remarks(log: Log, noise: TiltNoise) -> list[str]:
+    """Describe the noise that observers assume, and what the log shows.
+
+    Args:
+        log: The log.
+        noise: The noise of one sample that observers assume.
+
+    Returns:
+        A line for each noise; none for a run's recording, whose sensors are known.
+    """
+    if log.white_noise is None:
+        return []
+    shown, tilt_name, unit = noise_in(log), "tilt", "deg"
+    size = math.degrees
+    if log.tilt is not None:
+        tilt_name, unit = "accelerometer", "ug/rtHz"
+        size = lambda tilt: density_of(log, tilt)  # noqa: E731  (one of two units)
+    lines = [_remark(tilt_name, size(noise.tilt), _scaled(shown.tilt, size), unit)]
+    if shown.acceleration is not None and log.tilt is None:
+        lines.append(_remark("acceleration", noise.acceleration, shown.acceleration, "rad/s^2"))
+    return lines
+
+
+def _remark(name: str, used: float, estimate: WhiteNoise | str, unit: str) -> str:
+    """Describe one noise of `--noise`, in its unit."""
+    start = f"Noise of the {name}: {used:.3g} {unit} is used; the log"
+    if isinstance(estimate, str):
+        return f"{start} cannot tell: {estimate}."
+    remark = f"{start} shows {estimate.sigma:.3g} ({estimate.low:.3g} to {estimate.high:.3g})"
+    ratio = estimate.sigma / used
+    if max(ratio, 1.0 / ratio) < APART:
+        return f"{remark}."
+    return f"{remark}: give --noise {name}={estimate.sigma:.3g}, or no {name} for the log's own."
+
+
+def _scaled(noise: WhiteNoise | str, size: Callable[[float], float]) -> WhiteNoise | str:
+    return noise if isinstance(noise, str) else WhiteNoise(*map(size, noise))
+
+
+def noise_figures(log: Log, noise: TiltNoise) -> dict[str, SummaryValue]:
+    """Return the noise that a log shows as `--json` prints it; nothing for a run's recording."""
+    if log.white_noise is None:
+        return {}
+    shown = noise_in(log)
+    figures: dict[str, SummaryValue] = {"tilt_rad": _figures(shown.tilt, noise.tilt)}
+    if shown.acceleration is not None:
+        figures["acceleration_rad_s2"] = _figures(shown.acceleration, noise.acceleration)
+        figures["correlation"] = shown.correlation
+    return {"noise_by_the_log": figures}
+
+
+def _figures(estimate: WhiteNoise | str, used: float) -> dict[str, SummaryValue]:
+    if isinstance(estimate, str):
+        return {"sigma": None, "reason": estimate, "used": False}
+    return {**estimate._asdict(), "used": math.isclose(used, estimate.sigma, rel_tol=1e-9)}

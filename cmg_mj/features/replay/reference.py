@@ -1,0 +1,314 @@
+"""The reference beside the tilt: its lag, scale and offset, and whether a model can be that of the log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.features.replay.log import REFERENCE, Log, WhiteNoise
+from cmg_mj.features.replay.noise import noise_in
+from cmg_mj.features.replay.scores import STRETCHES, Piece, jackknife_stretches, lag_with_error
+from cmg_mj.features.replay.table import UNITS
+
+SPAN_S = 0.2
+"""Time over which increments of the tilt and of the integrated reference are compared [s]; slopes are mostly noise."""
+OFF = 0.005
+"""Deviation of the reference's scale from 1, or its offset by its RMS, from which it matters, if it is significant."""
+NEAR = 0.05
+"""Largest such deviation at which a reference that correlates less than `AGREES` still agrees."""
+SURE = 2.365
+"""Standard errors of a 95 % interval: Student's, of the seven degrees of freedom of eight stretches."""
+CLEAR = 4.03
+"""Standard errors of a 99.5 % interval, which a deviation leaves that is reported: one of 20 faultless logs would leave
+the other."""
+NOISE = 1.2
+"""Ratio up to which the rest of the tilt is its white noise."""
+LATE = 0.1
+"""Lag from which it is reported, in periods of the log's rows or its samples, the longer of the two."""
+FINE = 0.01
+"""Step in which a delay is offered, at most, in the same periods."""
+AGREES = 0.95
+"""Correlation at the best lag, of either sign, from which a cure is offered. If the tilt freezes half-way, neither lag
+nor scale is meaningful."""
+RATE_SPAN_S = 0.04
+"""Time over which increments of the tilt give the rate in the model's damping term [s]."""
+WIDTH_S = 0.25
+"""Length of a stretch for the tilt's second derivative [s], of at least `FEWEST_SAMPLES` samples."""
+FEWEST_SAMPLES = 12
+FEWEST = 20
+"""Fewest stretches for a comparison."""
+MISFIT = 1.5
+"""Misfit from which a model is doubted. Right models have at most 1.15: docs/studies/model_misfit.py."""
+
+
+class Alignment(NamedTuple):
+    """Lag, scale and offset of a reference relative to the measured tilt; None where they cannot be found."""
+
+    lag_s: float | None
+    """Lag of the reference behind the tilt, as it was read [s]."""
+    scale: float | None
+    """Factor of the reference that fits the tilt's increments."""
+    offset_rad_s: float | None
+    """Addend after the scale [rad/s]."""
+    correlation: float | None
+    """Correlation of the increments, near -1 for a reference of the other sign."""
+    lag_error_s: float | None = None
+    """Standard error of the lag [s]; these errors are jackknives over `STRETCHES` of the log."""
+    scale_error: float | None = None
+    """Standard error of the scale."""
+    offset_error_rad_s: float | None = None
+    """Standard error of the offset [rad/s]."""
+    residual_rad: float | None = None
+    """RMS of the tilt's increments less those of the fit [rad]."""
+
+
+def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: float) -> Alignment:
+    """Compare the tilt's increments over `SPAN_S` with those of the integrated reference, at every sample.
+
+    The lag is where the two correlate most. The tilt's increments are then fitted by the reference's, shifted by it.
+
+    Args:
+        tilt: Pieces of the tilt, each (n,) [rad].
+        reference: Pieces of the rate, each (n,) [rad/s]; NaN where it is unknown.
+        dt: Sample period [s].
+
+    Returns:
+        The alignment.
+    """
+    span = max(2, round(SPAN_S / dt))
+    pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
+    rises = [y[span:] - y[:-span] for y, _ in pieces]
+    late = lag_with_error([_Travels(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
+    lag_s, lag_error = late or (None, None)
+    fit = _Fit.of(rises, [_Travels(rate, span, dt, lag_s or 0.0) for _, rate in pieces])
+    line = fit and fit.line(fit.sums.sum(axis=0))
+    if fit is None or line is None:
+        return Alignment(lag_s, None, None, None)
+    errors = fit.errors(span * dt)
+    return Alignment(lag_s, line.slope, line.start / (span * dt), line.correlation, lag_error, *errors)
+
+
+@dataclass(frozen=True)
+class _Travels:
+    """Increments of the integrated reference, shifted by its lag: see `_travelled`."""
+
+    rate: np.ndarray
+    span: int
+    dt: float
+    lag_s: float
+
+    def __len__(self) -> int:
+        return len(self.rate) - self.span
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        start, stop, _ = rows.indices(len(self))
+        margin = math.ceil(abs(self.lag_s) / self.dt) + 2
+        first = max(0, start - margin)
+        rate = self.rate[first : stop + self.span + margin]
+        return _travelled(rate, self.span, self.dt, self.lag_s)[start - first : stop - first]
+
+
+class _Line(NamedTuple):
+    """A fitted line, rise = start + slope travel."""
+
+    slope: float
+    start: float
+    correlation: float
+    residual: float
+    """RMS of the rises less the line."""
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Sums over the stretches of a log, from which lines are fitted.
+
+    Attributes:
+        middle: Numbers that are subtracted from 1, travel and rise: sums of numbers near zero lose nothing, (3,).
+        sums: Products of these, (`STRETCHES`, 3, 3).
+    """
+
+    middle: np.ndarray
+    sums: np.ndarray
+
+    @classmethod
+    def of(cls, rises: Sequence[Piece], travels: Sequence[Piece]) -> _Fit | None:
+        """Sum the known pairs; None if there are none."""
+        sums, middle = np.zeros((STRETCHES, 3, 3)), None
+        for number, piece, rows in jackknife_stretches([len(rise) for rise in rises], 0):
+            pairs = np.stack([np.ones(rows.stop - rows.start), travels[piece][rows], rises[piece][rows]])
+            pairs = pairs[:, np.isfinite(pairs[1])]
+            if not pairs.shape[1]:
+                continue
+            if middle is None:
+                middle = np.array([0.0, *pairs[1:].mean(axis=1)])
+            pairs -= middle[:, None]
+            sums[number] += pairs @ pairs.T
+        return None if middle is None else cls(middle, sums)
+
+    def line(self, sums: np.ndarray) -> _Line | None:
+        """Fit a line to some sums, (3, 3); None if there is too little motion."""
+        n = sums[0, 0]
+        if n < 3:
+            return None
+        means = sums[0, 1:] / n
+        (xx, xy), (_, yy) = sums[1:, 1:] - n * np.outer(means, means)
+        rounding = n * (n * np.finfo(float).eps * (means + self.middle[1:])) ** 2
+        if not xx > rounding[0] or not yy > rounding[1]:
+            return None
+        slope = xy / xx
+        start = (means[1] + self.middle[2]) - slope * (means[0] + self.middle[1])
+        residual = math.sqrt(max(0.0, yy - slope * xy) / n)
+        return _Line(float(slope), float(start), float(xy / math.sqrt(xx * yy)), residual)
+
+    def errors(self, span_s: float) -> tuple[float | None, float | None, float | None]:
+        """Return standard errors of the slope and of the start by the span [rad/s], and the RMS of the residual."""
+        whole = self.sums.sum(axis=0)
+        line = self.line(whole)
+        others = [self.line(whole - sums) for sums in self.sums if sums[0, 0]]
+        known = [(other.slope, other.start / span_s) for other in others if other]
+        if line is None or len(known) < max(2, len(others)):
+            return None, None, line and line.residual
+        slope, start = np.sqrt((len(known) - 1) * np.var(known, axis=0)).tolist()
+        return slope, start, line.residual
+
+
+def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float) -> np.ndarray:
+    """Integrate a rate, shifted by its lag, over each span of samples; NaN where it is unknown, (n - span,)."""
+    clock = np.arange(len(rate)) * dt
+    steps = (rate[1:] + rate[:-1]) * dt / 2.0
+    unknown = np.concatenate([[0], np.cumsum(np.isnan(steps))])
+    travelled = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
+    when = clock + lag_s
+    travelled, unknown = (np.interp(when, clock, sums, left=np.nan, right=np.nan) for sums in (travelled, unknown))
+    return np.where(unknown[span:] == unknown[:-span], travelled[span:] - travelled[:-span], np.nan)
+
+
+def alignment_of(log: Log) -> Alignment | None:
+    """Align a log's reference with its tilt; None without a reference, and for a run's recording."""
+    if "reference" not in log.has or log.scenario is not None:
+        return None
+    tilts, references = ([log[name][part] for part in log.parts] for name in ("y1_rad", REFERENCE))
+    return alignment(tilts, references, log.dt)
+
+
+def judge(log: Log, aligned: Alignment) -> str:
+    """Describe the reference's lag, scale and offset, with options that correct those that matter.
+
+    Args:
+        log: The log.
+        aligned: Alignment from `alignment_of`.
+    """
+    lag, scale, offset, correlation = aligned[:4]
+    if scale is None or offset is None or correlation is None:
+        return "The reference cannot be compared with the tilt: too little motion, or too short."
+    errors = (aligned.lag_error_s, aligned.scale_error, aligned.offset_error_rad_s)
+    lag_error, scale_error, offset_error = (math.inf if error is None else CLEAR * error for error in errors)
+    noisy, options = _is_noise(log, aligned.residual_rad), log.options
+    scale_set, offset_set = options.scale.get("rate", 1.0), options.offset.get("rate", 0.0)
+    period = max(log.dt, log.row_period_s or 0.0)
+    motion = math.sqrt(float(np.nanmean(log[REFERENCE] ** 2)))
+    near = lag is not None and abs(lag) <= LATE * period and abs(scale - 1.0) <= NEAR and abs(offset) <= NEAR * motion
+    not_alike = f"The reference does not go with the tilt (correlation {correlation:.2f})"
+    if correlation <= -AGREES or (noisy and scale < -scale_error):
+        return f"{not_alike}: it counts the other way: --scale rate={-scale_set:g}."
+    if correlation < AGREES and not (noisy and scale > scale_error) and not near:
+        return f"{not_alike}: is it the rate of this tilt, and do both move and not leap? No delay or scale is offered."
+    late = lag is not None and abs(lag) > max(LATE * period, lag_error)
+    resized = abs(scale - 1.0) > max(OFF, scale_error)
+    shifted = abs(offset) > max(OFF * motion, offset_error)
+    share = SURE / CLEAR
+    fits = f"{_with_interval(scale, share * scale_error)} times the reference plus "
+    fits += f"{_with_interval(offset, share * offset_error)} rad/s fits"
+    if not (late or resized or shifted):
+        return f"Tilt and reference agree: {fits}."
+    decimals = max(0, math.ceil(-math.log10(FINE * period)))
+    comes, cures = "", []
+    if late and lag is not None:
+        where = "behind" if lag > 0.0 else "before"
+        comes = f"the reference comes {abs(lag) * 1e3:.{max(2, decimals - 3)}f} ms {where}; "
+        cures.append(f"--delay {options.delay_s + lag:.{decimals}f}")
+    factor = scale if resized else 1.0
+    if resized:
+        cures.append(f"--scale rate={factor * scale_set:.4g}")
+    if shifted or (resized and offset_set):
+        unit_size = UNITS["rate"][options.units.get("rate", "rad_s")]
+        cures.append(f"--offset rate={factor * offset_set + (offset / unit_size if shifted else 0.0):.3g}")
+    return f"Beside the tilt {comes}{fits} (to take it out: {' '.join(cures)})."
+
+
+def remarks_on(log: Log, aligned: Alignment | None) -> list[str]:
+    """Describe the changes to a log, and its reference, in sentences."""
+    lines = [f"{note[:1].upper()}{note[1:]}." for note in log.notes]
+    return lines if aligned is None else [*lines, judge(log, aligned)]
+
+
+def _is_noise(log: Log, residual: float | None) -> bool:
+    """Return whether the tilt's noise explains all by which its increments differ from the reference's."""
+    noise = noise_in(log).tilt
+    return residual is not None and isinstance(noise, WhiteNoise) and residual <= NOISE * math.sqrt(2.0) * noise.high
+
+
+def _with_interval(value: float, error: float) -> str:
+    value, low, high = (round(number, 4) + 0.0 for number in (value, value - error, value + error))  # no -0.0000
+    return f"{value:.4f} ({low:.4f} to {high:.4f})" if math.isfinite(error) else f"{value:.4f}"
+
+
+def model_misfit(log: Log, model: ReducedModel) -> float | None:
+    """Compare the model's tilt acceleration with the tilt's second derivative.
+
+    Both are weighted over stretches of a quarter of a second, by w = (1 - s^2)^4, which ends smoothly: with
+    b = sum(y w'') and a = sum(a w) no noisy samples are subtracted. With the spread s of a set of sums (median of the
+    deviations from the median, which neither an offset of the tilt nor pushes move), the misfit is
+    s(predicted - measured)/s(measured), by what it is for white noise of the tilt alone. A model that says nothing has
+    1, a right one less or, where all is noise, 1 too.
+
+    Args:
+        log: The log; without gimbals y2 and u are zero.
+        model: The pendulum.
+
+    Returns:
+        The misfit; None for too few stretches, or if nothing moves.
+    """
+    half = max(FEWEST_SAMPLES // 2, round(WIDTH_S / 2.0 / log.dt))
+    s = np.arange(-half, half + 1) / (half + 1.0)
+    weights = (1.0 - s**2) ** 4
+    second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * log.dt) ** 2
+    second = second - second.mean()
+    m = max(1, round(RATE_SPAN_S / 2.0 / log.dt))
+    differences, measured = [np.zeros(0)], [np.zeros(0)]
+    for part in log.parts:
+        tilt = log["y1_rad"][part]
+        rate = np.zeros(len(tilt))
+        rate[m:-m] = (tilt[2 * m :] - tilt[: -2 * m]) / (2 * m * log.dt)
+        predicted = model.tilt_acceleration(tilt, rate, log["y2_rad"][part], log["u_rad_s"][part])
+        if len(tilt) >= len(weights):
+            derived = np.convolve(tilt, second, mode="valid")[::half]
+            smoothed = np.convolve(np.broadcast_to(predicted, tilt.shape), weights, mode="valid")[::half]
+            differences.append(smoothed - derived)
+            measured.append(derived)
+    size = _spread(np.concatenate(measured))
+    if sum(map(len, measured)) < FEWEST or not size > 0.0:
+        return None
+    stiffness = model.gravity_torque / model.J1
+    of_noise = float(np.linalg.norm(stiffness * weights - second) / np.linalg.norm(second))
+    return _spread(np.concatenate(differences)) / size / of_noise
+
+
+def _spread(values: np.ndarray) -> float:
+    return float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
+
+
+def model_remark(misfit: float | None) -> str | None:
+    """Doubt a model, or say nothing."""
+    if misfit is None or not misfit > MISFIT:
+        return None
+    return (
+        f"Can the model be that of this log? The tilt acceleration that it predicts misses the tilt's own by "
+        f"{misfit:.3g} times as much as one of zero would (of right models at most 1.15): look at --model, the tilt's "
+        "unit, sign and zero, or for large torques that the model does not know."
+    )

@@ -1,0 +1,242 @@
+"""Replay of observers on a user's log, and their scores."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cmg_mj.core.errors import InputError, raised
+from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.types import extra_signals, needs
+from cmg_mj.features.replay.log import REFERENCE, Log
+from cmg_mj.features.replay.noise import noise_of
+from cmg_mj.features.replay.reference import Alignment, alignment_of, model_misfit
+from cmg_mj.features.replay.scores import Figures, ZeroPhase, noise_gain, scores, zero_phase
+from cmg_mj.inputs.parameter_options import Parameters
+from cmg_mj.inputs.users_line import in_users_line
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
+from cmg_mj.results.baselines import ZERO
+from cmg_mj.results.trajectory import ESTIMATES, Layout, NamedColumns, Trajectory
+from cmg_mj.runs.open_loop import replay_all
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SETTLE_S = 1.0
+"""Default time at the start of each part that is not scored [s]."""
+NO_MODEL = ReducedModel(J1=math.nan, J2=math.nan, J_d=math.nan, omega_d=math.nan, gravity_torque=math.nan)
+"""Model for observers that need none: a computation with it gives NaN."""
+NEEDS_IN_WORDS = {
+    "model": "a model (--model)",
+    "gimbals": "the gimbal angle and the command (--columns gimbal=...,command=...)",
+    "acceleration": "two accelerometers (--columns inner_x=...) or the angular acceleration",
+}
+SEED = 0
+"""Seed of the noise for noise gains."""
+
+OnShare = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class ReplayResult(NamedColumns):
+    """Estimates and scores of observers on one log.
+
+    It has the log's signals and the estimates as columns: `replayed["estimate/linear/x2_rad_s"]`, `dict(replayed)`.
+
+    Attributes:
+        log: The log.
+        estimates: Observer -> signal -> (n,), as in a trajectory; NaN outside the parts.
+        summaries: Observer -> its figures; `zero`, an estimate of zero, is the last.
+        left_out: Observer -> why it does not take part, or failed.
+        alignment: Lag, scale and offset of the reference; None without a reference.
+        settle_s: Time at the start of each part that is not scored [s].
+        noise: The sensors' noise that observers assumed; also the noise of the noise gain.
+        parameters: Parameters that were set.
+        zero_phase: Figures of a smoother that sees the future, which is no observer; None without a reference.
+        misfit: How badly the model predicts the log, from `model_misfit`; None without a model.
+    """
+
+    log: Log
+    estimates: Mapping[str, Mapping[str, np.ndarray]]
+    summaries: Mapping[str, Figures]
+    left_out: Mapping[str, str]
+    alignment: Alignment | None
+    settle_s: float
+    noise: TiltNoise
+    parameters: Parameters = field(default_factory=dict)
+    zero_phase: ZeroPhase | None = None
+    misfit: float | None = None
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The log's signals and all estimates, evenly sampled, in SI units and radians."""
+        columns = {name: values for name, values in self.log.columns.items() if np.isfinite(values).any()}
+        for kind, signals in self.estimates.items():
+            columns |= {f"estimate/{kind}/{name}": values for name, values in signals.items()}
+        extra = tuple(tuple(name for name in signals if name not in ESTIMATES) for signals in self.estimates.values())
+        return Trajectory(columns, {}, Layout(tuple(self.estimates), extra, ()))
+
+    def _columns(self) -> Mapping[str, np.ndarray]:
+        return self.trajectory.columns
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Make a pandas frame of the log's signals and the estimates, a row a sample.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return self.trajectory.to_pandas()
+
+
+def replay_log(
+    log: Log,
+    observers: Sequence[str] | None = None,
+    *,
+    model: ReducedModel | None = None,
+    noise: TiltNoise | None = None,
+    parameters: Parameters | None = None,
+    settle_s: float = SETTLE_S,
+    on_share: OnShare | None = None,
+) -> ReplayResult:
+    """Replay observers on a log.
+
+    Args:
+        log: The log.
+        observers: Names, or `package.module:Class`; all by default. Observers whose needs the log lacks are omitted.
+        model: The pendulum, if it is known.
+        noise: The sensors' noise that observers assume; by default `noise_of(log)`.
+        parameters: Observer -> parameter -> value, where not the default.
+        settle_s: Time at the start of each part that is not scored [s].
+        on_share: Called now and then with the completed share.
+
+    Returns:
+        Estimates and figures.
+
+    Raises:
+        InputError: An observer does not exist or refuses its parameters, or nothing is left to score.
+    """
+    names = list(OBSERVERS) if observers is None else list(dict.fromkeys(observers))
+    parameters = dict(parameters or {})
+    noise = noise or noise_of(log)
+    if not 0.0 <= settle_s < math.inf:
+        raise InputError(f"--settle-s {settle_s:g}: must be a number of seconds not below 0")
+    scored = log.scored(settle_s)
+    _check_scored(log, scored, settle_s)
+    ready, left_out = _ready(log, names, model, noise, parameters)
+    estimates: dict[str, Mapping[str, np.ndarray]] = {}
+    summaries: dict[str, Figures] = {}
+    noisy = _with_noise(log, noise)
+    for i, (name, observer) in enumerate(ready.items()):
+        if on_share:
+            on_share(i / len(ready))
+        signals = _estimates(observer, log)
+        if isinstance(signals, str):
+            left_out[name] = signals
+            continue
+        estimates[name] = signals
+        disturbed = _estimates(observer, noisy)
+        rate = signals["x2_rad_s"]
+        gain = None if isinstance(disturbed, str) else noise_gain(disturbed["x2_rad_s"], rate, noise.tilt, scored)
+        summaries[name] = {**scores(log, rate, scored), "noise_gain_1_s": gain}
+    zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
+    return ReplayResult(
+        log,
+        estimates,
+        {**summaries, ZERO: zero},
+        left_out,
+        alignment_of(log),
+        settle_s,
+        noise,
+        parameters,
+        zero_phase(log, scored) if "reference" in log.has else None,
+        misfit_of(log, model),
+    )
+
+
+def misfit_of(log: Log, model: ReducedModel | None) -> float | None:
+    """Return the model's misfit; None without a model, or where its gimbals are not in the log."""
+    if model is None or (gimbals_matter(model) and "gimbals" not in log.has):
+        return None
+    return model_misfit(log, model)
+
+
+def _check_scored(log: Log, scored: np.ndarray, settle_s: float) -> None:
+    if scored.sum() < 10:
+        raise InputError(
+            f"{log.name}: nothing is left to score: {log.duration_s:.3g} s in {len(log.parts)} "
+            f"part{'' if len(log.parts) == 1 else 's'}, without the first {settle_s:g} s of each (--settle-s)"
+        )
+    if "reference" in log.has and not np.isfinite(log[REFERENCE][scored]).sum() >= 10:
+        raise InputError(f"{log.name}: the reference has no number where estimates are scored")
+
+
+def gimbals_matter(model: ReducedModel | None) -> bool:
+    """Return whether gimbals move the tilt; in the model of a pendulum without any, J2 = J_d omega_d = 0."""
+    return model is None or model.J2 != 0.0 or model.J_d * model.omega_d != 0.0
+
+
+def _ready(
+    log: Log,
+    names: Sequence[str],
+    model: ReducedModel | None,
+    noise: TiltNoise,
+    parameters: Parameters,
+) -> tuple[dict[str, Observer], dict[str, str]]:
+    """Make the observers that can take part, and say why the others cannot."""
+    available = set(log.has) | ({"model"} if model is not None else set())
+    if not gimbals_matter(model):
+        available.add("gimbals")
+    ready: dict[str, Observer] = {}
+    left_out: dict[str, str] = {}
+    for name in names:
+        cls = OBSERVER_CLASSES.find(name)
+        lacks = [need for need in needs(cls) if need not in available]
+        if lacks:
+            OBSERVER_CLASSES.check_names(name, parameters.get(name, {}))
+            left_out[name] = "needs " + " and ".join(NEEDS_IN_WORDS[need] for need in lacks)
+            continue
+        try:
+            ready[name] = make_observer(name, log.dt, model or NO_MODEL, noise, **parameters.get(name, {}))
+        except InputError as error:
+            if name in parameters:
+                raise
+            left_out[name] = f"refused: {error}"
+    if not ready:
+        reasons = "; ".join(f"{name} {reason}" for name, reason in left_out.items())
+        raise InputError(f"{log.name}: no observer can take part: {reasons}")
+    return ready, left_out
+
+
+def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
+    """Return the observer's estimates, part by part, NaN outside; or how it failed."""
+    estimates = {name: np.full(len(log), np.nan) for name in (*ESTIMATES, *extra_signals(observer))}
+    for part in log.parts:
+        try:
+            with np.errstate(all="ignore"):
+                signals = replay_all(observer, log.trajectory(part))
+        except Exception as error:  # a user's observer may fail in any way
+            return f"raised {raised(error)}{in_users_line(error)}"
+        for name, values in signals.items():
+            if not np.isfinite(values).all():
+                time = log["time_s"][part][int(np.argmin(np.isfinite(values)))]
+                return f"{name} is not finite from {time:.6g} s on"
+            estimates[name][part] = values
+    return estimates
+
+
+def _with_noise(log: Log, noise: TiltNoise) -> Log:
+    """Add noise to the tilt, and to the angular acceleration if there is one, with the given correlation."""
+    random = np.random.default_rng(SEED)
+    first, other = random.standard_normal(len(log)), random.standard_normal(len(log))
+    second = noise.correlation * first + math.sqrt(1.0 - noise.correlation**2) * other
+    noisy = {
+        "y1_rad": log["y1_rad"] + noise.tilt * first,
+        "acceleration_rad_s2": log["acceleration_rad_s2"] + noise.acceleration * second,
+    }
+    return replace(log, columns={**log.columns, **noisy})

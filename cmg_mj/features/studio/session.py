@@ -1,0 +1,332 @@
+"""A scenario's plant and controller in another loop, such as Studio's, changed and pushed during the run."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+import sys
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.core.sensor import whole_steps
+from cmg_mj.features.pivot.moving_pivot import pivot_directions
+from cmg_mj.features.pivot.pivot_signals import PivotSignals
+from cmg_mj.features.studio.settings import FieldValues, changed_fields
+from cmg_mj.plant.mujoco_state import set_control_callback
+from cmg_mj.plant.plant import Plant
+from cmg_mj.plant.tilt_line import apply_torques
+from cmg_mj.runs.callback import control
+from cmg_mj.runs.experiment import Experiment
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.stages.swing import add_swing_torques
+
+PLOTTED_TICKS = 2400
+"""Number of plotted ticks: 12 s at 200 Hz."""
+
+PHYSICS_ARRAYS = (
+    "actuator_acc0",
+    "actuator_biasprm",
+    "actuator_gainprm",
+    "body_inertia",
+    "body_invweight0",
+    "body_ipos",
+    "body_iquat",
+    "body_mass",
+    "body_sameframe",
+    "body_simple",
+    "body_subtreemass",
+    "dof_M0",
+    "dof_armature",
+    "dof_damping",
+    "dof_frictionloss",
+    "dof_invweight0",
+    "dof_length",
+    "dof_simplenum",
+    "key_ctrl",
+    "key_qvel",
+    "site_pos",
+    "site_sameframe",
+    "tendon_invweight0",
+)
+"""Arrays of a model that `plant.variations` changes or `mj_setConst` derives from them; none is indexed by geoms."""
+
+MUJOCO_VIEW = (90.0, -45.0)
+STUDIO_VIEW = (125.0, -20.0)
+"""Azimuth and elevation of the first view, unless the model file gives another than MuJoCo's default [deg]."""
+
+
+def drawn_plant(plant: Plant) -> Plant:
+    """Copy a plant onto a model of its own that has the visual geoms as well.
+
+    Args:
+        plant: The plant.
+
+    Returns:
+        A plant whose steps equal those of the first bit for bit.
+    """
+    other = copy.copy(plant)
+    other.model = copy.copy(plant.drawn_model)
+    other.model.opt = plant.model.opt
+    view = other.model.vis.global_
+    if (view.azimuth, view.elevation) == MUJOCO_VIEW:
+        view.azimuth, view.elevation = STUDIO_VIEW
+    copy_physics_numbers(other.model, plant.model)
+    return other
+
+
+def copy_physics_numbers(model: mujoco.MjModel, reference: mujoco.MjModel) -> None:
+    """Make a model with more geoms step as another model of the same plant does.
+
+    Args:
+        model: The model to change.
+        reference: The plant with its scenario's variations, without visual geoms.
+    """
+    model.stat.meaninertia = reference.stat.meaninertia  # scales the constraint solver's tolerance
+    for name in PHYSICS_ARRAYS:
+        getattr(model, name)[:] = getattr(reference, name)
+
+
+class Pushes:
+    """The torques about the tilt axes at every physics step: the scenario's and the user's, which add up.
+
+    Args:
+        scenario: The scenario.
+        axes: Names of the axes.
+        timestep: Physics step [s].
+    """
+
+    def __init__(self, scenario: Scenario, axes: Sequence[str], timestep: float) -> None:
+        self._timestep, self._axes, self._swings = timestep, axes, scenario.swing
+        indices = {name: index for index, name in enumerate(axes)}
+        self._pushes = [  # first step, step after the last, torque, index of the axis; -1: the plant lacks the axis
+            (self._step(p.start_s), self._step(p.end_s), p.torque_n_m, indices.get(p.axis or axes[0], -1))
+            for p in scenario.push
+        ]
+        self._n_scenario = len(self._pushes)
+        self._add_up()
+
+    def _step(self, seconds: float) -> int:
+        return whole_steps(seconds, self._timestep, "push", f"{seconds:g} s")
+
+    def add(self, step: int, torque: float, duration_s: float, axis: int) -> None:
+        """Push from a physics step on for at least one step: torque about an axis by its index [N m], duration [s]."""
+        self._pushes.append((step, step + max(1, round(duration_s / self._timestep)), torque, axis))
+        self._add_up()
+
+    def forget(self, step: int) -> None:
+        """Discard the user's pushes from a step on: time has gone back to it."""
+        scenario, user = self._pushes[: self._n_scenario], self._pushes[self._n_scenario :]
+        self._pushes = [*scenario, *(push for push in user if push[0] < step)]
+        self._add_up()
+
+    def _add_up(self) -> None:
+        changes: dict[int, list[float]] = {}
+        for start, end, torque, axis in self._pushes:
+            for step, change in ((start, torque), (end, -torque)):
+                at_step = changes.setdefault(step, [0.0] * len(self._axes))
+                if axis >= 0:
+                    at_step[axis] += change
+        self._edges = sorted(changes)
+        sums = [0.0] * len(self._axes)
+        self._torques = [sums]
+        for step in self._edges:
+            sums = [torque + change for torque, change in zip(sums, changes[step], strict=True)]
+            self._torques.append([torque if abs(torque) > 1e-12 else 0.0 for torque in sums])  # no remainders
+
+    def at(self, step: int, steps_per_sample: int) -> Sequence[float]:
+        """Return the torque about each axis during a physics step [N m]; a swinging one is held between samples."""
+        start, end = self.interval(step, steps_per_sample)
+        middle = (start + 0.5 * (end - start)) * self._timestep
+        return add_swing_torques(self._torques[bisect_right(self._edges, step)], self._swings, self._axes, middle)
+
+    def interval(self, step: int, steps_per_sample: int) -> tuple[int, int]:
+        """Return the steps around a physics step between which the torques are constant: the first, and the next."""
+        index = bisect_right(self._edges, step)
+        start = step // steps_per_sample * steps_per_sample
+        end = start + steps_per_sample
+        return max([start, *self._edges[:index][-1:]]), min([end, *self._edges[index : index + 1]])
+
+
+class PlottedTick(NamedTuple):
+    """A control tick of one axis in the plots: x1, the true and the estimated rate, u, the push."""
+
+    time_s: float
+    tilt_deg: float
+    rate_rad_s: float
+    estimate_rad_s: float
+    command_rad_s: float
+    push_n_m: float
+
+
+class StudioSession:
+    """A scenario that the owner of its data steps. Without interference its trajectory is the runner's.
+
+    Args:
+        experiment: The scenario.
+
+    Attributes:
+        base: The scenario at the start.
+        now: The scenario with the user's changes.
+        plant: The plant, on a model that has visual geoms as well.
+        pushes: The torques from outside.
+        stopped: The reason why the controller has stopped and the gimbals stand; empty while it runs.
+        diverged: Whether the controller has stopped because the physics diverged.
+        note: Result of the last change or jump, if the user should know.
+        ticks: The last ticks of each axis, for the plots.
+    """
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.base = self.now = experiment
+        self.plant = drawn_plant(experiment.plant)
+        self.timestep = self.plant.timestep
+        self._lines = [axis.line for axis in self.plant.axes]
+        scenario = experiment.scenario
+        self.pushes = Pushes(scenario, self.plant.axis_names, self.timestep)
+        self._pivot = PivotSignals(scenario.pivot, pivot_directions(self.plant, scenario.pivot), scenario.seed, 0)
+        self._still = self.model.opt.gravity.copy()
+        self._pivot_steps: tuple[int, int] | None = None if scenario.pivot else (0, sys.maxsize)
+        """The steps between which the present acceleration of the pivot is held; for ever if it is at rest."""
+        self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=PLOTTED_TICKS)
+        self._begin(0)
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The model that is stepped and shown."""
+        return self.plant.model
+
+    def new_data(self) -> mujoco.MjData:
+        """Make data at the scenario's initial state, and begin the run there."""
+        data = mujoco.MjData(self.model)
+        self.start(data)
+        return data
+
+    def start(self, data: mujoco.MjData) -> None:
+        """Put the plant at the scenario's initial state, and begin the run; the user's changes stay."""
+        initial = self.now.plant.new_data()
+        everything = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        mujoco.mj_copyState(self.now.plant.model, initial, data, everything)
+        with set_control_callback(None):
+            mujoco.mj_forward(self.model, data)
+        self.begin(data)
+
+    def begin(self, data: mujoco.MjData) -> None:
+        """Begin a run at the present state, with a fresh controller."""
+        self._begin(round(data.time / self.timestep))
+
+    def _begin(self, step: int) -> None:
+        self.pushes.forget(step)
+        self.ticks.clear()
+        self.controller = self.now.controller()
+        self.note = self.stopped = ""
+        self.diverged = False
+        self._next = step
+        """The next step, unless someone moves the state in time."""
+
+    def sync_to_time(self, data: mujoco.MjData) -> int:
+        """Begin again at the state's time, if someone has moved the state; return the step."""
+        step = round(data.time / self.timestep)
+        if step != self._next:
+            self._begin(step)
+            self.note = f"the controller starts afresh at t = {data.time:g} s"
+        return step
+
+    def step(self, data: mujoco.MjData) -> bool:
+        """Advance one physics step, before which the controller takes due samples and decisions.
+
+        No failure of an observer or of the physics raises from here.
+
+        Args:
+            data: The plant's data.
+
+        Returns:
+            Whether there was a control tick.
+        """
+        step = self.sync_to_time(data)
+        torques = self.pushes.at(step, self.controller.steps_per_sample)
+        # Studio's mouse writes xfrc_applied: MuJoCo adds them up.
+        apply_torques(data.qfrc_applied, self._lines, torques)
+        self._accelerate(step)
+        ticked = not self.stopped and self._control(data, step, torques)
+        mujoco.mj_step(self.model, data)
+        self._next = step + 1
+        if not np.isfinite(data.qpos).all():
+            self.diverged = True
+            self._stop(data, f"the physics diverged at t = {data.time:g} s; reset")
+        return ticked
+
+    def _accelerate(self, step: int) -> None:
+        """Set the pivot's acceleration during a physics step, which is held as long as a swinging torque."""
+        if self._pivot_steps is not None and self._pivot_steps[0] <= step < self._pivot_steps[1]:
+            return
+        self._pivot_steps = self.pushes.interval(step, self.controller.steps_per_sample)
+        start, end = self._pivot_steps
+        self.model.opt.gravity[:] = self._still - self._pivot.mean(start * self.timestep, end * self.timestep)
+
+    def _control(self, data: mujoco.MjData, step: int, torques: Sequence[float]) -> bool:
+        lean = self.plant.largest_tilt(data.qpos)
+        if not abs(lean) <= math.radians(self.now.scenario.metrics.fall_angle_deg):
+            self._stop(data, f"the rig fell at t = {data.time:g} s; reset, or go back in time")
+            return False
+        try:
+            ticked = control(self.plant, self.controller, data)
+        except (InputError, RunStopped) as error:
+            self._stop(data, str(error))
+            return False
+        if ticked:
+            axes = range(len(torques))
+            self.ticks.append(tuple(self._plotted_tick(data, axis, torques[axis]) for axis in axes))
+        return ticked
+
+    def _plotted_tick(self, data: mujoco.MjData, axis: int, torque: float) -> PlottedTick:
+        """Return the last tick of an axis."""
+        line, tick = self.plant.axes[axis].line, self.controller.parts[axis].tick
+        assert tick is not None
+        x1 = math.degrees(float(line.lean(data.qpos)) + self.now.plant.axes[axis].bias)
+        return PlottedTick(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u, torque)
+
+    def _stop(self, data: mujoco.MjData, why: str) -> None:
+        self.stopped = why
+        for axis in self.plant.axes:
+            data.ctrl[axis.servos] = 0.0
+
+    def choose(self, data: mujoco.MjData, values: FieldValues) -> None:
+        """Change settings of the scenario on all axes; `note` has the reason of a refusal.
+
+        The controller starts afresh at the present state.
+
+        Args:
+            data: The plant's data.
+            values: Field, named as with `--set` -> value: the observer, the law, `controller.feedback`, the
+                accelerometers' noise, e.
+        """
+        self.sync_to_time(data)
+        try:
+            fields = changed_fields(self.base, self.now, values)
+            if self.now.scenario.plant.timestep_s is None:
+                fields["plant.timestep_s"] = self.timestep  # the one it runs with
+            new = self.now.with_settings(fields)
+        except InputError as error:
+            self.note = str(error)
+            return
+        source = self.base.scenario.source  # which would grow with every change
+        self.now = dataclasses.replace(new, scenario=new.scenario.with_source(source))
+        copy_physics_numbers(self.model, new.plant.model)  # in place, because others hold the model too
+        self.restart_controller(data)
+        self.note = "; ".join(new.hints)
+
+    def restart_controller(self, data: mujoco.MjData) -> None:
+        """Start the controller afresh at the present state, for instance after the failure of an observer."""
+        self.sync_to_time(data)
+        self.stopped = self.note = ""
+        self.controller = self.now.controller()
+
+    def push(self, data: mujoco.MjData, torque: float, duration_s: float, axis: int = 0) -> None:
+        """Push from now on: torque about a tilt axis by its index [N m], duration [s]."""
+        self.pushes.add(self.sync_to_time(data), torque, duration_s, axis)

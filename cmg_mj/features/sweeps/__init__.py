@@ -1,0 +1,117 @@
+"""A sweep from Python, in this process, on one object."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+
+from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.features.sweeps.cells import Trials, cells_in_blocks
+from cmg_mj.features.sweeps.chunk import compute, table_of
+from cmg_mj.features.sweeps.sobol import index_rows, index_table
+from cmg_mj.features.sweeps.study import SweepStudy, Variation, check_values, parse_axis, sampling
+from cmg_mj.results.trajectory import frame_of
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+WORLDS = 20
+"""Worlds a cell by default."""
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """The tables of a sweep, by name: `result["cells"]`, `dict(result)`.
+
+    Attributes:
+        study: The sweep.
+        trials: A row a trial: its point, what is varied, observer, world, outcome, and the figures of its run.
+        cells: A row a point and observer: means with 95 % intervals, the share of falls with Wilson's interval, and the
+            paired difference to the best observer of the point.
+        indices: A row a figure, observer and field, of a design for Sobol indices; None of another.
+    """
+
+    study: SweepStudy
+    trials: pa.Table
+    cells: pa.Table
+    indices: pa.Table | None = None
+
+    def keys(self) -> list[str]:
+        """List the names of the tables that there are: `trials`, `cells`, perhaps `indices`."""
+        return ["trials", "cells", *(["indices"] if self.indices is not None else [])]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def __len__(self) -> int:
+        return len(self.keys())
+
+    def __getitem__(self, name: str) -> pa.Table:
+        if name not in self.keys():
+            raise KeyError(name)
+        return getattr(self, name)
+
+    def to_pandas(self, table: str = "cells") -> pd.DataFrame:
+        """Make a pandas frame of one table.
+
+        Args:
+            table: The table's name: `cells`, `trials` or `indices`.
+
+        Returns:
+            The frame.
+
+        Raises:
+            InputError: pandas is not installed, or the sweep has no such table.
+        """
+        if table not in self.keys():
+            raise InputError(f"to_pandas: {table!r} is no table of this sweep; {nearest(table, self.keys())}")
+        return frame_of(self[table])
+
+
+def sweep(
+    scenario: Scenario | str,
+    vary: Mapping[str, Variation],
+    observers: Sequence[str] | None = None,
+    worlds: int = WORLDS,
+    sample: int | None = None,
+    sobol: int | None = None,
+) -> SweepResult:
+    """Run a scenario in every cell: every point of what is varied with every observer.
+
+    Args:
+        scenario: The scenario, or its name.
+        vary: Field, named as with `--set` -> a list of values, or one, or text as `--vary` takes it, such as "-1:1:5".
+        observers: The observers in the loop; by default the scenario's own. Baselines too, such as `zero`, whose trials
+            are those of a loop with the true rate.
+        worlds: Trials a cell: world i has the same noise in every cell.
+        sample: Number of points of a quasi-random design of the ranges and lists, instead of every combination.
+        sobol: Rows of a design for Sobol indices instead, a power of two.
+
+    Returns:
+        The trials and cells, as tables.
+
+    Raises:
+        InputError: A field or its values are not written so or do not fit the design, or an observer cannot run.
+    """
+    design, n = sampling(sample, sobol) or ("grid", 0)
+    base = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    axes = tuple(parse_axis(field, values, f"vary: {field!r}") for field, values in vary.items())
+    if isinstance(observers, str):
+        raise InputError(f"observers = {observers!r}: must be a list of names, such as ['linear', 'ltv']")
+    names = (base.observer.kind,) if observers is None else tuple(observers)
+    study = SweepStudy(base, axes, names, worlds, design, n)
+
+    check_values(study)
+    table = pa.concat_tables(table_of(study, compute(study, chunk)) for chunk in study.chunks)
+    trials = Trials(study, [table])
+    return SweepResult(
+        study,
+        table,
+        pa.concat_tables(cells_in_blocks(trials)),
+        index_table(index_rows(trials)) if design == "sobol" else None,
+    )

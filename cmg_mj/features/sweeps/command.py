@@ -1,0 +1,161 @@
+"""The command that sweeps a scenario over many plants, noises and observers."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, TypedDict, Unpack
+
+import click
+
+from cmg_mj.cli.arguments import RunArguments, observers_option, output_path, overwrites, run_options, worlds_option
+from cmg_mj.cli.terminal import (
+    CtrlC,
+    end_interrupted,
+    note,
+    progress,
+    show,
+    users_code,
+)
+from cmg_mj.core.errors import InputError
+
+if TYPE_CHECKING:
+    from cmg_mj.features.sweeps.study import SweepStudy
+    from cmg_mj.features.sweeps.study_file import SweepFields
+
+
+class StudyOptions(TypedDict):
+    """The options that make the study, by click's names."""
+
+    varied: tuple[str, ...]
+    observers: list[str] | None
+    worlds: int | None
+    sample: int | None
+    sobol: int | None
+
+
+@click.command(short_help="Run a scenario with varied fields, observers and noise.")
+@run_options
+@click.option(
+    "--vary",
+    "varied",
+    multiple=True,
+    metavar="FIELD=VALUES",
+    help="Field and its values: a list (0,0.5,1 or RK4,implicit), a range first:last:count, or a logarithmic range "
+    "log:first:last:count. With --sample or --sobol also low:high. Fields joined by + take the same values. May be "
+    "given again: the sweep runs every combination.",
+)
+@observers_option("the scenario's", distinct=False, baselines=True)
+@worlds_option("Worlds of each cell.  [default: 20]")
+@click.option(
+    "--sample", type=click.IntRange(1), metavar="N", help="Run N points of a quasi-random design instead of a grid."
+)
+@click.option(
+    "--sobol", type=click.IntRange(1), metavar="N", help="Run a design for Sobol indices; N is a power of two."
+)
+@click.option("--dry-run", is_flag=True, help="Print the number of trials, time and memory, and run nothing.")
+@click.option(
+    "--cluster",
+    metavar="ADDRESS",
+    help="Run on a Dask cluster: its scheduler's address, or local:2 for 2 workers on this machine.",
+)
+@click.option("--yes", is_flag=True, help="Run the sweep even if it is very large.")
+@users_code()
+def sweep(
+    arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool, **options: Unpack[StudyOptions]
+) -> None:
+    """Run SCENARIO, or the study file of a sweep, in many worlds with every observer at every varied value.
+
+    World i has the same noise for every observer and value. An interrupted sweep resumes when the same command runs
+    again.
+
+    \b
+    Writes a folder:
+      trials.parquet  a row for each trial
+      cells.parquet   means with 95 % intervals, fall fractions, paired differences to the best
+      report.md       the tables, with pictures
+      study.toml      reruns the sweep
+    """  # noqa: D301  (click wants the character itself)
+    from cmg_mj.features.sweeps.cells import COLUMNS, Trials, cells_of
+    from cmg_mj.features.sweeps.chunk import estimate_cost
+    from cmg_mj.features.sweeps.cluster import local_workers, on_cluster
+    from cmg_mj.features.sweeps.report import save, summary
+    from cmg_mj.features.sweeps.sobol import index_rows
+    from cmg_mj.features.sweeps.store import Store
+    from cmg_mj.features.sweeps.store import run as run_here
+    from cmg_mj.features.sweeps.study import MOST_TRIALS, check_values, counted
+    from cmg_mj.scenario.differences import safe_name
+
+    if cluster is not None:
+        local_workers(cluster)
+    study = _study(arguments, options)
+    check_values(study)
+    if dry_run:
+        cost = estimate_cost(study)
+        show(cost, _cost_text(cost), arguments.as_json)
+        return
+    if study.trials > MOST_TRIALS and not yes:
+        raise InputError(
+            f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; for more than "
+            f"{MOST_TRIALS} give --yes (--dry-run prints the time and memory)"
+        )
+    path = output_path(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
+    with nullcontext(run_here) if cluster is None else on_cluster(cluster) as run:
+        store = Store.open(path, study, overwrite=overwrites())
+        left = store.left()
+        before = study.trials - sum(study.chunks.size(number) for number in left)
+        if before:
+            note(f"resuming: {before} of {study.trials} trials are done")
+        with CtrlC() as ctrl_c:
+            try:
+                with progress(f"sweep {arguments.name}", study.trials, ctrl_c) as on_progress:
+                    run(store, left, on_progress)
+            except KeyboardInterrupt:
+                kept = f"finished trials are kept in {store.folder}"
+                end_interrupted(f"interrupted; {kept}, and the same command resumes the sweep")
+            trials = Trials(study, store.tables(COLUMNS))
+            indices = index_rows(trials) if study.design == "sobol" else []
+            save(store, trials, indices)
+    figures = {"trials": study.trials, "cells": list(cells_of(trials))} if arguments.as_json else {}
+    if study.design == "sobol":
+        figures["indices"] = [row._asdict() for row in indices]
+    show(figures, summary(trials, indices), arguments.as_json)
+    if not arguments.as_json or store.folder != path:
+        click.echo(f"Written to {store.folder}. Read {store.folder / 'report.md'}", err=True)
+
+
+def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
+    """Make the study of the command's options, which precede those of a study file."""
+    from cmg_mj.features.sweeps import WORLDS
+    from cmg_mj.features.sweeps.study import SweepStudy, parse_axis, sampling
+    from cmg_mj.features.sweeps.study_file import axes_of, design_of, locate_tracks, scenario_of, study_file
+    from cmg_mj.inputs.files import find
+
+    design = sampling(options["sample"], options["sobol"], prefix="--")
+    axes = []
+    for setting in options["varied"]:
+        field, _, values = setting.partition("=")
+        axes.append(parse_axis(field, values, f"--vary {setting}"))
+    fields = study_file(arguments.name)
+    settings: SweepFields = {}
+    if fields is None:
+        scenario = arguments.scenario()
+    else:
+        scenario = scenario_of(arguments.name, fields, arguments.settings)
+        if arguments.seed is not None:
+            scenario = scenario.model_copy(update={"seed": arguments.seed})
+        settings = fields.get("sweep", {})
+        axes = axes or axes_of(arguments.name, fields)
+    beside = find("scenarios", arguments.name, ".toml", "scenario").parent
+    axes = [locate_tracks(axis, beside) for axis in axes]
+    names = options["observers"] or settings.get("observers", [scenario.observer.kind])
+    worlds_per_cell = options["worlds"] or settings.get("worlds", WORLDS)
+    file_design = design_of(arguments.name, settings)  # refused if wrong, also where an option replaces it
+    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *(design or file_design))
+
+
+def _cost_text(cost: dict[str, float]) -> str:
+    size = "{points} points x {observers} observers x {worlds} worlds = {trials} trials in {chunks} chunks".format(
+        **cost
+    )
+    return f"{size}; about {cost['minutes']:.2g} min on this machine, {cost['memory_mb']:.0f} MB"

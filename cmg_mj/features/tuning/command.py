@@ -1,0 +1,240 @@
+"""The commands that fit an observer's parameters: to the gyro of a scenario, or to the reference of logs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import click
+
+from cmg_mj.cli.arguments import (
+    MOST_WORLDS,
+    RunArguments,
+    all_of,
+    claim_output,
+    json_option,
+    names_in,
+    observer_option,
+    out_option,
+    run_options,
+    settings_option,
+    worlds_option,
+)
+from cmg_mj.cli.terminal import (
+    CtrlC,
+    end_interrupted,
+    final_path,
+    progress,
+    say_written,
+    shell_command,
+    show,
+    users_code,
+)
+from cmg_mj.core.errors import InputError
+from cmg_mj.features.replay.command import log_options, noise_option, pendulum_option
+
+if TYPE_CHECKING:
+    from cmg_mj.features.replay.log import ReadOptions
+
+parameter_options = all_of(
+    click.option(
+        "--parameters", default="", metavar="NAMES", help="Parameters to tune, separated by commas.  [default: all]"
+    ),
+    click.option(
+        "--range",
+        "ranges",
+        multiple=True,
+        metavar="NAME=LOW:HIGH",
+        help="Range in which to search for a parameter. May be given again.",
+    ),
+)
+"""The options that select the parameters to tune."""
+
+
+@click.command(short_help="Fit an observer's parameters to the gyro of a scenario.")
+@observer_option("to tune")
+@run_options
+@worlds_option(
+    "Worlds to fit; as many more are held out for scoring.",
+    default=20,
+    range=(2, MOST_WORLDS // 10),  # whose trajectories are kept
+)
+@parameter_options
+@click.option(
+    "--noise-levels",
+    default="",
+    metavar="LIST",
+    help="Accelerometer noise densities to tune at, separated by commas [ug/rtHz].  [default: the scenario's]",
+)
+@users_code()
+def tune(
+    arguments: RunArguments,
+    observer: str | None,
+    worlds: int,
+    parameters: str,
+    ranges: tuple[str, ...],
+    noise_levels: str,
+) -> None:
+    """Fit an observer's parameters to the gyro of a scenario, as section V of aranovskiy2020 does.
+
+    The bundled scenario observer_tuning is the experiment of that paper. The loop is closed on the gyro, whatever the
+    scenario says, and its recording is replayed through the observer. The score is the RMS of the estimated rate less
+    the gyro's, from each push to one second after it, on held-out worlds. The command compares this score with that of
+    the given parameters (by default, the paper's). With several noise levels it also prints the level at which the
+    given parameters are best.
+
+    Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
+    """
+    from cmg_mj.features.tuning import figures_of, save_study, tuning_table
+    from cmg_mj.features.tuning import tune as fit
+    from cmg_mj.runs.save import file_name
+
+    scenario = arguments.scenario(observer)
+    default = f"tune-{file_name(scenario.observer.kind)}-{scenario.seed}"
+    densities = _densities(noise_levels)
+    folder = claim_output(arguments.out, default)
+    with CtrlC() as ctrl_c:
+        with progress(f"{scenario.title or arguments.name}: {scenario.observer.kind}", 1.0, ctrl_c) as on_progress:
+            study = fit(
+                scenario,
+                worlds=worlds,
+                parameters=names_in(parameters),
+                ranges=_ranges(ranges),
+                noise_ug_rthz=densities,
+                on_share=on_progress,
+            )
+        show(figures_of(study), tuning_table(study), arguments.as_json)
+        total = len(densities) or 1
+        files = save_study(folder, study, complete=len(study.levels) == total)
+    place = files[0].parent
+    say_written(
+        folder, place, f"Run with the tuned observer: {shell_command('cmg-mj', 'run', files[1])}", arguments.as_json
+    )
+    if ctrl_c.noted:
+        end_interrupted(f"interrupted; {len(study.levels)} of {total} noise levels are in {final_path(folder, place)}")
+
+
+@click.command("tune-log", short_help="Fit an observer's parameters to the reference of your own logs.")
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True)
+@observer_option("to tune", required=True)
+@log_options
+@parameter_options
+@click.option(
+    "--split",
+    type=float,
+    default=0.5,
+    show_default=True,
+    metavar="SHARE",
+    help="Share of each log, from its start, to fit; the rest is scored.",
+)
+@click.option(
+    "--settle-s",
+    type=float,
+    default=1.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Seconds to ignore at the start of each part of a log.",
+)
+@click.option(
+    "--closed-loop",
+    metavar="SCENARIO",
+    help="Scenario in whose closed loop the tuned parameters are compared with the given ones; none for no loop.  "
+    "[default: push_recovery, or that of a run's recording]",
+)
+@pendulum_option()
+@noise_option()
+@settings_option("Set a parameter to start from and to compare with.", "observer.NAME=VALUE")
+@out_option()
+@json_option()
+@users_code()
+def tune_log(
+    options: ReadOptions,
+    logs: tuple[str, ...],
+    observer: str,
+    parameters: str,
+    ranges: tuple[str, ...],
+    split: float,
+    settle_s: float,
+    closed_loop: str | None,
+    model: str | None,
+    noise: str,
+    settings: tuple[str, ...],
+    out: str | None,
+    as_json: bool,
+) -> None:
+    """Fit an observer's parameters to the reference of one part of each LOG, and score them on the rest.
+
+    \b
+      cmg-mj tune-log LOG.csv --columns tilt=pitch_deg,rate=gyro_dps --observer linear
+
+    The score is the RMS of the estimated rate less the reference, compared with that of the parameters as given. Tuned
+    parameters count as better by more than 1 % and beyond chance. Sixteen short worlds compare both in a closed loop.
+    Logs are read as in replay. Writes a folder with tuned.json.
+    """  # noqa: D301  (click wants the character itself)
+    from cmg_mj.features.replay.inputs import model_of
+    from cmg_mj.features.replay.noise import noise_numbers
+    from cmg_mj.features.replay.reading import check_distinct_logs, read_log
+    from cmg_mj.features.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
+    from cmg_mj.features.tuning.closed_loop import loop_scenario
+    from cmg_mj.inputs.parameter_options import parameters_of
+    from cmg_mj.runs.save import file_name
+    from cmg_mj.scenario.differences import safe_name
+
+    for setting in settings:
+        if not setting.startswith("observer."):
+            raise InputError(f"--set {setting}: write observer.PARAMETER=VALUE")
+    start_parameters = parameters_of([observer + setting.removeprefix("observer") for setting in settings])
+    noises = noise_numbers(noise)
+    check_distinct_logs(logs)
+    recordings = [read_log(path, options) for path in logs]
+    pendulum = None if model is None else model_of(model)
+    loop = loop_scenario(closed_loop, recordings[0])
+    folder = claim_output(out, f"tune-{file_name(observer)}-{safe_name(recordings[0].name)}")
+    with CtrlC() as ctrl_c:
+        with progress(f"{recordings[0].name}: {observer}", 1.0, ctrl_c) as on_progress:
+            study = tune_on_logs(
+                recordings,
+                observer,
+                model=pendulum,
+                noises=noises,
+                start_parameters=start_parameters.get(observer),
+                split=split,
+                settle_s=settle_s,
+                parameters=names_in(parameters),
+                ranges=_ranges(ranges),
+                closed_loop=loop,
+                on_share=on_progress,
+            )
+        show(figures_of_logs(study), logs_table(study), as_json)
+        place = save_log_study(folder, study)
+    tuned = " ".join(f"--set '{setting}'" for setting in study.settings())
+    say_written(folder, place, f"Replay it tuned: {tuned}", as_json)
+
+
+def _ranges(texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+    """Parse texts such as `L=10.4:1000`."""
+    ranges = {}
+    for text in texts:
+        name, _, ends = text.partition("=")
+        low, _, high = ends.partition(":")
+        try:
+            ranges[name.strip()] = float(low), float(high)
+        except ValueError as error:
+            raise InputError(f"--range {text!r}: write NAME=LOW:HIGH, for example tau=0.005:0.1") from error
+    return ranges
+
+
+def _densities(text: str) -> list[float]:
+    """Parse noise densities separated by commas; a repeated one counts once."""
+    densities: list[float] = []
+    for part in names_in(text):
+        try:
+            density = float(part)
+        except ValueError:
+            density = -1.0
+        if not 0.0 <= density < math.inf:
+            raise InputError(f"--noise-levels {part!r}: must be numbers not below 0, separated by commas")
+        densities.append(density)
+    if text and not densities:
+        raise InputError(f"--noise-levels {text!r}: give numbers separated by commas")
+    return list(dict.fromkeys(densities))

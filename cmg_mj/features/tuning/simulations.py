@@ -1,0 +1,211 @@
+"""Recordings of the tuning experiment: the loop closed on the gyro, and the windows that are scored."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.types import law_needs
+from cmg_mj.features.replay import replay
+from cmg_mj.laws import LAW_CLASSES
+from cmg_mj.observers import Observer
+from cmg_mj.results.result import Result
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
+from cmg_mj.scenario.schema import ObserverSettings, Scenario
+from cmg_mj.scenario.time_grid import common_period
+from cmg_mj.stages.push import Window, inside, push_windows
+
+WARM_UP_S = 2.0
+"""Time before the window that is replayed as well, for the observer to settle [s]."""
+
+
+def windows_of(scenario: Scenario) -> list[Window]:
+    """Return the scored windows: from each push to one second after its end; the whole run without a push.
+
+    Over a whole run with a push, an estimate of zero would have the smallest error: outside that second the plant
+    hardly moves.
+    """
+    end = scenario.duration_s
+    windows = push_windows(scenario.push) or [(0.0, end)]
+    return [(start, min(stop, end)) for start, stop in windows if start < end] or windows
+
+
+def window_of(scenario: Scenario) -> Window:
+    """Return the start of the first window and the end of the last [s]."""
+    windows = windows_of(scenario)
+    return windows[0][0], windows[-1][1]
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Measurements and commands of some worlds, all of which stood.
+
+    Attributes:
+        trajectory: Trajectory from the warm-up to the window's end.
+        window: Start and end of the scored time [s].
+        fell: Number of worlds that fell and are discarded.
+        windows: Parts of the window that are scored, if not all of it is [s].
+    """
+
+    trajectory: Trajectory
+    window: Window
+    fell: int = 0
+    windows: Sequence[Window] = ()
+
+    @property
+    def worlds(self) -> int:
+        """Number of worlds."""
+        return self.trajectory["y1_rad"].shape[1]
+
+    @property
+    def largest_acceleration(self) -> float:
+        """Largest acceleration of the tilt, by differences of its true rate [rad/s^2]."""
+        steps = np.diff(self.trajectory["x2_rad_s"], axis=0) / np.diff(self.trajectory["time_s"])[:, None]
+        return float(np.abs(steps).max())
+
+    @property
+    def zero_rms(self) -> float:
+        """Error of an estimate of zero: RMS of the gyro's rate over the window, mean of the worlds [rad/s]."""
+        return float(np.sqrt(np.mean(self.trajectory["fog_rad_s"][self._scored] ** 2, axis=0)).mean())
+
+    @property
+    def _scored(self) -> np.ndarray:
+        """Mask of the scored rows, (n_ticks,)."""
+        return inside(self.trajectory["time_s"], self.windows or [self.window])
+
+    def errors(self, observer: Observer) -> np.ndarray:
+        """Return the RMS over the window of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN on failure."""
+        scored = self._scored
+        with np.errstate(all="ignore"):
+            difference = replay(observer, self.trajectory).x2[scored] - self.trajectory["fog_rad_s"][scored]
+            return np.sqrt(np.mean(difference**2, axis=0))
+
+
+def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> Scenario:
+    """Return the scenario of the tuning experiment: the law fed by the gyro and the measured angles.
+
+    No observer takes part in that loop, so one recording serves all observers; it ends with the window.
+
+    Args:
+        scenario: The experiment.
+        noise_ug_rthz: Another noise density of the accelerometers [ug/sqrt(Hz)].
+
+    Returns:
+        The scenario to record.
+    """
+    sensors = scenario.sensors
+    if noise_ug_rthz is not None:
+        sensors = sensors.with_noise_density(noise_ug_rthz)
+    period = scenario.plant.timestep_s or common_period(scenario)
+    duration = math.ceil(window_of(scenario)[1] / period - 1e-9) * period
+    feedback = scenario.controller.feedback
+    if feedback == "observer" and law_needs(LAW_CLASSES.find(scenario.controller.kind)):
+        feedback = "fog"
+    loop = {"feedback": feedback, "bias_trim_s": 0.0}
+    return scenario.model_copy(
+        update={
+            "duration_s": duration,
+            "controller": scenario.controller.model_copy(update=loop),
+            "observer": ObserverSettings(kind="finite_difference"),  # its angles are the measured ones
+            "open_loop_observers": [],
+            "sensors": sensors,
+        }
+    )
+
+
+RecordingRequest = tuple[Scenario, Sequence[int], float | None]
+"""A scenario, the worlds' numbers, and another noise density of the accelerometers [ug/sqrt(Hz)]."""
+
+
+def record_all(
+    requests: Sequence[RecordingRequest],
+    *,
+    warm_up_s: float = WARM_UP_S,
+    on_share: Callable[[float], None] | None = None,
+) -> list[Recorded]:
+    """Run tuning experiments, in one batch where possible.
+
+    Args:
+        requests: The recordings; `tuning_scenario` changes their scenarios.
+        warm_up_s: Time before the window that is kept [s].
+        on_share: Called now and then with the completed share.
+
+    Returns:
+        The worlds that stood, request by request.
+
+    Raises:
+        InputError: Fewer than two worlds of a request stood.
+        KeyboardInterrupt: The user interrupted.
+    """
+    experiments = [prepare(tuning_scenario(scenario, noise)) for scenario, _, noise in requests]
+    runs = [
+        BatchJob([experiment] * len(worlds), worlds)
+        for experiment, (_, worlds, _) in zip(experiments, requests, strict=True)
+    ]
+    duration = max(experiment.scenario.duration_s for experiment in experiments)
+    results = run_side_by_side(runs, on_progress=on_share and (lambda time: on_share(min(time / duration, 1.0))))
+    return [_recorded(*run, warm_up_s) for run in zip(requests, experiments, results, strict=True)]
+
+
+def _recorded(request: RecordingRequest, experiment: Experiment, result: Result, warm_up_s: float) -> Recorded:
+    scenario, duration = request[0], experiment.scenario.duration_s
+    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        raise KeyboardInterrupt
+    stood = np.array([outcome.kind == "done" for outcome in result.outcomes])
+    if stood.sum() < 2:
+        raise InputError(
+            f"{scenario.title or 'the scenario'}: with the law fed by the {experiment.scenario.controller.feedback}, "
+            f"{len(stood) - stood.sum()} of {len(stood)} worlds fell before {duration:g} s: there is nothing to tune on"
+        )
+    window = window_of(scenario)
+    assert result.trajectory is not None
+    trajectory = result.trajectory.of_worlds(stood).between(window[0] - warm_up_s, window[1])
+    return Recorded(trajectory, window, int((~stood).sum()), windows_of(scenario))
+
+
+def record(
+    scenario: Scenario,
+    worlds: Sequence[int],
+    *,
+    noise_ug_rthz: float | None = None,
+    warm_up_s: float = WARM_UP_S,
+    on_share: Callable[[float], None] | None = None,
+) -> Recorded:
+    """Run one tuning experiment; see `record_all`."""
+    return record_all([(scenario, worlds, noise_ug_rthz)], warm_up_s=warm_up_s, on_share=on_share)[0]
+
+
+def recorder(requests: Sequence[RecordingRequest], *, warm_up_s: float = WARM_UP_S) -> Callable[..., Recorded]:
+    """Make the recordings of several calls of `tune` at once.
+
+    Args:
+        requests: The recordings; the observer takes no part in them.
+        warm_up_s: Time before the window that is kept [s].
+
+    Returns:
+        A function that returns them, the `recorded` of `tune`.
+    """
+    distinct = {_key(*request): request for request in requests}
+    recordings = dict(zip(distinct, record_all(list(distinct.values()), warm_up_s=warm_up_s), strict=True))
+
+    def recorded(scenario: Scenario, worlds: Sequence[int], *, noise_ug_rthz: float, warm_up_s: float) -> Recorded:
+        return recordings[_key(scenario, worlds, noise_ug_rthz)]
+
+    return recorded
+
+
+def halves(scenario: Scenario, worlds: int, noise_ug_rthz: Sequence[float]) -> list[RecordingRequest]:
+    """Return the requests of `tune`: worlds to fit and as many held out, at every noise."""
+    spans = range(worlds), range(worlds, 2 * worlds)
+    return [(scenario, span, density) for density in noise_ug_rthz for span in spans]
+
+
+def _key(scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None) -> tuple:
+    """Return what a recording depends on: the whole recorded scenario, and the worlds."""
+    return tuple(worlds), repr(tuning_scenario(scenario, noise_ug_rthz))

@@ -1,0 +1,180 @@
+"""The parts of a rig, by name and kind; finds all parts that a model lacks, not only the first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+
+from cmg_mj.core.errors import nearest
+
+EQUILIBRIUM_KEY = "equilibrium"
+TILT_ELEMENT = "tilt"
+"""The hinge that a rig tilts about, or the site whose y axis lies along a line that it tilts about."""
+BEND_JOINT = "bend"
+"""Joint and body that a frame which bends gets, beside what its file has."""
+SENSORS = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
+REQUIRED_PARTS = (
+    "a rig needs a joint or a site tilt, the joints MODULE/gimbal, MODULE/flywheel, the actuators MODULE/gimbal_servo, "
+    f"MODULE/flywheel_motor, the sensors MODULE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe "
+    f"{EQUILIBRIUM_KEY}, for one MODULE or more; of several axes each has its name before these, as roll/tilt and "
+    "roll/MODULE/gimbal"
+)
+ON_A_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+"""Transmissions of an actuator that drives a joint."""
+_OF_A_MODULE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
+JOINT_KINDS = {
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name for name in ("hinge", "slide", "ball", "free")
+}
+
+
+@dataclass(frozen=True)
+class Module:
+    """Addresses of one module in the compiled model.
+
+    Attributes:
+        name: Its prefix, `cube1`.
+        gimbal: Address of the gimbal angle in qpos.
+        gimbal_dof: Address of its rate in qvel; the same where a rig consists of hinges and slides alone.
+        flywheel: Address of the flywheel's angle in qpos.
+        flywheel_dof: Address of its rate in qvel.
+        servo: The gimbal servo's control.
+        motor: The flywheel motor's control.
+        direction: +1 or -1: the sign of u its gimbal is given, so that all modules push the same way.
+        gimbal_zero: Gimbal angle at which the spin axis is upright, x3 = 0 [rad].
+        speed: Nominal flywheel speed, signed [rad/s].
+    """
+
+    name: str
+    gimbal: int
+    gimbal_dof: int
+    flywheel: int
+    flywheel_dof: int
+    servo: int
+    motor: int
+    direction: float
+    gimbal_zero: float
+    speed: float
+
+    @property
+    def of_axis(self) -> str:
+        """The module's name without that of its axis: `cube1` of `roll/cube1`."""
+        return self.name.rpartition("/")[2]
+
+
+def missing_parts(spec: mujoco.MjSpec) -> list[str]:
+    """List the joints, actuators, sensors and the keyframe that a rig needs and a parsed model lacks.
+
+    The compiler, which comes after this, would only say that the keyframe has the wrong size.
+
+    Args:
+        spec: The parsed model.
+
+    Returns:
+        Clauses for an error message.
+    """
+    elements = {
+        "joint": {joint.name: joint for joint in spec.joints},
+        "actuator": {actuator.name: actuator for actuator in spec.actuators},
+        "sensor": {sensor.name: sensor for sensor in spec.sensors},
+        "keyframe": {key.name: key for key in spec.keys},
+    }
+    missing: dict[str, list[str]] = {kind: [] for kind in elements}
+    wrong = []
+
+    def check(kind: str, name: str, is_right: Callable[[Any], bool], what: str) -> None:
+        if name not in elements[kind]:
+            missing[kind] += [] if name in missing[kind] else [name]
+        elif not is_right(elements[kind][name]):
+            wrong.append(what)
+
+    for joint in spec.joints:
+        if not joint.name:
+            wrong.append(f"the joint of body {joint.parent.name!r} has no name")
+    if "yaw" in elements["joint"]:
+        check("joint", "yaw", _is_hinge, "joint 'yaw' must be a hinge")
+    names = [name for kind in elements.values() for name in kind]
+    sites = {site.name for site in spec.sites}
+    for axis in axes_in([*names, *sites]) or [""]:
+        prefix = f"{axis}/" if axis else ""
+        if prefix + TILT_ELEMENT not in sites:
+            check(
+                "joint",
+                prefix + TILT_ELEMENT,
+                _turns_about_y,
+                f'joint {prefix + TILT_ELEMENT!r} must turn about y (axis="0 1 0")',
+            )
+            check("joint", prefix + TILT_ELEMENT, _is_hinge, f"joint {prefix + TILT_ELEMENT!r} must be a hinge")
+        for module in modules_in(names, axis) or [f"{prefix}cube1"]:
+            for name, actuator in (("gimbal", "gimbal_servo"), ("flywheel", "flywheel_motor")):
+                joint, drive = f"{module}/{name}", f"{module}/{actuator}"
+                check("joint", joint, _is_hinge, f"joint {joint!r} must be a hinge")
+                check("actuator", drive, _drives(joint), f"actuator {drive!r} must drive the joint {joint!r}")
+            joint, encoder = f"{module}/gimbal", f"{module}/gimbal_encoder"
+            check("sensor", encoder, _reads(joint), f"sensor {encoder!r} must be the jointpos of {joint!r}")
+        for name, kind in SENSORS.items():
+            check("sensor", prefix + name, _is_a(kind), f"sensor {prefix + name!r} must be of the kind {kind!r}")
+    check("keyframe", EQUILIBRIUM_KEY, lambda _: True, "")
+    return [_missing(kind, names, list(elements[kind])) for kind, names in missing.items() if names] + wrong
+
+
+def element_id(model: mujoco.MjModel, kind: str, name: str) -> int:
+    """Return the number of an element of a kind, such as `joint`; -1 if there is none of that name."""
+    return int(mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
+
+
+def joint_sizes(kind: int) -> tuple[int, int]:
+    """Return how many numbers a joint of a kind (MuJoCo's mjtJoint) has in qpos and in qvel."""
+    return {0: (7, 6), 1: (4, 3)}.get(kind, (1, 1))
+
+
+def axes_in(names: Iterable[str]) -> list[str]:
+    """Names of the axes that elements' names speak of; the only one of a rig need have none."""
+    of_an_axis = {TILT_ELEMENT, *SENSORS}
+    axes = [axis for name in names for axis, _, last in [name.rpartition("/")] if last in of_an_axis]
+    return list(dict.fromkeys(axes))
+
+
+def modules_in(names: Iterable[str], axis: str) -> list[str]:
+    """Prefixes of the modules of an axis that elements' names speak of, such as `cube1` or `roll/cube1`."""
+    prefixes = dict.fromkeys(name.rpartition("/")[0] for name in names if name.endswith(_OF_A_MODULE))
+    return [prefix for prefix in prefixes if prefix.rpartition("/")[0] == axis]
+
+
+def axes_of(model: mujoco.MjModel) -> dict[str, list[str]]:
+    """Find the axes of a compiled model, each with the names of its modules."""
+    joints = [model.joint(i).name for i in range(model.njnt)]
+    sites = [model.site(i).name for i in range(model.nsite)]
+    return {axis: modules_in(joints, axis) for axis in axes_in([*joints, *sites])}
+
+
+def _missing(kind: str, names: list[str], known: list[str]) -> str:
+    """Write `the model has no joint 'tilt'; did you mean 'tlit'? its joints: tlit, yaw`."""
+    hints = [nearest(name, known, f"its {kind}s") for name in names]
+    meant = [hint.removeprefix("did you mean ").partition("? ")[0] for hint in hints if "? its " in hint]
+    listing = hints[0].rpartition("? ")[2]
+    guess = f"did you mean {', '.join(dict.fromkeys(meant))}? " if meant else ""
+    return f"the model has no {kind} {', '.join(map(repr, names))}; {guess}{listing}"
+
+
+def _is_hinge(joint: Any) -> bool:
+    return int(joint.type) == int(mujoco.mjtJoint.mjJNT_HINGE)
+
+
+def _turns_about_y(joint: Any) -> bool:
+    x, y, z = joint.axis
+    return y > 0.0 and x == z == 0.0
+
+
+def _drives(joint: str) -> Callable[[Any], bool]:
+    return lambda drive: drive.target == joint and int(drive.trntype) == int(mujoco.mjtTrn.mjTRN_JOINT)
+
+
+def _reads(joint: str) -> Callable[[Any], bool]:
+    return lambda sensor: sensor.objname == joint and int(sensor.type) == int(mujoco.mjtSensor.mjSENS_JOINTPOS)
+
+
+def _is_a(kind: str) -> Callable[[Any], bool]:
+    return lambda sensor: int(sensor.type) == int(getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"))

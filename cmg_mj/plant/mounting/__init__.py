@@ -1,6 +1,0 @@
-"""Mounting of scissored pairs on a user's own robot: MJCF in, a plant out."""
-
-from cmg_mj.plant.mounting.mount import mount
-from cmg_mj.plant.mounting.mounted import MountedRobot
-
-__all__ = ["MountedRobot", "mount"]

@@ -1,0 +1,66 @@
+"""Coupling of the axes by a turn about the vertical, which sweeps the momenta of an axis' wheels and tilt round."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from cmg_mj.plant.axis import Axis
+from cmg_mj.plant.elements import Module
+from cmg_mj.plant.inertia import wheel_momentum
+from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.tilt_line import UP
+from cmg_mj.stages.turning import YawCoupling
+
+
+def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCoupling:
+    """Compute the coupling of the axes in a turn about the vertical.
+
+    Args:
+        model: The compiled model.
+        key: The keyframe at which the rig stands upright.
+        axes: Its axes.
+
+    Returns:
+        The coefficients, from the wheels' axes and speeds and the masses as the model has them.
+    """
+    data = at_keyframe(model, key)
+    along = [data.xmat[axis.frame].reshape(3, 3) @ axis.direction for axis in axes]
+    swept = [sum((_turned(model, data, module) for module in axis.modules), np.zeros(3)) for axis in axes]
+    pushes = [float(n @ s) for n, s in zip(along, swept, strict=True)]
+    rows = [(n, push, _inertia(model, data, axis)) for n, push, axis in zip(along, pushes, axes, strict=True)]
+    wheels = [[-float(n @ np.cross(UP, s)) / push for s in swept] for n, push, _ in rows]
+    body = [
+        [float((n @ about @ n + m @ about @ m - UP @ about @ UP) * (n @ np.cross(m, UP))) / push for m in along]
+        for n, push, about in rows
+    ]
+    coriolis = [[2.0 * float(n @ np.cross(UP, m)) for m in along] for n, _, _ in rows]
+    return YawCoupling(np.array(wheels), np.array(body), np.array(coriolis))
+
+
+def _turned(model: mujoco.MjModel, data: mujoco.MjData, module: Module) -> np.ndarray:
+    """Return the derivative of a wheel's momentum by x3 at x3 = 0, in the world (3,) [N m s]."""
+    gimbal, wheel = int(model.dof_jntid[module.gimbal_dof]), int(model.dof_jntid[module.flywheel_dof])
+    return module.direction * np.cross(data.xaxis[gimbal], wheel_momentum(model, data, wheel, module.speed))
+
+
+def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarray:
+    """Return the inertia of all that tilts about a point of the line, in the world (3, 3) [kg m^2]."""
+    pivot = data.xpos[axis.frame] + data.xmat[axis.frame].reshape(3, 3) @ axis.point
+    inertia = np.zeros((3, 3))
+    for body in _tilting(model, int(model.jnt_bodyid[axis.line.joint])):
+        axes, arm = data.ximat[body].reshape(3, 3), data.xipos[body] - pivot
+        inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
+        inertia += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return inertia
+
+
+def _tilting(model: mujoco.MjModel, root: int) -> list[int]:
+    """Return a body and its descendants."""
+    bodies = {root}
+    for body in range(root + 1, model.nbody):  # children come after their parents
+        if int(model.body_parentid[body]) in bodies:
+            bodies.add(body)
+    return sorted(bodies)

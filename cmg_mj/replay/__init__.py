@@ -1,5 +1,0 @@
-"""Observers replayed open loop: on a run's recording, and on a user's log, where they are judged."""
-
-from cmg_mj.replay.open_loop import replay, replay_all
-
-__all__ = ["replay", "replay_all"]

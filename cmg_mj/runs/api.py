@@ -1,0 +1,87 @@
+"""A comparison of observers from Python, in this process, on one object."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.results.summary_keys import Summary
+from cmg_mj.results.trajectory import frame_of
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.runs import comparison
+from cmg_mj.runs.comparison import ComparedObserver
+from cmg_mj.runs.statistics import standings, worlds_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+WORLDS = 20
+"""Worlds an observer by default."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Observers on the same plant, pushes and noise, by name: `comparison["gyro_free"]`.
+
+    Attributes:
+        observers: Name -> the observer's experiment, the result of all worlds, and world 0 with its trajectory.
+    """
+
+    observers: Mapping[str, ComparedObserver]
+
+    def keys(self) -> list[str]:
+        """List the observers' names, in the order given."""
+        return list(self.observers)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.observers)
+
+    def __len__(self) -> int:
+        return len(self.observers)
+
+    def __getitem__(self, name: str) -> ComparedObserver:
+        return self.observers[name]
+
+    @property
+    def summaries(self) -> list[Summary]:
+        """Summaries of the observers, then the baselines: means over the worlds, with 95 % intervals."""
+        return standings(list(self.observers.values()))
+
+    def table(self) -> pa.Table:
+        """Make a table with a row per observer and world, then the baselines' rows: columns as in `Result.table`."""
+        return worlds_table(list(self.observers.values()))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Make a pandas frame of `table`.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return frame_of(self.table())
+
+
+def compare(scenario: Scenario | str, observers: Sequence[str], worlds: int = WORLDS) -> Comparison:
+    """Run every observer in many worlds: world i has the same plant, pushes and noise for each observer.
+
+    Args:
+        scenario: The scenario, or its name.
+        observers: The observers' names, or `package.module:Class`; each takes its turn in the loop.
+        worlds: Worlds an observer.
+
+    Returns:
+        The comparison.
+
+    Raises:
+        InputError: An observer does not exist or is named twice, or something does not fit.
+    """
+    if isinstance(observers, str) or not observers or len(set(observers)) < len(observers):
+        raise InputError(f"observers = {observers!r}: must be a list of different names")
+    if worlds < 1:
+        raise InputError(f"worlds = {worlds}: must be at least 1")
+    base = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    compared = comparison.compare(comparison.prepare_comparison(base, observers), worlds)
+    return Comparison({entry.kind: entry for entry in compared})

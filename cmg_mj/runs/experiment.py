@@ -1,0 +1,450 @@
+"""A scenario made ready to run."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Unpack
+
+import numpy as np
+import tomli_w
+
+from cmg_mj.laws import Law
+from cmg_mj.features.board.processor import Processor
+from cmg_mj.core.axes import AnyController, MultiAxisController
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.errors import InputError
+from cmg_mj.inputs.overrides import assign
+from cmg_mj.features.bend.verdict import bend_hints, judge_bend
+from cmg_mj.linear.loop import linear_closed_loop
+from cmg_mj.linear.verdict import hints
+from cmg_mj.observers import Observer
+from cmg_mj.plant.plant import Plant
+from cmg_mj.results.files import whole_file
+from cmg_mj.runs.rerun_head import rerun_head
+from cmg_mj.results.result import Driver, Result
+from cmg_mj.scenario.design import Design, design
+from cmg_mj.scenario.loading import base_of
+from cmg_mj.features.pivot.settings import Pivot
+from cmg_mj.scenario.resolve import differences, resolved
+from cmg_mj.scenario.schema import Scenario, parse_scenario
+from cmg_mj.scenario.time_grid import time_grid
+from cmg_mj.runs.batch import (
+    AxisPart,
+    BatchKey,
+    batch_key,
+    batched,
+    batched_interface,
+    batched_open_loop_observers,
+    hashable,
+    once,
+    require_same_structure,
+    varied_settings,
+)
+from cmg_mj.plant.build import check_scenario, plant_on_grid
+from cmg_mj.runs.simulate import SimulationOptions, simulate
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.turning import compensation
+
+if TYPE_CHECKING:
+    import control
+
+
+@dataclasses.dataclass(frozen=True)
+class Experiment:
+    """A scenario made ready to run: its plant is loaded, everything in it has been constructed once and fits.
+
+    Attributes:
+        scenario: What it was made from.
+        plant: The rig.
+        design: The law and the observers; of several axes the first one's.
+        axes: One an axis, if the rig has several, or if the scenario says of an axis what it has of its own.
+    """
+
+    scenario: Scenario
+    plant: Plant
+    design: Design
+    axes: tuple[Experiment, ...] = ()
+
+    @property
+    def law(self) -> Law:
+        """The control law."""
+        return self.design.law
+
+    @property
+    def observer_title(self) -> str:
+        """The observer in the loop; of several axes with observers of their own, each with its axis."""
+        kinds = [part.scenario.observer.kind for part in self.parts]
+        if len(set(kinds)) == 1:
+            return kinds[0]
+        return ", ".join(f"{part.plant.axis.name} {kind}" for part, kind in zip(self.parts, kinds, strict=True))
+
+    @property
+    def observer_names(self) -> list[str]:
+        """The observer in the loop, then the open-loop observers; of several axes the first one's."""
+        first = self.parts[0].scenario
+        return [first.observer.kind, *first.open_loop_names()]
+
+    def controller(self, worlds: int | Sequence[int] = 0) -> AnyController:
+        """Make a fresh controller.
+
+        Args:
+            worlds: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
+
+        Returns:
+            The controller; of several axes a `MultiAxisController`.
+        """
+        return self.of_axes(
+            [part.design.controller(part.plant.interface, worlds=worlds, axis=i) for i, part in enumerate(self.parts)]
+        )
+
+    def axis_controller(
+        self, worlds: int | Sequence[int] = 0, processor: Processor | None = None, observer: Observer | None = None
+    ) -> Controller:
+        """Make a fresh controller of the only axis.
+
+        Args:
+            worlds: The number of one world, or the numbers of many.
+            processor: Takes the decisions in the host's place.
+            observer: Instead of the scenario's.
+
+        Returns:
+            The controller.
+
+        Raises:
+            InputError: The plant has several axes.
+        """
+        part = self.require_single_axis("one controller" if processor is None else "a board or other processor")
+        return part.design.controller(part.plant.interface, worlds=worlds, processor=processor, observer=observer)
+
+    def of_axes(self, controllers: Sequence[Controller]) -> AnyController:
+        """Join the controllers of the axes; of one axis its controller itself."""
+        if len(controllers) == 1:
+            return controllers[0]
+        compensates = self.scenario.controller.compensate_turning
+        between = compensation(self.plant.turning, self.scenario.sensors.mems_gyro) if compensates else None
+        return MultiAxisController(controllers, between)
+
+    def run(self, driver: Driver = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
+        """Run one world. Options are those of `simulate`."""
+        if driver == "board":
+            from cmg_mj.features.board import on_a_board
+
+            self.require_single_axis("the board")
+            with on_a_board(self.axis_controller()) as board:
+                return dataclasses.replace(self.run_on(board, world, **options), driver="board")
+        if driver == "plugin":
+            from cmg_mj.features.plugin.make import run_with_plugin
+
+            return run_with_plugin(self, int(world), **options)
+        return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
+
+    def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
+        """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
+        return self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
+
+    def run_many(
+        self,
+        worlds: int | Sequence[int],
+        plants: Sequence[Plant] | None = None,
+        vary: Mapping[str, Sequence[Any] | np.ndarray] | None = None,
+        **options: Unpack[SimulationOptions],
+    ) -> Result:
+        """Run many worlds at once.
+
+        Args:
+            worlds: How many, or their numbers: world i has the same noise wherever it stands.
+            plants: A plant a world, if they differ.
+            vary: The same by settings: a field -> its value in each world, such as {"equilibrium_bias_deg": [0.0, 0.5],
+                "push.0.torque_n_m": [1.0, 2.0]}. Only numbers that worlds of one batch may differ in: see `batch.py`.
+            **options: Those of `simulate`.
+
+        Returns:
+            The result of all worlds.
+
+        Raises:
+            InputError: There is no world, or the plants do not fit the worlds or each other.
+        """
+        numbers = [int(number) for number in (range(worlds) if isinstance(worlds, int) else worlds)]
+        if vary is not None and plants is not None:
+            raise InputError("run_many: give plants or vary, not both")
+        if vary is not None:
+            return run_batch(self.with_varied(vary), numbers, **options)
+        plants = [self.plant] * len(numbers) if plants is None else list(plants)
+        require_same_structure(plants, len(numbers), self.plant)
+        controllers = [
+            part.design.controller(batched_interface(part.plant, plants, i), worlds=numbers, axis=i)
+            for i, part in enumerate(self.parts)
+        ]
+        return self.simulate(plants, self.of_axes(controllers), **options)
+
+    @property
+    def batch_key(self) -> BatchKey:
+        """Key that its worlds share with all worlds that may run in one batch with them."""
+        return batch_key(
+            [AxisPart(part.scenario, part.design, part.plant.axis.name if self.axes else "") for part in self.parts]
+        )
+
+    @property
+    def parts(self) -> tuple[Experiment, ...]:
+        """One an axis."""
+        return self.axes or (self,)
+
+    def with_varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
+        """Return the scenario with other settings in each world; worlds with equal settings share one.
+
+        Args:
+            vary: Field -> its value in each world. A field is named as with `--set`; one of [plant] by itself too.
+
+        Returns:
+            An experiment a world.
+
+        Raises:
+            InputError: There is no such field, a value is not allowed, or the lists differ in length.
+        """
+        keyed = [(hashable(row), row) for row in varied_settings(vary, self.scenario)]
+        experiments = {key: self.with_settings(row) for key, row in dict(keyed).items()}
+        return [experiments[key] for key, _ in keyed]
+
+    def with_settings(self, values: Mapping[str, Any]) -> Experiment:
+        """Return the experiment with other values of some fields.
+
+        Args:
+            values: By field, named as with `--set`.
+
+        Returns:
+            Another experiment; a model file that stays the same is not compiled again.
+
+        Raises:
+            InputError: There is no such field, or a value is not allowed.
+        """
+        fields = self.scenario.as_fields()
+        for name, value in values.items():
+            assign(fields, name, value, f"vary: {name!r}")
+        settings = ", ".join(f"{name}={value}" for name, value in values.items())
+        return prepare(parse_scenario(fields, f"{self.scenario.source} with {settings}".strip()), like=self.plant)
+
+    def simulate(
+        self,
+        plant: Plant | Sequence[Plant],
+        controller: AnyController,
+        pushes: Sequence[Push] | None = None,
+        pivots: Sequence[Pivot] | None = None,
+        driver: Driver = "native",
+        **options: Unpack[SimulationOptions],
+    ) -> Result:
+        """Run a controller on one rig or several, for the scenario's time and judged by its settings.
+
+        Args:
+            plant: The rig, or one a world.
+            controller: A fresh one.
+            pushes: Instead of the scenario's.
+            pivots: Likewise.
+            driver: What calls the controller.
+            **options: Those of `simulate`.
+
+        Returns:
+            The result.
+        """
+        scenario = self.scenario
+        return simulate(
+            plant,
+            controller,
+            scenario.duration_s,
+            observers={name: part.observer_names for name, part in zip(self.plant.axis_names, self.parts, strict=True)},
+            pushes=scenario.push if pushes is None else pushes,
+            swings=scenario.swing,
+            pivots=scenario.pivot if pivots is None else pivots,
+            settings=scenario.metrics,
+            driver=driver,
+            **options,
+        )
+
+    def require_single_axis(self, what: str) -> Experiment:
+        """Return the experiment of the only axis, and refuse a plant of several.
+
+        Args:
+            what: The operation that takes one axis, for the message.
+
+        Returns:
+            The experiment of that axis.
+
+        Raises:
+            InputError: The rig has several.
+        """
+        if len(self.axes) > 1:
+            names = self.plant.axis_names
+            raise InputError(
+                f"{self.plant.path}: tilts about several axes ({', '.join(names)}), and {what} takes one; lock the "
+                f'others, as with --set plant.locked_axes=["{names[-1]}"]'
+            )
+        return self.parts[0]
+
+    def linear_closed_loop(self, plant: Literal["rig", "reduced"] = "rig") -> control.StateSpace:
+        """Make the closed loop, with the observer in it, a linear system for python-control.
+
+        The system is discrete at the control period. The plant is sampled exactly with the command held. Observer and
+        law are the scenario's own code, whose slopes at rest are taken by differences. The loop is linear about
+        upright at e = 0.
+
+        - Covered: sample rates, latencies, skew, low-pass and constant errors of the sensors; notch, `feedback`,
+          `angle_source`, laws and observers of one's own.
+        - Left out: dry friction, range, resolution, the rate limit, `bias_trim_s`, and what an observer learns from
+          noise.
+        - Refused: observers without a slope at rest (`homogeneous`, `homogeneous_adaptive`, `super_twisting`),
+          backlash, several axes, sensors slower than the controller, and with `rig` a robot that stands on contacts.
+
+        A gain that varies, as of `ltv` or `kalman`, counts with the value it has at rest.
+
+        Inputs, each held for a period:
+
+        - `push_n_m`: a tilting torque on the rig [N m].
+        - `y1_noise_rad`, `acceleration_noise_rad_s2`, `y2_noise_rad`, `fog_noise_rad_s`: added to a measurement [rad,
+          rad/s^2, rad, rad/s]. An equilibrium bias e acts as a constant `y1_noise_rad` of -e.
+        - `gimbal_rate_noise_rad_s`: gimbal rate beside the command [rad/s]. The observer does not know it. The loop
+          transfer at the gimbals is L = -H/(1 + H), where H is the system from here to `u_rad_s`.
+
+        Outputs at the tick, after its decision:
+
+        - `x1_rad`, `x2_rad_s`, `x3_rad`: true tilt, tilt rate and gimbal angle [rad, rad/s, rad].
+        - `u_rad_s`: the command [rad/s].
+        - `estimated_x1_rad`, `estimated_x2_rad_s`, `estimated_x3_rad`, and the observer's extra signals.
+
+        Args:
+            plant: `rig`: the rig as it is simulated, linearised at its keyframe, with its servos, viscous friction, and
+                a bend or a pivot that slides. `reduced`: the reduced model (6), whose gimbals turn as commanded.
+
+        Returns:
+            A `control.StateSpace` with these names. States that no output depends on are left out.
+
+        Raises:
+            InputError: Something in the loop is not linear, or not covered; the message names it.
+        """
+        part = self.require_single_axis("linear_closed_loop")
+        with part.scenario.named_in_errors():
+            return linear_closed_loop(part.design, part.plant, plant)
+
+    @property
+    def hints(self) -> list[str]:
+        """Clauses on what is no mistake and yet likely to make the plant fall."""
+        if not self.axes:
+            bend = judge_bend(self.design, self.plant)
+            return [*hints(self.design, self.plant), *bend_hints(self.plant, bend)]
+        return [f"{part.plant.axis.name}: {hint}" for part in self.axes for hint in part.hints]
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the scenario with every default written out, and the versions it ran with, as TOML can hold it."""
+        return resolved(self.scenario, {part.plant.axis.name: part.design for part in self.parts})
+
+    @functools.cached_property
+    def differences(self) -> dict[str, Any]:
+        """Differences from the bundled scenario it is based on: `section.field` -> its value.
+
+        Title, seed and observer are ignored; a scenario of the user's own differs from none.
+        """
+        base = base_of(self.scenario)
+        if base is None:
+            return {}
+        law = self.scenario.controller.kind
+        law_change = {} if law == base.controller.kind else {"controller.kind": law}
+        other = base.with_observer(self.scenario.observer.kind).with_law(law)
+        if other.model_dump(mode="json") == self.scenario.model_dump(mode="json"):
+            return law_change
+        try:
+            bundled = prepare(other)
+        except InputError:  # it does not suit this observer
+            bundled = prepare(base)
+        return law_change | differences(bundled.resolved(), self.resolved())
+
+    def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
+        """Return the resolved scenario: running it again gives the same run; its head says if that needs options."""
+        return rerun_head(driver, world) + tomli_w.dumps(self.resolved())
+
+    def save(self, path: Path) -> None:
+        """Write it as TOML."""
+        with whole_file(path) as temporary:
+            temporary.write_text(self.as_toml(), encoding="utf-8")
+
+
+def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None = None) -> Experiment:
+    """Load the plant and construct everything, so that what does not fit is found before a run.
+
+    Args:
+        scenario: The scenario.
+        plant: Its plant, if that has been loaded already.
+        like: A plant that may be of the same model file, which then is not compiled again.
+
+    Returns:
+        The experiment.
+
+    Raises:
+        InputError: Something in the scenario does not fit.
+    """
+    with scenario.named_in_errors():
+        grid = time_grid(scenario)
+        plant = plant or plant_on_grid(scenario, grid, like)
+        check_scenario(scenario, plant)
+    if len(plant.axes) == 1 and not scenario.axes:
+        return Experiment(scenario, plant, design(scenario, plant.parameters))
+    parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
+    axes = tuple(Experiment(part, rig, design(part, rig.parameters)) for part, rig in parts)
+    return Experiment(scenario, plant, axes[0].design, axes)
+
+
+def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:
+    """Run worlds of different experiments in one batch: every number that differs is an array (n_worlds,).
+
+    Args:
+        experiments: One a world.
+        worlds: The worlds' numbers: world i has the same noise in every experiment.
+        **options: Options of `simulate`.
+
+    Returns:
+        The result of all worlds, each as if it had run alone, bit for bit.
+
+    Raises:
+        InputError: They differ in something that worlds of one batch have in common.
+    """
+    require_same_structure([experiment.plant for experiment in experiments], len(worlds))
+    first, *others = once(experiments)
+    key = first.batch_key
+    for other in others:
+        part = key.first_difference(other.batch_key)
+        if part:
+            raise InputError(
+                f"run_many: {part} differs, which worlds of one batch must have in common; call run_many once for "
+                "each value"
+            )
+    return first.simulate(*batch_inputs(experiments, worlds), **options)
+
+
+def batch_inputs(
+    experiments: Sequence[Experiment], worlds: Sequence[int], observer: Observer | None = None
+) -> tuple[list[Plant], AnyController, Sequence[Push], Sequence[Pivot]]:
+    """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, what moves all worlds.
+
+    Args:
+        experiments: One a world.
+        worlds: The worlds' numbers.
+        observer: The observer of all worlds instead of the first experiment's.
+    """
+    first, plants = experiments[0], [experiment.plant for experiment in experiments]
+    controllers, pushes, pivots = [], (), ()
+    for i, part in enumerate(first.parts):
+        parts = [experiment.parts[i] for experiment in experiments]
+        law, sensors, pushes, pivots = batched([(one.design.fresh_law(), one.scenario) for one in parts])
+        open_loop = batched_open_loop_observers([one.design for one in parts])
+        controllers.append(
+            part.design.controller(
+                batched_interface(part.plant, plants, i),
+                worlds=worlds,
+                axis=i,
+                observer=observer,
+                open_loop_observers=open_loop,
+                law=law,
+                sensors=sensors,
+            )
+        )
+    return plants, first.of_axes(controllers), pushes, pivots

@@ -1,0 +1,242 @@
+"""Runs a controller on one plant or many, and judges the ticks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import TypedDict, Unpack
+
+import numpy as np
+
+from cmg_mj.core.axes import AnyController
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.loop import ControlLoop, Ending
+from cmg_mj.core.outside import Disturbance
+from cmg_mj.core.sensor import whole_steps
+from cmg_mj.core.types import BIAS
+from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.features.pivot.moving_pivot import pivot_directions, refuse_other_forces, with_own_model
+from cmg_mj.plant.mujoco_state import quiet
+from cmg_mj.plant.plant import Plant
+from cmg_mj.results.baselines import RATES, References
+from cmg_mj.results.floors import Floors
+from cmg_mj.results.metrics import Metrics
+from cmg_mj.results.result import Driver, Outcome, Result
+from cmg_mj.results.summary_keys import combine_axes
+from cmg_mj.features.pivot.settings import Pivot
+from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
+from cmg_mj.scenario.schema import MetricsSettings
+from cmg_mj.runs.batch_values import split_values
+from cmg_mj.runs.callback import CallbackLoop, control_callback
+from cmg_mj.plant.physics import ManyWorlds, OneWorld
+from cmg_mj.runs.recorder import MultiAxisRecorder, TickRecorder
+from cmg_mj.stages.push import Push, Pushes
+from cmg_mj.stages.swing import Swing, Swings
+
+DIVERGED_TILT = 2.0 * math.pi
+"""No plant that stood at one instant lies a whole turn farther at the next one: it has diverged [rad]."""
+
+Recorder = TickRecorder | MultiAxisRecorder
+
+
+class SimulationOptions(TypedDict, total=False):
+    """Options of a run that change no figure."""
+
+    keep_trajectory: bool
+    """True to keep every tick; if False, memory does not grow with the duration."""
+    on_progress: Callable[[float], None] | None
+    """Called after every tick with the simulated time [s]; a KeyboardInterrupt it raises ends the run."""
+    on_start: Callable[[Recorder], None] | None
+    """Called before the first tick with the recorder, whose `since` shows the ticks meanwhile."""
+    threads: int
+    """Number of threads that step many worlds; 0: as many as there are processors."""
+
+
+@quiet()
+def simulate(
+    plant: Plant | Sequence[Plant],
+    controller: AnyController,
+    duration_s: float,
+    *,
+    observers: Sequence[str] | Mapping[str, Sequence[str]],
+    pushes: Sequence[Push] = (),
+    swings: Sequence[Swing] = (),
+    pivots: Sequence[Pivot] = (),
+    settings: MetricsSettings | None = None,
+    driver: Driver = "native",
+    **options: Unpack[SimulationOptions],
+) -> Result:
+    """Run one world, or as many as there are plants.
+
+    Args:
+        plant: The plant; or one a world, which may differ in numbers but not in structure.
+        controller: A fresh controller, made for one world or for as many as there are plants.
+        duration_s: Simulated time [s].
+        observers: Names of the controller's observer and open-loop observers; or of each axis' if they differ.
+        pushes: Torques from outside; of many worlds a torque may be an array (n_worlds,).
+        swings: Others that swing.
+        pivots: Motions of the pivot; of many worlds a size may be an array (n_worlds,).
+        settings: What counts as settled and fallen.
+        driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only). `plugin`: the model
+            has a plugin that decides (likewise): see `run_with_plugin`.
+        **options: See `SimulationOptions`.
+
+    Returns:
+        The outcomes, summaries and the trajectory. Whatever stops a run, what was recorded until then is there.
+
+    Raises:
+        InputError: A time or rate does not fit the physics step, or the callback was asked to drive many worlds.
+    """
+    single = isinstance(plant, Plant)
+    plants = [plant] if single else list(plant)
+    if driver in ("callback", "plugin") and not single:
+        raise InputError(f"driver = {driver!r}: drives one world, not a batch")
+    names = plants[0].axis_names
+    of_axis = observers if isinstance(observers, Mapping) else dict.fromkeys(names, observers)
+    if pivots and single:
+        plants = [with_own_model(plants[0])]
+    run = _Simulation(
+        plants, controller, duration_s, of_axis, pushes, swings, pivots, settings or MetricsSettings(), options
+    )
+    physics = OneWorld(plants[0]) if single else ManyWorlds(plants, options.get("threads", 0))
+    run.advance(physics, driver)
+    return run.result(driver)
+
+
+class _Simulation:
+    """A run of one world or many: its loop, its recorders and how its worlds end. See `simulate`."""
+
+    def __init__(
+        self,
+        plants: Sequence[Plant],
+        controller: AnyController,
+        duration_s: float,
+        observers: Mapping[str, Sequence[str]],
+        pushes: Sequence[Push],
+        swings: Sequence[Swing],
+        pivots: Sequence[Pivot],
+        settings: MetricsSettings,
+        options: SimulationOptions,
+    ) -> None:
+        self.plants, self.controller, self.duration_s, self.observers = plants, controller, duration_s, observers
+        self.pushes, self.pivots, self.settings = pushes, pivots, settings
+        self.axis_names = names = plants[0].axis_names
+        self.timestep = timestep = plants[0].timestep
+        steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
+        self.fall_angle = np.radians(settings.fall_angle_deg).item()
+        self.recorders = [self._recorder_of(*pair, options) for pair in zip(names, controller.parts, strict=True)]
+        several = MultiAxisRecorder(dict(zip(names, self.recorders, strict=True))) if len(names) > 1 else None
+        self.recorder: Recorder = several or self.recorders[0]
+        self.on_progress = options.get("on_progress")
+        if on_start := options.get("on_start"):
+            on_start(self.recorder)
+        self.outcomes: list[Outcome] = []
+        self.steps = steps
+        self.disturbances: list[Disturbance] = []
+        if pushes:
+            self.disturbances.append(Pushes(pushes, timestep, names))
+        if swings:
+            self.disturbances.append(Swings(swings, timestep, names))
+        if pivots:
+            for plant in dict.fromkeys(plants):
+                refuse_other_forces(plant)
+            directions = pivot_directions(plants[0], pivots)
+            signals = PivotSignals(pivots, directions, controller.seed, controller.worlds)
+            self.disturbances.append(MovingPivot(signals, timestep))
+
+    def _recorder_of(self, axis: str, controller: Controller, options: SimulationOptions) -> TickRecorder:
+        """Make what records and judges the ticks of one axis; that of the first axis has the joints."""
+        plants, observers = [plant.single_axis(axis) for plant in self.plants], self.observers[axis]
+        pairs = list(zip(plants, split_values(controller.sensors, len(plants)), strict=True))
+        targets = {BIAS: [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs]}
+        dt, limit, sensors = controller.law.dt, controller.law.rate_limit, controller.sensors
+        noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
+        y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
+        moves = any(np.any(pivot.size) for pivot in self.pivots)
+        has_acceleration = [
+            not (moves or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.settings.bends)
+            and plant.radial_tilt.height == plant.reduced.pivot_arm
+            for plant, sensor in pairs
+        ]
+        floors = Floors(noises, y1_period, has_acceleration)
+        # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
+        tilt_sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
+        references = References(
+            sensors.mems_gyro, dt, controller.seed, controller.worlds, tilt_sigmas, axis=controller.axis
+        )
+        metrics = Metrics(observers, len(plants), dt, self.pushes, limit, self.settings, targets, RATES, floors)
+        keep, first = options.get("keep_trajectory", True), axis == self.axis_names[0]
+        return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first)
+
+    def advance(self, physics: OneWorld | ManyWorlds, driver: Driver) -> None:
+        """Run to the end, whatever that is."""
+        called_back = driver == "callback"
+        loop_class = CallbackLoop if called_back else ControlLoop
+        if driver == "plugin":
+            from cmg_mj.features.plugin.driver import PluginLoop as loop_class
+        loop = loop_class(physics, self.controller, self.steps, self.disturbances, self.fall_angle)
+        driving: AbstractContextManager = nullcontext()
+        if called_back:
+            driving = control_callback(self.plants[0], self.controller)
+        rest = Outcome("done", self.duration_s)
+        try:
+            with driving:
+                self._record(loop)
+        except RunStopped as error:
+            rest = Outcome("stopped", loop.step * self.timestep, str(error), len(self.plants) > 1)
+        except KeyboardInterrupt:
+            rest = Outcome("interrupted", loop.step * self.timestep)
+        for recorder in self.recorders:
+            recorder.flush()
+        endings = loop.endings
+        self.outcomes = [
+            _outcome(endings[world], self.timestep) if world in endings else rest for world in range(len(self.plants))
+        ]
+
+    def _record(self, loop: ControlLoop) -> None:
+        """Decide, advance and record at every control tick."""
+        timestep, on_progress = self.timestep, self.on_progress
+        parts = list(zip(range(len(self.recorders)), self.controller.parts, self.recorders, strict=True))
+        worlds, decide, advance = loop.physics, loop.decide, loop.advance
+        for tick in loop.ticks():
+            decide()
+            advance()
+            running = None if worlds.running is None else worlds.running.copy()
+            for axis, part, recorder in parts:
+                assert part.tick is not None
+                recorder.add(tick.q, tick.v, part.tick, part.body_rate, tick.torques[axis], running)
+            if on_progress:
+                on_progress((tick.step + tick.steps) * timestep)
+
+    def result(self, driver: Driver) -> Result:
+        """Put together outcomes, summaries and the trajectory."""
+        summaries = [
+            combine_axes(
+                {
+                    name: recorder.metrics.summary(world, outcome.kind == "done")
+                    for name, recorder in zip(self.axis_names, self.recorders, strict=True)
+                }
+            )
+            for world, outcome in enumerate(self.outcomes)
+        ]
+        worlds = self.controller.worlds
+        numbers = (worlds,) if isinstance(worlds, int) else tuple(worlds)
+        longest = max(outcome.time_s for outcome in self.outcomes)
+        trajectory = self.recorder.trajectory()
+        observers = tuple(self.observers[self.axis_names[0]])
+        return Result(self.outcomes, summaries, trajectory, longest, observers, self.controller.seed, numbers, driver)
+
+
+def _outcome(ending: Ending, timestep: float) -> Outcome:
+    """Say how a world ended that the loop stopped."""
+    time = ending.step * timestep
+    if ending.message:
+        return Outcome("stopped", time, f"{ending.message} at t = {time:g} s")
+    if abs(ending.tilt) < DIVERGED_TILT:
+        return Outcome("fell", time)
+    return Outcome(
+        "stopped",
+        time,
+        f"the plant diverged at t = {time:g} s: take a smaller plant.timestep_s, the integrator RK4 or a gentler push",
+    )

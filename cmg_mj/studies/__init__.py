@@ -1,1 +1,0 @@
-"""Runs many experiments and compares them: comparisons, sweeps, tuning, push limits, benchmarks."""

@@ -1,1 +1,0 @@
-"""Compares observers on the same plant, pushes and noise."""

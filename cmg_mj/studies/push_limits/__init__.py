@@ -1,1 +1,0 @@
-"""Computes the largest push that a rig, and one controller on it, can recover from."""

@@ -1,0 +1,153 @@
+"""Draws maps over two quantities: the best candidate with the boundaries of all, and one candidate's figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cmg_mj.view.plots.style import colours, hexadecimal, short_names
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.contour import QuadContourSet
+
+    from cmg_mj.view.plots.figure import Map, Surface
+
+EMPTY = (232, 232, 232)
+"""Colour of a cell without a best."""
+BOUNDARY, DASH = 2.4, 2.5
+"""Width of a boundary [points], and of its dashes [line widths]."""
+AHEAD = 3.2
+"""Width of the dotted line within which something that is no candidate is ahead [points]."""
+COLOURS_OF_VALUES = "viridis"
+NUMBERED = 6
+"""Most cells along an axis of a surface whose cells have room for numbers."""
+CASING = "white"
+"""Colour under every line, so that the line is seen on every other colour."""
+
+
+def draw_map(axes: Axes, spec: Map) -> None:
+    """Draw a map on axes whose scales are set."""
+    palette = colours([*spec.names, *spec.boundaries, *spec.ahead])
+    observers = list(spec.names)
+    names = short_names(list(palette))
+    cells = np.array([*(palette[name] for name in spec.names), EMPTY], dtype=np.uint8)[spec.best]  # -1 is the last
+    x = edges(spec.x, log=axes.get_xscale() == "log")
+    y = edges(spec.y, log=axes.get_yscale() == "log")
+    axes.pcolormesh(x, y, cells)
+    _contours(axes, spec, x, y)
+    _boundaries(axes, spec, x, y, [hexadecimal(palette[name]) for name in spec.boundaries])
+    _dotted(axes, spec, x, y, [hexadecimal(palette[name]) for name in spec.ahead])
+    unsure = (spec.best >= 0) & ~spec.sure
+    across, up = np.meshgrid(spec.x, spec.y)
+    axes.plot(across[unsure], up[unsure], "o", color="0.1", markeredgecolor=CASING, markeredgewidth=0.6, markersize=3.5)
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(y[0], y[-1])
+    for index in np.unique(spec.best[spec.best >= 0]):
+        name = observers[index]
+        _in_legend(axes, "s", names[name], color=hexadecimal(palette[name]), markersize=9)
+    if (spec.best < 0).any():
+        _in_legend(axes, "s", spec.nobody, color=hexadecimal(EMPTY), markersize=9)
+    if unsure.any():
+        _in_legend(axes, "o", "not beyond chance", color="0.1", markersize=3.5)
+    if spec.boundaries:
+        _in_legend(axes, " ", f"{spec.boundary}:")
+    for name in spec.boundaries:
+        _in_legend(axes, "--", names[name], color=hexadecimal(palette[name]), linewidth=BOUNDARY)
+    if spec.ahead:
+        _in_legend(axes, " ", "less error than the best:")
+    for name, share in spec.ahead.items():
+        label = f"{names[name]}, {int((share > 0.5).sum())} of {share.size} cells"
+        _in_legend(axes, ":", label, color=hexadecimal(palette[name]), linewidth=AHEAD)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize="small", frameon=False, borderpad=0)
+
+
+def edges(centres: np.ndarray, *, log: bool) -> np.ndarray:
+    """Return the edges of cells, half-way between their centres on the axis, (n + 1,)."""
+    on_axis = np.log(centres) if log else np.asarray(centres, dtype=float)
+    inner = (on_axis[:-1] + on_axis[1:]) / 2.0
+    result = np.concatenate([[2 * on_axis[0] - inner[0]], inner, [2 * on_axis[-1] - inner[-1]]])
+    return np.exp(result) if log else result
+
+
+def _contours(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray) -> None:
+    if not len(spec.levels):
+        return
+    values = _to_edges(spec, x, y, spec.values)
+    axes.contour(*values, spec.levels, colors=CASING, linewidths=2.2)
+    _labelled(axes, axes.contour(*values, spec.levels, colors="0.1", linewidths=0.8))
+
+
+def _labelled(axes: Axes, lines: QuadContourSet) -> None:
+    for text in axes.clabel(lines, fmt="%g", fontsize="small", inline=False):
+        text.set_color("0.1")
+        text.set_bbox({"facecolor": CASING, "edgecolor": "none", "alpha": 0.8, "pad": 0.8})
+
+
+def draw_surface(axes: Axes, spec: Surface) -> None:
+    """Draw one candidate's figure on axes whose scales are set: its value by colour, and as numbers or contours."""
+    norm = _norm(spec)
+    x = edges(spec.x, log=axes.get_xscale() == "log")
+    y = edges(spec.y, log=axes.get_yscale() == "log")
+    axes.set_facecolor(hexadecimal(EMPTY))
+    axes.pcolormesh(x, y, np.ma.masked_invalid(spec.values), cmap=COLOURS_OF_VALUES, norm=norm)
+    if max(spec.values.shape) <= NUMBERED:
+        for (row, column), value in np.ndenumerate(spec.values):
+            if np.isfinite(value):
+                ink = "white" if float(norm(value)) < 0.6 else "black"
+                text = axes.text(float(spec.x[column]), float(spec.y[row]), f"{value:.3g}", color=ink)
+                text.set(horizontalalignment="center", verticalalignment="center", fontsize="x-small")
+    elif len(spec.levels) and np.isfinite(spec.values).any():
+        across, up = np.meshgrid(spec.x, spec.y)
+        lines = axes.contour(across, up, np.ma.masked_invalid(spec.values), spec.levels, colors=CASING, linewidths=0.9)
+        _labelled(axes, lines)
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(y[0], y[-1])
+
+
+def mappable(spec: Surface) -> ScalarMappable:
+    """Make the scale of colours of a figure's surfaces."""
+    from matplotlib.cm import ScalarMappable
+
+    return ScalarMappable(_norm(spec), COLOURS_OF_VALUES)
+
+
+def _norm(spec: Surface) -> Normalize:
+    from matplotlib.colors import LogNorm, Normalize
+
+    return (LogNorm if spec.scale == "log" else Normalize)(*spec.limits)
+
+
+def _boundaries(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Sequence[str]) -> None:
+    """Draw the boundaries; their dashes alternate, so that two or three lines on each other are all seen."""
+    shares = [_to_edges(spec, x, y, share) for share in spec.boundaries.values()]
+    for share in shares:
+        axes.contour(*share, [0.5], colors=CASING, linewidths=BOUNDARY + 2.0)
+    n = min(len(shares), 3)
+    for i, (share, color) in enumerate(zip(shares, palette, strict=True)):
+        style = (i % n * DASH, (DASH, DASH * (n - 1))) if n > 1 else "-"
+        axes.contour(*share, [0.5], colors=color, linewidths=BOUNDARY, linestyles=[style])
+
+
+def _dotted(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Sequence[str]) -> None:
+    """Draw where each of what is no candidate is as good as the best; nothing where it is so in all cells or none."""
+    for share, color in zip(spec.ahead.values(), palette, strict=True):
+        known = share[np.isfinite(share)]
+        if known.min(initial=1.0) < 0.5 < known.max(initial=0.0):
+            line = _to_edges(spec, x, y, share)
+            axes.contour(*line, [0.5], colors=CASING, linewidths=AHEAD + 2.0)
+            axes.contour(*line, [0.5], colors=color, linewidths=AHEAD, linestyles=["dotted"])
+
+
+def _to_edges(spec: Map, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Extend values at the cells' centres to the map's edges: a line goes on through the outermost cell."""
+    across, up = (np.concatenate([ends[:1], centres, ends[-1:]]) for centres, ends in ((spec.x, x), (spec.y, y)))
+    return across, up, np.ma.masked_invalid(np.pad(values, 1, "edge"))
+
+
+def _in_legend(axes: Axes, style: str, label: str, **properties: Any) -> None:
+    axes.plot([], [], style, label=label.lstrip("_"), **properties)  # matplotlib hides a leading underscore

@@ -1,0 +1,214 @@
+"""A run to record: its names and colours, and its torques, phases and poses in time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import rerun as rr
+
+from cmg_mj.plant.plant import Plant
+from cmg_mj.results.result import Outcome
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.schema import MetricsSettings
+from cmg_mj.stages.push import Push
+from cmg_mj.stages.swing import Swing
+from cmg_mj.view.plots.style import (
+    Colour,
+    Summary,
+    colours,
+    figures_by_observer,
+    observers_to_draw,
+    section,
+    short_names,
+)
+
+POSE_RATE_HZ = 100.0
+"""Largest rate at which poses are recorded; the eye needs no more."""
+
+BALANCING, PUSH, RECOVERING, SETTLED = "balancing", "push", "recovering", "settled"
+ENDINGS = {"fell": "fallen", "stopped": "stopped", "interrupted": "interrupted"}
+"""Kind of the outcome of a run that did not reach its end -> the run's last phase."""
+
+
+@dataclass(frozen=True)
+class RecordingHeader:
+    """The experiment of a recording's runs, known before the first tick.
+
+    Attributes:
+        plant: The plant of all runs.
+        title: The experiment's title.
+        pushes: Torques from outside, the same in all runs.
+        swings: Sinusoidal torques from outside, the same in all runs.
+        settings: The settle band.
+        rate_limit_rad_s: Largest gimbal rate; None to leave its bounds away [rad/s].
+        scenario_toml: The resolved scenario.
+    """
+
+    plant: Plant
+    title: str = ""
+    pushes: Sequence[Push] = ()
+    swings: Sequence[Swing] = ()
+    settings: MetricsSettings = field(default_factory=MetricsSettings)
+    rate_limit_rad_s: float | None = None
+    scenario_toml: str = ""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run to record.
+
+    Attributes:
+        name: Name of the run's branch in the recording, usually the observer in the loop.
+        trajectory: One world's ticks, columns (n_ticks,).
+        summary: The run's numbers, by the names that `--json` prints.
+        outcome: The outcome.
+        axis: The axis of trajectory and numbers, if the plant has several.
+    """
+
+    name: str
+    trajectory: Trajectory
+    summary: Summary
+    outcome: Outcome
+    axis: str | None = None
+
+    @property
+    def observers(self) -> dict[str, Summary]:
+        """The observer in the loop, then the open-loop observers, each with its numbers."""
+        return figures_by_observer(self.trajectory.observers, self.summary)
+
+    @property
+    def ranking(self) -> Summary:
+        """The numbers that rank the run: a run that did not reach its end ranks last."""
+        return {**self.summary, "fell": self.outcome.kind in ENDINGS}
+
+    @property
+    def references(self) -> dict[str, Summary]:
+        """The baselines, each with its numbers."""
+        references = section(self.summary, "references")
+        return {name: section(references, name) for name in references}
+
+    @property
+    def open_loop_observers(self) -> tuple[str, ...]:
+        """The open-loop observers."""
+        return self.trajectory.observers[1:]
+
+
+@dataclass(frozen=True)
+class LegendEntry:
+    """A run or an observer as a recording names it.
+
+    Attributes:
+        name: The name.
+        part: Its part of an entity path.
+        label: The shortened name.
+        color: Its colour.
+        is_best: Whether it is switched on at first.
+    """
+
+    name: str
+    part: str
+    label: str
+    color: Colour
+    is_best: bool
+
+
+def legend(figures: Mapping[str, Summary], always: Collection[str] = ()) -> list[LegendEntry]:
+    """Make the legend of runs or observers.
+
+    Args:
+        figures: Name -> its numbers, which rank it.
+        always: Names that are switched on in any case.
+
+    Returns:
+        An entry for each, in the order of `figures`.
+    """
+    names = list(figures)
+    best, labels = observers_to_draw(figures, always), short_names(names)
+    places = zip(numbered_parts(names), colours(names).items(), strict=True)
+    return [LegendEntry(name, part, labels[name], color, name in best) for part, (name, color) in places]
+
+
+def numbered_parts(names: Sequence[str]) -> list[str]:
+    """Make parts of entity paths; each of several gets a number before its name, because the viewer sorts by path."""
+    digits = len(str(len(names)))
+    return [
+        rr.escape_entity_path_part(f"{i:0{digits}}_{name}" if len(names) > 1 else name)
+        for i, name in enumerate(names, 1)
+    ]
+
+
+def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, float]]:
+    """Add pushes up to the steps of one torque.
+
+    Args:
+        pushes: The pushes, which may overlap.
+        end_s: End of the run; later steps are discarded [s].
+
+    Returns:
+        (time [s], torque from then on [N m]), in order of time.
+    """
+    edges = sorted({time for push in pushes for time in (push.start_s, push.end_s) if time < end_s})
+    return [(t, sum(p.torque_n_m for p in pushes if p.start_s <= t < p.end_s)) for t in edges]
+
+
+def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[tuple[float, str]]:
+    """Divide a run into phases.
+
+    Before the first push the phase is `balancing`. After a push (or from the start, if there is no push) the phase is
+    `recovering` until the tilt stays inside the settle band up to the next push or the end. Then it is `settled`.
+
+    Args:
+        run: The run.
+        pushes: Torques from outside.
+        settings: The settle band.
+
+    Returns:
+        (time [s], name of the phase from then on), in order of time.
+    """
+    end = run.outcome.time_s
+    steps = [(0.0, BALANCING)] if pushes and min(p.start_s for p in pushes) > 0.0 else []
+    starts = sorted(push.start_s for push in pushes)
+    steps += [(start, PUSH) for start in starts]
+    for push_end in sorted({push.end_s for push in pushes}) if pushes else [0.0]:
+        if any(p.start_s <= push_end < p.end_s for p in pushes):
+            continue  # another push is still on
+        next_push = min((start for start in starts if start >= push_end), default=end)
+        steps += _recovery(run.trajectory, push_end, min(next_push, end), math.radians(settings.settle_band_deg))
+    steps = sorted((time, name) for time, name in steps if time < end)
+    steps = [step for i, step in enumerate(steps) if i == 0 or step[1] != steps[i - 1][1]]
+    if run.outcome.kind in ENDINGS:
+        steps.append((end, ENDINGS[run.outcome.kind]))
+    return steps
+
+
+def _recovery(trajectory: Trajectory, start: float, end: float, band: float) -> list[tuple[float, str]]:
+    """Return the steps `recovering` and `settled` between two pushes."""
+    time = trajectory["time_s"]
+    window = (time >= start - 1e-9) & (time < end - 1e-9)
+    if not window.any():
+        return [(start, RECOVERING)]
+    times = time[window]
+    excursions = np.flatnonzero(np.abs(trajectory["x1_rad"][window]) > band)
+    settle_index = int(excursions[-1]) + 1 if excursions.size else 0
+    steps = [(start, RECOVERING)] if settle_index > 0 else []
+    if settle_index < len(times):
+        steps.append((max(start, float(times[settle_index])), SETTLED))
+    return steps
+
+
+def recorded_poses(plant: Plant, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Choose the poses that are recorded; the initial pose, if the run has no tick.
+
+    Returns:
+        Times, (n_poses,) [s], and joint angles, (n_poses, n_joints) [rad].
+    """
+    n = len(trajectory)
+    if n == 0:
+        return np.zeros(1), plant.new_data().qpos[None].copy()
+    time = trajectory["time_s"]
+    stride = max(1, round(1.0 / (POSE_RATE_HZ * (time[1] - time[0])))) if n > 1 else 1
+    ticks = np.union1d(np.arange(0, n, stride), n - 1)
+    return time[ticks], trajectory.qpos(ticks)

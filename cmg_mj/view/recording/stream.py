@@ -1,0 +1,165 @@
+"""A recording's file, written whole or not at all, and its view in a notebook's cell."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import os
+import re
+import shutil
+import zlib
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.results.files import whole_file
+from cmg_mj.view.recording.signals import Lines
+
+PIPES = Path("/dev/fd")
+"""Folder in which a process finds its pipes as files; Windows has none."""
+LONGEST_LIST = 120
+"""Longest list of runs in an application's name [characters]."""
+
+
+@contextlib.contextmanager
+def open_recording(path: Path, name: str, application: str, blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
+    """Open a recording to log to; write its file at the end.
+
+    Args:
+        path: The file.
+        name: Name of the recording.
+        application: Result of `application_name`.
+        blueprint: Layout in which the recording opens.
+
+    Yields:
+        The recording.
+
+    Raises:
+        InputError: The environment turns rerun off.
+        OSError: The file cannot be written.
+    """
+    with whole_file(path) as temporary, _strict(), rr.RecordingStream(application) as rec:
+        require_enabled(rec)
+        with _written(rec, temporary):
+            rec.send_blueprint(blueprint, make_active=False, make_default=True)
+            set_up(rec, name)
+            yield rec
+
+
+@contextlib.contextmanager
+def _written(rec: rr.RecordingStream, path: Path) -> Iterator[None]:
+    """Write what is logged to a file, through a pipe: rerun by itself hides a full disk, or waits for ever."""
+    if not PIPES.exists():
+        rec.save(path)
+        yield
+        rec.disconnect()
+        return
+    read_end, write_end = os.pipe()
+    with ThreadPoolExecutor(1) as pool:
+        copied = pool.submit(_copy, read_end, path)
+        try:
+            try:
+                rec.save(PIPES / str(write_end))
+            finally:
+                os.close(write_end)  # rerun has opened one of its own
+            yield
+        finally:
+            rec.disconnect()
+        copied.result()
+
+
+def _copy(read_end: int, path: Path) -> None:
+    """Copy a pipe to a file; after a failure empty the pipe, because rerun waits for that."""
+    with open(read_end, "rb") as pipe:
+        try:
+            with path.open("wb") as file:
+                shutil.copyfileobj(pipe, file)
+        finally:
+            while pipe.read(1 << 20):
+                pass
+
+
+def require_enabled(rec: rr.RecordingStream) -> None:
+    """Refuse to record where the environment turns rerun off.
+
+    Raises:
+        InputError: The environment variable RERUN turns rerun off.
+    """
+    if not rr.is_enabled(rec):
+        raise InputError("RERUN: this environment variable turns recording off; unset it")
+
+
+def set_up(rec: rr.RecordingStream, name: str) -> None:
+    """Name a recording, and make simulated time its only timeline."""
+    rec.set_log_time_enabled(False)
+    rec.set_log_tick_enabled(False)
+    rec.send_recording_name(name)
+
+
+def application_name(names: Sequence[str], branches: Sequence[Lines]) -> str:
+    """Name the application of a recording.
+
+    The viewer remembers a layout by application: recordings with other branches or lines must not share its name.
+    The name may have about 180 characters, few of them punctuation.
+    """
+    run_names = " ".join(names)
+    if len(run_names) > LONGEST_LIST:
+        run_names = f"{len(names)} runs"
+    lines = " ".join(f"{branch.path}/{path}" for branch in branches for path in branch.series)
+    return re.sub(r"[^\w -]", "-", f"cmg-mj {run_names} {zlib.crc32(lines.encode()):08x}", flags=re.ASCII)
+
+
+def log_page(rec: rr.RecordingStream, path: str, page: str) -> None:
+    """Record a page of Markdown."""
+    rec.log(path, rr.TextDocument(page, media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+@contextlib.contextmanager
+def _strict() -> Iterator[None]:
+    """Make rerun raise where it would only warn."""
+    before = rr.strict_mode()
+    rr.set_strict_mode(True)
+    try:
+        yield
+    finally:
+        rr.set_strict_mode(before)
+
+
+def show_recording(path: Path | str, *, height: int = 600) -> Any:
+    """Show a recording in the cell of a notebook: make this call the cell's last line.
+
+    The viewer runs in the browser and holds the whole recording in memory. This process serves the viewer's code on a
+    port of localhost. For a notebook on another computer set `RERUN_NOTEBOOK_ASSET=inline` before the first call: the
+    code, 20 MB, is then part of the cell.
+
+    Args:
+        path: The file, `recording.rrd`, of a run or a comparison.
+        height: Height of the viewer [px]. The viewer is as wide as the cell.
+
+    Returns:
+        The viewer: a Jupyter widget, `rerun_notebook.Viewer`.
+
+    Raises:
+        InputError: The file cannot be read, or rerun's notebook viewer is not installed.
+    """
+    try:
+        recording = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "serve-local")  # by itself rerun fetches the code from its own site
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):  # it prints the port
+            viewer = importlib.import_module("rerun_notebook").Viewer(width="auto", height=height)
+    except ImportError as error:
+        raise InputError(
+            "show_recording: rerun's notebook viewer is not installed. Install it with `python -m pip install "
+            f'"cmg_mj[notebook]"`, or run `rerun {path}`'
+        ) from error
+    viewer.send_rrd(recording)
+    return viewer

@@ -1,0 +1,130 @@
+"""Play between the servos' motors and the gimbals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from cmg_mj.plant.plant import load_plant
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.stages.backlash import Backlash
+
+DT = 0.005
+
+
+def experiment(*settings: str) -> Experiment:
+    return prepare(load_scenario("push_recovery", ["duration_s=1.5", "push=[]", *settings]))
+
+
+def test_the_gap_in_radians() -> None:
+    assert load_plant(gimbal_backlash_arcmin=60.0).backlash == pytest.approx(np.radians(1.0))
+    assert load_plant().backlash == 0.0
+
+
+@pytest.mark.parametrize("worlds", [None, 3])
+def test_the_gimbal_rests_until_the_motor_has_crossed_the_gap(worlds: int | None) -> None:
+    """The motor swings by 2 about 0 behind a gap of 1; its angle less half the gap forward, plus half backward."""
+    motor = 2.0 * np.sin(np.linspace(0.0, 4.0 * np.pi, 401))
+    rates: Any = np.diff(motor) / DT
+    play = Backlash(1.0 if worlds is None else np.full(worlds, 1.0), DT)
+    gimbal = [0.0]
+    for rate in rates.tolist():
+        gimbal_rate = play(rate if worlds is None else np.full(worlds, rate))
+        if worlds is not None:
+            assert np.ptp(gimbal_rate) == 0.0
+        gimbal.append(gimbal[-1] + DT * float(np.max(gimbal_rate)))
+    angle = np.array(gimbal)
+    assert np.abs(motor - angle).max() == pytest.approx(0.5)
+    assert angle[50] == pytest.approx(1.5)  # the top of the first swing
+    assert angle[60] == pytest.approx(1.5)  # the motor has turned back by 0.38
+    assert angle[150] == pytest.approx(-1.5)
+    still = (motor[1:-1] < 2.0 - 1e-9) & (np.abs(np.diff(angle)[1:]) < 1e-12)
+    assert still.any()
+
+
+def test_without_a_gap_the_command_goes_through_as_it_is() -> None:
+    rates = np.random.default_rng(0).normal(size=(50, 2))
+    play = Backlash(np.array([0.0, 0.1]), DT)
+    gimbal_rates = np.array([play(rate) for rate in rates])
+    np.testing.assert_array_equal(gimbal_rates[:, 0], rates[:, 0])
+    alone = Backlash(0.1, DT)
+    np.testing.assert_array_equal(gimbal_rates[:, 1], [alone(float(rate)) for rate in rates[:, 1]])
+
+
+def trajectory(setup: Experiment, driver: Any = "native") -> Trajectory:
+    result = setup.run(driver=driver).trajectory
+    assert result is not None
+    return result
+
+
+def gimbals_from_commands(run: Trajectory, gap: float) -> np.ndarray:
+    """Where a gap leaves the gimbal behind the recorded commands: the motor's angle, followed at half the gap."""
+    motor = np.concatenate([[0.0], np.cumsum(run["u_rad_s"][:-1] * DT)])
+    gimbal = np.zeros(len(motor))
+    for k in range(1, len(motor)):
+        off = motor[k] - gimbal[k - 1]
+        gimbal[k] = gimbal[k - 1] + np.sign(off) * max(0.0, abs(off) - gap / 2.0)
+    return gimbal
+
+
+@pytest.mark.parametrize("driver", ["native", "callback"])
+def test_the_rigs_gimbals_stay_behind_the_recorded_commands(driver: Any) -> None:
+    """But for their servos' motion, I x'' = kp (setpoint - x) - kv x', and what the tilt does to it."""
+    gap = np.radians(60.0 / 60.0)
+    run = trajectory(experiment("plant.gimbal_backlash_arcmin=60.0"), driver)
+    prediction = gimbals_from_commands(run, gap)
+    servo = [85.6], [1.56e-3, 0.731, 85.6]
+
+    def off(setpoint: np.ndarray) -> float:
+        """By how much of the gap the gimbal is elsewhere."""
+        return float(np.abs(run["x3_rad"] - lsim(servo, setpoint, run["time_s"])[1]).max() / gap)
+
+    assert off(prediction) < 0.05
+    assert off(gimbals_from_commands(run, 0.0)) > 0.4
+    assert np.abs(np.diff(prediction)[20:] == 0.0).mean() > 0.1  # it does rest
+
+
+def test_a_users_own_loop_has_it_too() -> None:
+    import mujoco
+
+    from cmg_mj.runs.callback import control
+
+    setup = experiment("plant.gimbal_backlash_arcmin=60.0", "plant.timestep_s=0.005")
+    controller, data = setup.axis_controller(), setup.plant.new_data()
+    for _ in range(100):
+        control(setup.plant, controller, data)
+        mujoco.mj_step(setup.plant.model, data)
+    assert data.qpos[setup.plant.tilt] - setup.plant.tilt_zero + setup.plant.bias == trajectory(setup)["x1_rad"][100]
+    controller.reset()
+    assert controller.gimbal_rate is None
+
+
+def test_observers_get_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    setup = experiment("plant.gimbal_backlash_arcmin=60.0")
+    commands: list[float] = []
+    controller = setup.axis_controller()
+    observer: Any = controller.observer
+    monkeypatch.setattr(type(observer), "step", _record(type(observer).step, commands))
+    expected = []
+    step = 0
+    ideal = setup.plant.ideal_readings(setup.plant.new_data().sensordata.tolist(), setup.plant.new_data().qvel.tolist())
+    while len(expected) < 20:
+        if controller.update(step, ideal):
+            assert controller.tick is not None
+            expected.append(controller.tick.u)
+        step += controller.steps_per_sample
+    assert commands == expected[:-1]
+    assert controller.gimbal_rate != expected[-1] or controller.gimbal_rate == 0.0
+
+
+def _record(step: Any, commands: list[float]) -> Any:
+    def record_step(self: Any, state: Any, y: Any, u: float) -> Any:
+        commands.append(u)
+        return step(self, state, y, u)
+
+    return record_step

@@ -1,0 +1,512 @@
+"""The law (8), its integrator and limits, and the controller around it, against the paper's numbers and scipy."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import solve_continuous_are
+
+from cmg_mj.core.controller import Controller, PlantInterface
+from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.types import IdealReading
+from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
+from cmg_mj.observers import Estimate, Measurement, make_observer
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import prepare
+from cmg_mj.scenario.loading import load_scenario, parse_scenario
+from cmg_mj.scenario.make_controller import make_controller
+from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.sensors.encoder import Encoder
+from cmg_mj.sensors.fog import Fog
+from cmg_mj.sensors.sampled import Sensors
+from tests.observers.reference import DT, GRAVITY_TORQUE, J1, J2, PAPER
+from tests.plant import paper_model as paper
+
+K_E = (35.0, 4.0, -1.0, 0.3)  # aranovskiy2020 Table 2
+OTHER_GAINS = (20.0, -3.0, 1.5, 0.4)
+RATE_LIMIT = 4.7  # rad/s: 45 rev/min, Dynamixel MX-106R
+
+MOMENTUM = paper.J_d * paper.omega_d
+
+A_E = np.array(
+    [[0.0, 1.0, 0.0, 0.0], [GRAVITY_TORQUE / J1, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0]]
+)
+B_E = np.array([[0.0], [MOMENTUM / J1], [1.0], [0.0]])
+
+
+def run(*settings: str) -> Trajectory:
+    trajectory = prepare(load_scenario("push_recovery", settings)).run().trajectory
+    assert trajectory is not None
+    return trajectory
+
+
+# --- the reduced model that the gains are for ----------------------------------------------------------------
+
+
+def test_reduced_model_is_the_printed_equation() -> None:
+    """The second line of (4), and (6)."""
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        x1, x2, x3, u = rng.uniform(-1.0, 1.0), rng.uniform(-9.0, 9.0), rng.uniform(-3.0, 3.0), rng.uniform(-5.0, 5.0)
+        gyroscopic = u * (MOMENTUM * math.cos(x3) - J2 * x2 * math.sin(2.0 * x3))
+        f2 = (gyroscopic + GRAVITY_TORQUE * math.sin(x1)) / (J1 + J2 * math.sin(x3) ** 2)
+        assert PAPER.tilt_acceleration(x1, x2, x3, u) == pytest.approx(f2, rel=1e-12, abs=1e-12)
+    np.testing.assert_allclose(PAPER.A_e, A_E, rtol=1e-14)
+    np.testing.assert_allclose(PAPER.B_e, B_E, rtol=1e-14)
+
+
+def test_the_extended_pair_is_controllable() -> None:
+    """As the paper says below (7). Rank by Hautus' test, with the least singular value of [A - s I, B]."""
+    for pole in np.linalg.eigvals(A_E):
+        hautus = np.hstack([PAPER.A_e - pole * np.eye(4), PAPER.B_e])
+        assert np.linalg.svd(hautus, compute_uv=False)[-1] > 1e-3
+
+
+def test_closed_loop_poles_of_table_2() -> None:
+    """The law itself, differentiated: A_e - B_e K_e has -10.47 +- 4.60j and -0.203 +- 0.295j."""
+    K = [[-StateFeedback(DT)(*row)[0] for row in (1e-3 * np.eye(4)).tolist()]]
+    poles = np.linalg.eigvals(A_E - B_E @ (1e3 * np.array(K)))
+    expected = [-10.47 - 4.60j, -10.47 + 4.60j, -0.203 - 0.295j, -0.203 + 0.295j]
+    result = sorted(poles, key=lambda s: (round(s.real, 2), s.imag))
+    np.testing.assert_allclose([s.real for s in result], [s.real for s in expected], atol=6e-3)
+    np.testing.assert_allclose([s.imag for s in result], [s.imag for s in expected], atol=6e-3)
+    np.testing.assert_allclose([s.real for s in result[2:]], -0.203, atol=6e-4)
+    np.testing.assert_allclose([abs(s.imag) for s in result[2:]], 0.295, atol=6e-4)
+
+
+# --- the law -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("law", "gains"), [(StateFeedback(DT), K_E), (StateFeedback(DT, OTHER_GAINS), OTHER_GAINS)])
+def test_law_is_the_papers(law: StateFeedback, gains: tuple[float, float, float, float]) -> None:
+    """u = -K_e [y1, x2, y2, x_e], x_e' = -x3 over a control period."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        x = rng.normal(0.0, [0.02, 0.2, 0.5, 1.0]).tolist()
+        u, x_e = law(*x)
+        assert u == pytest.approx(-(gains[0] * x[0] + gains[1] * x[1] + gains[2] * x[2] + gains[3] * x[3]), rel=1e-12)
+        assert x_e == pytest.approx(x[3] - DT * x[2], rel=1e-12)
+
+
+@pytest.mark.parametrize("limit", [RATE_LIMIT, 2.0])
+def test_rate_limit(limit: float) -> None:
+    law = StateFeedback(DT) if limit == RATE_LIMIT else StateFeedback(DT, rate_limit=limit)
+    x1 = limit / 35.0
+    assert law(0.999 * x1, 0.0, 0.0, 0.0)[0] == pytest.approx(-0.999 * limit)
+    for sign in (1.0, -1.0):
+        assert law(sign * 1.001 * x1, 0.0, 0.0, 0.0)[0] == -sign * limit
+        assert law(sign * 9.0, 0.0, 0.0, 0.0)[0] == -sign * limit
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("k4", [0.3, -0.3])
+def test_integrator_does_not_wind_up(sign: float, k4: float) -> None:
+    """Saturated: x_e moves only if that brings the demand back. The demand moves by k4 x3 dt a period."""
+    law = StateFeedback(DT, (35.0, 4.0, -1.0, k4))
+    saturating = -sign * 0.5  # demand of sign * 17.5 rad/s
+    outward = math.copysign(0.2, sign * k4)
+    assert law(saturating, 0.0, outward, 1.0) == (sign * RATE_LIMIT, 1.0)
+    u, x_e = law(saturating, 0.0, -outward, 1.0)
+    assert (u, x_e) == (sign * RATE_LIMIT, pytest.approx(1.0 + DT * outward))
+    assert law(0.0, 0.0, outward, 0.0)[1] == pytest.approx(-DT * outward)  # not saturated: it integrates
+
+
+def test_integrator_stays_bounded_through_a_long_saturation_and_resumes() -> None:
+    """Held at x1 = 0.5 for 10 s with the gimbal turned outward, it stays; let go, it goes on at -x3."""
+    law, x_e = StateFeedback(DT), 0.0
+    for _ in range(2000):
+        _, x_e = law(-0.5, 0.0, 0.3, x_e)
+    assert x_e == 0.0
+    for _ in range(200):
+        u, x_e = law(0.0, 0.0, 0.3, x_e)
+        assert abs(u) < RATE_LIMIT
+    assert x_e == pytest.approx(-0.3)
+
+
+def test_law_treats_each_world_alone() -> None:
+    rng = np.random.default_rng(2)
+    x = rng.normal(0.0, [[0.2], [1.0], [0.5], [3.0]], (4, 500))
+    u, x_e = StateFeedback(DT)(*x)
+    singles = [StateFeedback(DT)(*column) for column in x.T.tolist()]
+    np.testing.assert_array_equal(np.array(singles).T, [u, x_e])
+    assert 50 < np.sum(np.abs(u) == RATE_LIMIT) < 450
+
+
+def reduced_loop(
+    e: float, duration: float, x: list[float], x_e: float = 0.0, law: StateFeedback | None = None
+) -> np.ndarray:
+    """(4) under the sampled law with y1 = x1 - e and the true rate: [x1, x2, x3, x_e, u] at each tick."""
+    law, rows = law or StateFeedback(DT), []
+    for _ in range(round(duration / DT)):
+        u, following = law(x[0] - e, x[1], x[2], x_e)
+        rows.append([*x, x_e, u])
+        x, x_e = one_period(x, u), following
+    return np.array(rows)
+
+
+def one_period(x: list[float], u: float) -> list[float]:
+    """(4) over a control period, u held; RK4, whose error here is below 1e-9."""
+
+    def slope(x: list[float]) -> list[float]:
+        gyroscopic = u * (MOMENTUM * math.cos(x[2]) - J2 * x[1] * math.sin(2.0 * x[2]))
+        return [x[1], (gyroscopic + GRAVITY_TORQUE * math.sin(x[0])) / (J1 + J2 * math.sin(x[2]) ** 2), u]
+
+    def advance(k: list[float], h: float) -> list[float]:
+        return [a + h * b for a, b in zip(x, k, strict=True)]
+
+    k1 = slope(x)
+    k2 = slope(advance(k1, DT / 2.0))
+    k3 = slope(advance(k2, DT / 2.0))
+    k4 = slope(advance(k3, DT))
+    return advance([(a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)], DT)
+
+
+@pytest.mark.parametrize("e_deg", [0.5, -2.0])
+def test_integrator_settles_at_plus_k1_over_k4_e(e_deg: float) -> None:
+    """The paper's own sign is minus; with y1 = x1 - e, u = 0 asks for x_e = +k_e1/k_e4 e = +35/0.3 e."""
+    e = math.radians(e_deg)
+    end = reduced_loop(e, 60.0, [math.radians(1.0), 0.0, 0.0])[-1]
+    np.testing.assert_allclose(end[:3], 0.0, atol=2e-3 * abs(e))
+    assert end[3] == pytest.approx(35.0 / 0.3 * e, rel=1e-3)
+    still = reduced_loop(e, 0.1, [0.0, 0.0, 0.0], 35.0 / 0.3 * e)
+    np.testing.assert_allclose(still[:, [0, 1, 2, 4]], 0.0, atol=1e-12)
+
+
+def test_sampled_loop_decays_as_its_poles_say() -> None:
+    """Small motions of the loop at 200 Hz: the slow pair decays at 0.203/s (the sampling moves it by 1 %)."""
+    x_e = reduced_loop(0.0, 45.0, [1e-4, 0.0, 0.0])[:, 3]
+    peaks = np.flatnonzero((np.abs(x_e[1:-1]) > np.abs(x_e[:-2])) & (np.abs(x_e[1:-1]) > np.abs(x_e[2:]))) + 1
+    late = peaks[peaks * DT > 5.0]
+    decay = -np.polyfit(late * DT, np.log(np.abs(x_e[late])), 1)[0]
+    assert decay == pytest.approx(0.203, rel=0.02)
+    assert np.diff(late * DT) == pytest.approx(math.pi / 0.295, rel=0.02)
+
+
+# --- LQR -----------------------------------------------------------------------------------------------------
+
+WEIGHTS = [([100.0, 1.0, 1.0, 0.1], 1.0), ([1.0, 1.0, 1.0, 1.0], 0.2), ([2000.0, 5.0, 0.5, 0.05], 3.0)]
+
+
+def riccati(state_cost: list[float], input_cost: float) -> np.ndarray:
+    return solve_continuous_are(A_E, B_E, np.diag(state_cost), np.array([[input_cost]]))
+
+
+@pytest.mark.parametrize(("state_cost", "input_cost"), WEIGHTS)
+def test_lqr_gains_are_those_of_the_riccati_equation(state_cost: list[float], input_cost: float) -> None:
+    expected = B_E.T @ riccati(state_cost, input_cost) / input_cost
+    np.testing.assert_allclose([lqr_gains(PAPER, state_cost, input_cost)], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("state_cost", "input_cost"), WEIGHTS[:2])
+def test_simulated_cost_of_the_lqr_is_x_P_x(state_cost: list[float], input_cost: float) -> None:
+    """The integral of x'Qx + u'Ru along the linear loop; and no law nearby does better."""
+    x0 = np.array([0.02, -0.1, 0.1, 0.3])
+    K = np.array([lqr_gains(PAPER, state_cost, input_cost)])
+
+    def cost(gain: np.ndarray) -> float:
+        def slope(t: float, z: np.ndarray) -> np.ndarray:
+            x = z[:4]
+            u = -gain @ x
+            return np.append(A_E @ x + (B_E @ u), state_cost @ x**2 + input_cost * u @ u)
+
+        return solve_ivp(slope, (0.0, 60.0), np.append(x0, 0.0), "LSODA", rtol=1e-9, atol=1e-12).y[4, -1]
+
+    best = cost(K)
+    assert best == pytest.approx(x0 @ riccati(state_cost, input_cost) @ x0, rel=1e-5)
+    for factor in ([1.05, 1.0, 1.0, 1.0], [1.0, 0.95, 1.0, 1.0], [1.0, 1.0, 1.05, 1.0], [1.0, 1.0, 1.0, 0.95]):
+        assert cost(K * factor) > best * (1.0 + 1e-7)
+
+
+def test_lqr_of_a_scenario_reaches_the_law() -> None:
+    state_cost, input_cost = WEIGHTS[0]
+    scenario = {"controller": {"lqr": {"state_cost": state_cost, "input_cost": input_cost}}}
+    expected = (B_E.T @ riccati(state_cost, input_cost) / input_cost).ravel()
+    law = prepare(parse_scenario(scenario)).law
+    assert isinstance(law, StateFeedback)
+    assert law.gains == pytest.approx(tuple(expected), rel=1e-6)
+    assert prepare(parse_scenario({})).law == StateFeedback(DT, K_E, RATE_LIMIT)
+
+
+@pytest.mark.parametrize("state_cost", [[1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
+def test_lqr_that_leaves_the_integrator_alone_is_refused(state_cost: list[float]) -> None:
+    with pytest.raises(InputError, match=r"^controller\.lqr: no stabilising gain"):
+        lqr_gains(PAPER, state_cost, 1.0)
+
+
+# --- the controller ------------------------------------------------------------------------------------------
+
+
+class Script:
+    """An observer that returns what it was told, and remembers what it was asked."""
+
+    def __init__(self, estimate: Callable[[int], Any]) -> None:
+        self.estimate = estimate
+        self.calls: list[tuple[float, float, float]] = []
+
+    def init(self, y: Measurement) -> int:
+        return 0
+
+    def step(self, state: int, y: Measurement, u: float) -> tuple[int, Any]:
+        self.calls.append((y.y1, y.y2, u))
+        return state + 1, self.estimate(state + 1)
+
+
+IDEAL_SENSORS = Sensors(
+    Accelerometer(noise_density_ug_rthz=0.0, counts_per_g=0.0),
+    Encoder(counts_per_revolution=0.0),
+    Fog(angle_random_walk_deg_rth=0.0, bandwidth_hz=0.0, bias_deg_h=0.0),
+)
+
+
+def reading(tilt: float, gimbal: float, rate: float) -> IdealReading:
+    """A still rig: gravity in both accelerometers, gimbals moved oppositely from a quarter turn."""
+    x, z = -9.81 * math.sin(tilt), 9.81 * math.cos(tilt)
+    return IdealReading((x, z, x, z), [math.pi / 2.0 + gimbal, math.pi / 2.0 - gimbal], rate, rate)
+
+
+def controller(observer: Any, law: StateFeedback | None = None, **options: Any) -> Controller:
+    return make_controller(
+        observer,
+        law or StateFeedback(DT),
+        IDEAL_SENSORS,
+        PlantInterface(RadialTilt(0.1, 0.3), GimbalAngle((1.0, -1.0), (math.pi / 2.0, math.pi / 2.0)), 0.001),
+        **options,
+    )
+
+
+READINGS = [reading(0.01, 0.0, 0.5), reading(0.02, 0.1, 0.6), reading(-0.01, 0.2, 0.7), reading(0.03, -0.1, 0.8)]
+ESTIMATES = [Estimate(0.01, 0.0, 0.0), *(Estimate(0.001 * k, 0.1 * k, -0.05 * k) for k in (1, 2, 3))]
+
+
+def ticks(loop: Controller, readings: list[IdealReading] = READINGS) -> list[Any]:
+    result = []
+    for k, ideal in enumerate(readings):
+        assert loop.update(5 * k, ideal)
+        result.append(loop.tick)
+    return result
+
+
+def test_measurements_are_tilt_and_half_the_difference_of_the_gimbals() -> None:
+    for tick, (tilt, gimbal) in zip(
+        ticks(controller(Script(ESTIMATES.__getitem__))),
+        [(0.01, 0.0), (0.02, 0.1), (-0.01, 0.2), (0.03, -0.1)],
+        strict=True,
+    ):
+        assert tick.y1 == pytest.approx(tilt, abs=1e-14)
+        assert tick.y2 == pytest.approx(gimbal, abs=1e-14)
+    lopsided = IdealReading(READINGS[0].accelerations, [math.pi / 2.0 + 0.3, math.pi / 2.0 - 0.1], 0.0, 0.0)
+    assert ticks(controller(Script(ESTIMATES.__getitem__)), [lopsided])[0].y2 == pytest.approx(0.2)
+
+
+def test_first_estimate_is_at_rest_at_the_measurement() -> None:
+    """For every observer; and the law acts on it at once."""
+    for kind in ("linear", "ltv", "homogeneous", "luenberger", "finite_difference", "super_twisting"):
+        tick = ticks(controller(make_observer(kind, DT, PAPER)), [reading(0.01, 0.2, 0.5)])[0]
+        assert tick.estimates == [(tick.y1, 0.0, tick.y2)]
+        assert tick.u == pytest.approx(-(35.0 * 0.01 - 0.2), rel=1e-9)
+        assert tick.x_e == 0.0
+
+
+def test_observer_gets_the_sample_and_the_command_held_since_the_last() -> None:
+    observer = Script(ESTIMATES.__getitem__)
+    result = ticks(controller(observer))
+    assert observer.calls == [(tick.y1, tick.y2, last.u) for last, tick in itertools.pairwise(result)]
+
+
+@pytest.mark.parametrize("angles", ["measured", "estimated"])
+@pytest.mark.parametrize("feedback", ["observer", "fog", "truth"])
+def test_law_acts_on_the_signals_of_its_settings(feedback: Any, angles: Any) -> None:
+    """(8) with y1, y2 or their estimates; the rate from the observer, the gyro (here off by 0.02) or the truth."""
+    loop = controller(Script(ESTIMATES.__getitem__), feedback=feedback, angle_source=angles)
+    loop.sensors = Sensors(
+        IDEAL_SENSORS.accelerometer,
+        IDEAL_SENSORS.encoder,
+        Fog(angle_random_walk_deg_rth=0.0, bandwidth_hz=0.0, bias_deg_h=math.degrees(0.02) * 3600.0),
+    )
+    loop.reset()
+    x_e = 0.0
+    for ideal, estimate, tick in zip(READINGS, ESTIMATES, ticks(loop), strict=True):
+        assert tick.fog == pytest.approx(ideal.rate + 0.02, rel=1e-12)
+        x1, x3 = (estimate.x1, estimate.x3) if angles == "estimated" else (tick.y1, tick.y2)
+        x2 = {"observer": estimate.x2, "fog": tick.fog, "truth": ideal.rate}[feedback]
+        assert tick.u == pytest.approx(-(35.0 * x1 + 4.0 * x2 - x3 + 0.3 * x_e), rel=1e-12)
+        assert tick.x_e == pytest.approx(x_e, abs=1e-15)
+        x_e -= DT * x3
+
+
+def test_open_loop_observers_see_the_same_and_change_nothing() -> None:
+    open_loop_observer = Script(lambda k: Estimate(9.0, -9.0 * k, 9.0))
+    alone, observer = ticks(controller(Script(ESTIMATES.__getitem__))), Script(ESTIMATES.__getitem__)
+    both_ticks = ticks(controller(observer, open_loop_observers={"hers": open_loop_observer}))
+    assert open_loop_observer.calls == observer.calls
+    assert [tick.u for tick in both_ticks] == [tick.u for tick in alone]
+    assert [tick.estimates[1].x2 for tick in both_ticks] == [0.0, -9.0, -18.0, -27.0]
+
+
+class WithBias(Script):
+    """One that estimates the bias and something else besides."""
+
+    extra_signals = ("torque_n_m", "bias_rad")
+
+
+def test_extra_signals_follow_the_state() -> None:
+    loop = controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4 * k, 0.5 * k)))
+    assert loop.extra_signals == [("torque_n_m", "bias_rad")]
+    assert [tuple(tick.estimates[0])[3:] for tick in ticks(loop)] == [
+        (0.0, 0.0),
+        (0.4, 0.5),
+        (0.8, 1.0),
+        (0.4 * 3, 1.5),
+    ]
+
+
+def test_a_declared_signal_that_is_missing_or_nan_stops_the_run() -> None:
+    with pytest.raises(RunStopped, match="bias_rad"):
+        ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4))))
+    with pytest.raises(RunStopped, match="returned nan for bias_rad"):
+        ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, math.nan))))
+
+
+def test_trim_holds_the_integrator_where_the_bias_asks_for_it() -> None:
+    """u = 0 at y1 = -e needs k_e4 x_e = k_e1 e; from the end of the trim on, x_e' = -x3 as ever."""
+    result = ticks(controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4, 0.01 * k)), bias_trim_s=2.0 * DT))
+    expected = [0.0, 35.0 / 0.3 * 0.01]
+    expected += [expected[-1] - DT * result[1].y2, expected[-1] - DT * (result[1].y2 + result[2].y2)]
+    assert [tick.x_e for tick in result] == pytest.approx(expected, rel=1e-12)
+    assert -35.0 * -0.01 - 0.3 * result[1].x_e == pytest.approx(0.0, abs=1e-15)  # at rest at y1 = -e nothing is asked
+
+
+def test_trim_needs_a_bias_and_an_integrator() -> None:
+    with pytest.raises(
+        InputError, match=r"controller\.bias_trim_s = 1: needs an observer in the loop that estimates the bias"
+    ):
+        controller(Script(ESTIMATES.__getitem__), bias_trim_s=1.0)
+    with pytest.raises(InputError, match=r"controller\.bias_trim_s = 1: the gain on the integrator is zero"):
+        controller(WithBias(ESTIMATES.__getitem__), bias_trim_s=1.0, law=StateFeedback(DT, (35.0, 4.0, 1.0, 0.0)))
+
+
+def test_reset_starts_the_same_run_again() -> None:
+    loop = controller(make_observer("homogeneous", DT, PAPER), seed=3)
+    loop.sensors = Sensors()
+    loop.reset()
+    first = ticks(loop)
+    loop.reset()
+    assert loop.tick is None
+    assert ticks(loop) == first
+
+
+def test_nothing_is_due_between_ticks() -> None:
+    observer = Script(ESTIMATES.__getitem__)
+    loop = controller(observer)
+    assert (loop.period, loop.steps_per_sample) == (5, 5)
+    dues = [loop.update(step, READINGS[0]) for step in range(16)]
+    assert [step for step, is_due in enumerate(dues) if is_due] == [0, 5, 10, 15]
+    assert len(observer.calls) == 3
+
+
+def test_steps_per_sample_is_where_anything_may_be_due() -> None:
+    sensors = Sensors(Accelerometer(rate_hz=1000.0), Encoder(rate_hz=100.0), Fog(rate_hz=500.0))
+    loop = Controller(
+        Script(ESTIMATES.__getitem__),
+        StateFeedback(0.01),
+        sensors,
+        PlantInterface(RadialTilt(0.1, 0.3), GimbalAngle((1.0,), (0.0,)), 0.0005),
+    )
+    assert (loop.period, loop.steps_per_sample) == (20, 2)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_an_estimate_that_is_no_number_stops_the_run(value: float) -> None:
+    loop = controller(Script(lambda k: Estimate(0.0, value if k == 2 else 0.0, 0.0)))
+    with pytest.raises(RunStopped, match=rf"observer Script returned {value} for x2 at t = 0\.01 s"):
+        ticks(loop)
+
+
+@pytest.mark.parametrize("estimate", [Estimate(math.nan, 0.0, 0.0), Estimate(0.0, 0.0, math.nan)])
+def test_an_estimated_angle_that_is_no_number_stops_the_run(estimate: Estimate) -> None:
+    """If the law uses the estimated angles."""
+    with pytest.raises(RunStopped):
+        ticks(controller(Script(lambda k: estimate), angle_source="estimated"))
+
+
+def test_an_observer_that_raises_stops_the_run_by_name() -> None:
+    def fail(k: int) -> Estimate:
+        raise ZeroDivisionError("no gain")
+
+    with pytest.raises(RunStopped, match=r"observer Script .*0\.005 s(.|\n)*ZeroDivisionError: no gain") as info:
+        ticks(controller(Script(fail)))
+    assert isinstance(info.value.__cause__, ZeroDivisionError)
+
+
+# --- in the loop ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["homogeneous", "ltv", "linear"])
+def test_recorded_commands_are_the_papers_law(kind: str) -> None:
+    """(8) on the record of a run on the full model, through start, push and saturation."""
+    trajectory = run("duration_s=1", f"observer.kind={kind}", "push.0.start_s=0.3", "push.0.torque_n_m=4.0")
+    y1, y2, u, x_e = (trajectory[name] for name in ("y1_rad", "y2_rad", "u_rad_s", "x_e_rad_times_s"))
+    x2 = trajectory[f"estimate/{kind}/x2_rad_s"]
+    demand = -(35.0 * y1 + 4.0 * x2 - 1.0 * y2 + 0.3 * x_e)
+    np.testing.assert_allclose(u, np.clip(demand, -4.7, 4.7), rtol=0.0, atol=1e-12)
+    saturated = np.abs(demand) > 4.7
+    assert 0 < saturated.sum() < 100
+    assert x_e[0] == 0.0
+    is_held = saturated & (y2 * demand > 0.0)
+    np.testing.assert_allclose(np.diff(x_e), np.where(is_held, 0.0, -0.005 * y2)[:-1], rtol=0.0, atol=1e-12)
+
+
+def test_a_scenario_may_feed_back_the_estimated_angles() -> None:
+    """As the text after (10) has it: the whole estimate, the integrator too."""
+    trajectory = run("duration_s=0.5", "push=[]", "observer.kind=ltv", "controller.angle_source=estimated")
+    x1, x2, x3 = (trajectory[f"estimate/ltv/{name}"] for name in ("x1_rad", "x2_rad_s", "x3_rad"))
+    u, x_e = trajectory["u_rad_s"], trajectory["x_e_rad_times_s"]
+    np.testing.assert_allclose(u, -(35.0 * x1 + 4.0 * x2 - 1.0 * x3 + 0.3 * x_e), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(np.diff(x_e), -0.005 * x3[:-1], rtol=0.0, atol=1e-12)
+    assert np.abs(x1 - trajectory["y1_rad"]).max() > 1e-3
+
+
+def test_the_true_rate_is_read_only_when_asked_for() -> None:
+    """feedback = observer: another truth (a biased gyro) changes nothing; feedback = fog: it does."""
+    runs = {
+        (feedback, bias): run(
+            "duration_s=0.3", "push=[]", f"controller.feedback={feedback}", f"sensors.fog.bias_deg_h={bias}"
+        )
+        for feedback in ("observer", "fog")
+        for bias in (0.0, 3600.0)
+    }
+    for feedback, same in (("observer", True), ("fog", False)):
+        pair = [runs[feedback, bias]["u_rad_s"] for bias in (0.0, 3600.0)]
+        assert np.array_equal(pair[0], pair[1]) == same
+
+
+def test_gimbals_move_oppositely_at_the_commanded_rate() -> None:
+    """The command arrives as +-u: the gimbals' mean rate, in their own directions, follows it."""
+    trajectory = run(
+        "duration_s=1", "push=[]", "controller.feedback=truth", "sensors.accelerometer.noise_density_ug_rthz=0"
+    )
+    first, second = (trajectory[f"angle/cube{i}/gimbal_rad"] - math.pi / 2.0 for i in (1, 2))
+    np.testing.assert_allclose(first, -second, atol=1e-6)
+    np.testing.assert_allclose(trajectory["x3_rad"], first, atol=1e-6)
+    setpoint = np.concatenate([[0.0], np.cumsum(trajectory["u_rad_s"])[:-1]]) * 0.005
+    np.testing.assert_allclose(first[100:], setpoint[100:], atol=2e-2)
+
+
+def test_it_goes_on_with_the_integrator_and_the_command_of_another() -> None:
+    before = controller(Script(ESTIMATES.__getitem__))
+    ticks(before, READINGS[:2])
+    assert before.tick is not None
+    law = StateFeedback(DT, (30.0, 3.0, -0.5, 0.1))
+    loop = controller(Script(ESTIMATES.__getitem__), law, feedback="truth")
+    loop.continue_from(before)
+    assert loop.gimbal_rate == before.gimbal_rate
+    loop.update(10, READINGS[2])
+    assert loop.tick is not None
+    assert loop.tick.x_e == pytest.approx(before.tick.x_e - DT * before.tick.y2)

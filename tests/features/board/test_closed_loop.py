@@ -1,0 +1,270 @@
+"""Exported controllers on the emulated board: in lockstep with the host, and closing the loop."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import subprocess
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.features.board import Board, on_a_board, temporary_export
+from cmg_mj.features.board.image import available, build
+from cmg_mj.features.board.processor import Decision
+from cmg_mj.observers import OBSERVERS, Measurement
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.scenario.loading import load_scenario
+from tests.command import cmg_mj
+from tests.features.board.toy import SHORT, short
+from tests.tiers import slow_but
+
+pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
+
+
+@pytest.fixture(autouse=True)
+def few_signals(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On which an export compares C with Python, before it goes to the board: see the tests of the export."""
+    monkeypatch.setattr("cmg_mj.features.export.check.TICKS", 40)
+
+
+NO_COUNTS = ("sensors.accelerometer.counts_per_g=0", "sensors.encoder.counts_per_revolution=0")
+ARE_PUSHED = ("homogeneous", "kalman", "gyro_free")
+"""In lockstep; the others stand there for half a second."""
+PUSH_SETTINGS = ("duration_s=2.5", "push.0.start_s=1.0", "push.0.torque_n_m=2.5")
+
+
+def set_options(settings: tuple[str, ...]) -> list[str]:
+    return [word for setting in settings for word in ("--set", setting)]
+
+
+class Recorder:
+    """A processor that does what the controller itself does, and keeps what it was given and decided."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.controller = experiment.axis_controller()
+        self.readings: list[tuple[list[float], list[float]]] = []
+        self.decisions: list[Decision] = []
+
+    def start(self) -> None:
+        self.controller.reset()
+
+    def update(self, accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
+        tick = self.controller.decide(
+            len(self.readings) * self.controller.period, accelerations, encoders, math.nan, math.nan
+        )
+        self.readings.append((list(accelerations), list(encoders)))
+        self.decisions.append(Decision(tick.u, tick.x_e, tick.estimates[0]))
+        return self.decisions[-1]
+
+
+DOUBLE = re.compile(
+    r"__aeabi_\w*d\w*|__\w*df\w*|(pow|exp|log|sqrt|sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|f(abs|max|min|mod)"
+    r"|floor|ceil|copysign|hypot|expm1|log1p)"
+)
+"""Functions that compute in double precision on this processor: the compiler's helpers, and the C library's."""
+
+
+def double_precision_names(image: Path) -> list[str]:
+    listing = subprocess.run(["arm-none-eabi-nm", image], capture_output=True, text=True, check=True).stdout
+    names = [line.split()[-1] for line in listing.splitlines()]
+    assert "main" in names
+    return [name for name in names if DOUBLE.fullmatch(name)]
+
+
+def test_a_processor_that_is_the_controller_changes_nothing() -> None:
+    experiment = short("adaptive")
+    ours, on_processor = experiment.run(), experiment.run_on(Recorder(experiment))
+    assert ours.summaries == on_processor.summaries
+    assert ours.trajectory is not None
+    assert on_processor.trajectory is not None
+    for name in ours.trajectory.columns:
+        np.testing.assert_array_equal(ours.trajectory[name], on_processor.trajectory[name], err_msg=name)
+
+
+@pytest.mark.parametrize("observer", slow_but(OBSERVERS, "linear"))
+def test_lockstep_on_the_same_inputs(observer: str) -> None:
+    """The board's inputs are rounded to single precision, and so are its numbers; nothing is in double."""
+    experiment = prepare(load_scenario("push_recovery", PUSH_SETTINGS if observer in ARE_PUSHED else SHORT, observer))
+    host = Recorder(experiment)
+    experiment.run_on(host)
+    with temporary_export(experiment.axis_controller()) as (name, folder):
+        image = build(name, folder).path
+        assert double_precision_names(image) == []
+        board = Board(image)
+    with board:
+        board.start()
+        decisions = [board.update(*reading) for reading in host.readings]
+    for signal in (lambda decision: decision.estimate[1], lambda decision: decision.x_e):
+        host_signal, board_signal = (
+            np.array([signal(decision) for decision in series]) for series in (host.decisions, decisions)
+        )
+        assert np.sqrt(np.mean((board_signal - host_signal) ** 2)) < 1e-5
+    if observer in ARE_PUSHED:  # and hard: the command went to its limit
+        assert max(abs(decision.u) for decision in host.decisions) == experiment.law.rate_limit
+    u, board_u = (np.array([decision.u for decision in series]) for series in (host.decisions, decisions))
+    assert np.sqrt(np.mean((board_u - u) ** 2)) < 1e-4
+
+
+def test_super_twisting_is_chaotic_by_itself() -> None:
+    """So no lockstep can hold over a whole run, of single precision or of anything else; of linear it can."""
+    ends = []
+    for name in ("super_twisting", "linear"):
+        experiment = prepare(load_scenario("push_recovery", [], name))
+        trajectory = experiment.run().trajectory
+        assert trajectory is not None
+        columns = [trajectory[key].tolist() for key in ("y1_rad", "y2_rad", "u_rad_s")]
+        rates = []
+        for offset in (0.0, 1e-12):
+            observer = experiment.design.observer()
+            state = observer.init(Measurement(columns[0][0] + offset, columns[1][0]))
+            rates.append([])
+            for y1, y2, u in zip(columns[0][1:], columns[1][1:], columns[2], strict=False):
+                state, estimate = observer.step(state, Measurement(y1 + offset, y2), u)
+                rates[-1].append(estimate[1])
+        ends.append(np.abs(np.subtract(*rates)).max())
+    assert ends[0] > 0.01
+    assert ends[1] < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("observer", "settings"),
+    [
+        ("gyro_free", ()),
+        pytest.param(
+            "adaptive",
+            ("controller.bias_trim_s=0.2", "controller.angle_source=estimated"),
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
+    """Tick by tick, without the sensors' counts: a reading just between two of them may fall to either side."""
+    experiment = short(observer, *NO_COUNTS, *settings)
+    host, board = experiment.run(), experiment.run(driver="board")
+    assert board.outcomes == host.outcomes
+    assert host.trajectory is not None
+    assert board.trajectory is not None
+    assert board.trajectory.columns.keys() == host.trajectory.columns.keys()
+    for name in ("x1_rad", "x2_rad_s", "u_rad_s", "x_e_rad_times_s", f"estimate/{observer}/x2_rad_s"):
+        np.testing.assert_allclose(board.trajectory[name], host.trajectory[name], atol=1e-4, err_msg=name)
+    assert not np.array_equal(board.trajectory["u_rad_s"], host.trajectory["u_rad_s"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "law", ["lqg", *(f"tests.features.export.own_laws:{law}" for law in ("Elaborate", "Memoryless"))]
+)
+def test_another_law_closes_the_loop(law: str) -> None:
+    """Its integrator too, which of one of them does not begin at zero, and which another one does not have."""
+    experiment = short("kalman", *NO_COUNTS, f"controller.kind={law}")
+    with temporary_export(experiment.axis_controller()) as (name, folder):
+        assert double_precision_names(build(name, folder).path) == []
+    host, board = experiment.run(), experiment.run(driver="board")
+    assert board.outcomes == host.outcomes
+    assert host.trajectory is not None
+    assert board.trajectory is not None
+    for name in ("x1_rad", "x2_rad_s", "u_rad_s", "x_e_rad_times_s", "estimate/kalman/x2_rad_s"):
+        np.testing.assert_allclose(board.trajectory[name], host.trajectory[name], atol=1e-4, err_msg=name)
+    assert not np.array_equal(board.trajectory["u_rad_s"], host.trajectory["u_rad_s"])
+    assert np.isnan(board.trajectory["x_e_rad_times_s"]).all() == law.endswith("Memoryless")
+
+
+@pytest.mark.slow
+def test_open_loop_observers_run_on_the_host() -> None:
+    experiment = short("linear", "open_loop_observers=['ltv']")
+    host, board = experiment.run(), experiment.run(driver="board")
+    key = "velocity_rms_error_rad_s"
+    assert board.values(key, "ltv") == pytest.approx(host.values(key, "ltv"), rel=1e-3)
+    assert host.values(key, "ltv") != host.values(key)
+
+
+def test_a_reading_that_is_not_finite_stops_the_board_until_start() -> None:
+    good = ((0.0, 9.81, 0.0, 9.81), (math.pi / 2.0, math.pi / 2.0))
+    broken = ((math.inf, *good[0][1:]), good[1])
+    with on_a_board(prepare(load_scenario("push_recovery", SHORT, "linear")).axis_controller()) as board:
+        before = [board.update(*good) for _ in range(3)]
+        for readings in (broken, good):
+            with pytest.raises(
+                RunStopped, match=r"^the controller on the board has stopped: a reading was not finite$"
+            ):
+                board.update(*readings)
+        board.start()
+        assert [board.update(*good) for _ in range(3)] == before
+
+
+def test_what_the_board_cannot_do_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^controller\.feedback = 'truth': a board has no such sensor"):
+        short("linear", "controller.feedback=truth").run(driver="board")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("elsewhere")
+def test_a_run_on_the_board_says_so_and_reruns_to_the_same_numbers() -> None:
+    first = cmg_mj("run", "push_recovery", "--driver", "board", *set_options(SHORT))
+    host = cmg_mj("run", "push_recovery", *set_options(SHORT))
+    assert "homogeneous on the board, seed 0" in " ".join(first.out.split())
+    assert "board" not in host.out
+    assert len(list(Path("runs").iterdir())) == 2
+    board_folder, host_folder = sorted(Path("runs").iterdir(), key=lambda folder: "-board-0" not in folder.name)
+    file = board_folder / "scenario.toml"
+    assert "cmg-mj run scenario.toml --driver board" in file.read_text().splitlines()[1]
+    assert "board" not in (host_folder / "scenario.toml").read_text()
+    assert cmg_mj("run", file, "--driver", "board", "--out", "again").status == 0
+    assert cmg_mj("run", file, "--out", "on_host").status == 0
+    folders = [board_folder, Path("again"), host_folder, Path("on_host")]
+    summaries = [(folder / "summary.json").read_text() for folder in folders]
+    assert summaries[0] == summaries[1] != summaries[2] == summaries[3]
+    assert (board_folder / "scenario.toml").read_text() == Path("again/scenario.toml").read_text()
+    assert tomllib.loads(file.read_text()) == tomllib.loads(Path("on_host/scenario.toml").read_text())
+    drivers = ["board", "board", None, None]
+    assert [json.loads(summary).get("driver") for summary in summaries] == drivers
+    assert [Trajectory.load(folder / "trajectory.parquet").metadata.get("driver") for folder in folders] == drivers
+    cmg_mj("run", "push_recovery", "--driver", "board", *set_options(SHORT))
+    assert len(list(Path("runs").iterdir())) == 2  # the same run again goes to the same folder
+
+
+OPEN_LOOP_OBSERVER = """
+import signal
+from cmg_mj import Estimate
+
+class Presses:
+    '''Presses Ctrl-C at the 20th sample.'''
+    def __init__(self, dt, model):
+        pass
+    def init(self, y):
+        return 0
+    def step(self, k, y, u):
+        if k == 18:
+            signal.raise_signal(signal.SIGINT)
+        return k + 1, Estimate(y.y1, 0.0 * y.y1, y.y2)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("elsewhere", "ctrl_c")
+def test_ctrl_c_ends_the_board_too() -> None:
+    Path("pressing.py").write_text(OPEN_LOOP_OBSERVER)
+    others = children()
+    outcome = cmg_mj(
+        *["run", "push_recovery", "--driver", "board", "--out", "here"],
+        "--set",
+        "open_loop_observers=['pressing:Presses']",
+    )
+    assert outcome.status == 130
+    assert outcome.err.endswith("cmg-mj: interrupted at 0.095 s; what was recorded until then is in here\n")
+    assert json.loads(Path("here/summary.json").read_text())["outcome"] == "interrupted"
+    assert children() == others
+
+
+def children() -> set[str]:
+    """Processes that this one has started."""
+    if not Path("/proc/self/task").exists():
+        return set()
+    return {pid for task in Path("/proc/self/task").iterdir() for pid in (task / "children").read_text().split()}

@@ -1,0 +1,103 @@
+"""Exported code against Python, on the samples of a closed loop over 15 s."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj.observers import OBSERVERS, Measurement
+from tests.features.export.compiled import Compiled, controller, needs_compiler, record
+
+pytestmark = needs_compiler
+
+USER_OBSERVERS = [f"tests.features.export.own:{name}" for name in ("Plain", "Elaborate")]
+SWITCHING = "super_twisting"
+"""Makes so much of a difference that single precision cannot follow it: see the test with those words."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [*OBSERVERS, *USER_OBSERVERS])
+def test_double_precision_is_bit_for_bit(kind: str, tmp_path: Path) -> None:
+    loop, export = record(kind), Compiled(kind, "double", tmp_path)
+    np.testing.assert_array_equal(export.run(loop.samples), loop.results)
+    assert export.output.splitlines()[-1] == "as in cmg_mj"
+
+
+@pytest.mark.daily_cases("adaptive")
+@pytest.mark.parametrize("kind", ["linear", "adaptive"])
+def test_a_second_is_bit_for_bit(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Besides, the export itself compares on few signals here."""
+    monkeypatch.setattr("cmg_mj.features.export.check.TICKS", 40)
+    settings = ("duration_s=1.0", "push.0.start_s=0.25")
+    loop, compiled = record(kind, *settings), Compiled(kind, "double", tmp_path, *settings)
+    np.testing.assert_array_equal(compiled.run(loop.samples), loop.results)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "settings",
+    [
+        pytest.param(("controller.bias_trim_s=0.52",), id="trimmed"),
+        pytest.param(("controller.angle_source=estimated", "controller.rate_hz=400"), id="estimated angles"),
+        pytest.param(("controller.gains=[30, 3.5, -1.2, 0.5]", "controller.rate_limit_rad_s=0.6"), id="limited"),
+        pytest.param(("observer.torque=true", "observer.bias=false", "observer.sinusoid_hz=1.5"), id="a sinusoid"),
+    ],
+)
+def test_settings_of_the_scenario_are_in_the_c(settings: tuple[str, ...], tmp_path: Path) -> None:
+    loop = record("adaptive", *settings)
+    plain = Compiled("adaptive", "double", tmp_path / "plain").run(loop.samples)
+    assert not np.array_equal(plain[:, -1], loop.results[:, -1])  # they do make a difference
+    np.testing.assert_array_equal(Compiled("adaptive", "double", tmp_path, *settings).run(loop.samples), loop.results)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [*OBSERVERS, *USER_OBSERVERS])
+def test_single_precision_is_close_and_nothing_else(kind: str, tmp_path: Path) -> None:
+    """RMS of the rate's difference: below 1e-5 rad/s, or 1e-4 of the observer's own error."""
+    loop, export = record(kind), Compiled(kind, "single", tmp_path)
+    off = export.run(loop.samples)[:, 1] - loop.results[:, 1]
+    own_error = loop.results[:, 1] - loop.rate
+    assert (rms(off) <= max(1e-5, 1e-4 * rms(own_error))) is (kind != SWITCHING)
+    assert export.output.splitlines()[-1] == "as in cmg_mj"
+
+    code = re.sub(r"/\*.*?\*/", "", export.header.read_text() + export.source.read_text(), flags=re.DOTALL)
+    assert not re.search(r"\bdouble\b|malloc|static (?!const|void|int is_finite\()", code)
+    floats = re.findall(r"(?<![\w.])(?:\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)\w?", code)
+    assert floats
+    assert all(literal.endswith("f") for literal in floats)
+    if shutil.which("nm"):
+        symbols = subprocess.run(["nm", "-D", "-u", export.library], capture_output=True, text=True, check=True).stdout
+        calls = [name for name in re.findall(r"U (\w+)", symbols) if not name.startswith("_")]
+        assert "atan2f" in calls
+        assert all(name.endswith("f") for name in calls), calls
+
+
+@pytest.mark.slow
+def test_what_single_precision_cannot_follow(tmp_path: Path) -> None:
+    """The one that switches: each of its steps is as exact, and Python itself does the same to samples rounded once."""
+    loop = record(SWITCHING)
+    export = Compiled(SWITCHING, "single", tmp_path)
+    off = rms(export.run(loop.samples)[:, 1] - loop.results[:, 1])
+    switching = controller(SWITCHING)
+    rounded_tilt = [switching.tilt(*forces) for forces in loop.samples[:, :4].astype(np.float32).astype(float).tolist()]
+    states, estimates = [switching.observer.init(Measurement(rounded_tilt[0], 0.0))], [0.0]
+    for y1 in rounded_tilt[1:]:
+        state, estimate = switching.observer.step(states[-1], Measurement(y1, 0.0), 0.0)
+        states.append(state)
+        estimates.append(estimate[1])
+    assert rms(np.array(estimates) - loop.results[:, 1]) > 0.1 * off > 1e-4
+
+    single_steps = [
+        export.step(np.array(before), y1, 0.0, 0.0, 0.0)[1][1] - estimate
+        for before, y1, estimate in zip(states, rounded_tilt[1:], estimates[1:], strict=False)
+    ]
+    assert rms(np.array(single_steps)) < 1e-5
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

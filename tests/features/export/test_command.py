@@ -1,0 +1,231 @@
+"""`cmg-mj export` as a user meets it."""
+
+from __future__ import annotations
+
+import errno
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.features.export import check_installed, export
+from cmg_mj.results import folder
+from tests.command import cmg_mj
+from tests.features.export.compiled import compile_c, controller, needs_compiler
+
+FILES = ["linear.c", "linear.h", "linear_example.c", "linear_test_vector.h"]
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+@pytest.fixture(autouse=True)
+def few_signals(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On which an export compares C with Python; the other tests of the export have all."""
+    monkeypatch.setattr("cmg_mj.features.export.check.TICKS", 100)
+
+
+def files(place: str) -> list[str]:
+    return sorted(path.name for path in Path(place).iterdir() if path.name != folder.MARKER)
+
+
+@needs_compiler
+def test_what_the_readme_of_an_export_says() -> None:
+    outcome = cmg_mj("export", "linear", "--out", "board")
+    assert outcome.status == 0
+    assert "linear, double precision" in outcome.out
+    assert outcome.out.count("0 (bit for bit)") == 5
+    assert files("board") == FILES
+    compile_c("board/linear.c", "board/linear_example.c", "-lm", "-o", "example")
+    subprocess.run(["./example"], check=True, capture_output=True)
+
+
+@pytest.mark.slow
+def test_json_and_the_folder_it_takes_by_itself() -> None:
+    outcome = cmg_mj("export", "linear", "--precision", "single", "--json", "--set", "observer.tau=0.03")
+    figures = json.loads(outcome.out)
+    assert (figures["observer"], figures["precision"], figures["trace_off_by"]) == ("linear", "single", 0.0)
+    assert sorted(figures["files"]) == files("runs/export-linear-single") == FILES
+    assert "tau = 0.03  Time constant of the filter [s]" in Path("runs/export-linear-single/linear.h").read_text()
+
+
+def test_parameters_gains_and_units_are_in_comments() -> None:
+    cmg_mj("export", "homogeneous", "--out", "board", "--set", "controller.rate_limit_rad_s=3")
+    header, source = (Path(f"board/homogeneous.{end}").read_text() for end in "hc")
+    assert "k1 = 20.0" in header
+    assert "gravity_torque = 3.45" in header
+    assert "[kg m^2]" in header
+    assert "rate_limit = 3.0;" in source
+    assert "/* largest gimbal rate [rad/s] */" in source
+
+
+def test_a_users_own_observer(tmp_path: Path) -> None:
+    Path("exported_by_a_user.py").write_text(
+        "class HTTPObserver2D:\n"
+        "    def __init__(self, dt, model): self.dt = dt\n"
+        "    def init(self, y): return y.y1\n"
+        "    def step(self, state, y, u): return y.y1, (y.y1, (y.y1 - state)/self.dt, y.y2)\n"
+    )
+    assert cmg_mj("export", "exported_by_a_user:HTTPObserver2D", "--out", "board").status == 0
+    assert "http_observer2_d.h" in files("board")
+
+
+@needs_compiler
+@pytest.mark.daily_cases("*-watcher")
+@pytest.mark.parametrize(
+    ("cls", "arguments", "name"),
+    [("Größe", [], "grosse"), ("Double", [], "double_observer"), ("观测器", ["--name", "watcher"], "watcher")],
+)
+def test_a_class_with_any_name(cls: str, arguments: list[str], name: str) -> None:
+    """Compiled by the command, and by a user whose compiler looks for headers in the folder."""
+    Path(f"called_{name}.py").write_text(
+        f"class {cls}:\n"
+        "    def __init__(self, dt, model): self.dt = dt\n"
+        "    def init(self, y): return {'abs': y.y1, 'ω': 0.0, '速度': 0.0, 'this': 0.0, 'NAN': 0.0}\n"
+        "    def step(self, state, y, u):\n"
+        "        rate = (y.y1 - state['abs'])/self.dt + 0*(state['速度'] + state['this'] + state['NAN'] + state['ω'])\n"
+        "        return {'abs': y.y1, 'ω': rate, '速度': rate, 'this': u, 'NAN': u}, (y.y1, rate, y.y2)\n",
+        encoding="utf-8",
+    )
+    assert cmg_mj("export", f"called_{name}:{cls}", *arguments, "--out", "board").status == 0
+    assert f"{name}.h" in files("board")
+    code = Path(f"board/{name}.h").read_text() + Path(f"board/{name}.c").read_text()
+    assert f"{name}_status {name}_update(" in code
+    assert all(f" {member};" in code for member in ("abs_", "omega", "value", "this_", "NAN_"))
+    assert re.sub(r"/\*.*?\*/", "", code, flags=re.DOTALL).isascii()
+    compile_c("-Iboard", f"board/{name}.c", f"board/{name}_example.c", "-lm", "-o", "example")
+    if arguments:
+        complaint = cmg_mj("export", f"called_{name}:{cls}", "--out", "other").complaint
+        assert complaint.endswith("give one with --name")
+        assert not Path("other").exists()
+
+
+def test_a_rig_with_one_gimbal() -> None:
+    assert cmg_mj("export", "linear", "--scenario", "single_gimbal", "--out", "board").status == 0
+    assert "#define LINEAR_ENCODERS 1" in Path("board/linear.h").read_text()
+
+
+@pytest.mark.slow
+def test_files_of_the_users_stay_and_an_earlier_export_is_replaced() -> None:
+    cmg_mj("export", "linear", "--out", "board")
+    Path("board/notes.txt").write_text("mine")
+    assert cmg_mj("export", "finite_difference", "--out", "board").status == 0
+    assert files("board") == sorted([name.replace("linear", "finite_difference") for name in FILES] + ["notes.txt"])
+    Path("board/linear.h").write_text("mine")
+    assert "linear.h there is not as cmg-mj wrote it" in cmg_mj("export", "linear", "--out", "board").complaint
+    assert Path("board/linear.h").read_text() == "mine"
+    Path("board/finite_difference.c").write_text("changed")
+    assert "finite_difference.c there is" in cmg_mj("export", "finite_difference", "--out", "board").complaint
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["lineer"], "OBSERVER 'lineer': no such observer; did you mean 'linear'?"),
+        (["nowhere:Class"], "cannot be imported: ModuleNotFoundError"),
+        (["linear", "--out", ""], "--out '': name a folder"),
+        (["linear", "--out", "file"], "--out file: cannot be written"),
+        (
+            ["linear", "--name", "double"],
+            "--name double: is a word of C or of its library; take another, such as double_",
+        ),
+        (["linear", "--name", "a-b"], "--name 'a-b': must be a name in C"),
+        (["linear", "--precision", "half"], "'half' is not one of 'double', 'single'"),
+        (["linear", "--scenario", "pish"], "scenario 'pish': no such file"),
+        (["linear", "--set", "observer.tau=0"], "observer.tau = 0: must be a number greater than 0"),
+        (["linear", "--set", "controller.bias_trim_s=1"], "needs an observer in the loop that estimates the bias"),
+        (["linear", "--set", "controller.feedback=fog"], "set controller.feedback=observer"),
+        (
+            ["linear", "--set", "controller.kind=tests.features.export.own_laws:Branches"],
+            "law Branches: cannot be exported: a branch on a value (",
+        ),
+        ([], "Missing argument 'OBSERVER'"),
+    ],
+)
+def test_wrong_input_is_one_line(arguments: list[str], words: str) -> None:
+    Path("file").write_text("")
+    assert words in cmg_mj("export", *arguments).complaint
+    assert not Path("runs").exists() or not any(Path("runs").iterdir())
+
+
+def test_a_disk_that_is_full_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    genuine = folder.write_text
+
+    def full(path: Path, text: str) -> None:
+        if path.name == "linear_test_vector.h" and path.parent.name.endswith(".part"):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        genuine(path, text)
+
+    monkeypatch.setattr(folder, "write_text", full)
+    assert cmg_mj("export", "linear", "--out", "board").complaint == (
+        "board/linear_test_vector.h: cannot be written: No space left on device"
+    )
+    assert not Path("board").exists()
+
+
+@needs_compiler
+def test_a_temporary_folder_that_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path, text: str) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("cmg_mj.features.export.pipeline.write_text", full)
+    complaint = cmg_mj("export", "linear", "--out", "board").complaint
+    assert re.search(r"temporary folder \S+: cannot be written: No space left on device$", complaint)
+    assert not Path("board").exists()
+
+
+@pytest.mark.daily_cases("'-No closing quotation", "* -c 0-*")
+@pytest.mark.parametrize(
+    ("cc", "words"),
+    [
+        ("'", "No closing quotation"),
+        ("no-such-compiler", "the C compiler no-such-compiler cannot be run: No such file or directory"),
+        (f"{sys.executable} -c 'raise SystemExit(1)'", "it ended with status 1 and without a message"),
+        (f"{sys.executable} -c 0", "the compiled example cannot be run"),
+    ],
+)
+def test_a_compiler_that_is_none(cc: str, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", cc)
+    assert words in cmg_mj("export", "linear", "--out", "board").complaint
+    assert not Path("board").exists()
+
+
+def test_without_a_compiler_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    outcome = cmg_mj("export", "linear", "--out", "board")
+    assert outcome.status == 0
+    assert "no C compiler was found" in outcome.err
+    assert "C, off from Python" not in outcome.out
+    assert files("board") == FILES
+
+
+@needs_compiler
+def test_c_that_is_not_what_python_runs_is_not_left(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A fault planted in the printing: the formulas agree, the C does not."""
+    from cmg_mj.features.export import c_code
+
+    genuine = c_code.literal
+    monkeypatch.setattr(c_code, "literal", lambda value, precision: genuine(1.0001 * value, precision))
+    with pytest.raises(InputError, match=r"the C is not what Python runs: .*x2_rad_s: off by at most"):
+        export(controller("linear"), tmp_path / "board")
+    assert not (tmp_path / "board").exists()
+
+
+def test_without_casadi_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    genuine = importlib.util.find_spec
+
+    def find_all_but_casadi(name: str, *arguments: Any) -> Any:
+        return None if name == "casadi" else genuine(name, *arguments)
+
+    monkeypatch.setattr("cmg_mj.features.export.save.find_spec", find_all_but_casadi)
+    with pytest.raises(InputError, match=r'casadi is not installed: python -m pip install "cmg_mj\[export\]"'):
+        check_installed()
+    assert 'pip install "cmg_mj[export]"' in cmg_mj("export", "linear", "--out", "board").complaint
+    assert not Path("board").exists()

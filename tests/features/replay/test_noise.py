@@ -1,0 +1,151 @@
+"""The noise that observers assume in a replay: told, else by the log itself, else the default."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj import load_scenario, prepare
+from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.features.replay.inputs import replay_prepared
+from cmg_mj.features.replay.log import Log, ReadOptions
+from cmg_mj.features.replay.noise import noise_figures, noise_in, noise_of, noise_remarks
+from cmg_mj.features.replay.reading import read_log
+from cmg_mj.features.replay.replay import replay_log
+from cmg_mj.features.replay.table import ACCELEROMETERS
+from cmg_mj.scenario.schema import Scenario
+from tests.features.replay.motion import COLUMNS, DT, N, sine, write_csv
+
+PLACES = RadialTilt(0.1, 0.3)
+RUN_COLUMNS = {
+    "time": "time_s",
+    "tilt": "y1_rad",
+    "acceleration": "acceleration_rad_s2",
+    "gimbal": "y2_rad",
+    "command": "u_rad_s",
+    "rate": "x2_rad_s",
+}
+
+
+def noisy_log(folder: Path, degrees: float, options: ReadOptions | None = None, n: int = N) -> Log:
+    columns = sine()
+    columns["tilt_rad"] = columns["tilt_rad"] + np.radians(degrees) * np.random.default_rng(0).standard_normal(N)
+    path = write_csv(folder / "noisy.csv", {name: values[:n] for name, values in columns.items()})
+    return read_log(path, options or ReadOptions(COLUMNS))
+
+
+def two_accelerometers(folder: Path, density: float) -> Log:
+    """Write a log of two accelerometers at 200 Hz that swing at 0.7 Hz."""
+    random, t = np.random.default_rng(1), DT * np.arange(N)
+    w, sigma = 1.4 * np.pi, density * 1e-6 * 9.80665 * math.sqrt(100.0)
+    y, rate = 0.1 * np.sin(w * t), 0.1 * w * np.cos(w * t)
+    columns = {"t_s": t}
+    for name, r in (("inner", PLACES.r_inner), ("outer", PLACES.r_outer)):
+        columns[f"{name}_x"] = -r * w**2 * y - 9.81 * np.sin(y) + sigma * random.standard_normal(N)
+        columns[f"{name}_z"] = 9.81 * np.cos(y) - r * rate**2 + sigma * random.standard_normal(N)
+    path = write_csv(folder / "two.csv", columns)
+    names = {name: name for name in ACCELEROMETERS}
+    options = ReadOptions({"time": "t_s", **names}, units=dict.fromkeys(names, "m_s2"), radii_m=(0.1, 0.3))
+    return read_log(path, options)
+
+
+def run_scenario(density: float, seed: int, duration_s: float) -> Scenario:
+    settings = ["observer.kind=gyro_free", f"sensors.accelerometer.noise_density_ug_rthz={density}", f"seed={seed}"]
+    return load_scenario("push_recovery", [*settings, f"duration_s={duration_s}"])
+
+
+def errors_of_a_run(folder: Path, density: float, seed: int, duration_s: float) -> list[tuple[float, ...]]:
+    """Return the errors of `gyro_free` and `kalman` on a run's log: noise told, and not told."""
+    experiment = prepare(run_scenario(density, seed, duration_s))
+    trajectory = experiment.run().trajectory
+    assert trajectory is not None
+    trajectory.save(folder / "run.parquet")
+    log = read_log(folder / "run.parquet", ReadOptions(RUN_COLUMNS))
+    _, model, truth = experiment.design.constructor_arguments
+    told = {"tilt": math.degrees(truth.tilt), "acceleration": truth.acceleration}
+    results = [replay_prepared(log, ["gyro_free", "kalman"], model=model, noises=noises) for noises in (told, {})]
+    return [
+        tuple(float(figures["velocity_rms_error_rad_s"] or 0.0) for figures in list(result.summaries.values())[:2])
+        for result in results
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("density", [400.0, 600.0, 1000.0, 1500.0])
+def test_a_run_replayed_without_being_told_its_noise(density: float, tmp_path: Path) -> None:
+    """At 400 ug/rtHz the tilt's noise is 0.36 deg; the default of 0.1 deg gives 0.034 and 0.166 for 0.014 and 0.069."""
+    for seed in range(2):
+        told, by_the_log = errors_of_a_run(tmp_path, density, seed, 15.0)
+        assert by_the_log == pytest.approx(told, rel=0.1)
+
+
+def test_a_noise_is_told_or_else_the_logs(tmp_path: Path) -> None:
+    log = noisy_log(tmp_path, 0.36)
+    assert math.degrees(noise_of(log).tilt) == pytest.approx(0.36, rel=0.04)
+    assert replay_log(log, ["linear"]).noise == noise_of(log)
+    assert math.degrees(noise_of(log, {"tilt": 0.2}).tilt) == pytest.approx(0.2, rel=1e-12)
+    assert math.degrees(noise_of(noisy_log(tmp_path, 0.0)).tilt) == pytest.approx(0.1, rel=1e-12)
+
+
+def test_the_noise_of_two_accelerometers(tmp_path: Path) -> None:
+    """Tilt and acceleration as the two make them, with the model's correlation."""
+    log = two_accelerometers(tmp_path, 800.0)
+    noise, expected = noise_of(log), noise_of(log, {"accelerometer": 800.0})
+    assert noise.tilt == pytest.approx(expected.tilt, rel=0.04)
+    assert noise.acceleration == pytest.approx(expected.acceleration, rel=0.04)
+    assert noise.correlation == pytest.approx(expected.correlation, abs=0.02)
+    assert noise.gimbal == expected.gimbal
+    (remark,) = noise_remarks(log, noise)
+    assert "--noise" not in remark
+    (told,) = noise_remarks(log, noise_of(log, {"accelerometer": 400.0}))
+    assert "give --noise accelerometer=8" in told
+
+
+@pytest.mark.parametrize("rate", [100.0, 400.0, 1000.0])
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+def test_resampled_noise_has_the_density_that_observers_assume(rate: float, jitter: float, tmp_path: Path) -> None:
+    """Below 20 Hz, where observers look; white noise of that density is larger at quicker rates."""
+    random = np.random.default_rng(0)
+    t = DT * (np.arange(N) + random.uniform(-jitter, jitter, N))
+    tilt = 0.01 * random.standard_normal(N)
+    path = write_csv(tmp_path / "log.csv", {"t_s": t, "tilt_rad": tilt})
+    log = read_log(path, ReadOptions({"time": "t_s", "tilt": "tilt_rad"}, rate_hz=rate))
+    density = np.abs(np.fft.rfft(log["y1_rad"])) ** 2 / len(log)
+    band = np.arange(len(density)) / (len(log) * log.dt) < 20.0
+    noise = noise_in(log).tilt
+    assert not isinstance(noise, str)
+    assert noise.sigma == pytest.approx(math.sqrt(float(density[band].mean())), rel=0.1)
+
+
+def test_a_told_density_is_that_of_the_rows(tmp_path: Path) -> None:
+    """A sample at a slower rate than the rows' has all of a row's noise, since nothing filters it."""
+    from dataclasses import replace
+
+    log = two_accelerometers(tmp_path, 800.0)
+    told = {"accelerometer": 800.0}
+    slow, quick = replace(log, dt=2.0 * log.dt), replace(log, dt=log.dt / 2.0)
+    assert noise_of(slow, told) == noise_of(log, told)
+    assert noise_of(quick, told).tilt == pytest.approx(math.sqrt(2.0) * noise_of(log, told).tilt, rel=1e-3)
+    for log_at_rate in (slow, quick):
+        assert noise_of(log_at_rate).tilt == pytest.approx(noise_of(log_at_rate, told).tilt, rel=0.04)
+
+
+def keys(figures: object, path: Sequence[str]) -> object:
+    for name in path:
+        assert isinstance(figures, dict)
+        figures = figures[name]
+    return figures
+
+
+def test_json_has_the_logs_noise(tmp_path: Path) -> None:
+    log = noisy_log(tmp_path, 0.36)
+    figures = noise_figures(log, noise_of(log))
+    assert keys(figures, ("noise_by_the_log", "tilt_rad", "used")) is True
+    assert keys(noise_figures(log, noise_of(log, {"tilt": 0.1})), ("noise_by_the_log", "tilt_rad", "used")) is False
+    fine = noisy_log(tmp_path, 0.0)
+    tilt = keys(noise_figures(fine, noise_of(fine)), ("noise_by_the_log", "tilt_rad"))
+    assert tilt == {"sigma": None, "reason": "there is hardly any", "used": False}

@@ -1,0 +1,249 @@
+"""Who takes part in a replay and why, and a run's own recording, which replays to the figures of its run."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj import InputError, ReducedModel, load_scenario, prepare
+from cmg_mj.core.tilt import RadialTilt, TiltNoise
+from cmg_mj.core.types import needs
+from cmg_mj.features.replay.inputs import model_of, observer_inputs, replay_prepared
+from cmg_mj.features.replay.log import Log, ReadOptions
+from cmg_mj.features.replay.noise import noise_numbers, noise_of
+from cmg_mj.features.replay.reading import read_log
+from cmg_mj.features.replay.replay import NO_MODEL, replay_log
+from cmg_mj.inputs.parameter_options import parameters_of
+from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.save import report_run, save_run
+from tests.features.replay.motion import COLUMNS, DT, N, sine, write_csv
+from tests.observers.reference import PAPER
+
+KEYS = ("velocity_rms_error_rad_s", "velocity_fit", "velocity_rms_error_push_rad_s", "velocity_fit_push")
+SETTINGS = ["duration_s=1.4", "push.0.start_s=0.3", 'open_loop_observers="all"', "observer.k1=23.0", "seed=5"]
+SETTINGS += ["sensors.accelerometer.noise_density_ug_rthz=300"]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    experiment = prepare(load_scenario("push_recovery", SETTINGS))
+    folder = tmp_path_factory.mktemp("runs") / "a-run"
+    result = experiment.run()
+    save_run(folder, report_run(experiment, result))
+    assert report_run(experiment, result).summary["observer"] == "homogeneous"
+    return folder
+
+
+def log(tmp_path: Path, **more: np.ndarray) -> Log:
+    columns = dict(COLUMNS, **{name.partition("_")[0]: name for name in more})
+    return read_log(write_csv(tmp_path / "log.csv", {**sine(), **more}), ReadOptions(columns))
+
+
+def test_a_run_replays_to_its_figures(run: Path) -> None:
+    """Estimates bit for bit, of the loop's observer (whose k1 is not the default) and of every open-loop observer."""
+    result = replay_prepared(read_log(run))
+    summary = json.loads((run / "summary.json").read_text())
+    trajectory = Trajectory.load(run / "trajectory.parquet")
+    assert result.left_out == {}
+    assert set(result.estimates) == set(OBSERVERS)
+    for name, figures in result.summaries.items():
+        expected = (
+            summary if name == "homogeneous" else {**summary["open_loop_observers"], **summary["references"]}[name]
+        )
+        for key in KEYS:
+            assert figures[key] == pytest.approx(expected[key], rel=1e-12, abs=1e-13), (name, key)
+        for signal, values in result.estimates.get(name, {}).items():
+            np.testing.assert_array_equal(values, trajectory[f"estimate/{name}/{signal}"])
+
+
+def test_a_runs_file_is_the_same_as_its_folder(run: Path) -> None:
+    folder, file = read_log(run), read_log(run / "trajectory.parquet")
+    np.testing.assert_array_equal(folder["y1_rad"], file["y1_rad"])
+    assert folder.name == file.name == "a-run"
+
+
+def test_a_runs_parameters_model_and_noise_can_be_changed(run: Path) -> None:
+    run_log = read_log(run)
+    original = replay_prepared(run_log, ["homogeneous", "gyro_free"])
+    parameters = {"homogeneous": {"alpha": 0.9}}
+    changed = replay_prepared(run_log, ["homogeneous", "gyro_free"], parameters=parameters, noises={"tilt": 1.0})
+    for name in ("homogeneous", "gyro_free"):
+        assert np.abs(changed.estimates[name]["x2_rad_s"] - original.estimates[name]["x2_rad_s"]).max() > 1e-3
+
+
+def test_a_runs_recording_as_any_parquet(run: Path) -> None:
+    """With --columns it is a log like others: the same estimates of those that need no more."""
+    path = run / "trajectory.parquet"
+    plain = read_log(path, ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
+    result = replay_log(plain, ["linear"], settle_s=0.0)
+    trajectory = Trajectory.load(path)["estimate/linear/x2_rad_s"]
+    np.testing.assert_allclose(result.estimates["linear"]["x2_rad_s"], trajectory, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_who_takes_part(tmp_path: Path) -> None:
+    """The observer's needs and the log's signals decide, for every combination."""
+    plain = log(tmp_path)
+    t = DT * np.arange(N)
+    gimbals = {"gimbal_rad": 0.01 * t, "command_rad_s": 0.01 + 0.0 * t}
+    for more, signals in (
+        ({}, set()),
+        (gimbals, {"gimbals"}),
+        ({"acceleration_rad_s2": -sine()["tilt_rad"]}, {"acceleration"}),
+    ):
+        one = log(tmp_path, **more)
+        for model in (None, PAPER):
+            inputs = signals | ({"model"} if model else set())
+            result = replay_log(one, model=model)
+            for kind in OBSERVERS:
+                missing_inputs = set(needs(OBSERVER_CLASSES.find(kind))) - inputs
+                assert (kind in result.left_out) == bool(missing_inputs), kind
+                assert (kind in result.estimates) != bool(missing_inputs), kind
+    assert "needs a model (--model)" in replay_log(plain).left_out["ltv"]
+
+
+def test_of_a_pendulum_without_gimbals_the_model_alone_is_enough(tmp_path: Path) -> None:
+    pendulum = model_of("inertia=0.06,gravity_torque=3.4")
+    assert pendulum == ReducedModel(0.06, 0.0, 0.0, 1.0, 3.4)
+    result = replay_log(log(tmp_path), ["homogeneous", "high_gain", "gyro_free"], model=pendulum)
+    assert set(result.left_out) == {"gyro_free"}
+
+
+def test_observers_that_need_no_model_do_not_look_at_it() -> None:
+    """They are given one of NaN; whatever is made of it is no number."""
+    for kind in OBSERVERS:
+        if "model" not in needs(OBSERVER_CLASSES.find(kind)):
+            observer = make_observer(kind, DT, NO_MODEL, TiltNoise(1e-3, 1.0, 0.5))
+            _, estimate = observer.step(observer.init(Measurement(0.1, 0.0, 0.2)), Measurement(0.11, 0.0, 0.2), 0.0)
+            assert np.isfinite(list(estimate)).all(), kind
+
+
+def test_parts_are_replayed_each_from_its_start(tmp_path: Path) -> None:
+    mask = np.ones(N, dtype=bool)
+    mask[2000:2300] = False
+    log_of_parts = read_log(
+        write_csv(tmp_path / "p.csv", {k: v[mask] for k, v in sine().items()}), ReadOptions(COLUMNS)
+    )
+    second = read_log(write_csv(tmp_path / "s.csv", {k: v[2300:] for k, v in sine().items()}), ReadOptions(COLUMNS))
+    parts_result, second_result = (
+        replay_log(log_of_parts, ["linear"], settle_s=0.5),
+        replay_log(second, ["linear"], settle_s=0.5),
+    )
+    np.testing.assert_array_equal(
+        parts_result.estimates["linear"]["x2_rad_s"][2000:], second_result.estimates["linear"]["x2_rad_s"]
+    )
+    assert log_of_parts.scored(0.5).sum() == 1900 + 1600
+
+
+def test_one_that_is_lost_is_said_and_the_others_go_on(tmp_path: Path) -> None:
+    result = replay_log(
+        log(tmp_path),
+        ["linear", "tests.features.replay.test_replayed:Loses", "tests.features.replay.test_replayed:Raises"],
+    )
+    assert set(result.estimates) == {"linear"}
+    assert "x2_rad_s is not finite from 0.05 s on" in result.left_out["tests.features.replay.test_replayed:Loses"]
+    reason = result.left_out["tests.features.replay.test_replayed:Raises"]
+    assert re.fullmatch(r"raised ZeroDivisionError: .* \(test_replayed\.py, line \d+\).*", reason)
+
+
+class Loses:
+    needs = ()
+
+    def __init__(self, dt: float, model: ReducedModel) -> None:
+        pass
+
+    def init(self, y: Measurement) -> int:
+        return 0
+
+    def step(self, state: int, y: Measurement, u: float) -> tuple[int, tuple]:
+        return state + 1, (y.y1, float("nan") if state == 9 else 0.0, 0.0)
+
+
+class Raises(Loses):
+    def step(self, state: int, y: Measurement, u: float) -> tuple[int, tuple]:
+        return state + 1, (y.y1, 1.0 / (9 - state), 0.0)
+
+
+def test_noise_of_two_accelerometers_follows_from_theirs(tmp_path: Path) -> None:
+    """White noise and resolution together, as in the bench: at 1 ug/rtHz the resolution is the larger."""
+    one = log(tmp_path)
+    assert noise_of(one).tilt == pytest.approx(np.radians(0.1))
+    radial = RadialTilt(0.1, 0.3)
+    for density in (1.0, 200.0):
+        noise = noise_of(dataclasses.replace(one, tilt=radial), {"accelerometer": density})
+        white, step = density * 1e-6 * 9.80665 * np.sqrt(100.0), 9.80665 / 16384.0
+        expected = radial.noise(math.hypot(white, step / math.sqrt(12.0)), 9.80665)
+        assert noise.tilt == pytest.approx(expected.tilt, rel=1e-12)
+        assert noise.acceleration == pytest.approx(expected.acceleration, rel=1e-12)
+        assert noise.correlation == expected.correlation
+
+
+def test_the_noise_of_a_runs_accelerometers_can_be_set(run: Path) -> None:
+    """All else of its sensors stays: told what it had, it is the run's; of its resolution the rest."""
+    run_log, run_noise = (
+        read_log(run),
+        prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2],
+    )
+    assert observer_inputs(run_log, noises={"accelerometer": 300.0}).noise == run_noise
+    more = observer_inputs(run_log, noises={"accelerometer": 600.0}).noise
+    assert more.tilt == pytest.approx(2.0 * run_noise.tilt, rel=1e-4)
+    assert more.gimbal == run_noise.gimbal
+    with pytest.raises(InputError, match="give accelerometer"):
+        observer_inputs(run_log, noises={"accelerometer": 300.0, "tilt": 0.1})
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (lambda: model_of("inertia=0.06"), "--model: gravity_torque"),
+        (lambda: model_of("inertia=-1,gravity_torque=3"), "must be greater than 0"),
+        (lambda: model_of("inertia=a,gravity_torque=3"), "--model inertia=a: must be a finite number"),
+        (lambda: model_of("mass=2"), "--model mass: no such number; allowed: gimbal_inertia"),
+        (lambda: model_of("nothing.xml"), "no such file, nor a bundled one"),
+        (lambda: noise_numbers("tild=3"), "--noise tild: no such number; did you mean 'tilt'?"),
+        (lambda: noise_numbers("tilt=0"), "must be greater than 0"),
+        (lambda: parameters_of(["k1=3"]), "write OBSERVER.PARAMETER=VALUE"),
+        (lambda: parameters_of(["homogenous.k1=3"]), "did you mean 'homogeneous'?"),
+        (lambda: parameters_of(["homogeneous.k1=x"]), "'x' is no number"),
+    ],
+)
+def test_what_cannot_be(action, message: str) -> None:
+    with pytest.raises(InputError) as info:
+        action()
+    assert message in str(info.value)
+
+
+def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
+    one = log(tmp_path)
+    with pytest.raises(InputError, match="linear has no such parameter"):
+        replay_log(one, ["linear"], parameters={"linear": {"tou": 0.1}})
+    with pytest.raises(InputError, match="nothing is left to score"):
+        replay_log(one, settle_s=20.0)
+    with pytest.raises(InputError, match="no observer can take part: ltv needs a model"):
+        replay_log(one, ["ltv"])
+
+
+@pytest.mark.parametrize("option", [{"units": {"tilt": "rad"}}, {"delay_s": 0.1}, {"delimiter": ";"}])
+def test_options_that_change_a_runs_recording_are_refused(run: Path, option: dict) -> None:
+    with pytest.raises(InputError, match=next(iter(option))):
+        read_log(run, ReadOptions(**option))
+
+
+def test_a_runs_recording_has_windows(run: Path) -> None:
+    assert read_log(run, ReadOptions(windows_s=[(0.4, 0.6)])).windows == ((0.4, 0.6),)
+    with pytest.raises(InputError, match="--window 5:6"):
+        read_log(run, ReadOptions(windows_s=[(5.0, 6.0)]))
+
+
+def test_a_replay_has_its_columns_and_a_frame(tmp_path: Path) -> None:
+    pytest.importorskip("pandas")
+    result = replay_log(log(tmp_path), ["linear"])
+    assert list(dict(result)) == result.keys()
+    np.testing.assert_array_equal(result.to_pandas()["estimate/linear/x2_rad_s"], result["estimate/linear/x2_rad_s"])

@@ -1,0 +1,130 @@
+"""A rig of several axes in Studio: it is the runner's on each of them, pushed about any, switched and brought back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mujoco.studio import messages
+
+from cmg_mj import load_scenario, prepare
+from cmg_mj.features.studio.panel import ChangeSettings, PushRequest, ShowAxis
+from cmg_mj.features.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, choosable_laws, current_law
+from tests.features.studio.session import SIGNALS, as_rows, session
+from tests.features.studio.test_session import runner_rows, same
+
+ROLL, PITCH = 0, len(SIGNALS)
+RATE, PUSH = 1, 7
+"""Columns of roll's in a row; pitch's come so many later."""
+
+SWING = (
+    "swing=[{frequency_hz=1.3, amplitude_n_m=0.3, axis='pitch'},"
+    " {frequency_hz=2.0, amplitude_n_m=0.2, start_s=0.2513, axis='roll'}]"
+)
+REAL = (
+    "sensors.accelerometer.vibration_mg=4",
+    "sensors.accelerometer.wheel_harmonics_mg=[5, 2]",
+    "plant.accelerometer_outer_misplaced_mm=3",
+    "pivot=[{kind='noise', acceleration_m_s2=0.3, corner_hz=5.0, axis='pitch'},"
+    " {kind='sine', acceleration_m_s2=0.2, frequency_hz=3.0, start_s=0.2513, direction='vertical'}]",
+)
+
+
+def runner(*settings: str) -> np.ndarray:
+    return runner_rows(*settings, scenario="two_axes")
+
+
+@pytest.mark.daily_cases("swings", "free base", "locked")
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ("duration_s=2.0", "push.0.start_s=0.5", "push.1.start_s=0.75"),
+        ("duration_s=1.5", "plant.model=two_axes_free_base", "axes.roll.observer.kind=adaptive", "push=[]"),
+        ("duration_s=1.0", "push.0.start_s=0.313", "push.1.start_s=0.32", "plant.timestep_s=0.001", SWING),
+        ("duration_s=1.0", 'plant.locked_axes=["roll"]', "push.1.start_s=0.5", "push.0.start_s=0.253"),
+        ("duration_s=1.0", "push.0.start_s=0.313", "push.1.start_s=0.32", "plant.timestep_s=0.001", *REAL),
+    ],
+    ids=["pushed", "free base", "swings", "locked", "a real rig"],
+)
+def test_untouched_it_is_the_runners_trajectory_of_each_axis(settings: tuple[str, ...]) -> None:
+    expected = runner(*settings)
+    with session(*settings, scenario="two_axes") as studio:
+        studio.run(float(settings[0].partition("=")[2]))
+        assert (studio.live.stopped, studio.live.note) == ("", "")
+        assert len(studio.rows) == len(expected)
+        same(studio.rows, expected)
+
+
+def test_a_push_by_button_is_about_the_axis_that_is_shown() -> None:
+    with session("push=[]", scenario="two_axes") as studio:
+        studio.run(1.0)
+        studio.send(ShowAxis("pitch"), PushRequest(-0.8, 0.2))
+        state = studio.session_state()
+        assert state.settings is not None
+        assert (state.axes, state.axis, state.settings.bias_deg) == (("roll", "pitch"), "pitch", -0.3)
+        studio.run(1.0)
+        rows = studio.rows
+        expected = runner("duration_s=2.0", 'push=[{start_s=1.0, duration_s=0.2, torque_n_m=-0.8, axis="pitch"}]')
+        same(rows[: len(expected)], expected)
+        assert np.count_nonzero(rows[:, PUSH + PITCH]) == 40
+        assert np.count_nonzero(rows[:, PUSH + ROLL]) == 0
+        ticks = studio.session_state().ticks
+        np.testing.assert_array_equal(ticks[: len(rows), 2], rows[: len(ticks), RATE + PITCH])
+        studio.send(ShowAxis("roll"), PushRequest(0.8, 0.2))  # what was plotted of it is there
+        np.testing.assert_array_equal(studio.session_state().ticks[: len(rows), 2], rows[:, RATE + ROLL])
+        studio.run(0.5)
+        assert np.count_nonzero(studio.rows[:, PUSH + PITCH]) == 40
+        assert np.count_nonzero(studio.rows[:, PUSH + ROLL]) == 40
+
+
+def test_a_law_is_the_runners_on_both_axes_from_the_start() -> None:
+    settings = ("axes.pitch.controller.lqr.state_cost=[2,1,1,1]", "axes.pitch.controller.rate_limit_rad_s=3.0")
+    with session(*settings, scenario="two_axes") as studio:
+        laws = choosable_laws(studio.live.base)
+        assert current_law(studio.live.base, studio.live.now) == "the scenario's"
+        studio.send(ChangeSettings(laws["LQR"]), ChangeSettings({FEEDBACK: "truth"}))
+        assert current_law(studio.live.base, studio.live.now) == "LQR"
+        studio.run(1.0)
+        base = prepare(load_scenario("two_axes", ["axes.pitch.controller.rate_limit_rad_s=3.0", "push=[]"]))
+        law = {"lqr": {"state_cost": [1, 1, 1, 1]}, "feedback": "truth"}
+        trajectory = base.with_settings({"controller": law, "duration_s": 1.0}).run().trajectory
+        assert trajectory is not None
+        same(studio.rows[:200], as_rows(trajectory))
+
+
+def test_a_fall_about_the_second_axis_is_a_fall() -> None:
+    with session(scenario="two_axes") as studio:
+        studio.send(ShowAxis("pitch"), PushRequest(30.0, 0.5))
+        studio.run(1.5)
+        push_setting = 'push=[{start_s=0.0, duration_s=0.5, torque_n_m=30.0, axis="pitch"}]'
+        outcome = prepare(load_scenario("two_axes", [push_setting])).run().outcomes[0]
+        assert outcome.kind == "fell"
+        assert studio.session_state().stopped.startswith(f"the rig fell at t = {outcome.time_s:g} s")
+        for axis in studio.live.plant.axes:
+            assert np.all(studio.data.ctrl[axis.servos] == 0.0)
+        studio.send(messages.ResetEvent(key=-1))
+        studio.stepping.rows.clear()
+        studio.run(1.0)
+        same(studio.rows, runner("duration_s=2.0", "push=[]"))
+
+
+def test_what_is_chosen_is_chosen_on_all_axes() -> None:
+    settings_of_axes = ("axes.pitch.observer.k1=40.0", "axes.pitch.controller.feedback=truth", "observer.k1=50.0")
+    with session(*settings_of_axes, scenario="two_axes") as studio:
+        live = studio.live
+        studio.run(0.5)
+        studio.send(ChangeSettings({OBSERVER: "linear"}), ChangeSettings(choosable_laws(live.base)["LQR"]))
+        scenarios = [part.scenario for part in live.now.parts]
+        assert [scenario.observer.kind for scenario in scenarios] == ["linear", "linear"]
+        assert [scenario.controller.lqr is not None for scenario in scenarios] == [True, True]
+        assert [scenario.controller.feedback for scenario in scenarios] == ["observer", "truth"]
+        assert studio.session_state().law == "LQR"
+        studio.send(ChangeSettings({FEEDBACK: "fog"}), ChangeSettings({BIAS: 0.5}), ChangeSettings({NOISE: 0.0}))
+        for scenario in (part.scenario for part in live.now.parts):
+            assert (scenario.controller.feedback, scenario.plant.equilibrium_bias_deg) == ("fog", 0.5)
+            assert scenario.sensors.accelerometer.noise_density_ug_rthz == 0.0
+        np.testing.assert_array_equal(live.model.body_ipos, live.now.plant.model.body_ipos)
+        laws = choosable_laws(live.base)
+        studio.send(ChangeSettings({OBSERVER: "homogeneous"}), ChangeSettings(laws["the scenario's"]))
+        assert [part.scenario.observer.parameters for part in live.now.parts] == [{"k1": 50.0}, {"k1": 40.0}]
+        studio.run(0.5)
+        assert not live.stopped

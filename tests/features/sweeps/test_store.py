@@ -1,0 +1,240 @@
+"""A chunk is there and reads, or it is computed again; a sweep's folder is its own."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.features.sweeps import store as module
+from cmg_mj.features.sweeps import study as study_module
+from cmg_mj.features.sweeps.chunk import table_of
+from cmg_mj.features.sweeps.store import Store, hash_of, resolved, run
+from cmg_mj.features.sweeps.study import Chunk, SweepStudy, parse_axis
+from cmg_mj.inputs.files import folder
+from cmg_mj.scenario.loading import load_scenario
+from tests.command import COMMAND, ROOT, cmg_mj
+from tests.features.sweeps.synthetic_trials import BIAS, VELOCITY
+
+SWEEP = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--worlds", "2", "--set", "push=[]"]
+SWEEP += ["--set", "duration_s=0.2", "--observers", "linear,gyro_free,high_gain", "--out"]
+MOTIONS = "pivot=[{{kind='track', file='{}'}}],[{{kind='track', file='{}', scale=2.0}}]"
+
+
+def study(values: str = "0:1:20", *settings: str, worlds: int = 2) -> SweepStudy:
+    scenario = load_scenario("push_recovery", ["duration_s=0.2", "push=[]", *settings])
+    return SweepStudy(scenario, (parse_axis(BIAS, values, BIAS),), ("linear", "ltv"), worlds)
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study_module, "CHUNK", 8)
+
+
+def rows_of(sweep: SweepStudy, chunk: Chunk, *_: object) -> list[dict]:
+    """Rows without a run, other ones in every chunk."""
+    of_all = {"observer": chunk.observer, "seed": 0, "outcome": "done"}
+    return [
+        {"point": number, **sweep.points[number], **of_all, "world": world, VELOCITY: chunk.number + 1e-3 * world}
+        for number, world in chunk.trials
+    ]
+
+
+@pytest.fixture
+def whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
+    """A finished sweep of ten chunks."""
+    monkeypatch.setattr(module, "compute", rows_of)
+    store = Store.open(tmp_path / "out", study())
+    run(store, store.left())
+    assert store.left() == []
+    return store
+
+
+def test_it_goes_on_where_it_was(whole: Store) -> None:
+    before = pa.concat_tables(whole.tables())
+    for number in (3, 7):
+        whole.path(number).unlink()
+    begun = whole.path(3).with_name(".000003.parquet.7.partial")
+    begun.touch()
+    again = Store.open(whole.folder, study())
+    assert again.left() == [3, 7]
+    assert not begun.exists()
+    done: list[float] = []
+    run(again, again.left(), done.append)
+    assert done[-1] == again.study.trials == 80
+    assert pa.concat_tables(again.tables()).equals(before)
+    assert table_of(whole.study, rows_of(whole.study, whole.study.chunks[3])).equals(again.read(3))
+
+
+def test_interrupted_it_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "compute", rows_of)
+    store = Store.open(tmp_path / "out", study())
+
+    def stop(n_trials: float) -> None:
+        if n_trials > 20:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(store, store.left(), stop)
+    assert store.left() == list(range(3, 10))
+
+
+def test_every_flipped_bit_is_noticed(whole: Store) -> None:
+    """One in each of many bytes: of the values by the pages' checksums, of the rest by what the file says."""
+    path = whole.path(0)
+    content = path.read_bytes()
+    table = whole.read(0)
+    assert table is not None
+    for place in range(0, len(content), 7):
+        flipped = bytearray(content)
+        flipped[place] ^= 1 << place % 8
+        path.write_bytes(flipped)
+        found = whole.read(0)
+        assert found is None or found.equals(table), place
+
+
+def shorten(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:100])
+
+
+def take_away_a_row(path: Path) -> None:
+    table = pq.read_table(path)
+    pq.write_table(table[1:], path)
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        shorten,
+        take_away_a_row,
+        lambda path: path.write_bytes(b""),
+        lambda path: shutil.copy(path.with_name("000004.parquet"), path),
+    ],
+    ids=["the first bytes alone", "a row less", "no byte", "another chunk"],
+)
+def test_a_damaged_chunk_is_computed_again(whole: Store, harm: Callable[[Path], object]) -> None:
+    harm(whole.path(2))
+    again = Store.open(whole.folder, study())
+    assert again.left() == [2]
+    with pytest.raises(InputError, match=r"000002\.parquet: cannot be read"):
+        list(again.tables())
+    run(again, again.left())
+    assert again.left() == []
+
+
+def test_other_versions_are_another_hash(whole: Store) -> None:
+    fields = resolved(whole.study)
+    other = {**fields, "scenario": {**fields["scenario"], "versions": {"mujoco": "2.0"}}}
+    assert hash_of(whole.study, fields) == whole.hash != hash_of(whole.study, other)
+    assert len(Store(whole.folder, whole.study, hash_of(whole.study, other)).left()) == 10
+
+
+@pytest.mark.parametrize("name", ["scissored_pair.xml", "cube.xml"])
+def test_an_edited_model_is_another_sweeps(tmp_path: Path, name: str) -> None:
+    for file in ("scissored_pair.xml", "cube.xml"):
+        shutil.copy(folder("models") / file, tmp_path / file)
+    sweep = study("0,1", f"plant.model={tmp_path / 'scissored_pair.xml'}")
+    store = Store.open(tmp_path / "out", sweep)
+    run(store, store.left()[:1])
+    with (tmp_path / name).open("a", encoding="utf-8") as file:
+        file.write("<!-- edited -->\n")
+    with pytest.raises(RunStopped, match="has changed since it began"):
+        run(store, store.left())
+    assert Store.open(tmp_path / "out", sweep).left() == [0, 1]
+
+
+@pytest.mark.parametrize("varied", ["", "pivot.0.file={},{}", MOTIONS], ids=["of the scenario", "varied", "motions"])
+def test_an_edited_track_is_another(tmp_path: Path, varied: str) -> None:
+    first, track = tmp_path / "first.csv", tmp_path / "track.csv"
+    for file in (first, track):
+        file.write_text("t,a\n0,0.1\n1,0.2\n", encoding="utf-8")
+    sweep = study("0,1", f"pivot=[{{kind='track', file='{first if varied else track}'}}]")
+    if varied:
+        field, _, values = varied.format(first, track).partition("=")
+        sweep = SweepStudy(sweep.scenario, (parse_axis(field, values, field),), ("linear",), 2)
+    before = hash_of(sweep, {})
+    track.write_text("t,a\n0,0.1\n1,0.3\n", encoding="utf-8")
+    assert hash_of(sweep, {}) != before
+
+
+def test_another_study_takes_the_next_number(whole: Store) -> None:
+    before = {path: path.read_bytes() for path in whole.folder.rglob("*.*") if path.is_file()}
+    other = Store.open(whole.folder, study(worlds=3))
+    assert other.folder == whole.folder.with_name("out-2")
+    assert Store.open(whole.folder, study(worlds=3)).folder == other.folder
+    assert Store.open(whole.folder, study()).folder == whole.folder
+    assert {path: path.read_bytes() for path in whole.folder.rglob("*.*") if path.is_file()} == before
+    assert Store.open(whole.folder, study(worlds=3), overwrite=True).left()
+    assert len(list(whole.folder.rglob("*.parquet"))) == 0
+
+
+@pytest.mark.parametrize("name", ["notes", "chunks/notes"])
+def test_a_folder_with_a_users_file_is_never_replaced(whole: Store, name: str) -> None:
+    (whole.folder / name).write_text("mine", encoding="utf-8")
+    assert Store.open(whole.folder, study(worlds=3), overwrite=True).folder != whole.folder
+    assert (whole.folder / name).read_text(encoding="utf-8") == "mine"
+    assert Store.open(whole.folder, study()).left() == []  # and goes on to be this sweep's
+
+
+def test_a_disk_that_is_full_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    out = tmp_path / "out"
+    monkeypatch.setattr(module.pq, "write_table", full)
+    complaint = cmg_mj(*SWEEP, out).complaint
+    assert complaint.startswith(f"{out / 'chunks' / '000000.parquet'}: cannot be written: No space left on device")
+    assert complaint.endswith("the same command resumes the sweep")
+    monkeypatch.undo()
+    monkeypatch.setattr("cmg_mj.features.sweeps.report.draw", full)
+    assert f"{out / 'curves.png'}: cannot be written" in cmg_mj(*SWEEP, out).complaint
+    monkeypatch.undo()
+    outcome = cmg_mj(*SWEEP, out)
+    assert (outcome.status, "resuming: 12 of 12 trials are done" in outcome.err) == (0, True)
+    assert not [path for path in out.rglob(".*") if path.name != ".cmg_mj"]
+
+
+def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert cmg_mj(*SWEEP, tmp_path / "file" / "out").complaint.startswith(f"--out {tmp_path / 'file' / 'out'}: cannot")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
+def test_killed_at_random_moments(tmp_path: Path) -> None:
+    """The same command again and again, until it is done: the same trials as in one go."""
+    arguments = [
+        *SWEEP[:-1],
+        "--vary",
+        "controller.rate_hz=100,200",
+        "--set",
+        "duration_s=4",
+        "--worlds",
+        "40",
+        "--out",
+    ]
+    uninterrupted, interrupted = tmp_path / "whole", tmp_path / "killed"
+    cmg_mj(*arguments, uninterrupted)
+    rng = np.random.default_rng(5)
+    for kill in range(int(os.environ.get("CMG_MJ_KILLS", "3"))):
+        process = subprocess.Popen(
+            [*COMMAND, *arguments, str(interrupted)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, cwd=ROOT
+        )
+        time.sleep(rng.uniform(0.5, 6.0))
+        process.kill()
+        process.wait()
+        if kill % 3 == 2:  # all over again, now and then
+            shutil.rmtree(interrupted / "chunks", ignore_errors=True)
+    assert cmg_mj(*arguments, interrupted).status == 0
+    for name in ("trials.parquet", "cells.parquet"):
+        assert (interrupted / name).read_bytes() == (uninterrupted / name).read_bytes()

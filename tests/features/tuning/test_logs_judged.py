@@ -1,0 +1,132 @@
+"""When parameters tuned on a log are called better, what is said of limits, and what they do in a closed loop."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from cmg_mj import load_scenario
+from cmg_mj.features.replay.log import Log, ReadOptions
+from cmg_mj.features.replay.reading import read_log
+from cmg_mj.features.tuning import figures_of_logs, logs_table, tune_on_logs
+from cmg_mj.features.tuning.closed_loop import LoopComparison, compare_in_loop, judged, loop_scenario
+from cmg_mj.features.tuning.on_logs import LogStudy
+from cmg_mj.results.intervals import Interval
+from tests.features.replay.motion import COLUMNS, sine, write_csv
+
+
+@pytest.mark.parametrize(
+    ("ratio", "verdict"),
+    [
+        ((1.2, 1.1, 1.3), "better"),
+        ((1.2, 0.9, 1.5), "tie"),
+        ((1.004, 1.003, 1.005), "tie"),
+        ((1.011, 1.010, 1.012), "better"),
+        ((0.8, 0.7, 0.9), "worse"),
+        ((0.995, 0.994, 0.996), "tie"),
+    ],
+)
+def test_better_is_more_than_a_hundredth_and_beyond_chance(ratio: tuple, verdict: str) -> None:
+    assert judged(Interval(*ratio)) == verdict
+
+
+def log(folder: Path, noise: float = 0.0, seed: int = 0) -> Log:
+    columns = {name: values[:2080] for name, values in sine().items()}
+    columns["tilt_rad"] = columns["tilt_rad"] + noise * np.random.default_rng(seed).standard_normal(2080)
+    return read_log(write_csv(folder / "log.csv", columns), ReadOptions(COLUMNS))
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> LogStudy:
+    ranges = {"tau": (0.019, 0.021)}
+    return tune_on_logs([log(tmp_path_factory.mktemp("logs"))], "linear", settle_s=0.1, ranges=ranges)
+
+
+def table(study: LogStudy) -> str:
+    console = Console(file=io.StringIO(), width=400)
+    console.print(logs_table(study))
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
+def test_a_limit_is_named(study: LogStudy) -> None:
+    assert study.limits == ["tau (lowest, 0.019)"]
+    assert "at a limit of its range: tau (lowest, 0.019)." in table(study)
+
+
+def test_a_tie_says_why(study: LogStudy) -> None:
+    """Made 0.5 % apart without chance, and 5 % with it; the figures of the level itself stay."""
+    given = study.level.given_rms
+    for rms, reason in (
+        (given / 1.005, "A tie: 0.50% of difference, where less than 1% counts for none."),
+        (given / np.linspace(0.5, 2.0, len(given)), "A tie: the difference is not beyond chance."),
+    ):
+        changed = replace(study, level=replace(study.level, rms=rms))
+        assert changed.verdict == figures_of_logs(changed)["verdict"] == "tie"
+        assert reason in table(changed)
+
+
+def test_the_loop_is_told_in_a_line(study: LogStudy) -> None:
+    worse = LoopComparison("Push", 5.0, 8, (8, 6), (2, 0), Interval(0.5, 0.4, 0.6))
+    text = table(replace(study, loop=worse))
+    assert "In the closed loop of Push (8 worlds of 5 s, its rig, sensors and control rate) the tuned" in text
+    assert "stand 6 times (0 where the given ones fall), the given ones 8 (2 where the tuned ones fall)" in text
+    figures = figures_of_logs(replace(study, loop=worse))["closed_loop"]
+    assert isinstance(figures, dict)
+    assert (figures["given_stood_alone"], figures["tuned_stood_alone"]) == (2, 0)
+    assert "; RMS of the tilt, given / tuned, 0.500 (0.400 to 0.600)" in text
+    assert "the tuned ones are WORSE there." in text
+    refused = LoopComparison("Push", 5.0, 8, refused="linear: tau: too small")
+    assert "cannot be compared: linear: tau: too small." in table(replace(study, loop=refused))
+
+
+@pytest.mark.parametrize(
+    ("alone", "ratio", "verdict"),
+    [
+        ((6, 0), Interval(1.5, 1.4, 1.6), "worse"),  # 2/2^6 = 3 %
+        ((0, 6), None, "better"),
+        ((5, 0), None, "tie"),  # 2/2^5 = 6 %
+        ((0, 1), Interval(0.4, 0.3, 0.5), "worse"),
+        ((0, 0), Interval(0.999, 0.998, 0.9995), "tie"),
+    ],
+)
+def test_falls_count_only_beyond_chance(alone: tuple[int, int], ratio: Interval | None, verdict: str) -> None:
+    assert LoopComparison("Push", 5.0, 16, (8, 8), alone, ratio).verdict == verdict
+
+
+@pytest.mark.slow
+def test_what_is_best_on_a_log_may_fall_in_a_loop(tmp_path: Path) -> None:
+    """On a log without noise the least time constant is the best; on the rig its noise drowns everything."""
+    noiseless = log(tmp_path)
+    loop = loop_scenario(None, noiseless)
+    assert loop is not None
+    study = tune_on_logs([noiseless], "linear", settle_s=0.1, ranges={"tau": (2e-4, 0.1)}, closed_loop=loop)
+    assert study.verdict == "better"
+    assert study.loop is not None
+    assert study.loop.verdict == "worse"
+    assert figures_of_logs(study)["closed_loop"]["duration_s"] == 5.0  # type: ignore[index,call-overload]
+
+
+@pytest.mark.slow
+def test_the_same_parameters_are_no_different_in_a_loop() -> None:
+    same = {"tau": 0.02}
+    comparison = compare_in_loop(load_scenario("push_recovery", []), "linear", same, same, worlds=4)
+    assert comparison.verdict == "tie"
+    assert comparison.ratio == Interval(1.0, 1.0, 1.0)
+    assert comparison.stood == (4, 4)
+
+
+def test_parameters_that_the_loop_refuses_are_said() -> None:
+    scenario = load_scenario("push_recovery", [])
+    comparison = compare_in_loop(scenario, "linear", {"tau": 0.02}, {"tau": -1.0})
+    assert "tau" in comparison.refused
+    assert comparison.verdict is None
+
+
+def test_no_loop() -> None:
+    assert loop_scenario("none", None) is None  # type: ignore[arg-type]

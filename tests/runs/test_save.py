@@ -1,0 +1,339 @@
+"""Run folders: whole and repeatable; comparisons equal to their single runs."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import json
+import os
+import subprocess
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from cmg_mj import Estimate, Measurement, load_scenario, parse_scenario, prepare
+from cmg_mj.core.errors import InputError
+from cmg_mj.inputs.files import folder
+from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.result import Outcome
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs import save as runs
+from cmg_mj.runs import comparison
+from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, environment
+from tests.run_folders import assert_whole, names, write
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+# --- the same again ------------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class Mine:
+    """A user's observer."""
+
+    dt: float
+    model: object
+    gain: float = 0.3
+    nothing: float | None = None
+
+    def init(self, y: Measurement) -> Any:
+        return y.y1, 0.0 * y.y1
+
+    def step(self, state: Any, y: Measurement, u: Any) -> tuple[Any, Estimate]:
+        y1, rate = state
+        rate = rate + self.gain * ((y.y1 - y1) / self.dt - rate)
+        return (y.y1, rate), Estimate(y.y1, rate, y.y2)
+
+
+def own_model() -> list[str]:
+    """A model of the user's, named relative to the scenario, that differs from the bundled one."""
+    for name in ("scissored_pair.xml", "cube.xml"):
+        write((folder("models") / name).read_text().replace('mass="0.35"', 'mass="0.45"'), f"rigs/{name}")
+    return [write("duration_s = 0.4\n[plant]\nmodel = '../rigs/scissored_pair.xml'", "scenarios/my.toml")]
+
+
+PUSHED = ("--set", "duration_s=0.5", "--set", "push.0.start_s=0.3")
+KINDS: dict[str, Callable[[], list[str]]] = {
+    "a bundled scenario": lambda: ["push_recovery", "--seed", "3", *PUSHED, "--observer", "ltv"],
+    "a user's model": own_model,
+    "a user's observer": lambda: [write(f"duration_s = 0.4\n[observer]\nkind = '{__name__}:Mine'\ngain = 0.4")],
+    "lqr": lambda: [write("duration_s = 0.4\n[controller]\nlqr.state_cost = [30, 1, 0.5, 0.1]\nlqr.input_cost = 0.3")],
+    "every observer": lambda: [write("duration_s = 0.4\nopen_loop_observers = 'all'\n[controller]\nfeedback = 'fog'")],
+    "another grid": lambda: [
+        write("duration_s = 0.4\n[plant]\ntimestep_s = 0.0005\nmodel = 'single_gimbal'\nlock_thrust_bearing = true")
+    ],
+}
+
+
+@pytest.mark.daily_cases("every observer", "a user's observer", "a user's model")
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_written_scenario_reruns_to_the_same_bits(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From another folder, where other files may lie about; twice is the same run, too."""
+    arguments = KINDS[kind]()
+    first = cmg_mj("run", *arguments, "--out", "first", "--json")
+    assert first.status == 0, first.err
+    repetition = cmg_mj("run", *arguments, "--out", "again", "--json")
+    write("<mujoco/>", "elsewhere/scissored_pair.xml")
+    monkeypatch.chdir("elsewhere")
+    rerun = cmg_mj("run", "../first/scenario.toml", "--out", "../rerun", "--json")
+    assert rerun.status == 0, rerun.err
+    assert first.out == repetition.out == rerun.out
+    monkeypatch.chdir("..")
+    trajectories = [Path(f"{place}/trajectory.parquet").read_bytes() for place in ("first", "again", "rerun")]
+    assert trajectories[0] == trajectories[1] == trajectories[2]
+    scenarios = [Path(f"{place}/scenario.toml").read_text() for place in ("first", "again", "rerun")]
+    assert scenarios[0] == scenarios[1] == scenarios[2]
+
+
+def test_another_seed_is_another_run() -> None:
+    file = write("duration_s = 0.3")
+    assert cmg_mj("run", file, "--json").out != cmg_mj("run", file, "--json", "--seed", 1).out
+
+
+def test_the_callback_writes_the_same() -> None:
+    file = write("duration_s = 0.5\n[[push]]\nstart_s = 0.1")
+    native = cmg_mj("run", file, "--out", "native", "--json")
+    callback = cmg_mj("run", file, "--out", "callback", "--json", "--driver", "callback")
+    assert native.out == callback.out
+    assert Path("native/trajectory.parquet").read_bytes() == Path("callback/trajectory.parquet").read_bytes()
+
+
+# --- what is written -----------------------------------------------------------------------------------------
+
+
+def test_a_run_folder() -> None:
+    outcome = cmg_mj(
+        "run", write("title = 'Mine'\nduration_s = 0.5\nopen_loop_observers = ['ltv']"), "--out", "deep/er", "--json"
+    )
+    trajectory = assert_whole("deep/er")
+    assert Path("deep/er/summary.json").read_text() == outcome.out
+    assert len(trajectory) == 100
+    assert trajectory.observers == ("homogeneous", "ltv")
+    assert trajectory.metadata["outcome"] == {"kind": "done", "time_s": 0.5, "reason": ""}
+    assert trajectory.metadata["scenario"] == tomllib.loads(Path("deep/er/scenario.toml").read_text())
+
+
+def test_another_run_takes_the_next_number_or_overwrites() -> None:
+    for seed, options in ((1, ()), (2, ()), (2, ()), (3, ("--overwrite",))):
+        cmg_mj("run", write("duration_s = 0.1"), "--out", "it", "--seed", seed, *options)
+    for place, seed in (("it", 3), ("it-2", 2)):
+        assert tomllib.loads(Path(place, "scenario.toml").read_text())["seed"] == seed
+        assert_whole(place)
+
+
+def test_a_fall_is_a_result() -> None:
+    outcome = cmg_mj("run", write("duration_s = 3.0\n[plant]\nequilibrium_bias_deg = 20.0"), "--out", "it", "--json")
+    summary = json.loads(outcome.out)
+    assert (outcome.status, outcome.err) == (0, "")
+    assert (summary["fell"], summary["outcome"], summary["settle_time_s"]) == (True, "fell", None)
+    assert len(assert_whole("it")) == pytest.approx(summary["end_time_s"] * 200, abs=1)
+
+
+@pytest.mark.parametrize(("tilt_deg", "outcome"), [(29.9, "done"), (30.1, "fell"), (-30.1, "fell")])
+def test_a_fall_is_beyond_30_degrees(tilt_deg: float, outcome: str) -> None:
+    plant = {"equilibrium_bias_deg": 0.0, "initial_tilt_deg": tilt_deg}
+    assert prepare(parse_scenario({"duration_s": 0.001, "plant": plant})).run().outcomes[0].kind == outcome
+
+
+def test_a_run_shorter_than_a_tick_has_one() -> None:
+    assert cmg_mj("run", write("duration_s = 0.001"), "--out", "it").status == 0
+    assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 1
+
+
+def test_a_run_without_a_tick_can_be_written() -> None:
+    """An interrupt may come before the first."""
+    experiment = prepare(load_scenario(write("duration_s = 0.1")))
+    result = experiment.run()
+    assert result.trajectory is not None
+    none = replace(result.trajectory, columns={name: column[:0] for name, column in result.trajectory.columns.items()})
+    empty = dataclasses.replace(result, trajectory=none, outcomes=[Outcome("interrupted", 0.0)])
+    runs.save_run(Path("it"), runs.report_run(experiment, empty), plot=True)
+    assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 0
+    assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_numbers_json_does_not_know() -> None:
+    experiment = prepare(load_scenario(write("duration_s = 0.1")))
+    result = experiment.run()
+    result.summaries[0]["gimbal_peak_deg"] = float("nan")
+    assert runs.report_run(experiment, result).summary["gimbal_peak_deg"] is None
+
+
+# --- comparisons ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_comparison_of_one_world_equals_single_runs() -> None:
+    file = write("duration_s = 0.5\n[[push]]\nstart_s = 0.2\n[observer]\nkind = 'homogeneous'\nk1 = 30.0")
+    user_observer = f"{__name__}:Mine"
+    outcome = cmg_mj(
+        "compare", file, "--worlds", 1, "--observers", f"ltv,homogeneous,{user_observer}", "--json", "--out", "it"
+    )
+    assert (outcome.status, outcome.err) == (0, "")
+    rows = json.loads(outcome.out)
+    assert json.loads(Path("it/summary.json").read_text()) == rows
+    assert [entry["observer"] for entry in rows] == ["ltv", "homogeneous", user_observer, *REFERENCES]
+    for entry, name in zip(rows, ("ltv", "homogeneous", "Mine"), strict=False):
+        single = json.loads(cmg_mj("run", file, "--observer", entry["observer"], "--json", "--out", name).out)
+        shared = {key: entry[key] for key in single.keys() & entry.keys()}
+        assert shared == {key: single[key] for key in shared}
+        assert len(shared) == 15
+        columns = Trajectory.load(Path(f"it/trajectory-{name}.parquet")).columns
+        assert all(
+            (columns[key] == values).all()
+            for key, values in Trajectory.load(Path(f"{name}/trajectory.parquet")).columns.items()
+        )
+    assert names("it") == [
+        "recording.rrd",
+        "scenario.toml",
+        "summary.json",
+        "trajectory-Mine.parquet",
+        "trajectory-homogeneous.parquet",
+        "trajectory-ltv.parquet",
+        "worlds.parquet",
+    ]
+
+
+def test_a_comparison_of_many_worlds() -> None:
+    """Means over the worlds that stood, and how they spread."""
+    experiment = prepare(load_scenario(write("duration_s = 0.5")))
+    (entry,) = comparison.compare([experiment], 3)
+    singles: list[dict[str, Any]] = [experiment.run(world=world).summaries[0] for world in range(3)]
+    for key in ("velocity_rms_error_rad_s", "tilt_rms_deg", "settle_time_s"):
+        assert entry.summary[key] == pytest.approx(sum(single[key] for single in singles) / 3, rel=1e-12)
+    summary: dict[str, Any] = entry.summary
+    assert summary["velocity_rms_error_std_rad_s"] > 0.0
+    assert (summary["worlds"], summary["fell_fraction"], summary["settled_fraction"]) == (3, 0.0, 1.0)
+
+
+def test_a_comparison_reports_progress_from_nothing_to_all() -> None:
+    experiment = prepare(load_scenario(write("duration_s = 3.0\n[controller]\nfeedback = 'truth'")))
+    shares: list[float] = []
+    comparison.compare([experiment, experiment], 1, shares.append)
+    assert shares == sorted(shares)
+    assert 0.0 < shares[0] < 0.5 < shares[-1] <= 1.0
+
+
+def test_observers_of_one_name_from_two_places_do_not_overwrite_each_other() -> None:
+    assert runs.file_names(["ltv", "a.b:Mine", "c:Mine", "c:Yours"]) == ["ltv", "a.b.Mine", "c.Mine", "Yours"]
+
+
+def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
+    """Observers without one run untrimmed; alone, they are refused (tests/inputs/)."""
+    scenario = load_scenario("bias_estimation", ["duration_s=0.5"])
+    experiments = comparison.prepare_comparison(scenario, ["linear", "adaptive", "homogeneous_adaptive"])
+    assert [experiment.scenario.controller.bias_trim_s for experiment in experiments] == [0.0, 1.0, 1.0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scenario", "observers", "same"),
+    [
+        ("push_recovery", "linear,ltv", ["linear", "ltv"]),  # without the scenario's own observer
+        ("bias_estimation", f"linear,{__name__}:Mine,adaptive", ["linear", f"{__name__}:Mine", "adaptive"]),  # trimmed
+        (
+            "bias_estimation --set observer.kind=linear --set observer.tau=0.03",
+            "linear,adaptive",
+            ["linear", "adaptive"],
+        ),
+    ],
+)
+def test_a_comparisons_scenario_runs_to_the_same_comparison(scenario: str, observers: str, same: list[str]) -> None:
+    scenario, *settings = scenario.split()
+    settings += ["--set", "duration_s=0.4", "--set", "push=[]", "--set", "plant.equilibrium_bias_deg=0.3"]
+    first = cmg_mj("compare", scenario, "--observers", observers, "--worlds", 2, "--out", "a", "--json", *settings)
+    assert first.status == 0, first.err
+    rerun = cmg_mj("compare", "a/scenario.toml", "--out", "b", "--json")
+    assert (rerun.status, rerun.err) == (0, "")
+    assert rerun.out == first.out
+    assert [row["observer"] for row in json.loads(rerun.out)][: -len(REFERENCES)] == same
+    assert pq.read_table("a/worlds.parquet").equals(pq.read_table("b/worlds.parquet"))
+    fields = tomllib.loads(Path("a/scenario.toml").read_text(encoding="utf-8"))
+    assert fields == tomllib.loads(Path("b/scenario.toml").read_text(encoding="utf-8"))
+    assert fields["compare"] == {"observers": same, "worlds": 2}
+
+
+@pytest.mark.slow
+def test_options_come_before_what_the_scenario_says_to_compare() -> None:
+    file = write("duration_s = 0.2\n[compare]\nobservers = ['ltv', 'linear', 'ltv']\nworlds = 3")
+    plain = json.loads(cmg_mj("compare", file, "--json").out)
+    assert [(row["observer"], row["worlds"]) for row in plain[: -len(REFERENCES)]] == [("ltv", 3), ("linear", 3)]
+    rows = json.loads(cmg_mj("compare", file, "--json", "--observers", "homogeneous", "--worlds", 1).out)
+    assert [(row["observer"], row["worlds"]) for row in rows[: -len(REFERENCES)]] == [("homogeneous", 1)]
+    fewer = json.loads(cmg_mj("compare", file, "--json", "--set", "compare.worlds=2").out)
+    assert fewer[0]["worlds"] == 2
+
+
+def test_run_says_that_it_does_not_compare() -> None:
+    outcome = cmg_mj("run", write("duration_s = 0.2\n[compare]\nworlds = 3"), "--json")
+    assert (outcome.status, outcome.err) == (0, "cmg-mj: [compare] is for cmg-mj compare; this is one run\n")
+    assert json.loads(outcome.out)["observer"] == "homogeneous"
+
+
+@pytest.mark.slow
+def test_a_comparison_is_drawn_if_it_is_asked_for() -> None:
+    file = write("duration_s = 1.0\n[plant]\nequilibrium_bias_deg = 6.0")
+    outcome = cmg_mj("compare", file, "--observers", "linear,luenberger", "--worlds", 3, "--plot", "--out", "it")
+    assert outcome.status == 0
+    assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
+
+
+# --- letters -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("elsewhere")
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_a_title_of_any_letters_under_an_ascii_locale(command: str) -> None:
+    Path("my.toml").write_text('title = "Stoß – 1°"\nduration_s = 0.2', encoding="utf-8")
+    options = ["--observers", "linear", "--worlds", "1"] if command == "compare" else []
+    process = subprocess.run(
+        [*COMMAND, command, "my.toml", "--out", "it", *options],
+        env=environment(LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0"),
+        capture_output=True,
+        timeout=HANGS_AFTER_S,
+    )
+    assert process.returncode == 0, process.stderr
+    assert b"Sto\\xdf" in process.stdout
+    assert tomllib.loads(Path("it/scenario.toml").read_text(encoding="utf-8"))["title"] == "Stoß – 1°"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["run", "compare", "tune", "sweep"])
+@pytest.mark.parametrize("locale", [{}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}], ids=["", "C"])
+def test_a_folder_and_a_file_named_in_bytes_that_are_no_letters(command: str, locale: dict[str, str]) -> None:
+    Path(os.fsdecode(b"my\xff.toml")).write_text("duration_s = 0.2\n[observer]\nkind = 'linear'")
+    options = {
+        "run": [],
+        "compare": ["--observers", "linear", "--worlds", "1"],
+        "tune": ["--worlds", "2"],
+        "sweep": ["--vary", "plant.equilibrium_bias_deg=0,1", "--worlds", "2"],
+    }[command]
+    for place in (["--out", b"it\xff"], []):
+        process = subprocess.run(
+            [*COMMAND, command, b"my\xff.toml", *options, *place],
+            env=environment(**locale),
+            capture_output=True,
+            timeout=HANGS_AFTER_S,
+        )
+        assert process.returncode == 0, process.stderr
+    assert len(os.listdir(b"it\xff")) > 2
+    assert all(name.decode().isascii() for name in os.listdir(b"runs"))
+
+
+@pytest.mark.usefixtures("elsewhere")
+def test_a_title_that_no_file_can_hold_loses_nothing_else(capfd: pytest.CaptureFixture[str]) -> None:
+    """A lone surrogate, as the command line makes of a byte that is no UTF-8."""
+    experiment = prepare(parse_scenario({"duration_s": 0.2, "title": "ok"}))
+    bad = replace(experiment, scenario=experiment.scenario.model_copy(update={"title": "\udcff"}))
+    with pytest.raises(InputError, match="cannot be written: UnicodeEncodeError"):
+        runs.save_run(Path("it"), runs.report_run(bad, bad.run()))
+    assert {"summary.json", "trajectory.parquet"} <= {path.name for path in Path("it").iterdir()}
+    gc.collect()
+    assert capfd.readouterr().err == ""  # nor does rerun complain of a recording that it did not get to write
