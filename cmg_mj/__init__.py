@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from cmg_mj.features.plugin.make import plugin as plugin
     from cmg_mj.features.replay.log import Log as Log
     from cmg_mj.features.replay.log import ReadOptions as ReadOptions
+    from cmg_mj.features.replay.log_replay import ReplayResult as ReplayResult
+    from cmg_mj.features.replay.log_replay import replay_log as replay_log
     from cmg_mj.features.replay.reading import read_log as read_log
-    from cmg_mj.features.replay.replay import ReplayResult as ReplayResult
-    from cmg_mj.features.replay.replay import replay_log as replay_log
     from cmg_mj.features.sweeps import SweepResult as SweepResult
     from cmg_mj.features.sweeps import sweep as sweep
     from cmg_mj.features.tuning import TuningResult as TuningResult

@@ -207,6 +207,8 @@ def judge_gains(design: Design) -> GainsVerdict:
             f"plant.model = {shown(scenario.plant.model)}: its reduced model runs beyond all numbers within a sample "
             f"of {law.dt:g} s; gravity, masses, lengths and speeds must be of sizes that go together"
         ) from error
+    if law.gains[3] == 0.0:  # an integrator that nothing reads is no state of the loop, and its pole stays at 0
+        loop = loop._replace(poles=np.append(loop.poles, 0.0))
     up = 1j * np.geomspace(1e-3, 1e4, FREQUENCIES)
     states = np.linalg.solve(up[:, None, None] * np.eye(4) - model.A_e, np.broadcast_to(model.B_e, (len(up), 4, 1)))
     ideal = np.min(np.abs(1.0 + np.array(law.gains) @ states[:, :, 0].T))

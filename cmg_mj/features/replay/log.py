@@ -130,7 +130,7 @@ class Log:
         return f"{self.name}: {len(self):,} samples at {1.0 / self.dt:.6g} Hz, {self.duration_s:.6g} s{parts}"
 
     def trajectory(self, part: slice) -> Trajectory:
-        """Return one part, as `cmg_mj.features.replay.replay` takes it."""
+        """Return one part, as `cmg_mj.features.replay.log_replay` takes it."""
         return Trajectory({name: values[part] for name, values in self.columns.items()})
 
     def scored(self, settle_s: float) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmg_mj.features.replay.log import REFERENCE, Log
-from cmg_mj.features.replay.replay import ReplayResult
+from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.report import figure_text, shown_first
 from cmg_mj.features.replay.scores import Figures
 from cmg_mj.view.plots.figure import pyplot, save_figure

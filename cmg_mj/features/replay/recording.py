@@ -9,10 +9,10 @@ import numpy as np
 
 from cmg_mj.core.types import BIAS
 from cmg_mj.features.replay.log import REFERENCE
-from cmg_mj.features.replay.replay import ReplayResult
-from cmg_mj.features.replay.replay_recording import LogSeries, write_logs
+from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.report import replay_markdown, shown_first
 from cmg_mj.view.plots.style import BASELINE_COLOURS, Colour, colours, short_names
+from cmg_mj.view.recording.replay_recording import LogSeries, write_logs
 from cmg_mj.view.recording.run import numbered_parts
 from cmg_mj.view.recording.signals import CONTROLLER, MODULES, Series
 

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from rich.console import Group
 from rich.text import Text
 
+from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.noise import noise_figures, noise_remarks
 from cmg_mj.features.replay.reference import model_remark, remarks_on
-from cmg_mj.features.replay.replay import ReplayResult
 from cmg_mj.features.replay.scores import RECONSTRUCTED_S, ZERO_PHASE, Figures
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.intervals import Interval, format_interval, known_interval

@@ -12,9 +12,9 @@ import tomli_w
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.replay.inputs import model_of, replay_prepared
 from cmg_mj.features.replay.log import Log, ReadOptions
+from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.plot import plot_replay
 from cmg_mj.features.replay.reading import check_distinct_logs, read_log
-from cmg_mj.features.replay.replay import ReplayResult
 from cmg_mj.features.replay.report import log_figures, replay_figures
 from cmg_mj.inputs.parameter_options import Parameters
 from cmg_mj.results.folder import RunFolder, claimed, write_text

@@ -10,9 +10,9 @@ import pytest
 
 from cmg_mj.features.replay import replay
 from cmg_mj.features.replay.log import ReadOptions
+from cmg_mj.features.replay.log_replay import ReplayResult, replay_log
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.features.replay.reference import alignment
-from cmg_mj.features.replay.replay import ReplayResult, replay_log
 from cmg_mj.features.replay.scores import lag
 from cmg_mj.observers import make_observer
 from cmg_mj.results.trajectory import Trajectory

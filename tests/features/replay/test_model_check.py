@@ -11,8 +11,8 @@ import pytest
 from cmg_mj import load_scenario, prepare
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.replay.log import Log
+from cmg_mj.features.replay.log_replay import misfit_of, replay_log
 from cmg_mj.features.replay.reference import MISFIT, model_misfit, model_remark
-from cmg_mj.features.replay.replay import misfit_of, replay_log
 from cmg_mj.features.replay.report import log_figures, remarks
 
 HANGING = ReducedModel(0.06, 0.0, 0.0, 1.0, -3.4)

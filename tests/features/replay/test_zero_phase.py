@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.features.replay.log import REFERENCE, Log, ReadOptions
+from cmg_mj.features.replay.log_replay import replay_log
 from cmg_mj.features.replay.reading import read_log
-from cmg_mj.features.replay.replay import replay_log
 from cmg_mj.features.replay.report import log_figures, remarks, replay_markdown
 from cmg_mj.features.replay.scores import ZeroPhase, noise_gain_of, smoothed_rate, zero_phase
 from tests.features.replay.motion import COLUMNS, DT, write_csv
