@@ -51,7 +51,8 @@ MOVES = {
         {"kind": "noise", "acceleration_m_s2": 0.2, "corner_hz": 3.0, "start_s": 0.5},
     ],
 }
-TRACK = {"pivot": [{"kind": "track", "file": "tests/simulation/track.csv", "scale": 0.5}]}
+TRACK_FILE = next(map(str, Path("tests").rglob("track.csv")), "track.csv")
+TRACK = {"pivot": [{"kind": "track", "file": TRACK_FILE, "scale": 0.5}]}
 PUSHED_AXES = [{"axis": axis, "start_s": 1.0, "torque_n_m": 1.0} for axis in ("roll", "pitch")]
 PLANT_FIELDS = {
     "timestep_s": 0.001,
