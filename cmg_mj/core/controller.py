@@ -179,7 +179,6 @@ class Controller:
         """Forget everything: the next update is the first tick of a run with the same seed."""
         self._sampled = self.sensors.at_work(self.timestep, self.seed, self.worlds, self.axis)
         self.tick: Tick | None = None
-        self._integrator: Scalar | None = None
         self.gimbal_rate: Scalar = None
         """The rate at which the gimbals are turned since the last tick: its u, behind the servo's stages [rad/s]."""
         self.command_stages = [make() for make in self.commands]
@@ -193,11 +192,6 @@ class Controller:
         """The physics step of the last update."""
         self.steps_per_sample = math.gcd(self.period, *(sensor.steps_per_sample for sensor in self._sampled))
         """Physics steps between the instants at which anything may be due."""
-
-    def continue_from(self, predecessor: Controller) -> None:
-        """Start with another controller's integrator, and hold its command until the first tick."""
-        self._integrator = getattr(predecessor._law.state, "x_e", None)
-        self.gimbal_rate = predecessor.gimbal_rate
 
     def update(self, step: int, ideal: IdealReading) -> bool:
         """Take the samples and the control decision that are due at a physics step.
@@ -273,8 +267,6 @@ class Controller:
         if self.tick is None:
             estimates, held = self._observers.start(y, step), 0.0 * y1
             self._law.start(y, step)
-            if self._integrator is not None and hasattr(self._law.state, "x_e"):
-                self._law.state = self._law.state._replace(x_e=self._integrator)
         else:
             held = self.tick.u
             estimates = self._observers.advance(y, held, step)
