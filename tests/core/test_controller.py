@@ -497,16 +497,3 @@ def test_gimbals_move_oppositely_at_the_commanded_rate() -> None:
     np.testing.assert_allclose(trajectory["x3_rad"], first, atol=1e-6)
     setpoint = np.concatenate([[0.0], np.cumsum(trajectory["u_rad_s"])[:-1]]) * 0.005
     np.testing.assert_allclose(first[100:], setpoint[100:], atol=2e-2)
-
-
-def test_it_goes_on_with_the_integrator_and_the_command_of_another() -> None:
-    before = controller(Script(ESTIMATES.__getitem__))
-    ticks(before, READINGS[:2])
-    assert before.tick is not None
-    law = StateFeedback(DT, (30.0, 3.0, -0.5, 0.1))
-    loop = controller(Script(ESTIMATES.__getitem__), law, feedback="truth")
-    loop.continue_from(before)
-    assert loop.gimbal_rate == before.gimbal_rate
-    loop.update(10, READINGS[2])
-    assert loop.tick is not None
-    assert loop.tick.x_e == pytest.approx(before.tick.x_e - DT * before.tick.y2)
