@@ -14,7 +14,8 @@ from cmg_mj.features.sweeps.cells import Trials, baselines_ahead, fell_interval,
 from cmg_mj.features.sweeps.study import counted, is_number
 from cmg_mj.results.intervals import Interval, finite_mean, known_interval
 from cmg_mj.results.summary_keys import heading
-from cmg_mj.view.plots.figure import Line, Map, Panel, Picture, Surface
+from cmg_mj.view.plots.figure import Line, Panel, Picture
+from cmg_mj.view.plots.map_plot import Map, Surface
 from cmg_mj.view.plots.style import short_names
 
 ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Literal
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cmg_mj.results.files import whole_file
-from cmg_mj.view.plots.map_plot import draw_map, draw_surface, mappable
+from cmg_mj.view.plots.map_plot import Map, Surface, draw_map, draw_surface, mappable
 from cmg_mj.view.plots.style import colours, hexadecimal
 
 if TYPE_CHECKING:
@@ -44,61 +44,6 @@ class Line:
     width: float = 1.0
     spread: Sequence[float] | np.ndarray | None = None
     bars: bool = False
-
-
-@dataclass(frozen=True)
-class Map:
-    """The best of several candidates, over two quantities.
-
-    Attributes:
-        x: Centres of the cells to the right, (n_x,), rising.
-        y: Centres of the cells upward, (n_y,), rising.
-        names: The candidates, for the colours.
-        best: Index in `names` of each cell's best, (n_y, n_x); negative for none.
-        sure: Whether a cell's best is the best beyond chance, (n_y, n_x); the other cells have a dot.
-        values: Value of each cell's best, for contours, (n_y, n_x); NaN where a cell has no best.
-        levels: Levels of the contours.
-        boundaries: Name -> a share, (n_y, n_x); a boundary is drawn where the share crosses one half.
-        nobody: Name of a cell without a best in the legend.
-        boundary: Name of the boundaries in the legend.
-        ahead: Name -> a share, (n_y, n_x), above one half where something that is no candidate is better than the
-            best; a dotted line is drawn where it crosses one half. NaN where that is unknown.
-    """
-
-    x: np.ndarray
-    y: np.ndarray
-    names: Sequence[str]
-    best: np.ndarray
-    sure: np.ndarray
-    values: np.ndarray
-    levels: Sequence[float] = ()
-    boundaries: Mapping[str, np.ndarray] = field(default_factory=dict)
-    nobody: str = "none"
-    boundary: str = "half"
-    ahead: Mapping[str, np.ndarray] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Surface:
-    """The figure of one candidate, over two quantities.
-
-    Attributes:
-        x: Centres of the cells to the right, (n_x,), rising.
-        y: Centres of the cells upward, (n_y,), rising.
-        values: Value of each cell, (n_y, n_x); NaN for none.
-        label: Name of the values, with their unit, for the scale of colours.
-        limits: Values at the ends of the scale of colours, the same in all panels of a figure.
-        scale: Linear or logarithmic scale of colours.
-        levels: Levels of the contours, which are labelled, unless the cells are few enough for numbers.
-    """
-
-    x: np.ndarray
-    y: np.ndarray
-    values: np.ndarray
-    label: str
-    limits: tuple[float, float]
-    scale: Literal["linear", "log"] = "linear"
-    levels: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
