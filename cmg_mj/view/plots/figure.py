@@ -97,7 +97,7 @@ class Picture:
 
     name: str
     title: str
-    panels: Sequence[Panel] = field(default_factory=tuple)
+    panels: Sequence[Panel] = ()
     share_x: bool = True
     columns: int = 1
     panel_height: float = 2.3
