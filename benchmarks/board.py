@@ -19,6 +19,7 @@ from rich.table import Table
 from cmg_mj.core.controller import Controller
 from cmg_mj.features.board import Board, Cost, temporary_export
 from cmg_mj.features.board.image import build, flash_of, require
+from cmg_mj.features.board.processor import run_on
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain
 from cmg_mj.papers.aranovskiy2020.on_the_board import PLAIN, RECORDED
@@ -121,7 +122,7 @@ def cost_of(run: Experiment, controller: Controller) -> UpdateCost:
         flash = flash_of(observer, folder)
         board = Board(build(observer, folder).path, counting=True)
     with board:
-        result = run.run_on(board)
+        result = run_on(run, board)
         updates = board.costs[1:]  # the first only starts the observer
         steps = _steps(board, result)
         sizes = board.sizes

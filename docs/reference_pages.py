@@ -806,13 +806,12 @@ TABLE_HEAD = """
 """
 
 
+@functools.cache
 def leaf_commands() -> dict[str, click.Command]:
-    """Return every command that does something: its words -> the command."""
-    commands: dict[str, click.Command] = {}
-    for name, command in cli.commands.items():
-        below = getattr(command, "commands", None)
-        commands |= {f"{name} {word}": part for word, part in below.items()} if below else {name: command}
-    return commands
+    """Return every command by its name."""
+    context = click.Context(cli)
+    commands = {name: cli.get_command(context, name) for name in cli.list_commands(context)}
+    return {name: command for name, command in commands.items() if command is not None}
 
 
 def option_row(option: click.Option) -> tuple[str, str, str, str]:

@@ -1,28 +1,21 @@
-"""The commands. Each imports its modules when it runs, so that --help is quick and Ctrl-C works at once."""
+"""The commands: the core's own and those of the features. Each is imported when it is called."""
 
 from __future__ import annotations
 
 import gc
 import io
 import os
+import pkgutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, ClassVar
 
 import click
 
-from cmg_mj.cli import scenarios
 from cmg_mj.cli.terminal import DONE, INTERRUPTED, WRONG_INPUT, note
 from cmg_mj.core.errors import InputError, RunStopped, raised
-from cmg_mj.features.export import command as boards
-from cmg_mj.features.mounting import command as mount
-from cmg_mj.features.plugin import command as plugin
-from cmg_mj.features.replay import command as logs
-from cmg_mj.features.studio import command as studio
-from cmg_mj.features.sweeps import command as sweeps
-from cmg_mj.features.tuning import command as tune
-from cmg_mj.papers import command as reproduce
+from cmg_mj.inputs.features import COMMANDS, Command
 
 OBJECTS_A_COLLECTION = 50_000
 """New objects after which Python looks for cycles. Imports make many objects and few cycles: Python's default of 700
@@ -45,8 +38,37 @@ Exit status: 0 done (also if the plant fell), 2 wrong input or a run that could 
 """
 
 
+OWN = {
+    "run": Command("cmg_mj.cli.scenarios:run", "Run a scenario: summary, trajectory, rerun recording."),
+    "compare": Command("cmg_mj.cli.scenarios:compare", "Run several observers on the same plant, pushes and noise."),
+    "list": Command(
+        "cmg_mj.cli.scenarios:list_names", "List the bundled scenarios, the observers and the control laws."
+    ),
+    "check": Command("cmg_mj.cli.scenarios:check", "Check a scenario file, or a model file, without running it."),
+}
+"""The commands that are no feature's."""
+
+
 class Commands(click.Group):
-    """Commands that end with one line and exit status 130 on Ctrl-C, and that tolerate a closed output."""
+    """Commands that end with one line and exit status 130 on Ctrl-C, and that tolerate a closed output.
+
+    Each is imported when it is called.
+    """
+
+    table: ClassVar = {**OWN, **COMMANDS}
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the commands' names."""
+        return list(self.table)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command; None if there is none of this name."""
+        return pkgutil.resolve_name(self.table[cmd_name].entry) if cmd_name in self.table else None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the table of commands, without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, command.help) for name, command in self.table.items()])
 
     def make_context(
         self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
@@ -80,24 +102,6 @@ def _ignore_broken_pipe() -> Iterator[None]:
 @click.version_option(package_name="cmg_mj", prog_name="cmg-mj")
 def cli() -> None:  # noqa: D103  (its help is HELP)
     pass
-
-
-for command in (
-    scenarios.run,
-    scenarios.compare,
-    scenarios.list_names,
-    scenarios.check,
-    studio.studio,
-    sweeps.sweep,
-    reproduce.reproduce,
-    tune.tune,
-    tune.tune_log,
-    logs.replay,
-    boards.export,
-    plugin.plugin,
-    mount.mount,
-):
-    cli.add_command(command)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -18,7 +18,6 @@ from cmg_mj.core.errors import InputError, nearest
 
 if TYPE_CHECKING:
     from cmg_mj.results.folder import RunFolder
-    from cmg_mj.results.result import Driver
     from cmg_mj.runs.experiment import Experiment
     from cmg_mj.scenario.schema import Scenario
 
@@ -61,7 +60,7 @@ class RunArguments:
         self,
         label: str,
         experiment: Experiment,
-        driver: Driver = "native",
+        driver: str = "native",
         world: int = 0,
     ) -> RunFolder:
         """Prepare the folder: --out, or one in runs/ named for the scenario, the label and the settings."""

@@ -7,7 +7,6 @@ import tomllib
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -37,9 +36,7 @@ from cmg_mj.cli.terminal import (
     users_code,
 )
 from cmg_mj.core.errors import InputError, RunStopped
-
-if TYPE_CHECKING:
-    from cmg_mj.results.result import Driver
+from cmg_mj.inputs.features import DRIVERS
 
 
 @click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
@@ -47,7 +44,7 @@ if TYPE_CHECKING:
 @run_options
 @click.option(
     "--driver",
-    type=click.Choice(["native", "callback", "board", "plugin"]),
+    type=click.Choice(["native", "callback", *DRIVERS]),
     default="native",
     show_default=True,
     help="Run the controller in the simulation loop (native), in MuJoCo's control callback, or as C. The C runs on an "
@@ -65,7 +62,7 @@ if TYPE_CHECKING:
 def run(
     arguments: RunArguments,
     observer: str | None,
-    driver: Driver,
+    driver: str,
     world: int,
     plot: bool,
     live: bool,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -138,6 +138,7 @@ class ClosedLoop:
         ticks: The number of control periods in a common one.
         period: The common period [s].
         states: Name of each state.
+        inputs: Name of each input.
 
     Raises:
         InputError: Observer or law have no slope.
@@ -171,27 +172,35 @@ class ClosedLoop:
             *(["notch_1", "notch_2"] if self._notch else []),
             "u_before",
         ]
-        self._inputs = [*INPUTS, *(f"{INPUTS[-1]}_{tick}" for tick in range(1, self.ticks))]
-        rows = np.eye(len(self.states) + len(self._inputs))
-        self._rows = dict(zip((*self.states, *self._inputs), rows, strict=True))
+        self.inputs = [*INPUTS, *(f"{INPUTS[-1]}_{tick}" for tick in range(1, self.ticks))]
+        rows = np.eye(len(self.states) + len(self.inputs))
+        self._rows = dict(zip((*self.states, *self.inputs), rows, strict=True))
         self._y1_slopes = _measured_slopes(design)
 
     def system(self) -> control.StateSpace:
-        """Compute the system. With several ticks in a period their commands and gimbal rates are further signals."""
-        import control
+        """Make the system for python-control."""
+        import control  # 0.9 s of import: no run waits for it
 
-        names = [*OUTPUTS, *(f"estimated_{name}" for name in (*OUTPUTS[:3], *self._extra))]
-        outputs = [*names[: None if not self._true_state else 4], *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
-        A, B, C, D = self._matrices()
-        kept = needed_states(A, C)
+        A, B, C, D, kept, outputs = self.matrices()
         return control.StateSpace(
-            *(A[kept][:, kept], B[kept], C[:, kept], D, self.period if self.ticks > 1 else self._design.law.dt),
-            inputs=self._inputs,
+            *(A, B, C, D, self.period if self.ticks > 1 else self._design.law.dt),
+            inputs=self.inputs,
             outputs=outputs,
             states=[name for name, is_kept in zip(self.states, kept, strict=True) if is_kept],
             name="closed_loop",
             remove_useless_states=False,
         )
+
+    def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[str]]:
+        """Compute A, B, C, D of the states that reach an output, which states these are, and the outputs' names.
+
+        With several ticks in a period their commands and gimbal rates are further signals.
+        """
+        names = [*OUTPUTS, *(f"estimated_{name}" for name in (*OUTPUTS[:3], *self._extra))]
+        outputs = [*names[: None if not self._true_state else 4], *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
+        A, B, C, D = self._matrices()
+        kept = needed_states(A, C)
+        return A[kept][:, kept], B[kept], C[:, kept], D, kept, outputs
 
     def _matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Compute A, B, C, D over a common period."""
@@ -218,7 +227,7 @@ class ClosedLoop:
             if step in self._tick_steps:
                 readings = {channel.name: self._read(channel, step, latched, start) for channel in self._channels}
                 u, estimate = self._decide(motion, readings)
-                turned = u + rows[[INPUTS[-1], *self._inputs[len(INPUTS) :]][len(commands)]]
+                turned = u + rows[[INPUTS[-1], *self.inputs[len(INPUTS) :]][len(commands)]]
                 commands.append(u)
                 shown = shown or [*motion[:3], u, *estimate]
             if after - step not in holds:
@@ -298,7 +307,7 @@ class ClosedLoop:
         rows["u_before"] = u
         return u, estimate
 
-    def _advance(self, owner: str, slopes: Slopes, inputs: Sequence[np.ndarray]) -> np.ndarray:
+    def _advance(self, owner: str, slopes: Slopes, inputs: Sequence[Any]) -> np.ndarray:
         """Advance the observer or the law by a sample; return its outputs."""
         names, width = _prefixed(owner, slopes), len(self._rows["u_before"])
         state = np.array([self._rows[name] for name in names]).reshape(-1, width)

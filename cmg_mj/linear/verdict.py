@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -93,14 +93,14 @@ def judge(loop: ClosedLoop, lag: float = 0.0) -> Verdict:
     """
     from scipy.linalg import schur, solve_triangular
 
-    system: Any = loop.system()  # python-control has no types
+    A, B, C, D, _, outputs = loop.matrices()
     ticks = loop.ticks
-    rates = [i for i, name in enumerate(system.input_labels) if name.startswith("gimbal_rate_noise")]
-    commands = [i for i, name in enumerate(system.output_labels) if name.startswith("u_rad_s")]
-    triangle, basis = schur(system.A, output="complex")[:2]
-    C, B = system.C[commands] @ basis, basis.conj().T @ system.B[:, rates]
+    rates = [i for i, name in enumerate(loop.inputs) if name.startswith("gimbal_rate_noise")]
+    commands = [i for i, name in enumerate(outputs) if name.startswith("u_rad_s")]
+    triangle, basis = schur(A, output="complex")[:2]
+    shown, driven = C[commands] @ basis, basis.conj().T @ B[:, rates]
     z = np.diag(triangle)
-    poles = _continuous(loop, system.A, system.C[commands], z)
+    poles = _continuous(loop, A, C[commands], z)
     swinging = poles[(-np.real(poles) * lag < 1.0) & (np.abs(poles) > MARGIN)]
     damping = float(np.min(-np.real(swinging) / np.abs(swinging), initial=1.0))
     verdict = Verdict(poles, damping, 0.0)
@@ -111,8 +111,8 @@ def judge(loop: ClosedLoop, lag: float = 0.0) -> Verdict:
     angles = np.unique(np.round(angles, 9))
     angles = angles[(angles >= 1e-4) & (angles <= math.pi)]
     unit = np.eye(len(z))
-    H = [C @ solve_triangular(point * unit - triangle, B) for point in np.exp(1j * angles)]
-    sensitivity = np.eye(ticks) + np.array(H) + system.D[np.ix_(commands, rates)]  # 1 + H = 1/(1 + L)
+    H = [shown @ solve_triangular(point * unit - triangle, driven) for point in np.exp(1j * angles)]
+    sensitivity = np.eye(ticks) + np.array(H) + D[np.ix_(commands, rates)]  # 1 + H = 1/(1 + L)
     distance = 1.0 / float(np.linalg.norm(sensitivity, 2, axis=(1, 2)).max())
     transfer = 1.0 / sensitivity[:, 0, 0] - 1.0 if ticks == 1 else None
     return verdict._replace(distance=distance, transfer=transfer, omega=angles / loop.period)

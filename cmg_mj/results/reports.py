@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 
 from rich.console import Group
 
-from cmg_mj.cli.description import assignments
 from cmg_mj.inputs.files import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
+from cmg_mj.results.description import assignments
 from cmg_mj.results.floors import FLOOR_ACCELERATION, FLOORS, NO_ACCELERATION_FLOOR, NOISE_ALONE
 from cmg_mj.results.intervals import Interval, format_interval
 from cmg_mj.results.summary_keys import (

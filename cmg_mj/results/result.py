@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-Driver = Literal["native", "callback", "board", "plugin"]
 """The caller of the controller, or the controller itself. `simulate` knows the first two; `board` is a processor."""
 
 
@@ -70,7 +69,7 @@ class Result(NamedColumns):
     observers: Sequence[str] = ("",)
     seed: int = 0
     worlds: Sequence[int] = ()
-    driver: Driver = "native"
+    driver: str = "native"
 
     @property
     def stood(self) -> np.ndarray:

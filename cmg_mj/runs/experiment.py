@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping, Sequence
+import pkgutil
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
@@ -12,10 +13,11 @@ import numpy as np
 import tomli_w
 
 from cmg_mj.laws import Law
-from cmg_mj.features.board.processor import Processor
 from cmg_mj.core.axes import AnyController, MultiAxisController
 from cmg_mj.core.controller import Controller
-from cmg_mj.core.errors import InputError
+from cmg_mj.core.errors import InputError, nearest, shown
+from cmg_mj.core.loop import ControlLoop
+from cmg_mj.inputs.features import DRIVERS
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.features.bend.verdict import bend_hints, judge_bend
 from cmg_mj.linear.loop import linear_closed_loop
@@ -24,7 +26,7 @@ from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
 from cmg_mj.runs.rerun_head import rerun_head
-from cmg_mj.results.result import Driver, Result
+from cmg_mj.results.result import Result
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.loading import base_of
 from cmg_mj.features.pivot.settings import Pivot
@@ -101,14 +103,17 @@ class Experiment:
         )
 
     def axis_controller(
-        self, worlds: int | Sequence[int] = 0, processor: Processor | None = None, observer: Observer | None = None
+        self,
+        worlds: int | Sequence[int] = 0,
+        observer: Observer | None = None,
+        make: Callable[..., Controller] = Controller,
     ) -> Controller:
         """Make a fresh controller of the only axis.
 
         Args:
             worlds: The number of one world, or the numbers of many.
-            processor: Takes the decisions in the host's place.
             observer: Instead of the scenario's.
+            make: Makes a controller of another kind: see `make_controller`.
 
         Returns:
             The controller.
@@ -116,8 +121,8 @@ class Experiment:
         Raises:
             InputError: The plant has several axes.
         """
-        part = self.require_single_axis("one controller" if processor is None else "a board or other processor")
-        return part.design.controller(part.plant.interface, worlds=worlds, processor=processor, observer=observer)
+        part = self.require_single_axis("one controller")
+        return part.design.controller(part.plant.interface, worlds=worlds, observer=observer, make=make)
 
     def of_axes(self, controllers: Sequence[Controller]) -> AnyController:
         """Join the controllers of the axes; of one axis its controller itself."""
@@ -127,23 +132,26 @@ class Experiment:
         between = compensation(self.plant.turning, self.scenario.sensors.mems_gyro) if compensates else None
         return MultiAxisController(controllers, between)
 
-    def run(self, driver: Driver = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
-        """Run one world. Options are those of `simulate`."""
-        if driver == "board":
-            from cmg_mj.features.board import on_a_board
+    def run(self, driver: str = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
+        """Run one world. Options are those of `simulate`.
 
-            self.require_single_axis("the board")
-            with on_a_board(self.axis_controller()) as board:
-                return dataclasses.replace(self.run_on(board, world, **options), driver="board")
-        if driver == "plugin":
-            from cmg_mj.features.plugin.make import run_with_plugin
+        Args:
+            driver: What calls the controller: `native`, `callback`, or a feature's, such as `board` or `plugin`.
+            world: The world's number.
+            **options: Those of `simulate`.
 
-            return run_with_plugin(self, int(world), **options)
-        return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
+        Returns:
+            The result.
 
-    def run_on(self, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
-        """Run one world whose control decisions a processor takes, such as a board. Options are those of `simulate`."""
-        return self.simulate(self.plant, self.axis_controller(int(world), processor), **options)
+        Raises:
+            InputError: There is no such driver, or it does not take the scenario.
+        """
+        if driver in ("native", "callback"):
+            return self.simulate(self.plant, self.controller(int(world)), driver=driver, **options)
+        if driver not in DRIVERS:
+            known = nearest(driver, ["native", "callback", *DRIVERS])
+            raise InputError(f"driver = {shown(driver)}: no such driver; {known}")
+        return pkgutil.resolve_name(DRIVERS[driver])(self, int(world), **options)
 
     def run_many(
         self,
@@ -232,7 +240,8 @@ class Experiment:
         controller: AnyController,
         pushes: Sequence[Push] | None = None,
         pivots: Sequence[Pivot] | None = None,
-        driver: Driver = "native",
+        driver: str = "native",
+        loop: type[ControlLoop] = ControlLoop,
         **options: Unpack[SimulationOptions],
     ) -> Result:
         """Run a controller on one rig or several, for the scenario's time and judged by its settings.
@@ -242,7 +251,8 @@ class Experiment:
             controller: A fresh one.
             pushes: Instead of the scenario's.
             pivots: Likewise.
-            driver: What calls the controller.
+            driver: Name of what calls the controller.
+            loop: Advances physics and controller.
             **options: Those of `simulate`.
 
         Returns:
@@ -259,6 +269,7 @@ class Experiment:
             pivots=scenario.pivot if pivots is None else pivots,
             settings=scenario.metrics,
             driver=driver,
+            loop=loop,
             **options,
         )
 
@@ -358,7 +369,7 @@ class Experiment:
             bundled = prepare(base)
         return law_change | differences(bundled.resolved(), self.resolved())
 
-    def as_toml(self, driver: Driver = "native", world: int = 0) -> str:
+    def as_toml(self, driver: str = "native", world: int = 0) -> str:
         """Return the resolved scenario: running it again gives the same run; its head says if that needs options."""
         return rerun_head(driver, world) + tomli_w.dumps(self.resolved())
 

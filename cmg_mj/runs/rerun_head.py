@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from cmg_mj.results.result import Driver
 
 
-def rerun_head(driver: Driver, world: int) -> str:
+def rerun_head(driver: str, world: int) -> str:
     """Write the head as comments; empty where the scenario alone gives the same run.
 
     Args:

@@ -14,7 +14,7 @@ from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.results.files import write_parquet
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.reports import run_title
-from cmg_mj.results.result import Driver, Outcome, Result
+from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
@@ -41,7 +41,7 @@ class RunReport:
     """
 
     experiment: Experiment
-    driver: Driver
+    driver: str
     world: int
     outcome: Outcome
     summary: Summary
@@ -204,7 +204,7 @@ def _plot(path: Path, run: Run, experiment: Experiment) -> None:
     )
 
 
-def recording_header(experiment: Experiment, driver: Driver = "native", world: int = 0) -> RecordingHeader:
+def recording_header(experiment: Experiment, driver: str = "native", world: int = 0) -> RecordingHeader:
     """Collect what a recording shows of an experiment; the title says if it ran on the board."""
     from cmg_mj.view.recording import RecordingHeader
 

@@ -22,7 +22,7 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import RATES, References
 from cmg_mj.results.floors import Floors
 from cmg_mj.results.metrics import Metrics
-from cmg_mj.results.result import Driver, Outcome, Result
+from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
 from cmg_mj.features.pivot.settings import Pivot
 from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
@@ -64,7 +64,8 @@ def simulate(
     swings: Sequence[Swing] = (),
     pivots: Sequence[Pivot] = (),
     settings: MetricsSettings | None = None,
-    driver: Driver = "native",
+    driver: str = "native",
+    loop: type[ControlLoop] = ControlLoop,
     **options: Unpack[SimulationOptions],
 ) -> Result:
     """Run one world, or as many as there are plants.
@@ -78,8 +79,8 @@ def simulate(
         swings: Others that swing.
         pivots: Motions of the pivot; of many worlds a size may be an array (n_worlds,).
         settings: What counts as settled and fallen.
-        driver: `native`: the loop calls the controller. `callback`: MuJoCo does (one world only). `plugin`: the model
-            has a plugin that decides (likewise): see `run_with_plugin`.
+        driver: Name of what calls the controller: `native`: the loop, `callback`: MuJoCo (one world only).
+        loop: Advances physics and controller, if it is not these two.
         **options: See `SimulationOptions`.
 
     Returns:
@@ -90,7 +91,7 @@ def simulate(
     """
     single = isinstance(plant, Plant)
     plants = [plant] if single else list(plant)
-    if driver in ("callback", "plugin") and not single:
+    if driver != "native" and not single:
         raise InputError(f"driver = {driver!r}: drives one world, not a batch")
     names = plants[0].axis_names
     of_axis = observers if isinstance(observers, Mapping) else dict.fromkeys(names, observers)
@@ -100,7 +101,7 @@ def simulate(
         plants, controller, duration_s, of_axis, pushes, swings, pivots, settings or MetricsSettings(), options
     )
     physics = OneWorld(plants[0]) if single else ManyWorlds(plants, options.get("threads", 0))
-    run.advance(physics, driver)
+    run.advance(physics, CallbackLoop if driver == "callback" else loop)
     return run.result(driver)
 
 
@@ -169,15 +170,11 @@ class _Simulation:
         keep, first = options.get("keep_trajectory", True), axis == self.axis_names[0]
         return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first)
 
-    def advance(self, physics: OneWorld | ManyWorlds, driver: Driver) -> None:
+    def advance(self, physics: OneWorld | ManyWorlds, kind: type[ControlLoop]) -> None:
         """Run to the end, whatever that is."""
-        called_back = driver == "callback"
-        loop_class = CallbackLoop if called_back else ControlLoop
-        if driver == "plugin":
-            from cmg_mj.features.plugin.driver import PluginLoop as loop_class
-        loop = loop_class(physics, self.controller, self.steps, self.disturbances, self.fall_angle)
+        loop = kind(physics, self.controller, self.steps, self.disturbances, self.fall_angle)
         driving: AbstractContextManager = nullcontext()
-        if called_back:
+        if kind is CallbackLoop:
             driving = control_callback(self.plants[0], self.controller)
         rest = Outcome("done", self.duration_s)
         try:
@@ -209,7 +206,7 @@ class _Simulation:
             if on_progress:
                 on_progress((tick.step + tick.steps) * timestep)
 
-    def result(self, driver: Driver) -> Result:
+    def result(self, driver: str) -> Result:
         """Put together outcomes, summaries and the trajectory."""
         summaries = [
             combine_axes(

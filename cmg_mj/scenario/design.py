@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from cmg_mj.core.controller import Controller, PlantInterface
@@ -10,7 +10,6 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
-from cmg_mj.features.board.processor import Processor
 from cmg_mj.laws import LAWS, Law
 from cmg_mj.laws.registry import LAW_CLASSES
 from cmg_mj.observers import Observer, make_observer
@@ -62,7 +61,7 @@ class Design:
         *,
         worlds: int | Sequence[int] = 0,
         axis: int = 0,
-        processor: Processor | None = None,
+        make: Callable[..., Controller] = Controller,
         observer: Observer | None = None,
         open_loop_observers: Mapping[str, Observer] | None = None,
         law: Law | None = None,
@@ -74,7 +73,7 @@ class Design:
             plant: The controller's knowledge of the plant.
             worlds: The number of one world, or the numbers of many.
             axis: The number of the plant's axis.
-            processor: Takes the decisions in the host's place.
+            make: See `make_controller`.
             observer: Instead of the scenario's, as are the next three.
             open_loop_observers: The open-loop observers, by name.
             law: The control law.
@@ -92,7 +91,7 @@ class Design:
             law or self.fresh_law(),
             sensors or self.scenario.sensors,
             plant,
-            processor,
+            make,
             seed=self.scenario.seed,
             worlds=worlds,
             feedback=settings.feedback,

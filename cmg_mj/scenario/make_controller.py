@@ -1,13 +1,13 @@
-"""Makes controllers of one axis, whose decisions the host or a processor takes."""
+"""Makes controllers of one axis, with their stages."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Unpack
 
 from cmg_mj.core.controller import Controller, ControllerOptions, ControllerSite, PlantInterface, Sensors
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.types import Law, Observer, extra_signals
-from cmg_mj.features.board.processor import Processor, ProcessorController
 from cmg_mj.stages.notch import notch
 from cmg_mj.stages.trim import trim
 
@@ -31,7 +31,7 @@ def make_controller(
     law: Law,
     sensors: Sensors,
     plant: PlantInterface,
-    processor: Processor | None = None,
+    make: Callable[..., Controller] = Controller,
     **options: Unpack[StageOptions],
 ) -> Controller:
     """Make a fresh controller of one axis.
@@ -41,7 +41,7 @@ def make_controller(
         law: The control law.
         sensors: The sensors between the ideal readings and the controller.
         plant: The controller's knowledge of the plant.
-        processor: Takes the decisions in the host's place, such as a board.
+        make: Makes it of observer, law, sensors, plant and options: a controller of another kind.
         **options: Options of `Controller`, and settings of its stages.
 
     Returns:
@@ -57,8 +57,6 @@ def make_controller(
             raise InputError(f"controller: {name!r}: no such option; {nearest(name, known)}")
     own: dict[str, Any] = {name: options[name] for name in options if name in ControllerOptions.__annotations__}
     site = ControllerSite(law, plant.timestep, extra_signals(observer), options)
-    own["commands"] = [stage for make in COMMANDS if (stage := make(site)) is not None]
-    own["memories"] = [stage for make in MEMORIES if (stage := make(site)) is not None]
-    if processor is None:
-        return Controller(observer, law, sensors, plant, **own)
-    return ProcessorController(processor, observer, law, sensors, plant, **own)
+    own["commands"] = [stage for start in COMMANDS if (stage := start(site)) is not None]
+    own["memories"] = [stage for start in MEMORIES if (stage := start(site)) is not None]
+    return make(observer, law, sensors, plant, **own)

@@ -18,7 +18,7 @@ import numpy as np
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.features.board import Board, on_a_board
-from cmg_mj.features.board.processor import Decision
+from cmg_mj.features.board.processor import Decision, run_on
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.intervals import format_interval, in_line, known_interval
 from cmg_mj.results.markdown import table
@@ -63,7 +63,7 @@ def row(experiment: Experiment, worlds: int) -> list[str]:
     with on_a_board(experiment.axis_controller()) as board:
         beside = Beside(board, experiment.axis_controller())
         for world in range(worlds):
-            runs.append(experiment.run_on(beside, world, keep_trajectory=False))
+            runs.append(run_on(experiment, beside, world, keep_trajectory=False))
     cells = [experiment.scenario.observer.kind, f"{np.sqrt(np.mean(np.square(beside.differences))):.1e}"]
     cells.append(f"{int(host.fell.sum())} / {sum(bool(run.fell[0]) for run in runs)}")
     for key, pattern in FIGURES.items():

@@ -11,6 +11,7 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
+import click
 import pytest
 import tomli_w
 from click.testing import CliRunner
@@ -41,7 +42,7 @@ SUMMARY = [
 ]
 """Names that users' scripts rely on."""
 
-COMMANDS = sorted(cli.commands)
+COMMANDS = cli.list_commands(click.Context(cli))
 
 
 pytestmark = pytest.mark.usefixtures("elsewhere")

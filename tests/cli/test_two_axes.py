@@ -244,12 +244,6 @@ def test_what_takes_one_axis_says_so() -> None:
         assert "plant.locked_axes" in complaint
 
 
-def test_a_processor_takes_one_axis() -> None:
-    processor: Any = "a board"
-    with pytest.raises(InputError, match=r"\(roll, pitch\), and a board or other processor takes one; lock the others"):
-        two_axes().run_on(processor)
-
-
 def test_a_rig_of_two_axes_with_one_locked_is_a_rig_of_one() -> None:
     experiment = two_axes('plant.locked_axes=["roll"]')
     result = experiment.run()

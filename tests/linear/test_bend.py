@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -44,10 +45,10 @@ def test_a_mast_near_the_border_is_what_the_simulation_does(hz: int, is_stable: 
     if not is_stable:
         assert np.abs(experiment(*settings).linear_closed_loop().poles()).max() == pytest.approx(1.00115, abs=1e-5)
     subject = experiment(*settings, *QUIET)  # the observer's gains go with the noise that it is told
-    poles = subject.linear_closed_loop().poles()
+    poles: Any = subject.linear_closed_loop().poles()
     swinging = np.log(poles[(np.abs(poles) > 0.9) & (poles.imag > 0.1)]) / subject.law.dt
     pole = swinging[np.argmax(swinging.real)]
-    trajectory = subject.run().trajectory
+    trajectory: Any = subject.run().trajectory
     # The swing's size over windows of whole turns, by its Fourier sum at the pole's frequency.
     u = trajectory["u_rad_s"]
     time = np.arange(len(u)) * subject.law.dt

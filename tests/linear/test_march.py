@@ -10,7 +10,7 @@ import pytest
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.laws.state_feedback import StateFeedback
-from cmg_mj.linear.march import Motion, march
+from cmg_mj.linear.march import march
 from cmg_mj.linear.plant import linearise
 from cmg_mj.runs.experiment import Experiment
 
@@ -20,13 +20,14 @@ def experiment(*settings: str) -> Experiment:
 
 
 class Decay(NamedTuple):
-    bending: Motion
-    rigid: Motion
+    bending: str
+    rigid: str
 
 
 def decay_of(*settings: str, scenario: str = "push_recovery") -> Decay:
     subject = prepare(load_scenario(scenario, settings))
-    return Decay(*(march(subject.design, linearise(subject.plant, rigid=rigid)) for rigid in (False, True)))
+    bending, rigid = (march(subject.design, linearise(subject.plant, rigid=rigid)) for rigid in (False, True))
+    return Decay(bending, rigid)
 
 
 def test_a_rig_without_gains_falls() -> None:

@@ -42,16 +42,14 @@ def test_the_scenarios_of_the_pages_are_valid(generator, tmp_path: Path) -> None
 
 def test_every_command_is_there_and_takes_its_examples(generator) -> None:
     """Taken by click, with all its checks; nothing runs."""
-    assert {words.split()[0] for words in generator.COMMANDS} == set(cli.commands)
+    assert {words.split()[0] for words in generator.COMMANDS} == set(generator.leaf_commands())
     for words, notes in generator.COMMANDS.items():
         for line in notes.examples:
             for part in line.split(" && "):
                 name, *arguments = shlex.split(part)
                 if name == "python":
                     continue
-                command: click.Command = cli
-                while isinstance(command, click.Group):
-                    command = command.commands[arguments.pop(0)]
+                command = generator.leaf_commands()[arguments.pop(0)]
                 parent = click.Context(cli, **cli.context_settings)
                 with command.make_context("cmg-mj", list(arguments), parent=parent):
                     assert words

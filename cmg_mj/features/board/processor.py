@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple, Protocol, Unpack
 
 from cmg_mj.core.arrays import Scalar
@@ -10,6 +12,9 @@ from cmg_mj.core.controller import Controller, ControllerOptions, PlantInterface
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.runners import as_estimate
 from cmg_mj.core.types import Forces, Law, Measurement, Observer
+from cmg_mj.results.result import Result
+from cmg_mj.runs.experiment import Experiment
+from cmg_mj.runs.simulate import SimulationOptions
 from cmg_mj.stages.trim import trim_of
 
 
@@ -115,3 +120,27 @@ class ProcessorController(Controller):
             u=decision.u, x_e=x_e, estimates=[as_estimate(decision.estimate), *tick.estimates[1:]]
         )
         return self.tick
+
+
+def run_on(
+    experiment: Experiment, processor: Processor, world: int = 0, **options: Unpack[SimulationOptions]
+) -> Result:
+    """Run one world whose control decisions a processor takes, such as a board.
+
+    Args:
+        experiment: The scenario, of one axis.
+        processor: Takes the decisions.
+        world: The world's number.
+        **options: Those of `simulate`.
+    """
+    controller = experiment.axis_controller(int(world), make=partial(ProcessorController, processor))
+    return experiment.simulate(experiment.plant, controller, **options)
+
+
+def run_on_a_board(experiment: Experiment, world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
+    """Run one world on an emulated board: `run --driver board`."""
+    from cmg_mj.features.board import on_a_board
+
+    experiment.require_single_axis("the board")
+    with on_a_board(experiment.axis_controller()) as board:
+        return dataclasses.replace(run_on(experiment, board, world, **options), driver="board")

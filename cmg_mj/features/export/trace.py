@@ -19,10 +19,10 @@ from cmg_mj.features.export.formulas import (
     symbols_named,
 )
 from cmg_mj.features.export.names import identifiers
+from cmg_mj.features.export.pytree import form, numbers, rebuild
 from cmg_mj.features.export.source_location import NotExportable
 from cmg_mj.features.export.symbol import expression
 from cmg_mj.features.export.traced_law import TracedLaw, trace_law
-from cmg_mj.linear.pytree import form, numbers, rebuild
 
 
 class Traced(NamedTuple):

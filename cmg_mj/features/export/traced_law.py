@@ -18,10 +18,10 @@ from cmg_mj.features.export.formulas import (
     symbols_named,
 )
 from cmg_mj.features.export.names import identifiers
+from cmg_mj.features.export.pytree import form, numbers, rebuild
 from cmg_mj.features.export.source_location import LawNotExportable, NotExportable
 from cmg_mj.features.export.symbol import Symbol, expression
 from cmg_mj.laws.state_feedback import StateFeedback
-from cmg_mj.linear.pytree import form, numbers, rebuild
 
 INTEGRATOR = ("x_e",)
 """Path of the integrator in a law's state."""

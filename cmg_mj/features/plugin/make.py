@@ -17,6 +17,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.features.export import check_installed
 from cmg_mj.features.export.names import name_of
 from cmg_mj.features.plugin.build import check_platform, compile_plugin, library_name
+from cmg_mj.features.plugin.driver import PluginLoop
 from cmg_mj.features.plugin.model import plugin_mjcf
 from cmg_mj.features.plugin.sensors import PluginAxis, PluginRig
 from cmg_mj.features.plugin.tables import PluginCode, generate_plugin
@@ -204,4 +205,4 @@ def run_with_plugin(experiment: Experiment, world: int, **options: Unpack[Simula
         written = write_plugin(made, Path(temporary))
         mujoco.mj_loadPluginLibrary(str(written.library))
         plant.model = mujoco.MjModel.from_xml_path(str(written.model))
-    return experiment.simulate(plant, experiment.controller(world), driver="plugin", **options)
+    return experiment.simulate(plant, experiment.controller(world), driver="plugin", loop=PluginLoop, **options)

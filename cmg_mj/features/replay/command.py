@@ -198,7 +198,7 @@ def replay(
     from cmg_mj.features.replay import report
     from cmg_mj.features.replay.noise import noise_numbers
     from cmg_mj.features.replay.save import LogReplays
-    from cmg_mj.inputs.parameter_options import parameters_of
+    from cmg_mj.observers.parameter_options import parameters_of
 
     options = replace(options, windows_s=tuple(span(text, "--window") for text in windows))
     replays = LogReplays(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)

@@ -11,7 +11,7 @@ from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.features.replay.log import Log
 from cmg_mj.features.replay.log_replay import SETTLE_S, OnShare, ReplayResult, replay_log
 from cmg_mj.features.replay.noise import noise_of
-from cmg_mj.inputs.parameter_options import Parameters, numbers
+from cmg_mj.observers.parameter_options import Parameters, numbers
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.design import design
 from cmg_mj.scenario.loading import parse_scenario

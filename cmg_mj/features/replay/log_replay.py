@@ -18,9 +18,9 @@ from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reference import Alignment, alignment_of, model_misfit
 from cmg_mj.features.replay.scores import Figures, ZeroPhase, noise_gain, scores, zero_phase
-from cmg_mj.inputs.parameter_options import Parameters
 from cmg_mj.inputs.users_line import in_users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
+from cmg_mj.observers.parameter_options import Parameters
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.trajectory import ESTIMATES, Layout, NamedColumns, Trajectory
 from cmg_mj.runs.open_loop import replay_all

@@ -17,7 +17,7 @@ from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import Log, LogNoise, WhiteNoise
 from cmg_mj.features.replay.sampling import EVEN, Part
-from cmg_mj.inputs.parameter_options import numbers
+from cmg_mj.observers.parameter_options import numbers
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder

@@ -16,7 +16,7 @@ from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.plot import plot_replay
 from cmg_mj.features.replay.reading import check_distinct_logs, read_log
 from cmg_mj.features.replay.report import log_figures, replay_figures
-from cmg_mj.inputs.parameter_options import Parameters
+from cmg_mj.observers.parameter_options import Parameters
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.scenario.differences import safe_name

@@ -31,8 +31,8 @@ from cmg_mj.features.tuning.parameters import (
     plain,
 )
 from cmg_mj.features.tuning.search import evaluations
-from cmg_mj.inputs.parameter_options import ParameterValue
 from cmg_mj.observers import Observer, make_observer
+from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.results.intervals import PairedVerdict
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.scenario.schema import Scenario

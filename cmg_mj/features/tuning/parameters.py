@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.inputs.parameter_options import ParameterValue
 from cmg_mj.observers import OBSERVER_CLASSES, Observer
+from cmg_mj.observers.parameter_options import ParameterValue
 
 SPAN = 1000.0
 """Range of the search: from the given value divided by this to the given value times this."""

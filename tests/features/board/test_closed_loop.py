@@ -9,6 +9,7 @@ import subprocess
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ import pytest
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.features.board import Board, on_a_board, temporary_export
 from cmg_mj.features.board.image import available, build
-from cmg_mj.features.board.processor import Decision
+from cmg_mj.features.board.processor import Decision, run_on
 from cmg_mj.observers import OBSERVERS, Measurement
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -80,7 +81,7 @@ def double_precision_names(image: Path) -> list[str]:
 
 def test_a_processor_that_is_the_controller_changes_nothing() -> None:
     experiment = short("adaptive")
-    ours, on_processor = experiment.run(), experiment.run_on(Recorder(experiment))
+    ours, on_processor = experiment.run(), run_on(experiment, Recorder(experiment))
     assert ours.summaries == on_processor.summaries
     assert ours.trajectory is not None
     assert on_processor.trajectory is not None
@@ -93,7 +94,7 @@ def test_lockstep_on_the_same_inputs(observer: str) -> None:
     """The board's inputs are rounded to single precision, and so are its numbers; nothing is in double."""
     experiment = prepare(load_scenario("push_recovery", PUSH_SETTINGS if observer in ARE_PUSHED else SHORT, observer))
     host = Recorder(experiment)
-    experiment.run_on(host)
+    run_on(experiment, host)
     with temporary_export(experiment.axis_controller()) as (name, folder):
         image = build(name, folder).path
         assert double_precision_names(image) == []
@@ -268,3 +269,9 @@ def children() -> set[str]:
     if not Path("/proc/self/task").exists():
         return set()
     return {pid for task in Path("/proc/self/task").iterdir() for pid in (task / "children").read_text().split()}
+
+
+def test_a_processor_takes_one_axis() -> None:
+    processor: Any = "a board"
+    with pytest.raises(InputError, match=r"\(roll, pitch\), and one controller takes one; lock the others"):
+        run_on(prepare(load_scenario("two_axes")), processor)

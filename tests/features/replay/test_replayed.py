@@ -19,8 +19,8 @@ from cmg_mj.features.replay.log import Log, ReadOptions
 from cmg_mj.features.replay.log_replay import NO_MODEL, replay_log
 from cmg_mj.features.replay.noise import noise_numbers, noise_of
 from cmg_mj.features.replay.reading import read_log
-from cmg_mj.inputs.parameter_options import parameters_of
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
+from cmg_mj.observers.parameter_options import parameters_of
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.save import report_run, save_run
 from tests.features.replay.motion import COLUMNS, DT, N, sine, write_csv
