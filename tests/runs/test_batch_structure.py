@@ -19,7 +19,7 @@ from cmg_mj.runs.batch_values import batch_values, value_of_world
 from cmg_mj.runs.experiment import Experiment, prepare, run_batch
 
 N = 6
-TRACK = Path(__file__).with_name("track.csv")
+TRACK = Path(__file__).parents[1] / "features/pivot/track.csv"
 MOVING = (
     'pivot=[{kind="noise", acceleration_m_s2=0.1, corner_hz=5.0},'
     f" {{kind='track', file='{TRACK}', direction='vertical'}}]"

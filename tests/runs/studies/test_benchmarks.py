@@ -28,11 +28,3 @@ def test_loop() -> None:
     share = figures["batch_ms"] / figures["closed_loop_batch_ms"]
     assert figures["closed_loop_share_of_batch"] == pytest.approx(share)
     assert figures["timestep_ms"] == 5.0
-
-
-@pytest.mark.slow
-def test_sweep() -> None:
-    plants = {"plant.equilibrium_bias_deg": "-0.5:0.5"}
-    one, many = measure("sweep.py", "linear", 8, DURATION_S=3.0, PLANTS=plants)
-    assert (one["rigs"], one["trials"], many["rigs"], many["trials"]) == (1, 8, 2, 8)
-    assert min(one["cpu_over_batch"], many["cpu_over_batch"]) > 1.0

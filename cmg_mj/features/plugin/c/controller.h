@@ -1,4 +1,4 @@
-/* One axis' controller: measurement, observer, trim and law, as cmg_mj/controllers/controller.py decides. */
+/* One axis' controller: measurement, observer, trim and law, as cmg_mj/core/controller.py decides. */
 #ifndef CMG_MJ_CONTROLLER_H
 #define CMG_MJ_CONTROLLER_H
 

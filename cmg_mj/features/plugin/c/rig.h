@@ -30,7 +30,7 @@ typedef struct {
     const controller_type *controller;
 } axis_type;
 
-/* Coupling of the axes in a turn about the vertical: see YawCoupling in cmg_mj/controllers/multi_axis.py. */
+/* Coupling of the axes in a turn about the vertical: see YawCoupling in cmg_mj/stages/turning.py. */
 typedef struct {
     turn_gyro_type gyro;
     double flywheels[MOST_AXES][MOST_AXES], inertia[MOST_AXES][MOST_AXES], coriolis[MOST_AXES][MOST_AXES];
