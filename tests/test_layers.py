@@ -119,7 +119,6 @@ def test_a_package_says_its_job_in_a_sentence(package: str) -> None:
 OPEN = {
     "cmg_mj.cli": "cmg_mj.",
     "cmg_mj.inputs.parameter_options": "cmg_mj.observers",
-    "cmg_mj.linear.pytree": "cmg_mj.features.export",
     "cmg_mj.plant.build": "cmg_mj.features.pivot",
     "cmg_mj.plant.mjcf": "cmg_mj.features.bend",
     "cmg_mj.plant.variations": "cmg_mj.features.bend",
