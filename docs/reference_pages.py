@@ -22,7 +22,7 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from cmg_mj.cli import HELP, cli
-from cmg_mj.features.export.header_comment import attribute_descriptions
+from cmg_mj.features.export.constants import attribute_descriptions
 from cmg_mj.features.pivot.settings import FIELDS_OF, Pivot
 from cmg_mj.inputs.files import bundled, folder
 from cmg_mj.inputs.messages import fields_of

@@ -12,6 +12,82 @@ CasADi symbols run through the observer's Python code once and record its operat
 C. Random signals compare the formulas with Python always, and the C where there is a compiler.
 """
 
-from cmg_mj.features.export.save import check_installed, export, generate_code, write_code
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from cmg_mj.core.errors import InputError, raised
+
+if TYPE_CHECKING:
+    from cmg_mj.core.controller import Controller
+    from cmg_mj.features.export.pipeline import Code
+    from cmg_mj.results.folder import RunFolder
 
 __all__ = ["check_installed", "export", "generate_code", "write_code"]
+
+
+def export(
+    controller: Controller,
+    out: Path | RunFolder,
+    *,
+    precision: Literal["double", "single"] = "double",
+    name: str | None = None,
+) -> list[Path]:
+    """Write a controller as C, compared with Python.
+
+    Args:
+        controller: The controller: its observer, law, tilt estimate, the gimbals' directions and zeros. Its sensors'
+            errors, seed and open-loop observers do not count.
+        out: Folder to write to; made if need be.
+        precision: Precision of every number in C.
+        name: Prefix of everything in C; by default the observer's name, or a name derived from a user's class.
+
+    Returns:
+        The files: NAME.h, NAME.c, NAME_example.c, NAME_test_vector.h.
+
+    Raises:
+        InputError: The controller cannot be exported, the C differs from Python, CasADi is missing, or the folder
+            cannot be written.
+    """
+    return write_code(out, generate_code(controller, precision, name))
+
+
+def generate_code(
+    controller: Controller, precision: Literal["double", "single"], name: str | None = None, suffix: str = ""
+) -> Code:
+    """Generate a controller's C and compare it with Python, as `export` does, without writing it.
+
+    Its name has a suffix, which tells a plugin's axes apart.
+    """
+    check_installed()
+    from cmg_mj.features.export import pipeline
+
+    return pipeline.generate_code(controller, precision, name, suffix)
+
+
+def write_code(out: Path | RunFolder, code: Code) -> list[Path]:
+    """Write the files of a generated code."""
+    from cmg_mj.results.folder import claimed, write_text
+
+    with claimed(out) as folder:
+        place = folder.write(
+            {name: lambda path, text=text: write_text(path, text) for name, text in code.files.items()},
+            all_or_none=True,  # the example needs the code, and the code its test vector to be believed
+        )
+    return [place / name for name in code.files]
+
+
+def check_installed() -> None:
+    """Require CasADi, before anything is computed.
+
+    Raises:
+        InputError: CasADi is not installed, or cannot be imported.
+    """
+    if find_spec("casadi") is None:
+        raise InputError('export: casadi is not installed: python -m pip install "cmg_mj[export]"')
+    try:
+        import casadi  # noqa: F401
+    except Exception as error:
+        raise InputError(f"export: casadi cannot be imported: {raised(error)}") from error

@@ -20,9 +20,8 @@ from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.features.export.c_code import Precision
 from cmg_mj.features.export.constants import Constants
-from cmg_mj.features.export.source_location import LawNotExportable
-from cmg_mj.features.export.trace import Traced
-from cmg_mj.features.export.traced_law import law_arguments
+from cmg_mj.features.export.symbol import LawNotExportable
+from cmg_mj.features.export.trace import Traced, law_arguments
 from cmg_mj.laws import StateFeedback
 
 TICKS = 400

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from cmg_mj.core.arrays import Symbolic
-from cmg_mj.features.export.source_location import NotExportable
+from cmg_mj.core.errors import InputError
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -25,6 +25,10 @@ CONSTANTS = (type(None), str, type)
 """Types of values that a state may hold besides numbers, if they stay the same."""
 DEEPEST = 50
 """Largest depth of a state; a state that holds itself has no end."""
+
+
+class NotExportable(InputError):
+    """A state or an operation that no formula can express."""
 
 
 class Leaf(NamedTuple):

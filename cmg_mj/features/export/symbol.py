@@ -8,16 +8,23 @@ raises `NotExportable` with the line of the user's file.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+import linecache
+import os
+import sys
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
-from typing import Any, NoReturn, TypeAlias
+from pathlib import Path
+from types import FrameType, TracebackType
+from typing import Any, NoReturn, TypeAlias, TypeVar
 
 import casadi
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from cmg_mj.core.arrays import Symbolic
-from cmg_mj.features.export.source_location import NotExportable, here
+from cmg_mj.core.errors import InputError, raised
+from cmg_mj.features.export.pytree import NotExportable
 
 Operand: TypeAlias = "Symbol | float | np.generic | np.ndarray"
 
@@ -185,3 +192,109 @@ def _where(condition: Operand, a: Operand, b: Operand) -> Operand:
     first = casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, test, yes)
     second = casadi.SX.binary(casadi.OP_IF_ELSE_ZERO, casadi.SX.unary(casadi.OP_NOT, test), no)
     return Symbol(casadi.SX.binary(casadi.OP_ADD, first, second))
+
+
+Result = TypeVar("Result")
+
+MEASURED = ("y1", "y2", "acceleration")
+"""Names of an observer's measurements."""
+
+MOST_NUMBERS = 1000
+"""Largest state: 4 kB on a board in single precision. More is not meant for a board, and takes CasADi minutes."""
+
+
+@contextmanager
+def as_written() -> Iterator[None]:
+    """Turn CasADi's simplifications off: a simplified formula may round otherwise."""
+    before = casadi.GlobalOptions.getSimplificationOnTheFly()
+    casadi.GlobalOptions.setSimplificationOnTheFly(False)
+    try:
+        yield
+    finally:
+        casadi.GlobalOptions.setSimplificationOnTheFly(before)
+
+
+def needed_numbers(
+    symbols: Sequence[Symbol], next_state: Sequence[casadi.SX], outputs: Sequence[casadi.SX]
+) -> list[int]:
+    """Find the numbers of a state that an estimate depends on, now or later; a state may hold unused measurements."""
+    place = {symbol.sx.name(): i for i, symbol in enumerate(symbols)}
+    needed: set[int] = set()
+    waiting = list(outputs)
+    while waiting:
+        for symbol in casadi.symvar(waiting.pop()):
+            i = place.get(symbol.name())
+            if i is not None and i not in needed:
+                needed.add(i)
+                waiting.append(next_state[i])
+    return sorted(needed)
+
+
+def symbols_named(names: Sequence[str]) -> list[Symbol]:
+    """Make a symbol for each name."""
+    return [Symbol(casadi.SX.sym(name)) for name in names]
+
+
+def function_of(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX]) -> casadi.Function:
+    """Make a function of symbols.
+
+    Raises:
+        NotExportable: The outputs depend on other symbols.
+    """
+    arguments = [symbol.sx for symbol in inputs]
+    function = casadi.Function(name, arguments, casadi.cse(list(outputs)) if outputs else [], {"allow_free": True})
+    if function.has_free():
+        raise NotExportable(
+            "it remembers something outside of its state, in self or elsewhere, which C would not have: make it a part "
+            "of the state that step returns"
+        )
+    return function
+
+
+def call_traced(name: str, function: Callable[[], Result]) -> Result:
+    """Call a user's code with symbols."""
+    try:
+        return function()
+    except NotExportable:
+        raise
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise NotExportable(f"{name} raised {raised(error)} {raised_at(error.__traceback__)}") from error
+
+
+_LIBRARY_PATHS = (
+    str(Path(__file__).parent),
+    str(Path(np.__file__).parent),
+    str(Path(__file__).parents[2] / "core" / "arrays.py"),
+)
+
+
+class LawNotExportable(InputError):
+    """A control law that cannot be exported; all else is the observer's."""
+
+
+def here() -> str:
+    """Locate the running line, the innermost one outside this package: `(own.py, line 12: if y1 > 0.1:)`."""
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None and frame.f_code.co_filename.startswith(_LIBRARY_PATHS):
+        frame = frame.f_back
+    return "" if frame is None else _format_line(frame.f_code.co_filename, frame.f_lineno)
+
+
+def raised_at(traceback: TracebackType | None) -> str:
+    """Locate the innermost line of the user's code that an exception came from."""
+    place = ""
+    while traceback is not None:
+        file = traceback.tb_frame.f_code.co_filename
+        if not file.startswith(_LIBRARY_PATHS):
+            place = _format_line(file, traceback.tb_lineno)
+        traceback = traceback.tb_next
+    return place
+
+
+def _format_line(file: str, line: int) -> str:
+    text = linecache.getline(file, line).strip()
+    near = os.path.relpath(file)
+    name = near if len(near) < len(file) else file
+    return f"({name}, line {line}{': ' if text else ''}{text})"

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import casadi
 
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
-from cmg_mj.core.types import Law, Measurement, Observer, extra_signals
+from cmg_mj.core.types import Law, Measurement, Observer, extra_signals, feedback_state
 from cmg_mj.features.export.constants import Constants
-from cmg_mj.features.export.formulas import (
+from cmg_mj.features.export.names import identifiers
+from cmg_mj.features.export.pytree import form, numbers, rebuild
+from cmg_mj.features.export.symbol import (
     MEASURED,
     MOST_NUMBERS,
+    LawNotExportable,
+    NotExportable,
+    Symbol,
     as_written,
     call_traced,
+    expression,
     function_of,
     needed_numbers,
     symbols_named,
 )
-from cmg_mj.features.export.names import identifiers
-from cmg_mj.features.export.pytree import form, numbers, rebuild
-from cmg_mj.features.export.source_location import NotExportable
-from cmg_mj.features.export.symbol import expression
-from cmg_mj.features.export.traced_law import TracedLaw, trace_law
+from cmg_mj.laws.state_feedback import StateFeedback
 
 
 class Traced(NamedTuple):
@@ -97,3 +100,134 @@ def _measure(constants: Constants) -> casadi.Function:
     tilt, gimbal_angle = RadialTilt(inner, outer), GimbalAngle(directions, zeros)  # type: ignore[arg-type]
     y = (tilt(*forces), gimbal_angle(encoders), tilt.acceleration(forces[0], forces[2]))
     return function_of("measure", [*forces, *encoders, *parameters], [expression(part) for part in y])
+
+
+INTEGRATOR = ("x_e",)
+"""Path of the integrator in a law's state."""
+
+
+def law_arguments(extra_signals: int) -> list[str]:
+    """Name in C whatever a law may take at a decision: measurement, feedback, extra signals, the command held."""
+    return [*MEASURED, "x1", "x2", "x3", *(f"estimate[{3 + i}]" for i in range(extra_signals)), "held"]
+
+
+class TracedLaw(NamedTuple):
+    """A law's formulas.
+
+    Attributes:
+        arguments: Those of `law_arguments` that a decision depends on.
+        measured: Those of `MEASURED` that the first state depends on.
+        state: Names in C of the numbers in its state that a decision depends on, without the integrator.
+        has_integrator: Whether its state has an integrator.
+        init: (y1, y2, acceleration) -> state, integrator; None for (8), whose integrator begins at zero.
+        step: (arguments, state, integrator, constants) -> u, the next state, the next integrator.
+    """
+
+    arguments: tuple[str, ...]
+    measured: tuple[str, ...]
+    state: tuple[str, ...]
+    has_integrator: bool
+    init: casadi.Function | None
+    step: casadi.Function
+
+    @property
+    def is_state_feedback(self) -> bool:
+        """True for (8), which keeps u within its limit by itself, and whose numbers have names in C."""
+        return self.init is None
+
+    @property
+    def numbers(self) -> int:
+        """Numbers in its state, the integrator included, which is the last."""
+        return len(self.state) + self.has_integrator
+
+    def first(self, y: Sequence[float]) -> list[float]:
+        """Compute the state before the first decision, the integrator last."""
+        return [0.0] if self.init is None else [float(value) for value in self.init.call(list(y))]
+
+    def decide(
+        self, values: Mapping[str, float], memory: Sequence[float], constants: Sequence[float]
+    ) -> tuple[float, list[float]]:
+        """Compute u and the next state.
+
+        Args:
+            values: Name of an argument -> its value.
+            memory: The state, the integrator last.
+            constants: Values of the law's constants.
+
+        Returns:
+            u, and the next state.
+        """
+        arguments = [values[name] for name in self.arguments]
+        u, *after = (float(value) for value in self.step.call([*arguments, *memory, *constants]))
+        return u, after
+
+
+def trace_law(law: Law, constants: Constants, extra_signals: int) -> TracedLaw:
+    """Trace a law.
+
+    Args:
+        law: The law. Do not use it again: it may remember symbols.
+        constants: The constants of the law, which keep their names.
+        extra_signals: Number of signals that the observer estimates beyond x.
+
+    Returns:
+        The formulas.
+
+    Raises:
+        LawNotExportable: A formula cannot express what the law does.
+    """
+    if type(law) is StateFeedback:
+        return _trace_state_feedback(constants)
+    try:
+        return _trace(law, extra_signals)
+    except NotExportable as error:
+        raise LawNotExportable(str(error)) from error
+
+
+def _trace_state_feedback(constants: Constants) -> TracedLaw:
+    """Trace (8) with symbols for its numbers."""
+    parameters = symbols_named([constant.name for constant in constants.of_law])
+    dt, k1, k2, k3, k4, limit = parameters
+    inputs = symbols_named(["x1", "x2", "x3", "x_e"])
+    law = StateFeedback(dt, (k1, k2, k3, k4), limit)  # type: ignore[arg-type]
+    step = function_of("law", [*inputs, *parameters], [expression(part) for part in law(*inputs)])
+    return TracedLaw(("x1", "x2", "x3"), (), (), True, None, step)
+
+
+def _trace(law: Law, extra_signals: int) -> TracedLaw:
+    first = symbols_named(MEASURED)
+    state = call_traced("init(y)", lambda: law.init(Measurement(*first)))
+    leaves = list(numbers(state))
+    if len(leaves) > MOST_NUMBERS:
+        raise NotExportable(f"its state holds {len(leaves)} numbers; at most {MOST_NUMBERS} can be exported")
+    symbols = symbols_named([f"state {i}" for i in range(len(leaves))])
+    names = law_arguments(extra_signals)
+    arguments = symbols_named(names)
+    y, (x1, x2, x3, *extra), held = Measurement(*arguments[:3]), arguments[3:-1], arguments[-1]
+    before, x = rebuild(state, iter(symbols)), feedback_state(x1, x2, x3, tuple(extra))
+    after, u = call_traced("step(state, y, x, u)", lambda: law.step(before, y, x, held))
+    command, next_state = expression(u), [expression(leaf.value) for leaf in numbers(after)]
+    if form(after) != form(state):
+        raise NotExportable("its step returns a state that is made otherwise than the one of init")
+
+    integrator = [i for i, leaf in enumerate(leaves) if leaf.path == INTEGRATOR and hasattr(state, "x_e")]
+    if hasattr(state, "x_e") and not integrator:
+        raise NotExportable("its integrator x_e is no number in its state, where C would have it")
+    needed = needed_numbers(symbols, next_state, [command, *(symbols[i].sx for i in integrator)])
+    kept = [i for i in needed if i not in integrator] + integrator
+    begin, outputs = [expression(leaves[i].value) for i in kept], [command, *(next_state[i] for i in kept)]
+    used = _used(names, arguments, outputs)
+    return TracedLaw(
+        tuple(used),
+        tuple(_used(MEASURED, first, begin)),
+        tuple(identifiers([leaves[i].path for i in kept if i not in integrator])),
+        bool(integrator),
+        function_of("init_law", first, begin),
+        function_of("law", [*used.values(), *(symbols[i] for i in kept)], outputs),
+    )
+
+
+def _used(names: Sequence[str], symbols: Sequence[Symbol], outputs: Sequence[casadi.SX]) -> dict[str, Symbol]:
+    """Select the symbols that a formula depends on: name -> symbol."""
+    in_use = {symbol.name() for output in outputs for symbol in casadi.symvar(output)}
+    return {name: symbol for name, symbol in zip(names, symbols, strict=True) if name in in_use}

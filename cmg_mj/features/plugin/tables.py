@@ -28,7 +28,7 @@ from cmg_mj.stages.backlash import Backlash
 from cmg_mj.stages.trim import trim_of
 
 if TYPE_CHECKING:
-    from cmg_mj.features.export.law_code import LawPrinter
+    from cmg_mj.features.export.c_files import LawPrinter
 
 NAMES_IN_USE = frozenset(
     {

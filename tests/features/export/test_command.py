@@ -222,7 +222,7 @@ def test_without_casadi_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     def find_all_but_casadi(name: str, *arguments: Any) -> Any:
         return None if name == "casadi" else genuine(name, *arguments)
 
-    monkeypatch.setattr("cmg_mj.features.export.save.find_spec", find_all_but_casadi)
+    monkeypatch.setattr("cmg_mj.features.export.find_spec", find_all_but_casadi)
     with pytest.raises(InputError, match=r'casadi is not installed: python -m pip install "cmg_mj\[export\]"'):
         check_installed()
     assert 'pip install "cmg_mj[export]"' in cmg_mj("export", "linear", "--out", "board").complaint

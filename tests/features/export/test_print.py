@@ -18,7 +18,7 @@ import casadi  # isort: skip  (skipped above where it is missing)
 
 from cmg_mj.features.export.c_code import body, literal  # isort: skip
 from cmg_mj.features.export.symbol import OPERATIONS, Symbol  # isort: skip
-from cmg_mj.features.export.formulas import as_written  # isort: skip
+from cmg_mj.features.export.symbol import as_written  # isort: skip
 
 
 @pytest.mark.parametrize("value", [0.1, -1.0 / 3.0, 1e-200, 5e-324, 1.7976931348623157e308, 35.0, 0.0, -0.0, 1e22])

@@ -11,7 +11,7 @@ import pytest
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.export import export, pipeline, refusals
+from cmg_mj.features.export import export, pipeline
 from cmg_mj.laws import Law
 from tests.features.export import own
 from tests.features.export.compiled import controller
@@ -166,7 +166,7 @@ class WithADeadBand:
 def test_a_field_of_the_law_that_c_does_not_have_is_refused_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(refusals, "StateFeedback", WithADeadBand)
+    monkeypatch.setattr(pipeline, "StateFeedback", WithADeadBand)
     exported = controller("linear")
     exported.law = cast("Law", WithADeadBand(exported.law.dt, dead_band=0.05))
     with pytest.raises(InputError, match=r"^controller\.dead_band = 0\.05: cannot be exported"):
@@ -175,4 +175,4 @@ def test_a_field_of_the_law_that_c_does_not_have_is_refused_by_name(
     with pytest.raises(InputError, match=r"^controller\.notches_hz = \[7\.0\]: .*; set controller\.notches_hz=\[\]$"):
         export(exported, tmp_path / "export")
     exported.law = cast("Law", WithADeadBand(exported.law.dt))
-    refusals.refuse_unexported(exported)
+    pipeline.refuse_unexported(exported)

@@ -19,7 +19,7 @@ from tests.test_elementwise import FUNCTIONS, SPECIAL
 import casadi  # isort: skip  (skipped above where it is missing)
 
 from cmg_mj.features.export.symbol import Symbol  # isort: skip
-from cmg_mj.features.export.formulas import as_written  # isort: skip
+from cmg_mj.features.export.symbol import as_written  # isort: skip
 from cmg_mj.features.export.names import name_of  # isort: skip
 from cmg_mj.features.export.names import identifiers  # isort: skip
 from cmg_mj.features.export.pipeline import generate_code  # isort: skip
