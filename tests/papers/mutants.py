@@ -91,10 +91,10 @@ MUTANTS = [
     Mutant("the gimbal's momentum, its sign", S + "vertical_torque.py", "spin - np.sin(q_b) * inertia * w_c",
            "spin + np.sin(q_b) * inertia * w_c", "sokolov2019_bearing.py::test_momentum_about_the_vertical_is_mujocos"),
     # --- dao2023 ---
-    Mutant("what does not settle counts", D + "figure_3.py",
+    Mutant("what does not settle counts", D + "figures.py",
            "in_order = (thousand < ten) & (ten <= tenth) & np.isfinite(thousand)",
            "in_order = (thousand <= ten) & (ten <= tenth)", DAO + "test_settling_order_needs_both_steps"),
-    Mutant("(10) or (14), the other way round", D + "as_printed.py", "rearranged=bool(by_14 < by_10)",
+    Mutant("(10) or (14), the other way round", D + "theory.py", "rearranged=bool(by_14 < by_10)",
            "rearranged=bool(by_14 > by_10)", DAO + "test_what_the_observer_finds_decides_what_is_meant"),
     # --- andrieu2009 ---
     Mutant("(19) without the spread of A", A + "lyapunov.py", "(1.0 + spread) * part)", "part)",

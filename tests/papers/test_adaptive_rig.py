@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj.papers.dao2023 import adaptive_rig as rig
+from cmg_mj.papers.dao2023 import on_the_rig as rig
 from cmg_mj.papers.dao2023.on_the_rig import OTHERS, share_within
 from cmg_mj.results.intervals import mean_interval
 from cmg_mj.runs.experiment import prepare

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj.papers.dao2023 import as_printed, identities, paper
-from cmg_mj.papers.dao2023 import pendulum_robot as robot
-from cmg_mj.papers.dao2023.figure_2 import QUICK, state_settle_times
-from cmg_mj.papers.dao2023.study import SETTLED, SIGMAS, Study, exogenous_settle_times, study
+from cmg_mj.papers.dao2023 import paper, robot, theory
+from cmg_mj.papers.dao2023.figures import QUICK, state_settle_times
+from cmg_mj.papers.dao2023.robot import SETTLED, SIGMAS, Study, exogenous_settle_times, study
 
 SEED = 7
 
@@ -75,23 +74,23 @@ def test_too_large_a_gain_is_slow_at_a_finer_step_too(results: Study) -> None:
 @pytest.mark.parametrize(("sigma", "duration"), [(0.1, 4.0), (10.0, 4.0), (1000.0, 1.0)])  # (9) is stiff in Sigma
 def test_continuous_identity_along_the_chaotic_robot(sigma: float, duration: float) -> None:
     """(7) to (9) with the robot itself, integrated as one: z(t) = exp((A + L C2) t) z(0)."""
-    largest, size = identities.continuous_deviation(sigma, duration, seed=5)
+    largest, size = theory.continuous_deviation(sigma, duration, seed=5)
     print(f"Sigma {sigma:g}: identity held to {largest:.1e}, z up to {size:.2g}")
     assert size > 0.1
     assert largest < 1e-8
 
 
 def test_sampled_identity_and_upsilon_on_another_seed() -> None:
-    largest, size = identities.sampled_deviation(1000.0, 0.005, 20.0, seed=1)
+    largest, size = theory.sampled_deviation(1000.0, 0.005, 20.0, seed=1)
     assert size > 0.1
     assert largest < 1e-8
-    assert max(identities.upsilon_gaps(10.0, 0.005, 5.0, seed=1)) < 1e-9
+    assert max(theory.upsilon_gaps(10.0, 0.005, 5.0, seed=1)) < 1e-9
 
 
 def test_identity_can_fail() -> None:
     """With a wrong exosystem, z does not go its own way."""
     t = np.linspace(0.0, 3.0, 7)
-    x, guessed, xm, T = identities.continuous_run(10.0, robot.starts(0, 1)[0], np.ones(6), t, 1e-10)
+    x, guessed, xm, T = theory.continuous_run(10.0, robot.starts(0, 1)[0], np.ones(6), t, 1e-10)
     broken = np.array([*paper.THETA, 1.0, 0.0])  # a disturbance that stands still
     z = guessed - x - np.einsum("kij,kj->ki", T, xm - broken)
     right = guessed - x - np.einsum("kij,kj->ki", T, xm - paper.exosystem_state(t))
@@ -108,7 +107,7 @@ def test_stable_at_200_hz() -> None:
     tail = np.sqrt(np.mean(errors.state[16_000:] ** 2, axis=(0, 3)))
     print(f"at 200 Hz: state error RMS over 80-100 s {dict(zip(sigmas, tail.tolist(), strict=True))}")
     assert np.all(tail < np.array([[0.3], [0.03], [5.0]]))  # so large a gain slows the learning
-    assert as_printed.explicit_escape(1000.0, 0.005, 10.0) < 10.0
+    assert theory.explicit_escape(1000.0, 0.005, 10.0) < 10.0
 
 
 def test_settle_times() -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj.papers.dao2023 import as_printed, figure_2, figure_3
-from cmg_mj.papers.dao2023.pendulum_robot import Errors
-from cmg_mj.papers.dao2023.study import SIGMAS, Study
+from cmg_mj.papers.dao2023 import figures, theory
+from cmg_mj.papers.dao2023.robot import SIGMAS, Errors, Study
 
 T = np.linspace(0.0, 200.0, 401)
 WITHIN = "reproduced within stated conditions"
@@ -34,8 +33,8 @@ def test_conclusion_holds_for_the_weights_tested() -> None:
 
     def claim(**changed: float) -> tuple[str, bool]:
         settle = AS_PRINTED | {10_000.0: 20.0} | {float(key[1:].replace("_", ".")): t for key, t in changed.items()}
-        result = figure_3.larger_gains(study(settle))
-        return result.verdict, figure_3.TESTED in result.reason
+        result = figures.larger_gains(study(settle))
+        return result.verdict, figures.TESTED in result.reason
 
     assert claim() == ("illustrated", False)
     assert claim(s10000=170.0) == ("not reproduced", True)  # it turns round beyond them
@@ -45,7 +44,7 @@ def test_conclusion_holds_for_the_weights_tested() -> None:
 
 def test_settling_order_needs_both_steps() -> None:
     def verdict(settle: dict[float, float]) -> str:
-        return figure_3.settling_order(study(settle | {10_000.0: 20.0})).verdict
+        return figures.settling_order(study(settle | {10_000.0: 20.0})).verdict
 
     assert verdict(AS_PRINTED) == WITHIN
     assert verdict(AS_PRINTED | {1000.0: 160.0}) == "not reproduced"
@@ -64,16 +63,16 @@ def test_settling_order_needs_both_steps() -> None:
 )
 def test_figure_2(state: float, plain: float, two_a: str, two_b: str) -> None:
     result = study(AS_PRINTED | {10_000.0: 20.0}, state, plain)
-    assert figure_2.conventional(result).verdict == two_a
-    assert figure_2.proposed(result).verdict == two_b
+    assert figures.conventional(result).verdict == two_a
+    assert figures.proposed(result).verdict == two_b
 
 
 def test_soon_is_a_threshold_of_ours(monkeypatch: pytest.MonkeyPatch) -> None:
     """The paper has none: neither too slow nor quick enough for ours says anything of it."""
     for factor, holds in ((9.9, True), (10.1, False)):
         times = factor * np.array([6.0, 6.0]), np.array([6.0, 6.0])
-        monkeypatch.setattr(figure_2, "state_settle_times", lambda errors, times=times: times)
-        claim = figure_2.speed_claim(study(AS_PRINTED | {10_000.0: 20.0}))
+        monkeypatch.setattr(figures, "state_settle_times", lambda errors, times=times: times)
+        claim = figures.speed_claim(study(AS_PRINTED | {10_000.0: 20.0}))
         assert (claim.verdict, claim.holds) == ("cannot be tested", holds)
         assert claim.reason.startswith("The paper gives no time")
 
@@ -83,34 +82,34 @@ def test_figure_2_is_that_of_the_first_weight() -> None:
     errors_at = errors(AS_PRINTED | {10_000.0: 20.0})
     state = errors_at.state.copy()
     state[:, 1:] = 9.0
-    times, _ = figure_2.state_settle_times(Errors(T, state, errors_at.exogenous))
+    times, _ = figures.state_settle_times(Errors(T, state, errors_at.exogenous))
     assert (times == 0.0).all()
     plain = study(AS_PRINTED | {10_000.0: 20.0}).conventional
-    assert figure_2.proposed(Study(Errors(T, state, errors_at.exogenous), plain, 1.0)).verdict == WITHIN
+    assert figures.proposed(Study(Errors(T, state, errors_at.exogenous), plain, 1.0)).verdict == WITHIN
     state[:, 0] = 9.0
-    times, _ = figure_2.state_settle_times(Errors(T, state, errors_at.exogenous))
+    times, _ = figures.state_settle_times(Errors(T, state, errors_at.exogenous))
     assert np.isinf(times).all()
 
 
 def test_parameters_at_the_end() -> None:
     result = study(AS_PRINTED | {10_000.0: 20.0})
-    assert figure_3.parameters(result).verdict == WITHIN
+    assert figures.parameters(result).verdict == WITHIN
     result.proposed.exogenous[-1, 1, 0, 1] = 2e-3
-    assert figure_3.parameters(result).verdict == "not reproduced"
+    assert figures.parameters(result).verdict == "not reproduced"
 
 
 def test_what_the_observer_finds_decides_what_is_meant(monkeypatch: pytest.MonkeyPatch) -> None:
     """(10) or (14): both are seen, a third is not."""
     for amplitude, verdict, scales_d in ((2.0, WITHIN, True), (1.0, WITHIN, False), (1.5, "not reproduced", True)):
-        monkeypatch.setattr(as_printed, "amplitude_under_10", lambda a=amplitude: np.array([a, a]))
-        claim = as_printed.misprint_claim()
+        monkeypatch.setattr(theory, "amplitude_under_10", lambda a=amplitude: np.array([a, a]))
+        claim = theory.misprint_claim()
         assert claim.verdict == verdict
         assert ("(14), not (10), scales d." in claim.conditions) is scales_d
 
 
 def test_an_explicit_step_that_stays_bounded_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(as_printed, "explicit_escape", lambda *args: np.inf)
-    monkeypatch.setattr(as_printed, "DURATION_S", 80.0)
-    claim = as_printed.sampling_claim(lambda share: None)
+    monkeypatch.setattr(theory, "explicit_escape", lambda *args: np.inf)
+    monkeypatch.setattr(theory, "DURATION_S", 80.0)
+    claim = theory.sampling_claim(lambda share: None)
     assert claim.verdict == WITHIN
     assert claim.figures["explicit_step_escapes_after_s"] is None

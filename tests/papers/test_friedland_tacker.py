@@ -12,8 +12,8 @@ from scipy.linalg import expm
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.papers.dao2023 import paper
-from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, State, System
-from cmg_mj.papers.dao2023.pendulum_robot import make_single
+from cmg_mj.papers.dao2023.observer import FriedlandTacker, State, System
+from cmg_mj.papers.dao2023.robot import make_single
 
 N, NM, R, M, P = 3, 4, 2, 2, 2
 """n, nm, r, m, p of the random plants."""

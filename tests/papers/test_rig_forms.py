@@ -15,7 +15,7 @@ from cmg_mj.observers import Measurement
 from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, list_violations
 from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
-from cmg_mj.papers.dao2023.friedland_tacker import FriedlandTacker, System
+from cmg_mj.papers.dao2023.observer import FriedlandTacker, System
 from tests.observers.reference import DT, HEAVY, rough_signals, run
 from tests.observers.test_adaptive import MODES, PAIR, adaptive
 from tests.observers.test_high_gain import CASES, DEFAULTS, high_gain

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from cmg_mj.papers.claim import Section
-from cmg_mj.papers.dao2023 import as_printed, figures, identities, on_the_rig
+from cmg_mj.papers.dao2023 import figures, on_the_rig, theory
 
 SECTIONS: list[Section] = [
-    Section("pendulum robot", 14.0, figures.claims),
-    Section("equations (7) to (9)", 5.0, identities.claims),
-    Section("as printed", 2.0, as_printed.claims),
+    Section("pendulum robot", 14.0, figures.figures_claims),
+    Section("equations (7) to (9)", 5.0, theory.identities_claims),
+    Section("as printed", 2.0, theory.as_printed_claims),
     Section("on the rig", 13.0, on_the_rig.claims),
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmg_mj.papers.dao2023.friedland_tacker import System
+from cmg_mj.papers.dao2023.observer import System
 
 # Section 3.2, the arm.
 MASS, LENGTH, INERTIA, GRAVITY = 1.0, 1.0, 0.5, 9.81  # kg, m, kg m^2, m/s^2
