@@ -761,7 +761,7 @@ COMMANDS: dict[str, Notes] = {
         "plugin.md",
     ),
     "reproduce": Notes(
-        "about half a minute for `dao2023`, three minutes for `all`, four for `beyond`.",
+        "about half a minute for `dao2023`, three minutes for `all`.",
         ("cmg-mj reproduce dao2023",),
         "reproduced.md",
     ),
