@@ -133,7 +133,7 @@ def mutated(parameter: str, factor: float, root: Path = ROOT) -> tuple[str, str]
     """
     name = parameter.removeprefix("reduced: ")
     if name in REDUCED:
-        file = OBSERVERS + "reduced_model.py"
+        file = "cmg_mj/core/reduced_model.py"
         text = (root / file).read_text(encoding="utf-8")
         last = "    gravity_torque: float\n"
         # After construction, so that every reader sees the wrong value.
