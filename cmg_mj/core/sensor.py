@@ -174,26 +174,25 @@ class SampledSensor(Generic[Reading]):
         """Take what is due, at a physics step that is a multiple of `steps_per_sample`, or at the first one."""
         for watch in self._watches:
             watch(step, self._raw, ideal)
-        if not self._has_begun:  # before the start the rig stood still
+        is_first = not self._has_begun
+        if is_first:
             self._has_begun = True
-            for _ in range(self._settle):
+            for _ in range(self._settle):  # before the start the rig stood still
                 self._measure(ideal)
-            self._show(step, self._measure(ideal))
-        elif step % self._raw == 0:
-            reading = self._measure(ideal)
-            if step % self.period == 0:
-                self._show(step, reading)
-
-    def _measure(self, ideal: IdealReading) -> Reading:
+        elif step % self._raw:
+            return
         signal = self._take(ideal)
         for stage in self._stages:
             signal = stage(signal, ideal)
-        return signal
+        if is_first or step % self.period == 0:
+            self._newest = signal
+            if self._latency:
+                self._on_the_way.append((step + self._latency, signal))
 
-    def _show(self, step: int, reading: Reading) -> None:
-        self._newest = reading
-        if self._latency:
-            self._on_the_way.append((step + self._latency, reading))
+    def _measure(self, ideal: IdealReading) -> None:
+        signal = self._take(ideal)
+        for stage in self._stages:
+            signal = stage(signal, ideal)
 
     def read(self, step: int) -> Reading:
         """Return the newest sample delivered by a physics step; before the start the rig stood still."""

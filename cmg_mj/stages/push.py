@@ -63,19 +63,21 @@ class Pushes:
                     change[axes.index(about)] += torque
         self.edges = self._changes.keys()
         self._torques: list[Scalar] = [0.0] * len(axes)
-        self._others: Sequence[Scalar] | None = None
-        self._sum: Sequence[Scalar] = ()
+        self._before: Outside | None = None
+        self._sum = Outside(())
 
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
         """Add the torques: see `Disturbance`."""
-        others, acceleration = outside
         change = self._changes.get(step)
+        if change is None and outside is self._before:
+            return self._sum
+        others, acceleration = outside
         if change is not None:
             self._torques = [torque + more for torque, more in zip(self._torques, change, strict=True)]
-        if change is not None or others is not self._others:
-            held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in self._torques]  # no remainders
-            self._others, self._sum = others, [a + b for a, b in zip(others, held, strict=True)]
-        return Outside(self._sum, acceleration)
+        held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in self._torques]  # no remainders
+        self._before = outside
+        self._sum = Outside([a + b for a, b in zip(others, held, strict=True)], acceleration)
+        return self._sum
 
 
 def push_windows(pushes: Iterable[Push]) -> list[Window]:
