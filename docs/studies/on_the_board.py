@@ -5,7 +5,7 @@
 In lockstep the board closes the loop, and the host's controller gets the same readings. The column has the RMS
 difference of both estimated rates over all worlds and ticks. In closed loop there are means of velocity RMS error and
 settle time over the worlds. Those on the host have their 95 % intervals; for those with the board the table says
-whether they lie within. docs/board_evidence.md has the table. About a minute an observer.
+whether they lie within. docs/board.md has the table. About a minute an observer.
 """
 
 from __future__ import annotations

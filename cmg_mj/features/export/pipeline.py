@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
-import inspect
 import shlex
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple, TypedDict, TypeVar
 
-import numpy as np
-
 from cmg_mj.core.controller import Controller
-from cmg_mj.core.errors import InputError, TomlValue, raised, shown
+from cmg_mj.core.errors import InputError, raised, shown
 from cmg_mj.core.types import Observer
 from cmg_mj.features.export import check
 from cmg_mj.features.export.c_code import Precision, operations
 from cmg_mj.features.export.c_files import CodePrinter, LawPrinter, format_example, format_test_vector
-from cmg_mj.features.export.constants import constants_of
+from cmg_mj.features.export.constants import class_path, constants_of
 from cmg_mj.features.export.names import export_files, name_of
 from cmg_mj.features.export.symbol import LawNotExportable
 from cmg_mj.features.export.trace import trace
-from cmg_mj.laws import Law, StateFeedback
+from cmg_mj.laws import Law
 from cmg_mj.results.folder import write_text
+from cmg_mj.stages.notch import Notch
 from cmg_mj.stages.trim import Trim
 
 Part = TypeVar("Part", Observer, Law)
@@ -60,22 +56,39 @@ class Code(NamedTuple):
 
 def generate_code(controller: Controller, precision: Precision, name: str | None = None, suffix: str = "") -> Code:
     """Generate a controller's C, whose name has a suffix, and compare it with Python; see `export`."""
-    refuse_unexported(controller)
-    cls = type(controller.observer)
+    require_exportable(controller)
     try:
         return _generate(controller, precision, name_of(controller.observer, name) + suffix)
     except LawNotExportable as error:
         raise InputError(f"law {type(controller.law).__name__}: cannot be exported: {error}") from error
     except InputError as error:
-        raise InputError(f"{cls.__module__}:{cls.__qualname__} cannot be exported: {error}") from error
+        raise InputError(f"{class_path(controller.observer)} cannot be exported: {error}") from error
+
+
+def require_exportable(controller: Controller) -> None:
+    """Refuse what C does not have; an option that it misses otherwise, the comparison with Python finds.
+
+    Raises:
+        InputError: Something in use cannot be exported; the message names it.
+    """
+    if type(controller) is not Controller:
+        raise InputError(f"{type(controller).__name__}: cannot be exported: only the bench's own controller is")
+    if controller.feedback != "observer":
+        raise InputError(
+            f"controller.feedback = {shown(controller.feedback)}: cannot be exported: C has the observer's rate alone; "
+            "set controller.feedback=observer"
+        )
+    for stage in (*controller.command_stages, *controller.memories):
+        if isinstance(stage, Notch):
+            raise InputError("controller.notch_hz: cannot be exported: C has no notch; set controller.notch_hz=0.0")
+        if not isinstance(stage, Trim):
+            raise InputError(f"{type(stage).__name__}: cannot be exported: C has no such stage")
 
 
 def _copied(part: Part, refusal: type[InputError]) -> Part:
     try:
         return copy.deepcopy(part)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # a user's observer or law may hold anything
+    except Exception as error:  # a user's observer or law may hold anything
         raise refusal(f"it cannot be copied: {raised(error)}") from error
 
 
@@ -142,69 +155,3 @@ def export_table(figures: Figures) -> str:
 
 def _difference(size: float) -> str:
     return f"{size:.2g}" if size else "0 (bit for bit)"
-
-
-EXPORTED_OPTIONS = ("angle_source", "memories", "commands")
-"""Options of a `Controller` that its C has."""
-SIMULATION_OPTIONS = ("seed", "worlds", "axis", "open_loop_observers")
-"""Options that concern the simulation around a controller alone."""
-EXPORTED_LAW_FIELDS = ("dt", "gains", "rate_limit")
-"""Fields of the law (8) that its C has; another law is traced whole."""
-REASONS = {
-    "feedback": "what is exported has the observer's rate alone",
-    "notch_hz": "no notch is exported, so that a frame that needs one has to be stiffer, or another setting cures it",
-}
-"""Option of a `Controller` -> why its C has none, where that is known."""
-
-
-def refuse_unexported(controller: Controller) -> None:
-    """Refuse every option of the controller, and every field of (8), that C does not have and that is in use.
-
-    Raises:
-        InputError: There is one; the message names it, and the value without it.
-    """
-    law = controller.law
-    option_defaults = {
-        option.name: None if option.default is option.empty else option.default
-        for cls in type(controller).__mro__
-        for option in inspect.signature(cls.__init__).parameters.values()
-        if option.kind is option.KEYWORD_ONLY and option.name not in EXPORTED_OPTIONS + SIMULATION_OPTIONS
-    }
-    _refuse_in_use(controller, option_defaults)
-    for stage in controller.command_stages:
-        name = f"{type(stage).__name__.lower()}_hz"
-        reason = REASONS.get(name, "C has no such stage")
-        raise InputError(f"controller.{name}: cannot be exported: {reason}; set controller.{name}=0.0")
-    for memory in controller.memories:
-        if not isinstance(memory, Trim):
-            raise InputError(f"{type(memory).__name__}: cannot be exported: C has no such stage")
-    if type(law) is StateFeedback:
-        fields = [field for field in dataclasses.fields(law) if field.name not in EXPORTED_LAW_FIELDS]
-        _refuse_in_use(law, {field.name: _default_of(field) for field in fields})
-
-
-def _default_of(field: dataclasses.Field[TomlValue]) -> TomlValue:
-    """Return a field's default; None without one."""
-    if field.default_factory is not dataclasses.MISSING:
-        return field.default_factory()
-    return None if field.default is dataclasses.MISSING else field.default
-
-
-def _refuse_in_use(part: Controller | Law, defaults: Mapping[str, TomlValue]) -> None:
-    """Refuse a name whose value is not its default, and one that is no attribute: its value is not known.
-
-    Args:
-        part: The controller or its law.
-        defaults: Name of an attribute -> its default; None is no default.
-    """
-    for name, default in defaults.items():
-        setting = f"controller.{name}"
-        if not hasattr(part, name):
-            raise InputError(f"{setting}: cannot be exported: {type(part).__qualname__} has no attribute {name!r}")
-        value = getattr(part, name)
-        if not np.any(value != default):
-            continue
-        reason = REASONS.get(name, "C has no such option")
-        if default is not None:
-            reason += f"; set {setting}={default if isinstance(default, str) else shown(default)}"
-        raise InputError(f"{setting} = {shown(value)}: cannot be exported: {reason}")

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.export import export, pipeline
-from cmg_mj.laws import Law
+from cmg_mj.features.export import export, generate_code
 from tests.features.export import own
 from tests.features.export.compiled import controller
 
@@ -78,101 +76,31 @@ def refusal(name: str, folder: Path) -> str:
     return complaint
 
 
-@pytest.mark.parametrize("feedback", ["fog", "truth"])
-def test_a_board_has_the_observer_alone(feedback: str, tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=rf"^controller\.feedback = '{feedback}': .* the observer's rate alone; set .*=observer$"
-    ):
-        export(controller("linear", f"controller.feedback={feedback}"), tmp_path)
+class Derived(Controller):
+    """What it does otherwise, C would not have."""
 
 
-class Dithering(Controller):
-    """A controller with an option that the exporter has never heard of."""
-
-    def __init__(self, *parts: Any, dither_rad_s: float = 0.0, **options: Any) -> None:
-        self.dither_rad_s = dither_rad_s
-        super().__init__(*parts, **options)
-
-
-def dithering(**options: Any) -> Controller:
+def test_a_controller_of_another_class_is_refused() -> None:
     plain = controller("linear")
-    return Dithering(plain.observer, plain.law, plain.sensors, plain.plant, **options)
+    with pytest.raises(InputError, match=r"^Derived: "):
+        generate_code(Derived(plain.observer, plain.law, plain.sensors, plain.plant), "double")
 
 
-def test_an_option_that_c_does_not_have_is_refused_by_name(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=r"^controller\.dither_rad_s = 0\.5: cannot .* set controller\.dither_rad_s=0\.0$"
-    ):
-        export(dithering(dither_rad_s=0.5), tmp_path / "export")
-    assert not (tmp_path / "export").exists()
-    export(dithering(seed=3, axis=1, open_loop_observers={"kalman": plain_kalman()}), tmp_path / "export")
+@pytest.mark.parametrize(("field", "value"), [("feedback", "fog"), ("feedback", "truth"), ("notch_hz", "20.0")])
+def test_a_setting_that_c_does_not_have_is_refused_by_name(field: str, value: str) -> None:
+    with pytest.raises(InputError, match=rf"^controller\.{field}\b.* set controller\.{field}="):
+        generate_code(controller("linear", f"controller.{field}={value}"), "double")
 
 
-class Silent(Controller):
-    """A controller that keeps options under other names, or not at all."""
+class Hum:
+    """A stage without C."""
 
-    def __init__(self, *parts: Any, dither_rad_s: float = 0.0, **options: Any) -> None:
-        self._dither = dither_rad_s
-        super().__init__(*parts, **options)
+    def __call__(self, u: Any) -> Any:
+        return u
 
 
-def test_an_option_that_is_no_attribute_is_refused(tmp_path: Path) -> None:
+def test_a_stage_that_c_does_not_have_is_refused_by_name() -> None:
     plain = controller("linear")
-    silent = Silent(plain.observer, plain.law, plain.sensors, plain.plant)
-    with pytest.raises(
-        InputError, match=r"^controller\.dither_rad_s: cannot be exported: Silent has no attribute 'dither_rad_s'$"
-    ):
-        export(silent, tmp_path / "export")
-
-
-class Demanding(Controller):
-    """A controller with options that have no default, or none that is a number."""
-
-    def __init__(self, *parts: Any, dithers: bool = False, kind: str, **options: Any) -> None:
-        self.dithers, self.kind = dithers, kind
-        super().__init__(*parts, **options)
-
-
-@pytest.mark.parametrize(
-    ("dithers", "complaint"),
-    [
-        (True, "controller.dithers = true: cannot be exported: C has no such option; set controller.dithers=false"),
-        (False, "controller.kind = 'sine': cannot be exported: C has no such option"),
-    ],
-)
-def test_a_value_is_said_as_toml_and_a_default_where_there_is_one(dithers: bool, complaint: str) -> None:
-    plain = controller("linear")
-    demanding = Demanding(plain.observer, plain.law, plain.sensors, plain.plant, dithers=dithers, kind="sine")
-    with pytest.raises(InputError) as info:
-        pipeline.generate_code(demanding, "double")
-    assert str(info.value) == complaint
-
-
-def plain_kalman() -> Any:
-    return controller("kalman").observer
-
-
-@dataclass(frozen=True)
-class WithADeadBand:
-    """The fields of a law that has one more than C knows."""
-
-    dt: float
-    gains: tuple[float, float, float, float] = (35.0, 4.0, -1.0, 0.3)
-    rate_limit: float = 4.7
-    dead_band: float = 0.0
-    notches_hz: list[float] = field(default_factory=list)
-
-
-def test_a_field_of_the_law_that_c_does_not_have_is_refused_by_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(pipeline, "StateFeedback", WithADeadBand)
-    exported = controller("linear")
-    exported.law = cast("Law", WithADeadBand(exported.law.dt, dead_band=0.05))
-    with pytest.raises(InputError, match=r"^controller\.dead_band = 0\.05: cannot be exported"):
-        export(exported, tmp_path / "export")
-    exported.law = cast("Law", WithADeadBand(exported.law.dt, notches_hz=[7.0]))
-    with pytest.raises(InputError, match=r"^controller\.notches_hz = \[7\.0\]: .*; set controller\.notches_hz=\[\]$"):
-        export(exported, tmp_path / "export")
-    exported.law = cast("Law", WithADeadBand(exported.law.dt))
-    pipeline.refuse_unexported(exported)
+    humming = Controller(plain.observer, plain.law, plain.sensors, plain.plant, commands=[Hum])
+    with pytest.raises(InputError, match=r"^Hum: "):
+        generate_code(humming, "double")
