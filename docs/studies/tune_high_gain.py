@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 
 from cmg_mj import load_scenario, make_observer, prepare
 from cmg_mj.features.replay import replay
-from cmg_mj.papers.andrieu2009.bi_limit import largest_b
+from cmg_mj.papers.andrieu2009.observer import largest_b
 from cmg_mj.results import markdown
 from cmg_mj.results.summary_keys import heading
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from cmg_mj import papers
+from cmg_mj.papers.andrieu2009.bioreactor import coordinates, invariance
 from cmg_mj.papers.claim import Section
 from tests.command import cmg_mj
 
 
 @pytest.mark.usefixtures("elsewhere")
 def test_a_paper_is_reproduced(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cmg_mj.papers.andrieu2009.bioreactor_bounds import coordinates, invariance
 
     section = Section("the bioreactor's bounds", 1.0, lambda on_share: [invariance(), coordinates()])
     monkeypatch.setattr(papers, "sections_of", {"andrieu2009": [section]}.__getitem__)

@@ -11,32 +11,23 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from cmg_mj.papers.andrieu2009 import (
-    bioreactor_bounds,
-    chain_of_integrators,
-    figure_1,
-    figure_2,
-    finite_escape,
-    increments,
-    on_the_rig,
-    theorem_1,
-    theory,
-)
-from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, list_violations
-from cmg_mj.papers.andrieu2009.bioreactor import Bioreactor
-from cmg_mj.papers.andrieu2009.correction import correction, simple_copy
-from cmg_mj.papers.andrieu2009.paper import dilution
+from cmg_mj.papers.andrieu2009 import bioreactor, figures, lyapunov, on_the_rig, theorem_1, theory
+from cmg_mj.papers.andrieu2009.bioreactor import Bioreactor, dilution
+from cmg_mj.papers.andrieu2009.figures import correction, simple_copy
+from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, list_violations
 from cmg_mj.papers.andrieu2009.simulation import (
     CONSTANT,
     HOMOGENEOUS,
     UPDATED,
     Run,
+    Study,
     replay,
+    rms_by_kind,
     rms_late,
     run_plant,
+    study,
     window_means,
 )
-from cmg_mj.papers.andrieu2009.study import Study, rms_by_kind, study
 from cmg_mj.papers.claim import Claim
 from cmg_mj.view.plots.figure import Picture
 from tests.papers.worlds import make_result
@@ -152,7 +143,7 @@ def test_noise_has_the_papers_standard_deviation() -> None:
 
 def test_claims_on_the_bounds() -> None:
     parts = ("invariance", "coordinates", "increments", "order_of_bounds", "noise_level")
-    claims = [of_json(getattr(bioreactor_bounds, part)()) for part in parts]
+    claims = [of_json(getattr(bioreactor, part)()) for part in parts]
     partly = "reproduced within stated conditions"
     no = "not reproduced"
     assert [claim.verdict for claim in claims] == ["reproduced", "reproduced", partly, no, no]
@@ -160,7 +151,7 @@ def test_claims_on_the_bounds() -> None:
 
 def test_the_order_of_the_bounds_is_judged_by_each() -> None:
     """Omega_2 exceeds Omega_1 somewhere for hbar = 0.8, by the definitions on a fine grid of x2; nothing else does."""
-    claim = bioreactor_bounds.order_of_bounds()
+    claim = bioreactor.order_of_bounds()
     assert [name for name, holds in claim.measures.items() if not holds] == ["Omega_2 <= Omega_1"]
     reactor, p = Bioreactor(0.8), 0.9
     x1, x2_hat, u = (grid.ravel() for grid in reactor.domain(32))
@@ -177,22 +168,22 @@ def test_the_order_of_the_bounds_is_judged_by_each() -> None:
 
 def test_the_order_of_the_bounds_can_hold(monkeypatch: pytest.MonkeyPatch) -> None:
     """As with the plant's hbar = 1; then only the misprint is mended."""
-    right = bioreactor_bounds.increments_over_domain
-    monkeypatch.setattr(bioreactor_bounds, "increments_over_domain", lambda hbar: right(1.0))
-    assert bioreactor_bounds.order_of_bounds().verdict == "reproduced within stated conditions"
+    right = bioreactor.increments_over_domain
+    monkeypatch.setattr(bioreactor, "increments_over_domain", lambda hbar: right(1.0))
+    assert bioreactor.order_of_bounds().verdict == "reproduced within stated conditions"
 
 
 def test_the_set_is_not_invariant_for_inputs_beyond_its_own() -> None:
     reactor = Bioreactor(1.0)
-    assert bioreactor_bounds.least_inflow(reactor, reactor.u_min, reactor.u_max) > -1e-12
-    assert bioreactor_bounds.least_inflow(reactor, 0.9 * reactor.u_min, reactor.u_max) < -1e-4
-    assert bioreactor_bounds.least_inflow(reactor, reactor.u_min, 1.05 * reactor.u_max) < -1e-4
+    assert bioreactor.least_inflow(reactor, reactor.u_min, reactor.u_max) > -1e-12
+    assert bioreactor.least_inflow(reactor, 0.9 * reactor.u_min, reactor.u_max) < -1e-4
+    assert bioreactor.least_inflow(reactor, reactor.u_min, 1.05 * reactor.u_max) < -1e-4
 
 
 @pytest.mark.parametrize("p", [0.5, 0.9])
 @pytest.mark.parametrize("hbar", [0.8, 1.0])
 def test_both_inequalities_hold_and_the_misprint_shows(hbar: float, p: float) -> None:
-    quotients = bioreactor_bounds.increments_over_domain(hbar, p, 24)
+    quotients = bioreactor.increments_over_domain(hbar, p, 24)
     assert max(quotients.by_Omega1, quotients.by_Omega2, quotients.by_Omega2_local) <= 1.0 + 1e-9
     assert quotients.slope_over_Omega2 <= 1.0 + 1e-9
     assert quotients.slope_over_Omega2_printed > 1.01
@@ -210,7 +201,7 @@ def test_the_largest_slope_is_at_a_corner_of_the_domain() -> None:
 
 
 def test_rates_are_in_order_in_every_window(runs: Study) -> None:
-    means, in_order = figure_1.ordered_rates(runs)
+    means, in_order = figures.ordered_rates(runs)
     assert in_order.tolist() == [True] * 4
     # An independent implementation's figures. In the first window the start has not quite faded.
     assert means[1, 1:] == pytest.approx([1.25, 2.93, 1.35], rel=0.03)
@@ -221,19 +212,19 @@ def test_rates_are_in_order_in_every_window(runs: Study) -> None:
 def test_errors_are_in_order_in_every_seed(runs: Study) -> None:
     for replays in (runs.nominal, runs.loud):
         rms = rms_by_kind(runs.run, replays)
-        assert figure_2.share_in_order(rms) >= 0.95
+        assert figures.share_in_order(rms) >= 0.95
     assert rms_by_kind(runs.run, runs.nominal).mean(axis=1) == pytest.approx([0.255, 0.071, 0.056], rel=0.08)
 
 
 def test_claims_on_the_figures(runs: Study) -> None:
     partly = "reproduced within stated conditions"
     claims = {
-        figure_1.figure_1: (partly,),
-        figure_2.figure_2: (partly,),
-        figure_2.bias: (partly,),
-        figure_2.bias_of_constant_gain: ("not reproduced",),
-        figure_2.bias_of_updated_gains: ("not reproduced", partly),
-        figure_2.spread: (partly,),
+        figures.figure_1: (partly,),
+        figures.figure_2: (partly,),
+        figures.bias: (partly,),
+        figures.bias_of_constant_gain: ("not reproduced",),
+        figures.bias_of_updated_gains: ("not reproduced", partly),
+        figures.spread: (partly,),
         simple_copy: ("reproduced",),
     }
     for make, verdicts in claims.items():
@@ -244,7 +235,7 @@ def test_claims_can_fail(runs: Study) -> None:
     """The observers' names exchanged."""
     swapped = {CONSTANT: runs.nominal[UPDATED], UPDATED: runs.nominal[CONSTANT], HOMOGENEOUS: runs.nominal[HOMOGENEOUS]}
     exchanged = runs._replace(nominal=swapped)
-    for make in (figure_1.figure_1, figure_2.figure_2, figure_2.bias):
+    for make in (figures.figure_1, figures.figure_2, figures.bias):
         claim = make(exchanged)
         assert claim.verdict == "not reproduced"
         assert claim.reason
@@ -252,26 +243,26 @@ def test_claims_can_fail(runs: Study) -> None:
 
 def test_cause_of_a_bias_is_judged_by_what_is_left_without_it(runs: Study) -> None:
     """Observers that know hbar beside those that do not; the constant gain's bias stays, the others' mostly goes."""
-    shares = figure_2.bias_left(runs)
+    shares = figures.bias_left(runs)
     assert shares[0].min() > 0.7
-    claim = figure_2.bias_of_constant_gain(runs)
+    claim = figures.bias_of_constant_gain(runs)
     assert claim.figures["share_left_with_exact_hbar"] == shares[0].tolist()
     assert shares[1:, [0, 2]].max() < 0.4
     error = runs.nominal[CONSTANT].eta2_error
     gone = runs.exact | {CONSTANT: dataclasses.replace(runs.exact[CONSTANT], eta2_error=0.1 * error)}
     partly = "reproduced within stated conditions"
-    assert figure_2.bias_of_constant_gain(runs._replace(exact=gone)).verdict == partly
-    claim = figure_2.bias_of_updated_gains(runs._replace(exact=runs.nominal))
+    assert figures.bias_of_constant_gain(runs._replace(exact=gone)).verdict == partly
+    claim = figures.bias_of_updated_gains(runs._replace(exact=runs.nominal))
     assert (claim.verdict, claim.reason) == ("not reproduced", "Half of it or more remains in every window.")
 
 
 def test_the_cause_of_a_bias_must_be_so_in_every_window(runs: Study, monkeypatch: pytest.MonkeyPatch) -> None:
     shares = np.full((3, 4), 0.2)
-    monkeypatch.setattr(figure_2, "bias_left", lambda study: shares)
+    monkeypatch.setattr(figures, "bias_left", lambda study: shares)
     partly = "reproduced within stated conditions"
-    assert [figure_2.bias_of_constant_gain(runs).verdict, figure_2.bias_of_updated_gains(runs).verdict] == [partly] * 2
+    assert [figures.bias_of_constant_gain(runs).verdict, figures.bias_of_updated_gains(runs).verdict] == [partly] * 2
     shares[:, 3] = 0.7
-    claims = [figure_2.bias_of_constant_gain(runs), figure_2.bias_of_updated_gains(runs)]
+    claims = [figures.bias_of_constant_gain(runs), figures.bias_of_updated_gains(runs)]
     for claim in claims:
         assert claim.verdict == "not reproduced"
         assert list(claim.measures.values()) == [True, True, True, False]
@@ -286,7 +277,7 @@ def test_order_of_figure_2_is_needed_in_nearly_every_seed(runs: Study) -> None:
         UPDATED: dataclasses.replace(runs.nominal[UPDATED], eta2_error=second),
         HOMOGENEOUS: dataclasses.replace(runs.nominal[HOMOGENEOUS], eta2_error=third),
     }
-    claim = figure_2.figure_2(runs._replace(nominal=runs.nominal | swapped))
+    claim = figures.figure_2(runs._replace(nominal=runs.nominal | swapped))
     assert claim.figures["share_of_seeds_in_order"] == pytest.approx(5.0 / 6.0)
     assert claim.verdict == "not reproduced"
 
@@ -294,7 +285,7 @@ def test_order_of_figure_2_is_needed_in_nearly_every_seed(runs: Study) -> None:
 def test_spread_must_go_with_the_rate(runs: Study) -> None:
     """The errors of the noisiest given to the one with the least rate."""
     noisy = dataclasses.replace(runs.nominal[HOMOGENEOUS], eta2_error=10.0 * runs.nominal[CONSTANT].eta2_error)
-    assert figure_2.spread(runs._replace(nominal=runs.nominal | {HOMOGENEOUS: noisy})).verdict == "not reproduced"
+    assert figures.spread(runs._replace(nominal=runs.nominal | {HOMOGENEOUS: noisy})).verdict == "not reproduced"
 
 
 def test_gain_follows_its_rate(runs: Study) -> None:
@@ -339,17 +330,17 @@ def first_half(run: Run) -> Run:
 
 @pytest.mark.parametrize(("p", "holds"), [(0.2, True), (0.8, True), (1.2, False), (3.0, False)])
 def test_increments_of_system_1(p: float, holds: bool) -> None:
-    assert (increments.largest_increment(p) <= 1.0 + 1e-9) is holds
+    assert (theory.largest_increment(p) <= 1.0 + 1e-9) is holds
 
 
 def test_claims_of_the_theory() -> None:
     general = "illustrated"
     verdicts = {
-        increments.increments: general,
-        finite_escape.no_observer_beyond_1: general,
+        theory.increments: general,
+        theorem_1.no_observer_beyond_1: general,
         theory.scaling_conditions: "reproduced",
         theory.gain_tracking: general,
-        chain_of_integrators.theorem_2: general,
+        lyapunov.theorem_2: general,
         theorem_1.theorem_1: general,
     }
     for make, verdict in verdicts.items():
@@ -377,26 +368,26 @@ def test_another_bound_on_b_is_not_reproduced(monkeypatch: pytest.MonkeyPatch) -
 
 def test_a_poor_correction_is_seen() -> None:
     poor = BiLimitCorrection((1.0, 2.0, 0.9), 0.2)
-    assert chain_of_integrators.chain_errors(poor, (1.0,), 2, 20.0) > 3.0
+    assert lyapunov.chain_errors(poor, (1.0,), 2, 20.0) > 3.0
 
 
 @pytest.mark.parametrize("p", [0.5, 1.5, 2.0])
 def test_escaping_solution_solves_1(p: float) -> None:
     """x1' = x2 and x2' = x2^(1+p) by scipy, up to nine tenths of its time."""
     end = 3.0**-p / p
-    assert finite_escape.escape(p, 3.0).end_time == pytest.approx(end)
+    assert theorem_1.escape(p, 3.0).end_time == pytest.approx(end)
     x = solve_ivp(lambda t, x: [x[1], x[1] ** (1.0 + p)], (0.0, 0.9 * end), [0.0, 3.0], rtol=1e-10, atol=1e-12).y[:, -1]
-    assert [float(v) for v in finite_escape.solution(p, 3.0, 0.1)] == pytest.approx(x.tolist(), rel=1e-7)
+    assert [float(v) for v in theorem_1.solution(p, 3.0, 0.1)] == pytest.approx(x.tolist(), rel=1e-7)
 
 
 def test_escape_is_found_below_1_and_missed_beyond() -> None:
     """Other starts, powers and tolerances than the report's; the solution whose start is known is not missed."""
     for start in (3.0, 300.0):
-        assert finite_escape.escape(0.4, start, tolerance=1e-8).error[-1] < finite_escape.FOUND
-        assert finite_escape.escape(2.0, 10.0 * start, tolerance=1e-8).error[-1] > finite_escape.MISSED
-    assert finite_escape.escape(1.5, 30.0, 30.0, 1e-9).error.max() < 1e-4
-    assert finite_escape.escape(1.5, 3000.0).moved == pytest.approx(3000.0**-0.5 / 0.5)
-    assert math.isinf(finite_escape.escape(0.5, 3.0).moved)
+        assert theorem_1.escape(0.4, start, tolerance=1e-8).error[-1] < theorem_1.FOUND
+        assert theorem_1.escape(2.0, 10.0 * start, tolerance=1e-8).error[-1] > theorem_1.MISSED
+    assert theorem_1.escape(1.5, 30.0, 30.0, 1e-9).error.max() < 1e-4
+    assert theorem_1.escape(1.5, 3000.0).moved == pytest.approx(3000.0**-0.5 / 0.5)
+    assert math.isinf(theorem_1.escape(0.5, 3.0).moved)
 
 
 # --- the rig ------------------------------------------------------------------------------------------------
@@ -429,8 +420,8 @@ def test_differences_on_the_rig_are_world_by_world() -> None:
 
 def test_pictures_have_names(runs: Study) -> None:
     pictures: list[Picture] = [
-        *figure_1.figure_1(runs).pictures,
-        *figure_2.figure_2(runs).pictures,
+        *figures.figure_1(runs).pictures,
+        *figures.figure_2(runs).pictures,
     ]
     assert [picture.name for picture in pictures] == ["andrieu2009-fig-1", "andrieu2009-fig-2"]
     for i, picture in enumerate(pictures, start=1):

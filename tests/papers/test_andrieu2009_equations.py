@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from cmg_mj.papers.andrieu2009 import equations_11_12, equations_19_20, increments
-from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection
+from cmg_mj.papers.andrieu2009 import lyapunov, theory
 from cmg_mj.papers.andrieu2009.lyapunov import Lyapunov, States, decay, states
+from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection
 
 WITHIN = "reproduced within stated conditions"
 
 
-def lyapunov(d_inf: float, l1: float = 8.0, sigma: float = 3.0) -> Lyapunov:
+def make_lyapunov(d_inf: float, l1: float = 8.0, sigma: float = 3.0) -> Lyapunov:
     return Lyapunov(BiLimitCorrection((l1, 1.0), d_inf), sigma, 2.0 + d_inf)
 
 
@@ -31,7 +31,7 @@ def invert(W: Lyapunov, e1: float, e2: float) -> States:
 
 @pytest.mark.parametrize("d_inf", [0.0, 0.3, 0.5])
 def test_w_is_its_integral_and_the_gradient_its_derivative(d_inf: float) -> None:
-    W = lyapunov(d_inf)
+    W = make_lyapunov(d_inf)
     for e1, e2 in ((0.3, -0.8), (-0.2, -0.1), (0.01, 1.5)):
         point = invert(W, e1, e2)
         middle = W.h(point.s2)[0]
@@ -46,7 +46,7 @@ def test_w_is_its_integral_and_the_gradient_its_derivative(d_inf: float) -> None
 @pytest.mark.parametrize("d_inf", [0.25, 0.75])
 def test_w_is_homogeneous_in_the_bi_limit(d_inf: float) -> None:
     """W has the degree d_W with the weights (1, 1) near 0 and (1 - d_inf, 1) far out, and is positive."""
-    W = lyapunov(d_inf)
+    W = make_lyapunov(d_inf)
     near, far = invert(W, 0.4e-9, -0.7e-9), invert(W, 0.4 * (1e12) ** (1.0 - d_inf), -0.7e12)
     twice_near, twice_far = invert(W, 0.8e-9, -1.4e-9), invert(W, 0.4 * (2e12) ** (1.0 - d_inf), -1.4e12)
     assert W.W(twice_near)[0] / W.W(near)[0] == pytest.approx(2.0**W.d_W, rel=1e-3)
@@ -59,13 +59,13 @@ def test_w_is_homogeneous_in_the_bi_limit(d_inf: float) -> None:
 @pytest.mark.parametrize("d_inf", [0.0, 0.5, 0.9])
 def test_w_falls_along_motions_as_19_says(d_inf: float) -> None:
     """Integrated, with A1 and A2 that swing within (17), from other states than those of the grid."""
-    pair = equations_19_20.search(d_inf)
+    pair = lyapunov.search(d_inf)
     assert pair is not None
-    W = lyapunov(d_inf, pair.l1, pair.sigma)
+    W = make_lyapunov(d_inf, pair.l1, pair.sigma)
 
     def slope(tau: float, e: np.ndarray) -> list[float]:
         k1, k2 = W.K(float(e[0]))
-        spread = equations_19_20.SPREAD
+        spread = lyapunov.SPREAD
         return [(1.0 + spread * np.sin(7.0 * tau)) * (e[1] + k1), (1.0 + spread * np.cos(3.0 * tau)) * k2]
 
     for start in ([1.0, -2.0], [-30.0, 5.0], [0.01, 0.02]):
@@ -80,7 +80,7 @@ def test_w_falls_along_motions_as_19_says(d_inf: float) -> None:
 @pytest.mark.parametrize("b", [0.1, 0.8])
 def test_20_with_a_b_of_its_own(b: float) -> None:
     """dW/dE B E is the growth of W where e1 grows by b and e2 by 1 + b: c2 from differences along that."""
-    W = lyapunov(0.4)
+    W = make_lyapunov(0.4)
     grid = states(np.geomspace(1e-2, 1e2, 5), 7)
     e1, e2 = W.E(grid)
     step = 1e-5
@@ -93,15 +93,15 @@ def test_20_with_a_b_of_its_own(b: float) -> None:
 
 
 def test_constants_hold_on_a_finer_grid() -> None:
-    claim = equations_19_20.claim()
+    claim = lyapunov.claim()
     assert claim.verdict == "illustrated"
     for d_inf in (0.0, 0.5, 0.9):
-        pair = equations_19_20.search(d_inf)
+        pair = lyapunov.search(d_inf)
         assert pair is not None
         finer = decay(
-            lyapunov(d_inf, pair.l1, pair.sigma),
+            make_lyapunov(d_inf, pair.l1, pair.sigma),
             pair.b,
-            equations_19_20.SPREAD,
+            lyapunov.SPREAD,
             states(np.geomspace(1e-9, 1e8, 501), 97),
         )
         assert min(finer) > 0.0
@@ -110,7 +110,7 @@ def test_constants_hold_on_a_finer_grid() -> None:
 
 def test_19_holds_for_every_a_within_the_spread() -> None:
     """c1 by the worst of the four corners of (17), each by itself."""
-    W, grid, spread = lyapunov(0.4), states(np.geomspace(1e-2, 1e2, 7), 9), 0.25
+    W, grid, spread = make_lyapunov(0.4), states(np.geomspace(1e-2, 1e2, 7), 9), 0.25
     grid = States(*(s[np.abs(grid.s1 - grid.s2) > 1e-6 * np.abs(grid.s1)] for s in grid))
     (e1, e2), (by_e1, by_e2), value = W.E(grid), W.gradient(grid), W.W(grid)
     k1, k2 = W.K(e1)
@@ -126,17 +126,17 @@ def test_19_holds_for_every_a_within_the_spread() -> None:
 
 def test_a_poor_w_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Too little weight on e2 fails (20), too little l1 (19)."""
-    assert decay(lyapunov(0.5, sigma=0.03), 0.5).c2 < 0.0
-    assert decay(lyapunov(0.5, l1=0.5), 0.5, 0.3).c1 < 0.0
-    monkeypatch.setattr(equations_19_20, "L1", (0.5,))
-    assert equations_19_20.claim().verdict == "not reproduced"
+    assert decay(make_lyapunov(0.5, sigma=0.03), 0.5).c2 < 0.0
+    assert decay(make_lyapunov(0.5, l1=0.5), 0.5, 0.3).c1 < 0.0
+    monkeypatch.setattr(lyapunov, "L1", (0.5,))
+    assert lyapunov.claim().verdict == "not reproduced"
 
 
 # --- (11), (12) ---------------------------------------------------------------------------------------------
 
 
 def test_disturbances_and_starts() -> None:
-    error, gain = equations_11_12.claims()
+    error, gain = theory.equations_11_12_claims()
     assert error.verdict == gain.verdict == "illustrated"  # one system, one observer
     for row in error.figures["late_scaled_error"].values():  # a tenth of the disturbance, about a tenth of the error
         assert row[1] / row[2] == pytest.approx(10.0, rel=0.1)
@@ -146,7 +146,7 @@ def test_disturbances_and_starts() -> None:
 
 def test_the_disturbed_solution_is_one_of_the_system() -> None:
     """Without an error at the start, and with exact measurements of y, what is left is what was put in."""
-    quiet = equations_11_12.follow([equations_11_12.Column()])
+    quiet = theory.follow([theory.Column()])
     assert quiet.scaled_error.max() < 1e-5
     assert quiet.gain[0, 0] == 2.0  # phi2
 
@@ -154,44 +154,44 @@ def test_the_disturbed_solution_is_one_of_the_system() -> None:
 def test_11_and_12_can_fail() -> None:
     balls = np.array([[1.0, 0.1, 0.01], [1.0, 0.1, 0.01], [1.0, 0.1, 0.05]])
     fades = np.full((3, 4), 1e-8)
-    assert equations_11_12.scaled_error(balls, fades).verdict == "not reproduced"
+    assert theory.scaled_error(balls, fades).verdict == "not reproduced"
     balls[2, 2] = 0.01
-    assert equations_11_12.scaled_error(balls, fades).verdict == "illustrated"
-    assert equations_11_12.scaled_error(balls, np.full((3, 4), 1e-3)).verdict == "not reproduced"
+    assert theory.scaled_error(balls, fades).verdict == "illustrated"
+    assert theory.scaled_error(balls, np.full((3, 4), 1e-3)).verdict == "not reproduced"
     L = np.full((3, 4), 12.0)
     three, late = np.full(3, 12.0), np.array([False, True, True])
-    assert equations_11_12.gain_bound(L, three, three, late).verdict == "illustrated"
+    assert theory.gain_bound(L, three, three, late).verdict == "illustrated"
     L[1:, 3] = 13.0  # it remembers the largest error
-    assert equations_11_12.gain_bound(L, three, three, late).verdict == "not reproduced"
+    assert theory.gain_bound(L, three, three, late).verdict == "not reproduced"
     remembers = np.array([12.0, 12.0, 14.0])
-    assert equations_11_12.gain_bound(np.full((3, 4), 12.0), remembers, three, late).verdict == "not reproduced"
+    assert theory.gain_bound(np.full((3, 4), 12.0), remembers, three, late).verdict == "not reproduced"
 
 
 # --- (2), (6) -----------------------------------------------------------------------------------------------
 
 
 def test_linear_increments() -> None:
-    claim = increments.linear_increments()
+    claim = theory.linear_increments()
     assert claim.verdict == "reproduced"
-    assert increments.increments_of_2(0.0, seed=5) == pytest.approx(1.0, abs=1e-9)
-    assert increments.increments_of_2(0.2, seed=5) > 2.0
+    assert theory.increments_of_2(0.0, seed=5) == pytest.approx(1.0, abs=1e-9)
+    assert theory.increments_of_2(0.2, seed=5) > 2.0
 
 
 def test_exponent_of_6() -> None:
     """n = 2: 1 + p by section 2.1, 1 as printed, which bounds no power; the two differ for every n."""
-    claim = increments.exponent_of_6()
+    claim = theory.exponent_of_6()
     assert (claim.verdict, "n - i - 1" in claim.conditions) == ("illustrated", True)
-    assert increments.exponent_of_section_2_1(2, 2, 2, 0.4) == pytest.approx(1.4)
-    assert increments.printed_exponent(2, 2, 2, 0.4) == pytest.approx(1.0)
-    assert increments.exponent_of_section_2_1(4, 3, 2, 0.2) == pytest.approx(1.0 / 0.6)
-    grown = [increments.quotient_of_6(1.0, 0.5, size) for size in (1e2, 1e4, 1e6)]
+    assert theory.exponent_of_section_2_1(2, 2, 2, 0.4) == pytest.approx(1.4)
+    assert theory.printed_exponent(2, 2, 2, 0.4) == pytest.approx(1.0)
+    assert theory.exponent_of_section_2_1(4, 3, 2, 0.2) == pytest.approx(1.0 / 0.6)
+    grown = [theory.quotient_of_6(1.0, 0.5, size) for size in (1e2, 1e4, 1e6)]
     assert grown[1] / grown[0] == pytest.approx(10.0, rel=0.1)
     assert grown[2] / grown[1] == pytest.approx(10.0, rel=0.1)
 
 
 def test_exponent_of_6_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(increments, "printed_exponent", increments.exponent_of_section_2_1)
-    claim = increments.exponent_of_6()
+    monkeypatch.setattr(theory, "printed_exponent", theory.exponent_of_section_2_1)
+    claim = theory.exponent_of_6()
     assert (claim.verdict, "n - i - 1" in claim.conditions) == ("illustrated", False)  # no misprint
-    monkeypatch.setattr(increments, "exponent_of_section_2_1", lambda *args: 1.0)
-    assert increments.exponent_of_6().verdict == "not reproduced"
+    monkeypatch.setattr(theory, "exponent_of_section_2_1", lambda *args: 1.0)
+    assert theory.exponent_of_6().verdict == "not reproduced"

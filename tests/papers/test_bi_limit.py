@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, largest_b, list_violations, weights
+from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, largest_b, list_violations, weights
 
 E1 = (-3.0, -0.4, -1e-3, 0.0, 1e-3, 0.7, 20.0)
 

@@ -13,8 +13,7 @@ import pytest
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.adaptive import Adaptive
-from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection, list_violations
-from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
+from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, UpdatedHighGain, list_violations
 from cmg_mj.papers.dao2023.observer import FriedlandTacker, System
 from tests.observers.reference import DT, HEAVY, rough_signals, run
 from tests.observers.test_adaptive import MODES, PAIR, adaptive

@@ -12,8 +12,7 @@ from scipy.linalg import expm
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.observers.high_gain import updated_gain
-from cmg_mj.papers.andrieu2009.bi_limit import BiLimitCorrection
-from cmg_mj.papers.andrieu2009.updated_high_gain import UpdatedHighGain
+from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, UpdatedHighGain
 
 PHI: dict[str, Any] = {"phi1": 0.4, "phi2": 1.5, "phi3": 0.8}
 
