@@ -5,8 +5,8 @@ and the tests are run until the first failure: those of the daily tier, and if n
 line that tests/papers/mutants.py changes in the papers' reports must be caught by the test named there.
 
     python tests/mutations.py              # half an hour on two cores
-    python tests/mutations.py adaptive     # only the parameters with this in their names, printed and not written
-    python tests/mutations.py papers       # only the reports, printed and not written
+    python tests/mutations.py adaptive     # only the parameters with this in their names
+    python tests/mutations.py papers       # only the reports
     python tests/mutations.py papers gap   # of these only the ones with this in what is wrong
     python tests/mutations.py --check      # only whether each pattern is in the sources once; runs no test
 """
@@ -19,7 +19,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import textwrap
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -32,8 +31,6 @@ from tests.papers import mutants  # noqa: E402
 from tests.papers.mutants import MUTANTS, Mutant  # noqa: E402
 
 FACTORS = (0.8, 1.2)
-WIDTH = 100
-"""Columns of a page of the documentation."""
 NUMBER = r"(-?[0-9][0-9.e+-]*)"
 # Equations first: they name the culprit; the closed loop last.
 TESTS = [
@@ -197,39 +194,6 @@ def report_caught_by(mutant: Mutant) -> str:
     return first_failure(change, [mutants.TESTS + mutant.test], "papers")
 
 
-PAGE_SAYS = """\
-This page lists deliberate errors, mutations, and the test that catches each. `python tests/mutations.py` writes it in
-about half an hour on two cores. A dash marks a mutation that no test catches.
-"""
-PARAMETERS_SAY = """\
-The script multiplies each parameter of the law, the observers and the reduced model in a copy of the sources. A cell
-names the first test that then fails. `slow:` marks a test that is not in the daily tier.
-
-The tests see the effect of a parameter and do not compare its default with a literal, with two exceptions:
-
-- `kalman`: a test states its defaults. A fifth more or less of any but `torque_white` moves the mean errors in
-  push_recovery by less than 0.2 %. This holds over the run and in the push window.
-- `rate_start`, `bias_walk` and `jerk` of `gyro_free`: a fifth moves the mean errors by less than 0.3 %. A test compares
-  `gyro_free` with `free_pivot` on a pivot at rest, which has its own values of these parameters.
-"""
-REPORTS_SAY = """\
-The script changes one line of the papers' reports at a time, as `tests/papers/mutants.py` lists them. The last column
-names the test that then fails.
-"""
-
-
-def wrapped(text: str) -> str:
-    """Wrap paragraphs and lists at the width of the documentation; code stays in one piece."""
-    return "\n\n".join("\n".join(map(filled, re.split(r"\n(?=- )", part))) for part in text.strip().split("\n\n"))
-
-
-def filled(part: str) -> str:
-    """Wrap a paragraph or an item of a list."""
-    whole = re.sub(r"`[^`]*`", lambda code: code[0].replace(" ", "\0"), " ".join(part.split()))
-    indent = "  " if part.startswith("- ") else ""
-    return textwrap.fill(whole, WIDTH, subsequent_indent=indent, break_on_hyphens=False).replace("\0", " ")
-
-
 def parameter_table(pool: ThreadPoolExecutor, part: str) -> tuple[str, list[str]]:
     """The table of parameters, and those that no test caught and that matter."""
     chosen = [name for name in parameters() if part in name]
@@ -250,19 +214,20 @@ def report_table(pool: ThreadPoolExecutor, part: str) -> tuple[str, list[str]]:
 
 
 def main() -> None:
-    """Run all mutations and write the tables."""
+    """Run all mutations and print the tables."""
     if sys.argv[1:] == ["--check"]:
         for name in parameters():
             mutated(name, FACTORS[0])
         return
     selection = sys.argv[1] if len(sys.argv) > 1 else ""
-    parts, survivors = ["# Which test catches what", wrapped(PAGE_SAYS)], []
+    parts: list[str] = []
+    survivors: list[str] = []
     with ThreadPoolExecutor(2) as pool:
         if selection != "papers":
             if (failed := caught_by(MUTATIONS[0].parameter, 1.0)) != "-":
                 sys.exit(f"{failed} fails without any mutation: mend that first")
             table, survived = parameter_table(pool, selection)
-            parts += ["## Wrong parameters", wrapped(PARAMETERS_SAY), table]
+            parts.append(table)
             survivors += survived
         if selection in ("", "papers"):
             part = sys.argv[2] if len(sys.argv) > 2 else ""
@@ -270,10 +235,9 @@ def main() -> None:
             if (failed := first_failure(lambda copy: None, whole, "papers")) != "-":
                 sys.exit(f"{failed} fails without any mutation: mend that first")
             table, survived = report_table(pool, part)
-            parts += ["## Wrong reports", wrapped(REPORTS_SAY), table]
+            parts.append(table)
             survivors += survived
-    text = "\n\n".join(parts) + "\n"
-    print(text)
+    print("\n\n".join(parts))
     if survivors:
         sys.exit(f"survived: {', '.join(survivors)}")
 
