@@ -6,7 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
-EXTRAS = ("papers", "export", "cluster", "gymnasium", "board", "notebook", "test")
+EXTRAS = ("papers", "export", "cluster", "gymnasium", "notebook", "test")
 
 
 def main() -> None:
