@@ -13,7 +13,6 @@ import numpy as np
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
-from cmg_mj.features.replay import replay
 from cmg_mj.features.replay.inputs import ObserverInputs, observer_inputs
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.log_replay import NO_MODEL, misfit_of, replay_log
@@ -35,6 +34,7 @@ from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.results.intervals import PairedVerdict
 from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.runs.open_loop import replay
 from cmg_mj.scenario.schema import Scenario
 
 BLOCKS = 10

@@ -10,12 +10,12 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import law_needs
-from cmg_mj.features.replay import replay
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import Observer
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.runs.open_loop import replay
 from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.scenario.time_grid import common_period

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.features.replay import replay
 from cmg_mj.features.tuning import Recorded, best_noise, tune, tuning_table
 from cmg_mj.observers import make_observer
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
+from cmg_mj.runs.open_loop import replay
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from tests.features.tuning.user_observer import USER_OBSERVER
