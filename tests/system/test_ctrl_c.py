@@ -114,7 +114,7 @@ def test_is_heard_after_the_tick_however_slow_an_observer_is(command: list) -> N
 WRITING = """
 import signal
 from cmg_mj import cli
-from cmg_mj.studies import save as runs
+from cmg_mj.runs import save as runs
 def pressed(record, times=({times})):
     def press(*arguments):
         for _ in range(times):
