@@ -108,14 +108,6 @@ def test_every_package_is_in_the_table_once() -> None:
     assert sorted(ORDER) == sorted({package_of(name) for name in modules()} - {""})
 
 
-@pytest.mark.parametrize("package", ORDER)
-def test_a_package_says_its_job_in_a_sentence(package: str) -> None:
-    path = PACKAGE / package / "__init__.py"
-    text = ast.get_docstring(ast.parse((path if path.exists() else PACKAGE / f"{package}.py").read_text("utf-8")))
-    assert text
-    assert text.splitlines()[0].endswith(".")
-
-
 OPEN = {
     "cmg_mj.cli.check": "cmg_mj.features",
     "cmg_mj.plant": "cmg_mj.features",

@@ -82,18 +82,6 @@ def test_step_has_no_memory_but_the_state(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", EVERY)
-def test_two_runs_may_share_one_observer(kind: str) -> None:
-    estimator = observer(kind)
-    alone = [walk(estimator, samples(seed=seed))[1] for seed in (0, 1)]
-    states: list[Any] = [estimator.init(Measurement(*samples(seed=seed)[0][:3])) for seed in (0, 1)]
-    for k in range(1, 60):
-        for seed in (0, 1):
-            *y, u = samples(seed=seed)[k]
-            states[seed], estimate = estimator.step(states[seed], Measurement(*y), u)
-            assert estimate == alone[seed][k - 1]
-
-
-@pytest.mark.parametrize("kind", EVERY)
 def test_estimate_uses_the_sample_it_is_given(kind: str) -> None:
     """A filter, not a one-step predictor: y1_k and (for y2's model) y2_k move the estimate of sample k."""
     estimator = observer(kind)

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.observers import OBSERVERS, Estimate, Measurement
 from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.observers import OBSERVERS, Estimate, Measurement
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.result import Result
-from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.scenario.loading import load_scenario
 
 SHORT = ("duration_s=0.8", "push.0.start_s=0.2", "push.0.duration_s=0.1")
 

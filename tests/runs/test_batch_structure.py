@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.runs.batch import BATCHED_FIELDS
+from cmg_mj.runs.batch_values import batch_values, value_of_world
+from cmg_mj.runs.experiment import Experiment, prepare, run_batch
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.runs.batch import BATCHED_FIELDS
-from cmg_mj.runs.batch_values import batch_values, value_of_world
-from cmg_mj.runs.experiment import Experiment, prepare, run_batch
 
 N = 6
 TRACK = Path(__file__).parents[1] / "features/pivot/track.csv"

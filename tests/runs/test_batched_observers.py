@@ -8,10 +8,10 @@ import pytest
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import open_loop_figures
-from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.runs import side_by_side as side_by_side
-from cmg_mj.runs.side_by_side import BatchJob, run_of, run_side_by_side
 from cmg_mj.runs.experiment import Experiment, prepare, run_batch
+from cmg_mj.runs.side_by_side import BatchJob, run_of, run_side_by_side
+from cmg_mj.scenario.loading import load_scenario
 
 
 def experiment(observer: str, *more: str) -> Experiment:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.results.summary_keys import NESTED
-from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.scenario.loading import load_scenario
 
 PERFECT = (
     "duration_s=1",

@@ -22,8 +22,8 @@ from cmg_mj.inputs.files import folder
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs import save as runs
 from cmg_mj.runs import comparison
+from cmg_mj.runs import save as runs
 from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, environment
 from tests.run_folders import assert_whole, names, write
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from cmg_mj.features.mounting.recoverable_states import ceiling
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import section
-from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.runs.experiment import Experiment, prepare
-from cmg_mj.features.mounting.recoverable_states import ceiling
+from cmg_mj.scenario.loading import load_scenario
 from tests.tiers import slow_but
 
 WORLDS = 20

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.runs.api import compare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.runs.api import compare
 
 
 def scenario() -> Scenario:
