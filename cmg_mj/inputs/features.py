@@ -46,7 +46,7 @@ FEATURES = {
                 "cmg_mj.papers.command:reproduce", "Reproduce the four papers, claim by claim, with verdicts."
             )
         },
-        needs=("replay",),
+        needs=("replay", "tuning"),
     ),
     "tuning": Feature(
         {
