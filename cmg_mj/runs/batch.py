@@ -12,19 +12,19 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from cmg_mj.laws import LAW_CLASSES, Law
-from cmg_mj.core.controller import PlantInterface
-from cmg_mj.core.types import State, extra_signals
 from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.controller import PlantInterface
 from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.core.types import State, extra_signals
+from cmg_mj.features.pivot.settings import Pivot
 from cmg_mj.inputs.types import Batched, NoEffect, marked_fields
+from cmg_mj.laws import LAW_CLASSES, Law
 from cmg_mj.observers import OBSERVER_CLASSES, Estimate, Measurement, Observer
 from cmg_mj.plant.plant import Plant
+from cmg_mj.runs.batch_values import batch_values
 from cmg_mj.scenario.design import Design
-from cmg_mj.features.pivot.settings import Pivot
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.runs.batch_values import batch_values
 from cmg_mj.stages.backlash import backlash
 from cmg_mj.stages.push import Push
 

@@ -12,27 +12,22 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 import numpy as np
 import tomli_w
 
-from cmg_mj.laws import Law
 from cmg_mj.core.axes import AnyController, MultiAxisController
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.core.loop import ControlLoop
+from cmg_mj.features.bend.verdict import bend_hints, judge_bend
+from cmg_mj.features.pivot.settings import Pivot
 from cmg_mj.inputs.features import DRIVERS
 from cmg_mj.inputs.overrides import assign
-from cmg_mj.features.bend.verdict import bend_hints, judge_bend
+from cmg_mj.laws import Law
 from cmg_mj.linear.loop import linear_closed_loop
 from cmg_mj.linear.verdict import hints
 from cmg_mj.observers import Observer
+from cmg_mj.plant.build import check_scenario, plant_on_grid
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
-from cmg_mj.runs.rerun_head import rerun_head
 from cmg_mj.results.result import Result
-from cmg_mj.scenario.design import Design, design
-from cmg_mj.scenario.loading import base_of
-from cmg_mj.features.pivot.settings import Pivot
-from cmg_mj.scenario.resolve import differences, resolved
-from cmg_mj.scenario.schema import Scenario, parse_scenario
-from cmg_mj.scenario.time_grid import time_grid
 from cmg_mj.runs.batch import (
     AxisPart,
     BatchKey,
@@ -45,8 +40,13 @@ from cmg_mj.runs.batch import (
     require_same_structure,
     varied_settings,
 )
-from cmg_mj.plant.build import check_scenario, plant_on_grid
+from cmg_mj.runs.rerun_head import rerun_head
 from cmg_mj.runs.simulate import SimulationOptions, simulate
+from cmg_mj.scenario.design import Design, design
+from cmg_mj.scenario.loading import base_of
+from cmg_mj.scenario.resolve import differences, resolved
+from cmg_mj.scenario.schema import Scenario, parse_scenario
+from cmg_mj.scenario.time_grid import time_grid
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.turning import compensation
 

@@ -7,8 +7,8 @@ from itertools import chain
 
 import numpy as np
 
-from cmg_mj.core.types import extra_signals
 from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.types import extra_signals
 from cmg_mj.observers import Estimate, Measurement, Observer
 from cmg_mj.results.trajectory import ESTIMATES, Trajectory
 

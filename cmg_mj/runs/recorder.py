@@ -7,13 +7,13 @@ from itertools import chain
 
 import numpy as np
 
-from cmg_mj.core.controller import Controller, Tick
 from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.controller import Controller, Tick
+from cmg_mj.plant.physics import Joints
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import References
 from cmg_mj.results.metrics import Metrics, TickBlock
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
-from cmg_mj.plant.physics import Joints
 
 TICKS_A_PIECE = 256
 """Ticks that are made into columns together, which is much cheaper than one by one."""

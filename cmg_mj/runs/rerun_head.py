@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 
-
 def rerun_head(driver: str, world: int) -> str:
     """Write the head as comments; empty where the scenario alone gives the same run.
 

@@ -11,26 +11,26 @@ import numpy as np
 
 from cmg_mj.core.axes import AnyController
 from cmg_mj.core.controller import Controller
+from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import ControlLoop, Ending
 from cmg_mj.core.outside import Disturbance
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.types import BIAS
-from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.features.pivot.moving_pivot import pivot_directions, refuse_other_forces, with_own_model
+from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
+from cmg_mj.features.pivot.settings import Pivot
 from cmg_mj.plant.mujoco_state import quiet
+from cmg_mj.plant.physics import ManyWorlds, OneWorld
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import RATES, References
 from cmg_mj.results.floors import Floors
 from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
-from cmg_mj.features.pivot.settings import Pivot
-from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
-from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.runs.batch_values import split_values
 from cmg_mj.runs.callback import CallbackLoop, control_callback
-from cmg_mj.plant.physics import ManyWorlds, OneWorld
 from cmg_mj.runs.recorder import MultiAxisRecorder, TickRecorder
+from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push, Pushes
 from cmg_mj.stages.swing import Swing, Swings
 
