@@ -41,14 +41,6 @@ def whole_file(path: Path, ending: str = "") -> Iterator[Path]:
             temporary.unlink()
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file that outlasts a power cut."""
-    with whole_file(path) as temporary, temporary.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-
-
 def write_parquet(path: Path, table: pa.Table, metadata: Mapping[str, Any] | None = None) -> None:
     """Write a table as Parquet.
 
