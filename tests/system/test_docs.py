@@ -127,4 +127,3 @@ def test_the_field_of_contributing_is_one(tmp_path: Path) -> None:
     assert commands("off", "with/scenario.toml", "--set", "controller.dead_band_rad_s=0.0") == without
     export = command("export", "linear", *dead_band)
     assert export.returncode == 2
-    assert "dead_band_rad_s" in export.stderr
