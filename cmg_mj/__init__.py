@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cmg_mj.features.export import export as export
     from cmg_mj.features.mounting import MountedRobot as MountedRobot
     from cmg_mj.features.mounting import mount as mount
-    from cmg_mj.features.pivot.settings import Pivot as Pivot
+    from cmg_mj.features.pivot import Pivot as Pivot
     from cmg_mj.features.plugin.make import plugin as plugin
     from cmg_mj.features.replay.log import Log as Log
     from cmg_mj.features.replay.log import ReadOptions as ReadOptions
@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from cmg_mj.runs.callback import control as control
     from cmg_mj.runs.callback import control_callback as control_callback
     from cmg_mj.runs.comparison import ComparedObserver as ComparedObserver
+    from cmg_mj.runs.controller import controller as controller
     from cmg_mj.runs.experiment import Experiment as Experiment
     from cmg_mj.runs.experiment import prepare as prepare
     from cmg_mj.runs.save import RunReport as RunReport

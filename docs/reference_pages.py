@@ -23,7 +23,7 @@ from pydantic_core import PydanticUndefined
 
 from cmg_mj.cli import HELP, cli
 from cmg_mj.features.export.constants import attribute_descriptions
-from cmg_mj.features.pivot.settings import FIELDS_OF, Pivot
+from cmg_mj.features.pivot import FIELDS_OF, Pivot
 from cmg_mj.inputs.files import bundled, folder
 from cmg_mj.inputs.messages import fields_of
 from cmg_mj.inputs.types import OnAllAxes, OnGrid, PerAxis, marked_fields
@@ -107,10 +107,10 @@ EXAMPLES = {
     "plant.tilt_damping_n_m_s": "0.02",
     "plant.flywheel_speed_rad_s": "300.0",
     "plant.flywheel_imbalance_kg_m": "1e-6",
-    "plant.bend_frequency_hz": "25.0",
-    "plant.bend_damping_ratio": "0.02",
-    "plant.bend_share": "0.3",
-    "plant.bend_beyond": '"both"',
+    "bend.frequency_hz": "25.0",
+    "bend.damping_ratio": "0.02",
+    "bend.share": "0.3",
+    "bend.beyond": '"both"',
     "controller.kind": '"lqg"',
     "controller.rate_hz": "100.0",
     "controller.gains": '"scaled"',

@@ -13,7 +13,7 @@ import mujoco.viewer
 import cmg_mj
 
 rig = cmg_mj.load_plant(model="scissored_pair.xml")
-controller, data = rig.controller("homogeneous"), rig.new_data()
+controller, data = cmg_mj.controller(rig, "homogeneous"), rig.new_data()
 pushed_at = [-1.0]
 
 

@@ -9,7 +9,7 @@ import mujoco
 import cmg_mj
 
 rig = cmg_mj.load_plant(model="scissored_pair.xml", equilibrium_bias_deg=0.5)
-controller = rig.controller({"kind": "homogeneous", "k1": 20.0}, seed=3)
+controller = cmg_mj.controller(rig, {"kind": "homogeneous", "k1": 20.0}, seed=3)
 data = rig.new_data()
 while data.time < 5.0:
     cmg_mj.control(rig, controller, data)  # before every step

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from cmg_mj.core.errors import TomlValue
 from cmg_mj.core.types import law_needs
-from cmg_mj.features.bend.verdict import bend_hints, bend_rows, judge_bend
-from cmg_mj.features.pivot.pivot_track import read_track
+from cmg_mj.inputs.features import entries
 from cmg_mj.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.linear.omissions import omissions
 from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_gains, sliding_words
@@ -61,17 +60,13 @@ def description(name: str, part: Experiment) -> str:
         *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
     ]
     rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
-    for pivot in scenario.pivot:
-        rows.append(("pivot", pivot.words))
-        if pivot.file is not None:
-            rows.append(("", read_track(pivot.file, pivot.column).words))
     rows += _pivot_rows(part.plant)
     missing = list(omissions(scenario).values())
     if missing:
         rows.append(("omitted", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
-    bend = judge_bend(design, part.plant)
-    rows += bend_rows(design, part.plant, bend)
-    clauses = [*hints(design, part.plant), *bend_hints(part.plant, bend)]
+    judgements = [judge(design, part.plant) for judge in entries("judge").values()]
+    rows += [row for judgement in judgements for row in judgement.rows]
+    clauses = [*hints(design, part.plant), *(hint for judgement in judgements for hint in judgement.hints)]
     return lines(
         f"{name}{f', axis {axis}' if axis else ''}: valid",
         [*rows, *(("hint", hint) for hint in clauses)],

@@ -26,6 +26,11 @@ class Disturbance(Protocol):
         """Physics steps that become instants."""
         ...
 
+    @property
+    def accelerates(self) -> bool:
+        """Whether it accelerates the pivot."""
+        ...
+
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
         """Add what acts from a physics step on, for so many steps. Torques that stay are the same sequence."""
         ...

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+import functools
+import pkgutil
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 
 class Command(NamedTuple):
@@ -15,9 +17,32 @@ class Command(NamedTuple):
     """Its line in `cmg-mj --help`."""
 
 
-class Feature(NamedTuple):
-    """A folder that can be removed."""
+class Judgement(NamedTuple):
+    """What a feature says of a scenario."""
 
+    rows: Sequence[tuple[str, str]] = ()
+    """Rows of `cmg-mj check`: label, text."""
+    hints: Sequence[str] = ()
+    """Clauses on what is no mistake and yet likely to make the plant fall."""
+
+
+class Feature(NamedTuple):
+    """A folder that can be removed. An entry is `module:name`, imported when it is asked for: see `entries`."""
+
+    section: str = ""
+    """Settings that a scenario has under the feature's name, a `Section`."""
+    is_list: bool = False
+    """Whether there may be several: `[[name]]`."""
+    check: str = ""
+    """Refuses what does not fit: (scenario, plant)."""
+    edit: str = ""
+    """Changes a parsed model: (spec, model as resolved, plant settings, section) -> finish(compiled model)."""
+    limit_step: str = ""
+    """Finds the longest physics step: (section, plant settings, step, path) -> step [s]."""
+    disturbance: str = ""
+    """Makes what acts from outside: (sections, plants, seed, worlds) -> Disturbance."""
+    judge: str = ""
+    """Says what `cmg-mj check` prints of it: (design, plant) -> Judgement."""
     commands: Mapping[str, Command] = {}
     driver: str = ""
     """What `run --driver NAME` calls, `module:function`: (experiment, world, **options) -> Result."""
@@ -26,22 +51,36 @@ class Feature(NamedTuple):
 
 
 FEATURES = {
+    "bend": Feature(
+        section="cmg_mj.features.bend:Bend",
+        edit="cmg_mj.features.bend.edit:bend_frame",
+        limit_step="cmg_mj.features.bend.edit:limit_step",
+        judge="cmg_mj.features.bend.verdict:describe_bend",
+    ),
+    "pivot": Feature(
+        section="cmg_mj.features.pivot:Pivot",
+        is_list=True,
+        check="cmg_mj.features.pivot.moving_pivot:check_pivots",
+        disturbance="cmg_mj.features.pivot.moving_pivot:moving_pivot",
+        judge="cmg_mj.features.pivot.moving_pivot:describe_pivots",
+    ),
     "studio": Feature(
-        {
+        commands={
             "studio": Command(
                 "cmg_mj.features.studio.command:studio", "Open a scenario in MuJoCo Studio with its controller running."
             )
-        }
+        },
+        needs=("pivot",),
     ),
     "sweeps": Feature(
-        {
+        commands={
             "sweep": Command(
                 "cmg_mj.features.sweeps.command:sweep", "Run a scenario with varied fields, observers and noise."
             )
         }
     ),
     "papers": Feature(
-        {
+        commands={
             "reproduce": Command(
                 "cmg_mj.papers.command:reproduce", "Reproduce the four papers, claim by claim, with verdicts."
             )
@@ -49,7 +88,7 @@ FEATURES = {
         needs=("replay", "tuning"),
     ),
     "tuning": Feature(
-        {
+        commands={
             "tune": Command(
                 "cmg_mj.features.tuning.command:tune", "Fit an observer's parameters to the gyro of a scenario."
             ),
@@ -61,10 +100,12 @@ FEATURES = {
         needs=("replay",),
     ),
     "replay": Feature(
-        {"replay": Command("cmg_mj.features.replay.command:replay", "Replay your own log through every observer.")}
+        commands={
+            "replay": Command("cmg_mj.features.replay.command:replay", "Replay your own log through every observer.")
+        }
     ),
     "export": Feature(
-        {
+        commands={
             "export": Command(
                 "cmg_mj.features.export.command:export", "Write an observer and the control law around it as C code."
             )
@@ -72,7 +113,7 @@ FEATURES = {
     ),
     "board": Feature(driver="cmg_mj.features.board.processor:run_on_a_board", needs=("export",)),
     "plugin": Feature(
-        {
+        commands={
             "plugin": Command(
                 "cmg_mj.features.plugin.command:plugin", "Compile the controller into MuJoCo: a library, and a model."
             )
@@ -81,7 +122,7 @@ FEATURES = {
         needs=("export",),
     ),
     "mounting": Feature(
-        {
+        commands={
             "mount": Command(
                 "cmg_mj.features.mounting.command:mount", "Mount a scissored pair on your own robot, with a scenario."
             )
@@ -95,3 +136,9 @@ COMMANDS = {name: command for feature in FEATURES.values() for name, command in 
 """Command -> its row, in the order of `cmg-mj --help`."""
 DRIVERS = {name: feature.driver for name, feature in FEATURES.items() if feature.driver}
 """Driver of `run` -> its function."""
+
+
+@functools.cache
+def entries(kind: str) -> dict[str, Any]:
+    """Import what the features have of a kind, such as `section`: name of the feature -> the class or function."""
+    return {name: pkgutil.resolve_name(entry) for name, row in FEATURES.items() if (entry := getattr(row, kind))}

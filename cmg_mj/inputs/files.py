@@ -123,3 +123,9 @@ def model_files(path: Path, within: tuple[Path, ...] = ()) -> list[Path]:
         places = (path.parent / included, within[0].parent / included)
         files += next((model_files(place, within) for place in places if place.is_file()), [])
     return files
+
+
+def whole_path(file: str, beside: Path) -> str:
+    """Return the whole path of a file, which may start from a folder; one that is nowhere keeps its name."""
+    paths = [path for path in (beside / file, Path(file)) if path.is_file()]
+    return str(paths[0].resolve()) if paths else file

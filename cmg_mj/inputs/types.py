@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeVar, get_args
+from pathlib import Path
+from typing import Annotated, Any, Self, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
@@ -30,6 +31,21 @@ class Batched:
     """
 
     law_field: str | None = None
+
+
+@dataclass(frozen=True)
+class Held:
+    """Marks the frequency of something that is held from sample to sample [Hz].
+
+    Attributes:
+        what: What is held.
+    """
+
+    what: str
+
+
+class Start:
+    """Marks a time at which something begins, before the run ends [s]."""
 
 
 class PerAxis:
@@ -77,6 +93,24 @@ STRICT = ConfigDict(extra="forbid", arbitrary_types_allowed=True, allow_inf_nan=
 """Configuration of pydantic's dataclasses: an unknown field, infinity and NaN are refused."""
 
 Mark = TypeVar("Mark")
+
+
+class Section:
+    """Settings of a feature or a disturbance in a scenario. What one has no use for stays as it is here."""
+
+    @property
+    def unmodelled(self) -> str:
+        """What the reduced model knows nothing of, in words; empty if it leaves nothing out."""
+        return ""
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Files that the run depends on."""
+        return ()
+
+    def located(self, beside: Path) -> Self:
+        """Return the settings with whole paths of files, which may start from a folder."""
+        return self
 
 
 def marked_fields(section: type, mark: type[Mark]) -> dict[str, Mark]:

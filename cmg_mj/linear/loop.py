@@ -95,11 +95,8 @@ def linear_closed_loop(design: Design, plant: Plant, model: str = "rig") -> cont
 def _require_rigid(plant: Plant) -> None:
     """Refuse a plant that the reduced model does not describe."""
     settings, cure = plant.settings, 'linear_closed_loop(plant="rig")'
-    if settings.bends:
-        raise InputError(
-            f"plant.bend_frequency_hz = {settings.bend_frequency_hz:g}: the reduced model is rigid; take {cure}, or "
-            "set plant.bend_frequency_hz=0"
-        )
+    if plant.bends:
+        raise InputError(f"bend: the reduced model is rigid; take {cure}, or set bend.frequency_hz=0")
     if plant.reduced.pivot_arm:
         raise InputError(f"plant.model = {settings.model!r}: its pivot slides; take {cure}")
 

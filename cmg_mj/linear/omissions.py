@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from cmg_mj.inputs.features import entries
 from cmg_mj.scenario.schema import Scenario
 
 IN_THE_MODEL = (
     "plant.accelerometer_inner_misplaced_mm",
     "plant.accelerometer_outer_misplaced_mm",
-    "plant.bend_frequency_hz",
+    *entries("edit"),
 )
 """The properties that the plant's MuJoCo model itself has, whoever steps it."""
 
@@ -21,9 +22,12 @@ def omissions(scenario: Scenario) -> dict[str, str]:
     Returns:
         Field -> what it is, in words.
     """
-    clauses = {}
-    if any(pivot.size for pivot in scenario.pivot):
-        clauses["pivot"] = "the pivot's acceleration"
+    clauses = {
+        name: clause
+        for name, parts in scenario.feature_sections.items()
+        for part in parts
+        if (clause := part.unmodelled)
+    }
     accelerometer = scenario.sensors.accelerometer
     if accelerometer.vibration_mg:
         clauses["sensors.accelerometer.vibration_mg"] = "the accelerometers' vibration"
@@ -33,6 +37,4 @@ def omissions(scenario: Scenario) -> dict[str, str]:
         field = f"accelerometer_{which}_misplaced_mm"
         if getattr(scenario.plant, field):
             clauses[f"plant.{field}"] = f"the {which} accelerometer's misplacement"
-    if scenario.plant.bends:
-        clauses["plant.bend_frequency_hz"] = "the frame's bend"
     return clauses

@@ -149,7 +149,7 @@ def _outputs(plant: Plant, whole: np.ndarray, height: float) -> np.ndarray:
     angle, rate, acceleration = columns[:nv], columns[nv : 2 * nv], whole[nv : 2 * nv]
     modules = axis.line.motion(model, at_keyframe(model, key))
     sensors, gimbals = modules.copy(), np.zeros(nv)
-    if plant.settings.bends and plant.settings.bend_beyond != "both":
+    if _sensors_bend(plant):
         sensors[int(model.joint(BEND_JOINT).dofadr[0])] = 1.0
     for module in axis.modules:
         gimbals[module.gimbal_dof] = module.direction / len(axis.modules)
@@ -183,3 +183,10 @@ def _reached(A: np.ndarray, B: np.ndarray) -> np.ndarray:
             basis = np.column_stack([basis, part / np.linalg.norm(part)])
             waiting.append(F @ basis[:, -1])
     return basis
+
+
+def _sensors_bend(plant: Plant) -> bool:
+    """Return whether the sensors are on the part of the frame that a bend adds."""
+    model = plant.model
+    site = int(model.sensor_objid[element_id(model, "sensor", f"{plant.axis.prefix}fog")])
+    return plant.bends and int(model.site_bodyid[site]) == element_id(model, "body", BEND_JOINT)

@@ -229,7 +229,7 @@ def hints(design: Design, plant: Plant) -> list[str]:
     scenario, law = design.scenario, design.law
     gains = judge_gains(design) if isinstance(law, StateFeedback) else None
     # Margin that a notch against a bend takes is no fault.
-    is_for_bend = scenario.plant.bends and scenario.controller.notch_hz > 0.0
+    is_for_bend = plant.bends and scenario.controller.notch_hz > 0.0
     fault = None if gains is None or (is_for_bend and gains.loop.is_stable) else gains.hint
     others = fault, _sliding_hint(scenario, law, plant)
     return [*(f"{plant.path}: {hint}" for hint in plant.hints), *(hint for hint in others if hint)]
@@ -304,28 +304,9 @@ def loop_words(pole: float) -> str:
 
 
 def _sliding_hint(scenario: Scenario, law: object, plant: Plant) -> str | None:
-    """Clauses for a plant whose pivot slides: what its tilt is taken about, and a `[[pivot]]` that does nothing."""
+    """Clause for a pivot that slides where the tilt is taken about it, or the loop is unstable anyway."""
     if not plant.reduced.pivot_arm:
         return None
-    clauses = [_tilt_clause(scenario, law, plant), _across_clause(scenario)]
-    return "; ".join(clause for clause in clauses if clause) or None
-
-
-def _across_clause(scenario: Scenario) -> str:
-    """Name the motions across: they accelerate what the pivot slides on, which friction alone hands on."""
-    names = [
-        f"pivot.{i}" for i, pivot in enumerate(scenario.pivot) if pivot.direction == "across" and np.any(pivot.size)
-    ]
-    if not names:
-        return ""
-    return (
-        f"{', '.join(names)}: accelerates across what the pivot slides on, and moves the rig by no more than friction "
-        'and damping there hand on; direction = "vertical" does move it'
-    )
-
-
-def _tilt_clause(scenario: Scenario, law: object, plant: Plant) -> str | None:
-    """Clause where the tilt is taken about the pivot, or the loop is unstable anyway."""
     measured = scenario.controller.angle_source == "measured"
     poles = sliding_poles(law, plant) if measured else None
     if plant.radial_tilt.height:

@@ -1,12 +1,14 @@
-"""One axis of a rig: its line, its modules and sensors by address, and the reduced model read off about that line."""
+"""A compiled rig with its names resolved: of each axis its line, modules and sensors, and its reduced model."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
+from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,7 +17,7 @@ from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
-from cmg_mj.plant.elements import TILT_ELEMENT, Module, element_id
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.inertia import inertia_about
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_at_site, line_of_joint
@@ -138,6 +140,45 @@ class Axis:
             The bias at the equilibrium [rad].
         """
         return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.constant_errors(), gravity)
+
+
+class ResolvedModel(NamedTuple):
+    """A compiled rig as its file has it, with its names resolved.
+
+    Attributes:
+        path: The file.
+        model: The compiled model, without what is only seen.
+        key: The keyframe at which it stands upright.
+        modules: The names of its axes, the locked ones too, each with those of its modules.
+        axes: The axes that are not locked.
+        held: The modules of axes that are locked.
+        hints: Clauses on what is right and yet not what the reduced model takes it for.
+    """
+
+    path: Path
+    model: mujoco.MjModel
+    key: int
+    modules: Mapping[str, Sequence[str]]
+    axes: tuple[Axis, ...]
+    held: tuple[Module, ...]
+    hints: tuple[str, ...] = ()
+
+
+def resolve(
+    path: Path, model: mujoco.MjModel, modules: Mapping[str, Sequence[str]], locked: Sequence[str] = ()
+) -> ResolvedModel:
+    """Resolve the names of a compiled rig.
+
+    Args:
+        path: The model's file.
+        model: The compiled model, which has all elements of a rig.
+        modules: The names of its axes, each with those of its modules.
+        locked: Axes whose hinges have been taken out.
+    """
+    key = element_id(model, "key", EQUILIBRIUM_KEY)
+    axes = tuple(find_axis(model, key, name, modules[name]) for name in modules if name not in locked)
+    held = tuple(module for name in locked for module in find_locked_modules(model, key, modules[name]))
+    return ResolvedModel(path, model, key, modules, axes, held)
 
 
 def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]) -> Axis:

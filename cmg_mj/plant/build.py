@@ -1,89 +1,119 @@
-"""The plant of a scenario: on the grid of its times, with the axes that the scenario names."""
+"""A rig's model file -> a compiled model, all of whose names are resolved: text, one MjSpec, checks, edits."""
 
 from __future__ import annotations
 
-from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.features.pivot.moving_pivot import pivot_directions
-from cmg_mj.features.pivot.pivot_track import MOST_RECORDED_M_S2, read_track
-from cmg_mj.inputs.files import folder
-from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.scenario.schema import Scenario
-from cmg_mj.scenario.time_grid import TimeGrid, time_grid
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.inputs.features import entries
+from cmg_mj.plant.axis import ResolvedModel, resolve
+from cmg_mj.plant.checks import RigChecker, invalid_numbers
+from cmg_mj.plant.elements import REQUIRED_PARTS, axes_of, missing_parts
+from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
+from cmg_mj.plant.mjcf import compile_model, parse, parse_without_plugins
+from cmg_mj.scenario.plant_settings import PlantSettings
+
+_HAS_PLUGIN = "the model has the plugin {}, which is left out here: the scenario's own controller takes its place"
+
+Finish = Callable[[mujoco.MjModel], None]
+"""The end of an edit: sets numbers that depend on the compiled model."""
 
 
-def load_scenario_plant(scenario: Scenario, like: Plant | None = None) -> Plant:
-    """Load a scenario's plant.
+def build(path: Path, settings: PlantSettings, sections: Mapping[str, Any]) -> ResolvedModel:
+    """Read and compile a rig, without what is only seen.
 
     Args:
-        scenario: The scenario.
-        like: A plant that may be of the same model file, which then is not compiled again.
+        path: The model's file.
+        settings: What to lock.
+        sections: Settings of the features that edit the model.
+
+    Returns:
+        The rig.
 
     Raises:
-        InputError: The scenario's times fit no physics step, or `load_plant` refuses the plant; the scenario is named.
+        InputError: The file holds no rig. All that is missing or wrong is named.
     """
-    with scenario.named_in_errors():
-        return plant_on_grid(scenario, time_grid(scenario), like)
+    spec, plugins = parse_without_plugins(path)
+    missing = missing_parts(spec)
+    if settings.lock_thrust_bearing and not missing:
+        lock_thrust_bearing(spec, path)
+    spec.compiler.discardvisual = True
+    hints, wrong, modules = [], list(missing), {}
+    model = None
+    try:
+        model = compile_model(spec, path)
+    except InputError as error:
+        if not missing:
+            raise
+        if "keyframe" not in str(error):  # whose sizes are wrong because something is missing
+            wrong.append(str(error).removeprefix(f"{path}: "))
+    else:
+        modules, numbers = axes_of(model), invalid_numbers(model)
+        placement = None if numbers else RigChecker(model, modules)
+        wrong += numbers if placement is None else placement.wrong
+        hints = [] if placement is None else placement.hints
+    if wrong or model is None:
+        raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([REQUIRED_PARTS] if missing else [])]))
+    rig = edit(spec, resolve(path, model, modules), settings, sections)
+    return rig._replace(hints=(*hints, *(_HAS_PLUGIN.format(name) for name in plugins)))
 
 
-def plant_on_grid(scenario: Scenario, grid: TimeGrid, like: Plant | None = None) -> Plant:
-    """Load a scenario's plant, whose physics steps fill the times of a grid: see `load_scenario_plant`."""
-    settings, of_axes = scenario.plant, {name: part.plant for name, part in scenario.of_axes.items()}
-    if like is not None and like.is_of_same_file(settings):
-        return like.changed(settings, grid, of_axes)
-    plant = load_plant(settings, grid=grid, of_axes=of_axes)
-    if plant.path.resolve().parent != folder("models").resolve():
-        _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
-    return plant
+def edit(
+    spec: mujoco.MjSpec, rig: ResolvedModel, settings: PlantSettings, sections: Mapping[str, Any]
+) -> ResolvedModel:
+    """Edit a parsed rig: lock axes, then what features do. Each edit sees the model before it compiled.
+
+    Args:
+        spec: The parsed rig, which is changed.
+        rig: The same, compiled.
+        settings: What to lock.
+        sections: Settings of the features that edit the model.
+
+    Returns:
+        The rig, edited.
+    """
+    edits: list[Callable[[mujoco.MjSpec, ResolvedModel], Finish | None]] = []
+    if settings.locked_axes:
+        edits.append(partial(lock_axes, settings=settings))
+    edits += [partial(entries("edit")[name], settings=settings, section=section) for name, section in sections.items()]
+    for change in edits:
+        finish = change(spec, rig)
+        if finish is not None:
+            rig = resolve(rig.path, compile_model(spec, rig.path), rig.modules, settings.locked_axes)
+            finish(rig.model)
+    return rig
 
 
-def check_scenario(scenario: Scenario, plant: Plant) -> None:
-    """Refuse a scenario that does not fit a plant.
+def drawn_spec(rig: ResolvedModel, settings: PlantSettings, sections: Mapping[str, Any]) -> mujoco.MjSpec:
+    """Parse a rig with all that is only seen, and edit it as `build` does.
 
     Raises:
-        InputError: The plant lacks an axis, the pivot cannot be moved, or its track cannot be read.
+        InputError: MuJoCo's compiler refuses it, because of a mesh that cannot be read.
     """
-    check_axes(scenario, plant)
-    for i, pivot in enumerate(scenario.pivot):
-        if pivot.axis in plant.settings.locked_axes:
-            raise InputError(
-                f"pivot.{i}.axis = {pivot.axis!r}: is locked, and gives no direction; name one of "
-                f"{', '.join(plant.axis_names)}"
-            )
-        if pivot.file is not None:
-            try:
-                track = read_track(pivot.file, pivot.column)
-            except InputError as error:
-                raise InputError(f"pivot.{i}.file: {error}") from error
-            largest = abs(pivot.scale) * float(abs(track.accelerations).max())
-            if largest > MOST_RECORDED_M_S2:
-                raise InputError(
-                    f"pivot.{i}.scale = {pivot.scale:g}: {pivot.file} times this reaches {largest:.3g} m/s2; at most "
-                    f"{MOST_RECORDED_M_S2:g}"
-                )
-    pivot_directions(plant, scenario.pivot)
+    spec = parse(rig.path)
+    if settings.lock_thrust_bearing:
+        lock_thrust_bearing(spec, rig.path)
+    if settings.locked_axes or any(section.unmodelled for section in sections.values()):
+        edit(spec, resolve(rig.path, compile_model(spec, rig.path), rig.modules), settings, sections)
+    return spec
 
 
-def check_axes(scenario: Scenario, plant: Plant) -> None:
-    """Refuse the name of an axis that the plant does not have, and on a plant of several axes a push without one.
+def check_rig(path: Path, name: Path) -> None:
+    """See that a file is a rig.
+
+    Args:
+        path: The file.
+        name: Name of the file in messages.
 
     Raises:
-        InputError: There is such a name, or such a push.
+        InputError: The file is not a rig.
     """
-    known = [*plant.axis_names, *plant.settings.locked_axes]
-    for name in scenario.axes:
-        if known == [""]:
-            raise InputError(f"axes.{name}: the rig has one axis, without a name; set its values in [plant], ...")
-        if name not in known:
-            raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
-    torques = [(f"push.{i}.axis", push.axis) for i, push in enumerate(scenario.push)]
-    torques += [(f"swing.{i}.axis", swing.axis) for i, swing in enumerate(scenario.swing)]
-    for i, pivot in enumerate(scenario.pivot):
-        if pivot.direction != "vertical" or pivot.axis is not None:
-            torques.append((f"pivot.{i}.axis", pivot.axis))
-    for field, axis in torques:
-        if axis is None and len(known) > 1:
-            raise InputError(f"{field}: the rig has several axes: which of {', '.join(known)}?")
-        if axis is not None and known == [""]:
-            raise InputError(f"{field} = {axis!r}: the rig has one axis, without a name; leave it out")
-        if axis is not None and axis not in known:
-            raise InputError(f"{field} = {axis!r}: the rig has no such axis; {nearest(axis, known)}")
+    try:
+        build(path, PlantSettings(), {})
+    except InputError as error:
+        raise InputError(str(error).replace(str(path), str(name))) from error

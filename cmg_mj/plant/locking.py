@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,11 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest, shown
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, ON_A_JOINT, TILT_ELEMENT, element_id, joint_sizes
+from cmg_mj.plant.axis import ResolvedModel
+from cmg_mj.plant.elements import ON_A_JOINT, TILT_ELEMENT, element_id, joint_sizes
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
+from cmg_mj.scenario.plant_settings import PlantSettings
 
 YAW = "yaw"
 
@@ -28,22 +30,22 @@ def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:
     remove_hinge(spec, YAW)
 
 
-def lock_axes(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, axes: Sequence[str], known: Collection[str], path: Path
-) -> None:
+def lock_axes(spec: mujoco.MjSpec, rig: ResolvedModel, settings: PlantSettings) -> Callable[[mujoco.MjModel], None]:
     """Take the hinges of axes out, upright as they are at the keyframe.
 
     Args:
         spec: The parsed model, which is changed.
-        model: The same, compiled: a rig.
-        axes: Names of the axes to lock.
-        known: Names of all axes.
-        path: The file, for messages.
+        rig: The same, compiled.
+        settings: Which axes to lock.
+
+    Returns:
+        What is to be done to the compiled model: nothing.
 
     Raises:
         InputError: There is no such axis, it tilts about no hinge, or no axis is left.
     """
-    for line in _hinges_of(model, element_id(model, "key", EQUILIBRIUM_KEY), axes, known, path):
+    axes, path, model = settings.locked_axes, rig.path, rig.model
+    for line in _hinges_of(model, rig.key, axes, rig.modules, path):
         name = model.joint(line.joint).name
         angle = line.zero - float(model.qpos0[line.angle])
         if angle:
@@ -54,6 +56,7 @@ def lock_axes(
                 )
             _turn(spec.joint(name), angle)
         remove_hinge(spec, name)
+    return lambda _: None
 
 
 def _hinges_of(

@@ -5,52 +5,53 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Unpack
+from typing import Any
 
 import mujoco
 import numpy as np
 from pydantic import ValidationError
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.axes import MultiAxisController
-from cmg_mj.core.controller import Controller, PlantInterface
+from cmg_mj.core.controller import PlantInterface
 from cmg_mj.core.errors import InputError, TomlValue, nearest
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import MultiAxisReading
-from cmg_mj.inputs.files import find
+from cmg_mj.inputs.features import entries
+from cmg_mj.inputs.files import find, folder
 from cmg_mj.inputs.messages import complaints
-from cmg_mj.laws import Law, StateFeedback
-from cmg_mj.observers import Observer
-from cmg_mj.plant.axis import Axis, find_axis, find_locked_modules, read_reduced
+from cmg_mj.plant.axis import Axis, ResolvedModel
+from cmg_mj.plant.build import build, drawn_spec
 from cmg_mj.plant.checks import survives_first_steps
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, JOINT_KINDS, element_id
-from cmg_mj.plant.mjcf import compile_model, load_rig, parse_drawn
+from cmg_mj.plant.elements import BEND_JOINT, JOINT_KINDS, element_id
+from cmg_mj.plant.mjcf import compile_model
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
-from cmg_mj.plant.step_limit import largest_step
+from cmg_mj.plant.settings import apply, place_accelerometers
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.turning import turning
-from cmg_mj.plant.variations import place_accelerometers, set_turn_rate, vary, with_flywheel_speed
-from cmg_mj.scenario.make_controller import StageOptions, make_controller
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.plant_settings import COMPILED_FIELDS, FINEST_STEP_S, PlantSettings
-from cmg_mj.scenario.schema import ObserverSettings
-from cmg_mj.scenario.time_grid import TimeGrid
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.scenario.time_grid import TimeGrid, time_grid
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.stages.backlash import ARCMIN_A_DEGREE, backlash
-from cmg_mj.stages.turning import YawCoupling, compensation
+from cmg_mj.stages.turning import YawCoupling
 
 
 class Plant:
-    """A compiled rig with its names resolved.
+    """A compiled rig with its names resolved, and a scenario's settings in it.
+
+    Args:
+        filed: The rig as its file has it.
+        settings: Its settings.
+        sections: Settings of the features that edit the model, by name.
+        of_axes: The settings of axes that have their own.
+        grid: The times that whole physics steps must fill; by default the step is the largest that is accurate enough.
 
     Attributes:
-        settings: What it was made from.
         model: The compiled model, without what is only seen. Do not change it: the plant may be shared.
         axes: What it tilts about, each with its modules, sensors and reduced model. That is read off the file as it is
             but for the flywheels' speed, which the controller knows: without bias or friction, which it does not.
@@ -58,93 +59,24 @@ class Plant:
         yaw: Address of q_a, or None if the thrust bearing is locked.
         largest_step: The largest physics step that is accurate enough [s].
         backlash: Between the servos' motors and the gimbals [rad].
-        above_centre_m: So much above the common mass centre lies the point that the tilt estimate of a pivot that
-            slides takes to be at rest: an error of the estimate, which settings made from this plant keep [m].
-    """
 
-    above_centre_m = 0.0
+    Raises:
+        InputError: The settings do not fit the rig, or its physics fails.
+    """
 
     def __init__(
         self,
+        filed: ResolvedModel,
         settings: PlantSettings,
-        path: Path,
-        grid: TimeGrid | None = None,
+        sections: Mapping[str, Any] = MappingProxyType({}),
         of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+        grid: TimeGrid | None = None,
     ) -> None:
-        self.path = path
-        locked, lock = settings.locked_axes, settings.lock_thrust_bearing
-        self.model, modules, self.hints = load_rig(path, lock=lock, locked_axes=locked, bend=settings)
-        self._as_filed = self.model
-        self.key = element_id(self.model, "key", EQUILIBRIUM_KEY)
+        self.filed, self.settings, self.sections, self.of_axes = filed, settings, sections, of_axes
+        self.path, self.key, self.hints = filed.path, filed.key, filed.hints
+        self.model, self.axes, self.largest_step = apply(filed, settings, of_axes, sections)
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in self.joint_names else None
-        self._module_names = modules
-        self._axes_as_filed = tuple(
-            find_axis(self.model, self.key, name, modules[name]) for name in modules if name not in locked
-        )
-        self._held = tuple(
-            module for name in locked for module in find_locked_modules(self.model, self.key, modules[name])
-        )
-        self._apply_settings(settings, grid, of_axes)
-
-    def changed(
-        self,
-        settings: PlantSettings,
-        grid: TimeGrid | None = None,
-        of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
-    ) -> Plant:
-        """Return the rig with other settings, without compiling its file again.
-
-        Args:
-            settings: Settings with the same model file, the same locks and the same bend.
-            grid: The times that whole physics steps must fill.
-            of_axes: The settings of axes that have their own.
-
-        Returns:
-            Another plant.
-
-        Raises:
-            InputError: With these settings the physics fails.
-        """
-        other = copy.copy(self)
-        for cached in ("drawn_model", "turning"):
-            other.__dict__.pop(cached, None)
-        other._apply_settings(settings, grid, of_axes)
-        return other
-
-    def is_of_same_file(self, settings: PlantSettings) -> bool:
-        """Return whether `changed` can take these settings: the same model file, locks and bend."""
-        return all(getattr(self.settings, name) == getattr(settings, name) for name in COMPILED_FIELDS)
-
-    def _apply_settings(
-        self, settings: PlantSettings, grid: TimeGrid | None, of_axes: Mapping[str, PlantSettings]
-    ) -> None:
-        """Change the model as the settings say, and fit the physics step to the grid."""
-        self.settings, self._of_axes = settings, of_axes
         self.backlash = math.radians(settings.gimbal_backlash_arcmin / ARCMIN_A_DEGREE)
-        self.model = copy.copy(self._as_filed)
-        axes, speed = [], settings.flywheel_speed_rad_s
-        for axis in self._axes_as_filed:
-            axis_settings = of_axes.get(axis.name, settings)
-            changed = replace(
-                axis,
-                bias=math.radians(axis_settings.equilibrium_bias_deg),
-                initial_tilt=math.radians(axis_settings.initial_tilt_deg),
-                radial_tilt=place_accelerometers(self.model, axis_settings, axis, self.path, self.above_centre_m),
-                misplaced=axis_settings.has_misplaced,
-            )
-            if speed is not None:
-                modules = with_flywheel_speed(self.model, self.key, axis.modules, speed, self.path)
-                changed = replace(changed, modules=modules)
-                changed = replace(changed, reduced=read_reduced(self._as_filed, self.key, changed))
-            axes.append(changed)
-        self.axes = tuple(axes)
-        held = self._held if speed is None else with_flywheel_speed(self.model, self.key, self._held, speed, self.path)
-        if settings.turn_rate_rad_s:
-            set_turn_rate(self.model, self.key, settings.turn_rate_rad_s, self.path)
-        vary(self.model, settings, self.path, self.axes, held)
-        speeds = [abs(module.speed) for axis in self.axes for module in axis.modules]
-        shake_rate = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
-        self.largest_step = largest_step(self.model, self.key, float(self.model.opt.timestep), shake_rate)
         if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
             raise InputError(
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
@@ -158,6 +90,21 @@ class Plant:
                 "damping and servos must be of sizes that go together"
             )
 
+    def can_reuse(self, settings: PlantSettings, sections: Mapping[str, Any]) -> bool:
+        """Return whether a plant with these settings has the same compiled file, locks and edits."""
+        same = all(getattr(self.settings, name) == getattr(settings, name) for name in COMPILED_FIELDS)
+        return same and self.sections == sections
+
+    def with_settings(
+        self,
+        settings: PlantSettings,
+        of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+        grid: TimeGrid | None = None,
+    ) -> Plant:
+        """Return the rig with other settings, without compiling its file again: see `can_reuse`."""
+        with set_control_callback(None):
+            return Plant(self.filed, settings, self.sections, of_axes, grid)
+
     @property
     def _error_source(self) -> str:
         """Culprit if the physics fails: the settings that change it, or without such settings the file."""
@@ -169,13 +116,24 @@ class Plant:
         """The model with all that is only seen: the same bodies and joints, and geoms that physics does without."""
         with set_control_callback(None), quiet():  # compiling a model runs it
             model = compile_model(self.drawn_spec(), self.path)
-        for axis in self._axes_as_filed:
-            place_accelerometers(model, self._of_axes.get(axis.name, self.settings), axis, self.path)
+        for axis in self.filed.axes:
+            place_accelerometers(model, self.of_axes.get(axis.name, self.settings), axis, self.path)
         return model
 
     def drawn_spec(self) -> mujoco.MjSpec:
-        """Parse the model's file, with all that is only seen, and lock what the settings lock."""
-        return parse_drawn(self.path, self.settings, self._module_names)
+        """Parse the model's file, with all that is only seen, edited as the settings say."""
+        return drawn_spec(self.filed, self.settings, self.sections)
+
+    def with_own_model(self) -> Plant:
+        """Copy the plant onto a model of its own, whose gravity may be shifted while it runs."""
+        other = copy.copy(self)
+        other.model = copy.copy(self.model)
+        return other
+
+    @property
+    def bends(self) -> bool:
+        """True if the frame bends."""
+        return element_id(self.model, "joint", BEND_JOINT) >= 0
 
     def single_axis(self, axis: str) -> Plant:
         """Return the rig as one of its axes sees it: with that axis alone.
@@ -203,7 +161,7 @@ class Plant:
     @cached_property
     def turning(self) -> YawCoupling:
         """Coupling of the axes in a turn about the vertical."""
-        return turning(self._as_filed, self.key, self.axes)
+        return turning(self.filed.model, self.key, self.axes)
 
     def largest_tilt(self, qpos: Addressed) -> Scalar:
         """Return the tilt from the keyframe of the axis that is farthest from it [rad]."""
@@ -269,62 +227,6 @@ class Plant:
         gimbal_angle = GimbalAngle(tuple(self.axis.directions), zeros)
         return PlantInterface(self.radial_tilt, gimbal_angle, self.model.opt.timestep, backlash(self.backlash))
 
-    def controller(
-        self,
-        observer: Observer | str | Mapping[str, Any] = "homogeneous",
-        *,
-        law: Law | None = None,
-        sensors: Sensors | None = None,
-        **options: Unpack[StageOptions],
-    ) -> Controller:
-        """Make a fresh controller for a plant of one axis, without a scenario.
-
-        Args:
-            observer: An observer, its name (or package.module:Class), or a section [observer] with its `kind` and
-                parameters, such as {"kind": "homogeneous", "k1": 20.0}.
-            law: The law, an object; by default Table 2's gains at 200 Hz. `Experiment.law` is a scenario's.
-            sensors: The sensors; by default those of the datasheets.
-            **options: Options of `Controller`, such as seed and feedback.
-
-        Returns:
-            The controller.
-
-        Raises:
-            InputError: The plant has several axes, the observer does not exist or refuses a parameter, the law is a
-                name, or a rate does not fit the physics step.
-        """
-        if len(self.axes) > 1:
-            raise InputError(f"{self.path}: tilts about several axes; use multi_axis_controller")
-        if isinstance(law, (str, Mapping)):
-            raise InputError(
-                f"law = {law!r}: must be a law, not its name. Give StateFeedback(dt=0.005, gains=...), or "
-                "prepare(scenario).law of a scenario with this [controller]"
-            )
-        law, sensors = law or StateFeedback(dt=0.005), sensors or Sensors()
-        if isinstance(observer, (str, Mapping)):
-            settings = ObserverSettings(**({"kind": observer} if isinstance(observer, str) else observer))
-            observer = settings.make(law.dt, self.reduced, self.parameters.noise(sensors))
-        return make_controller(observer, law, sensors, self.interface, **options)
-
-    def multi_axis_controller(
-        self,
-        observer: Observer | str | Mapping[str, Any] = "homogeneous",
-        *,
-        law: Law | None = None,
-        sensors: Sensors | None = None,
-        **options: Unpack[StageOptions],
-    ) -> MultiAxisController:
-        """Make a fresh controller for a plant of several axes: one an axis, all made alike, as `controller` makes it.
-
-        Their gimbals also compensate what a turn about the vertical couples.
-        """
-        plants = [self.single_axis(name) for name in self.axis_names]
-        parts = [
-            plant.controller(observer, law=law, sensors=sensors, **{**options, "axis": i})
-            for i, plant in enumerate(plants)
-        ]
-        return MultiAxisController(parts, compensation(self.turning, parts[0].sensors.mems_gyro))
-
     @property
     def timestep(self) -> float:
         """The physics step [s]."""
@@ -374,6 +276,7 @@ def load_plant(
     beside: Path | None = None,
     grid: TimeGrid | None = None,
     of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+    sections: Mapping[str, Any] = MappingProxyType({}),
     **fields: TomlValue,
 ) -> Plant:
     """Load a rig.
@@ -383,6 +286,7 @@ def load_plant(
         beside: A folder that a relative model path may start from.
         grid: The times that whole physics steps must fill; by default the step is the largest that is accurate enough.
         of_axes: The settings of axes that have their own: equilibrium bias, initial tilt, places of the accelerometers.
+        sections: Settings of the features that edit the model, such as {"bend": Bend(frequency_hz=20.0)}.
         **fields: Fields of `PlantSettings`.
 
     Returns:
@@ -398,5 +302,62 @@ def load_plant(
         except ValidationError as error:
             wrong = complaints(PlantSettings, error.errors(), fields)
             raise InputError("; ".join(f"plant.{clause}" for clause in wrong)) from error
+    path = find("models", settings.model, ".xml", "plant.model =", beside)
     with set_control_callback(None):  # compiling a model runs it
-        return Plant(settings, find("models", settings.model, ".xml", "plant.model =", beside), grid, of_axes)
+        return Plant(build(path, settings, sections), settings, sections, of_axes, grid)
+
+
+@quiet()
+def load_scenario_plant(scenario: Scenario, reuse: Plant | None = None, grid: TimeGrid | None = None) -> Plant:
+    """Load a scenario's plant, with the axes that the scenario names.
+
+    Args:
+        scenario: The scenario.
+        reuse: A plant that may be of the same model file, which then is not compiled again.
+        grid: The grid of the scenario's times, if it is known.
+
+    Raises:
+        InputError: The scenario's times fit no physics step, or `load_plant` refuses the plant; the scenario is named.
+    """
+    with scenario.named_in_errors():
+        settings, grid = scenario.plant, grid or time_grid(scenario)
+        of_axes = {name: part.plant for name, part in scenario.of_axes.items()}
+        sections = {name: scenario.section(name) for name in entries("edit")}
+        if reuse is not None and reuse.can_reuse(settings, sections):
+            return reuse.with_settings(settings, of_axes, grid)
+        plant = load_plant(settings, None, grid, of_axes, sections)
+        if plant.path.resolve().parent != folder("models").resolve():
+            _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
+        return plant
+
+
+def check_axes(scenario: Scenario, plant: Plant) -> None:
+    """Refuse the name of an axis that the plant does not have, and on a plant of several axes a torque without one.
+
+    Raises:
+        InputError: There is such a name, or such a torque.
+    """
+    known = [*plant.axis_names, *plant.settings.locked_axes]
+    for name in scenario.axes:
+        if known == [""]:
+            raise InputError(f"axes.{name}: the rig has one axis, without a name; set its values in [plant], ...")
+        if name not in known:
+            raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
+    for section in ("push", "swing"):
+        for i, torque in enumerate(scenario.section(section)):
+            check_axis(f"{section}.{i}.axis", torque.axis, plant)
+
+
+def check_axis(field: str, axis: str | None, plant: Plant) -> None:
+    """Refuse the name of an axis that the plant does not have, and on a plant of several axes None.
+
+    Raises:
+        InputError: There is no such axis; the field is named.
+    """
+    known = [*plant.axis_names, *plant.settings.locked_axes]
+    if axis is None and len(known) > 1:
+        raise InputError(f"{field}: the rig has several axes: which of {', '.join(known)}?")
+    if axis is not None and known == [""]:
+        raise InputError(f"{field} = {axis!r}: the rig has one axis, without a name; leave it out")
+    if axis is not None and axis not in known:
+        raise InputError(f"{field} = {axis!r}: the rig has no such axis; {nearest(axis, known)}")

@@ -16,17 +16,16 @@ from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.controller import PlantInterface
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.types import State, extra_signals
-from cmg_mj.features.pivot.settings import Pivot
 from cmg_mj.inputs.types import Batched, NoEffect, marked_fields
 from cmg_mj.laws import LAW_CLASSES, Law
 from cmg_mj.observers import OBSERVER_CLASSES, Estimate, Measurement, Observer
 from cmg_mj.plant.plant import Plant
 from cmg_mj.runs.batch_values import batch_values
+from cmg_mj.runs.disturbances import Outsides, outsides
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.stages.backlash import backlash
-from cmg_mj.stages.push import Push
 
 T = TypeVar("T")
 BATCHED_FIELDS = marked_fields(Scenario, Batched)
@@ -183,17 +182,17 @@ def require_same_structure(plants: Sequence[Plant], worlds: int, scenario_plant:
         )
 
 
-def batched(worlds: Sequence[tuple[Law, Scenario]]) -> tuple[Law, Sensors, tuple[Push, ...], tuple[Pivot, ...]]:
-    """Law, sensors, pushes and motions of the pivot of many worlds as one, with arrays (n_worlds,) where they differ.
+def batched(worlds: Sequence[tuple[Law, Scenario]]) -> tuple[Law, Sensors, Outsides]:
+    """Law, sensors and what acts from outside of many worlds as one, with arrays (n_worlds,) where they differ.
 
     Args:
         worlds: The law and the scenario of each.
     """
     laws, scenarios = zip(*worlds, strict=True)
-    pushes = [tuple(scenario.push) for scenario in scenarios]
-    pivots = [tuple(scenario.pivot) for scenario in scenarios]
+    acting = [outsides(scenario) for scenario in scenarios]
+    outside = {name: batch_values([world[name] for world in acting]) for name in acting[0]}
     sensors = batch_values([scenario.sensors for scenario in scenarios])
-    return _batched_law(laws), sensors, batch_values(pushes), batch_values(pivots)
+    return _batched_law(laws), sensors, outside
 
 
 class BatchedObservers:

@@ -8,8 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from cmg_mj.core.types import BIAS, extra_signals
-from cmg_mj.plant.build import load_scenario_plant
-from cmg_mj.plant.plant import Plant
+from cmg_mj.plant.plant import Plant, load_scenario_plant
 from cmg_mj.results.intervals import finite_values
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import NESTED, Summary, finite

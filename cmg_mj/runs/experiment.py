@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -16,16 +17,13 @@ from cmg_mj.core.axes import AnyController, MultiAxisController
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.core.loop import ControlLoop
-from cmg_mj.features.bend.verdict import bend_hints, judge_bend
-from cmg_mj.features.pivot.settings import Pivot
-from cmg_mj.inputs.features import DRIVERS
+from cmg_mj.inputs.features import DRIVERS, entries
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.laws import Law
 from cmg_mj.linear.loop import linear_closed_loop
 from cmg_mj.linear.verdict import hints
 from cmg_mj.observers import Observer
-from cmg_mj.plant.build import check_scenario, plant_on_grid
-from cmg_mj.plant.plant import Plant
+from cmg_mj.plant.plant import Plant, check_axes, load_scenario_plant
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.result import Result
 from cmg_mj.runs.batch import (
@@ -40,6 +38,7 @@ from cmg_mj.runs.batch import (
     require_same_structure,
     varied_settings,
 )
+from cmg_mj.runs.disturbances import Outsides, outsides
 from cmg_mj.runs.rerun_head import rerun_head
 from cmg_mj.runs.simulate import SimulationOptions, simulate
 from cmg_mj.scenario.design import Design, design
@@ -47,7 +46,6 @@ from cmg_mj.scenario.loading import base_of
 from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.time_grid import time_grid
-from cmg_mj.stages.push import Push
 from cmg_mj.stages.turning import compensation
 
 if TYPE_CHECKING:
@@ -238,8 +236,7 @@ class Experiment:
         self,
         plant: Plant | Sequence[Plant],
         controller: AnyController,
-        pushes: Sequence[Push] | None = None,
-        pivots: Sequence[Pivot] | None = None,
+        outside: Outsides | None = None,
         driver: str = "native",
         loop: type[ControlLoop] = ControlLoop,
         **options: Unpack[SimulationOptions],
@@ -249,8 +246,7 @@ class Experiment:
         Args:
             plant: The rig, or one a world.
             controller: A fresh one.
-            pushes: Instead of the scenario's.
-            pivots: Likewise.
+            outside: What acts from outside, instead of what the scenario has.
             driver: Name of what calls the controller.
             loop: Advances physics and controller.
             **options: Those of `simulate`.
@@ -264,9 +260,7 @@ class Experiment:
             controller,
             scenario.duration_s,
             observers={name: part.observer_names for name, part in zip(self.plant.axis_names, self.parts, strict=True)},
-            pushes=scenario.push if pushes is None else pushes,
-            swings=scenario.swing,
-            pivots=scenario.pivot if pivots is None else pivots,
+            outside=outsides(scenario) if outside is None else outside,
             settings=scenario.metrics,
             driver=driver,
             loop=loop,
@@ -341,8 +335,8 @@ class Experiment:
     def hints(self) -> list[str]:
         """Clauses on what is no mistake and yet likely to make the plant fall."""
         if not self.axes:
-            bend = judge_bend(self.design, self.plant)
-            return [*hints(self.design, self.plant), *bend_hints(self.plant, bend)]
+            of_features = [judge(self.design, self.plant).hints for judge in entries("judge").values()]
+            return [*hints(self.design, self.plant), *itertools.chain(*of_features)]
         return [f"{part.plant.axis.name}: {hint}" for part in self.axes for hint in part.hints]
 
     def resolved(self) -> dict[str, Any]:
@@ -395,8 +389,11 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
     """
     with scenario.named_in_errors():
         grid = time_grid(scenario)
-        plant = plant or plant_on_grid(scenario, grid, like)
-        check_scenario(scenario, plant)
+    plant = plant or load_scenario_plant(scenario, like, grid)
+    with scenario.named_in_errors():
+        check_axes(scenario, plant)
+        for check in entries("check").values():
+            check(scenario, plant)
     if len(plant.axes) == 1 and not scenario.axes:
         return Experiment(scenario, plant, design(scenario, plant.parameters))
     parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
@@ -433,7 +430,7 @@ def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **option
 
 def batch_inputs(
     experiments: Sequence[Experiment], worlds: Sequence[int], observer: Observer | None = None
-) -> tuple[list[Plant], AnyController, Sequence[Push], Sequence[Pivot]]:
+) -> tuple[list[Plant], AnyController, Outsides]:
     """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, what moves all worlds.
 
     Args:
@@ -442,10 +439,10 @@ def batch_inputs(
         observer: The observer of all worlds instead of the first experiment's.
     """
     first, plants = experiments[0], [experiment.plant for experiment in experiments]
-    controllers, pushes, pivots = [], (), ()
+    controllers, outside = [], outsides(first.scenario)
     for i, part in enumerate(first.parts):
         parts = [experiment.parts[i] for experiment in experiments]
-        law, sensors, pushes, pivots = batched([(one.design.fresh_law(), one.scenario) for one in parts])
+        law, sensors, outside = batched([(one.design.fresh_law(), one.scenario) for one in parts])
         open_loop = batched_open_loop_observers([one.design for one in parts])
         controllers.append(
             part.design.controller(
@@ -458,4 +455,4 @@ def batch_inputs(
                 sensors=sensors,
             )
         )
-    return plants, first.of_axes(controllers), pushes, pivots
+    return plants, first.of_axes(controllers), outside

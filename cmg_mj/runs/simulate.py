@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from types import MappingProxyType
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -16,9 +17,6 @@ from cmg_mj.core.loop import ControlLoop, Ending
 from cmg_mj.core.outside import Disturbance
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.types import BIAS
-from cmg_mj.features.pivot.moving_pivot import pivot_directions, refuse_other_forces, with_own_model
-from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
-from cmg_mj.features.pivot.settings import Pivot
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.physics import ManyWorlds, OneWorld
 from cmg_mj.plant.plant import Plant
@@ -29,10 +27,9 @@ from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
 from cmg_mj.runs.batch_values import split_values
 from cmg_mj.runs.callback import CallbackLoop, control_callback
+from cmg_mj.runs.disturbances import Outsides, disturbances
 from cmg_mj.runs.recorder import MultiAxisRecorder, TickRecorder
 from cmg_mj.scenario.schema import MetricsSettings
-from cmg_mj.stages.push import Push, Pushes
-from cmg_mj.stages.swing import Swing, Swings
 
 DIVERGED_TILT = 2.0 * math.pi
 """No plant that stood at one instant lies a whole turn farther at the next one: it has diverged [rad]."""
@@ -60,9 +57,7 @@ def simulate(
     duration_s: float,
     *,
     observers: Sequence[str] | Mapping[str, Sequence[str]],
-    pushes: Sequence[Push] = (),
-    swings: Sequence[Swing] = (),
-    pivots: Sequence[Pivot] = (),
+    outside: Outsides = MappingProxyType({}),
     settings: MetricsSettings | None = None,
     driver: str = "native",
     loop: type[ControlLoop] = ControlLoop,
@@ -75,9 +70,7 @@ def simulate(
         controller: A fresh controller, made for one world or for as many as there are plants.
         duration_s: Simulated time [s].
         observers: Names of the controller's observer and open-loop observers; or of each axis' if they differ.
-        pushes: Torques from outside; of many worlds a torque may be an array (n_worlds,).
-        swings: Others that swing.
-        pivots: Motions of the pivot; of many worlds a size may be an array (n_worlds,).
+        outside: What acts from outside.
         settings: What counts as settled and fallen.
         driver: Name of what calls the controller: `native`: the loop, `callback`: MuJoCo (one world only).
         loop: Advances physics and controller, if it is not these two.
@@ -95,13 +88,12 @@ def simulate(
         raise InputError(f"driver = {driver!r}: drives one world, not a batch")
     names = plants[0].axis_names
     of_axis = observers if isinstance(observers, Mapping) else dict.fromkeys(names, observers)
-    if pivots and single:
-        plants = [with_own_model(plants[0])]
-    run = _Simulation(
-        plants, controller, duration_s, of_axis, pushes, swings, pivots, settings or MetricsSettings(), options
-    )
+    acting = disturbances(outside, plants, controller.seed, controller.worlds)
+    if single and any(one.accelerates for one in acting):
+        plants = [plants[0].with_own_model()]
+    run = _Simulation(plants, controller, duration_s, of_axis, outside, settings or MetricsSettings(), options)
     physics = OneWorld(plants[0]) if single else ManyWorlds(plants, options.get("threads", 0))
-    run.advance(physics, CallbackLoop if driver == "callback" else loop)
+    run.advance(physics, acting, CallbackLoop if driver == "callback" else loop)
     return run.result(driver)
 
 
@@ -114,14 +106,12 @@ class _Simulation:
         controller: AnyController,
         duration_s: float,
         observers: Mapping[str, Sequence[str]],
-        pushes: Sequence[Push],
-        swings: Sequence[Swing],
-        pivots: Sequence[Pivot],
+        outside: Outsides,
         settings: MetricsSettings,
         options: SimulationOptions,
     ) -> None:
         self.plants, self.controller, self.duration_s, self.observers = plants, controller, duration_s, observers
-        self.pushes, self.pivots, self.settings = pushes, pivots, settings
+        self.outside, self.settings = outside, settings
         self.axis_names = names = plants[0].axis_names
         self.timestep = timestep = plants[0].timestep
         steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
@@ -134,17 +124,6 @@ class _Simulation:
             on_start(self.recorder)
         self.outcomes: list[Outcome] = []
         self.steps = steps
-        self.disturbances: list[Disturbance] = []
-        if pushes:
-            self.disturbances.append(Pushes(pushes, timestep, names))
-        if swings:
-            self.disturbances.append(Swings(swings, timestep, names))
-        if pivots:
-            for plant in dict.fromkeys(plants):
-                refuse_other_forces(plant)
-            directions = pivot_directions(plants[0], pivots)
-            signals = PivotSignals(pivots, directions, controller.seed, controller.worlds)
-            self.disturbances.append(MovingPivot(signals, timestep))
 
     def _recorder_of(self, axis: str, controller: Controller, options: SimulationOptions) -> TickRecorder:
         """Make what records and judges the ticks of one axis; that of the first axis has the joints."""
@@ -154,9 +133,9 @@ class _Simulation:
         dt, limit, sensors = controller.law.dt, controller.law.rate_limit, controller.sensors
         noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
         y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
-        moves = any(np.any(pivot.size) for pivot in self.pivots)
+        unmodelled = any(part.unmodelled for parts in self.outside.values() for part in parts)
         has_acceleration = [
-            not (moves or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.settings.bends)
+            not (unmodelled or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.bends)
             and plant.radial_tilt.height == plant.reduced.pivot_arm
             for plant, sensor in pairs
         ]
@@ -166,13 +145,17 @@ class _Simulation:
         references = References(
             sensors.mems_gyro, dt, controller.seed, controller.worlds, tilt_sigmas, axis=controller.axis
         )
-        metrics = Metrics(observers, len(plants), dt, self.pushes, limit, self.settings, targets, RATES, floors)
+        metrics = Metrics(
+            observers, len(plants), dt, self.outside.get("push", ()), limit, self.settings, targets, RATES, floors
+        )
         keep, first = options.get("keep_trajectory", True), axis == self.axis_names[0]
         return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first)
 
-    def advance(self, physics: OneWorld | ManyWorlds, kind: type[ControlLoop]) -> None:
+    def advance(
+        self, physics: OneWorld | ManyWorlds, disturbances: Sequence[Disturbance], kind: type[ControlLoop]
+    ) -> None:
         """Run to the end, whatever that is."""
-        loop = kind(physics, self.controller, self.steps, self.disturbances, self.fall_angle)
+        loop = kind(physics, self.controller, self.steps, disturbances, self.fall_angle)
         driving: AbstractContextManager = nullcontext()
         if kind is CallbackLoop:
             driving = control_callback(self.plants[0], self.controller)

@@ -47,7 +47,7 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
     scenario = parse_scenario(fields, " ".join([name, *(["with"] if changes else []), *changes]))
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in overrides):
         scenario = find_model(scenario, path.parent)
-    return find_tracks(scenario, path.parent)
+    return find_files(scenario, path.parent)
 
 
 def _take_observer(fields: dict[str, Any], observer: str) -> None:
@@ -107,17 +107,12 @@ def find_model(scenario: Scenario, beside: Path) -> Scenario:
     return scenario.model_copy(update={"plant": dataclasses.replace(scenario.plant, model=str(model))})
 
 
-def find_tracks(scenario: Scenario, beside: Path) -> Scenario:
-    """Return the scenario with the whole paths of its tracks, which a scenario file names relative to itself."""
-    pivots = []
-    for pivot in scenario.pivot:
-        if pivot.file is not None:
-            pivot = dataclasses.replace(pivot, file=find_track(pivot.file, beside))
-        pivots.append(pivot)
-    return scenario.model_copy(update={"pivot": pivots}) if pivots else scenario
-
-
-def find_track(file: str, beside: Path) -> str:
-    """Return the whole path of a track, which may start from a folder; a file that is nowhere keeps its name."""
-    paths = [path for path in (beside / file, Path(file)) if path.is_file()]
-    return str(paths[0].resolve()) if paths else file
+def find_files(scenario: Scenario, beside: Path) -> Scenario:
+    """Return the scenario with the whole paths of its features' files, which it names relative to itself."""
+    found = {}
+    for name in scenario.feature_sections:
+        section = scenario.section(name)
+        found[name] = (
+            [part.located(beside) for part in section] if isinstance(section, list) else section.located(beside)
+        )
+    return scenario.model_copy(update=found)

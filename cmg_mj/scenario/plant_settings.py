@@ -13,12 +13,8 @@ from cmg_mj.inputs.types import STRICT, Batched, NonNegative, PerAxis, Positive
 FINEST_STEP_S = 1e-6
 """The smallest physics step [s]."""
 Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
-COMPILED_FIELDS = (
-    *("model", "lock_thrust_bearing", "locked_axes"),
-    *("bend_frequency_hz", "bend_damping_ratio", "bend_share", "bend_beyond"),
-)
+COMPILED_FIELDS = ("model", "lock_thrust_bearing", "locked_axes")
 """Settings on which it depends what is compiled; the others change the compiled model."""
-BendBeyond = Literal["sensors", "modules", "both"]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -56,11 +52,6 @@ class PlantSettings:
         tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
         flywheel_speed_rad_s: Speed of all flywheels, each in its own direction, which the controller uses [rad/s].
         flywheel_imbalance_kg_m: Static imbalance of each flywheel: its mass times the offset of its mass centre [kg m].
-        bend_frequency_hz: Undamped frequency of the frame's torsional mode about the tilt axis, with the hinge free
-            and without gravity; 0 for a rigid frame [Hz].
-        bend_damping_ratio: Damping ratio of the frame's torsional mode.
-        bend_share: Share of the inertia about the tilt axis that lies beyond the bend, seen from the pivot.
-        bend_beyond: Parts beyond the bend, seen from the pivot: the `sensors` on a mast, the `modules`, or `both`.
     """
 
     model: str = "scissored_pair.xml"
@@ -86,23 +77,6 @@ class PlantSettings:
     tilt_damping_n_m_s: Annotated[NonNegative | None, Batched()] = None
     flywheel_speed_rad_s: Positive | None = None
     flywheel_imbalance_kg_m: Annotated[float, Batched()] = 0.0
-    bend_frequency_hz: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
-    bend_damping_ratio: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.01
-    bend_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
-    bend_beyond: BendBeyond = "sensors"
-
-    @property
-    def bends(self) -> bool:
-        """True if the frame bends."""
-        return self.bend_frequency_hz > 0.0
-
-    @property
-    def unused_bend_fields(self) -> list[str]:
-        """Fields of the bend that were set while the frame is rigid."""
-        if self.bends:
-            return []
-        fields = [field for field in dataclasses.fields(self) if field.name.startswith("bend_")]
-        return [field.name for field in fields if getattr(self, field.name) != field.default]
 
     def changes(self) -> dict[str, float]:
         """Return the changed numbers of gimbals, servos, accelerometers, tilt and flywheels: field -> value."""

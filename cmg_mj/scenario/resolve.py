@@ -75,7 +75,7 @@ def _resolved(scenario: Scenario, design: Design) -> dict[str, Any]:
         "kind": scenario.observer.kind,
         **_parameters(scenario.observer.parameters, design.observer(), OBSERVER_CLASSES.bench_parameters),
     }
-    for rare in ("axes", "swing", "pivot"):
+    for rare in ("axes", "swing", *scenario.feature_sections):
         if not fields[rare]:
             fields.pop(rare)
     fields["versions"] = versions()

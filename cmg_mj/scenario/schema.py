@@ -15,7 +15,7 @@ from cmg_mj.core.controller import AngleSource, Feedback
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
-from cmg_mj.features.pivot.settings import Pivot
+from cmg_mj.inputs.features import FEATURES, entries
 from cmg_mj.inputs.messages import complaints, fields_of, out_of_size
 from cmg_mj.inputs.types import (
     STRICT,
@@ -30,6 +30,7 @@ from cmg_mj.inputs.types import (
     PerAxis,
     Positive,
     Rate,
+    Section,
     WhateverTheLaw,
     marked_fields,
 )
@@ -195,8 +196,8 @@ class AxisSettings(BaseModel):
         return {name: section for name, section in self.model_dump(mode="json", exclude_none=True).items() if section}
 
 
-class Scenario(BaseModel):
-    """One experiment."""
+class Sections(BaseModel):
+    """Sections of a scenario and fields above them, without those of features."""
 
     model_config = FORBID
     title: Annotated[Line, NoEffect()] = ""
@@ -215,7 +216,6 @@ class Scenario(BaseModel):
     """Settings of single axes, by name."""
     push: list[Push] = Field(default_factory=list)
     swing: list[Swing] = Field(default_factory=list)
-    pivot: list[Pivot] = Field(default_factory=list)
     metrics: MetricsSettings = Field(default_factory=MetricsSettings)
     compare: Annotated[CompareSettings | None, NoEffect()] = None
     """Written by `cmg-mj compare`, so that its scenario runs to the same comparison."""
@@ -223,7 +223,28 @@ class Scenario(BaseModel):
     """Bundled scenario that this one changes; folder names, titles and summaries say so."""
     versions: Annotated[dict[str, str], NoEffect()] = Field(default_factory=dict)
     """Versions of the packages of a run; the run writes this field, and no command reads it."""
+
+
+_OF_FEATURES: dict[str, Any] = {
+    name: (list[cls], Field(default_factory=list)) if FEATURES[name].is_list else (cls, Field(default_factory=cls))
+    for name, cls in entries("section").items()
+}
+
+
+class Scenario(create_model("Scenario", __base__=Sections, **_OF_FEATURES)):
+    """One experiment."""
+
     _source: str = PrivateAttr("")
+
+    def section(self, feature: str) -> Any:
+        """The settings of a feature; of one that may have several sections a list."""
+        return getattr(self, feature)
+
+    @property
+    def feature_sections(self) -> dict[str, list[Section]]:
+        """The settings of all features, by name."""
+        sections = {name: getattr(self, name) for name in _OF_FEATURES}
+        return {name: section if isinstance(section, list) else [section] for name, section in sections.items()}
 
     @property
     def source(self) -> str:

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.sensor import whole_steps
-from cmg_mj.inputs.types import OnGrid, marked_values
+from cmg_mj.inputs.types import Held, OnGrid, Start, marked_values
 from cmg_mj.scenario.schema import Scenario
 
 FINEST_S = 1e-4
@@ -112,27 +112,15 @@ def time_grid(scenario: Scenario) -> TimeGrid:
         grid.physics_step(timestep)
         for time in _grid_times(scenario):
             time.check(timestep)
-    for i, swing in enumerate(scenario.swing):
-        if swing.frequency_hz > control / SWING_SHARE:
+    for field, frequency, mark in marked_values(scenario, Held):
+        if frequency and frequency > control / SWING_SHARE:
             raise InputError(
-                f"swing.{i}.frequency_hz = {swing.frequency_hz:g}: the torque is held from sample to sample; at most "
+                f"{field} = {frequency:g}: the {mark.what} is held from sample to sample; at most "
                 f"{control / SWING_SHARE:g} Hz at controller.rate_hz = {control:g}"
             )
-    for i, pivot in enumerate(scenario.pivot):
-        for field in ("frequency_hz", "corner_hz"):
-            frequency = getattr(pivot, field)
-            if frequency and frequency > control / SWING_SHARE:
-                raise InputError(
-                    f"pivot.{i}.{field} = {frequency:g}: the acceleration is held from sample to sample; at most "
-                    f"{control / SWING_SHARE:g} Hz at controller.rate_hz = {control:g}"
-                )
-    for name, events in (("push", scenario.push), ("swing", scenario.swing), ("pivot", scenario.pivot)):
-        for i, event in enumerate(events):
-            if event.start_s >= duration:
-                raise InputError(
-                    f"{name}.{i}.start_s = {event.start_s:g}: must be less than duration_s = {duration:g}, "
-                    "where the run ends"
-                )
+    for field, start, _ in marked_values(scenario, Start):
+        if start >= duration:
+            raise InputError(f"{field} = {start:g}: must be less than duration_s = {duration:g}, where the run ends")
     return grid
 
 

@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 from cmg_mj.core.arrays import Scalar, where
 from cmg_mj.core.outside import Outside
 from cmg_mj.core.sensor import whole_steps
-from cmg_mj.inputs.types import STRICT, Batched, GridDuration, GridInstant
+from cmg_mj.inputs.types import STRICT, Batched, GridDuration, GridInstant, Section, Start
 
 AFTER_PUSH_S = 1.0
 """Estimates are judged from a push's start until so long after its end [s]: at other times the rig hardly
@@ -22,7 +22,7 @@ Window = tuple[float, float]
 
 
 @dataclass(frozen=True, config=STRICT)
-class Push:
+class Push(Section):
     """A constant torque about the tilt axis for a while.
 
     Attributes:
@@ -32,7 +32,7 @@ class Push:
         axis: Name of the tilt axis, on a rig of several axes.
     """
 
-    start_s: GridInstant
+    start_s: Annotated[GridInstant, Section, Start()]
     duration_s: GridDuration = 0.1
     torque_n_m: Annotated[float, Batched()] = 1.0
     axis: str | None = None
@@ -51,6 +51,8 @@ class Pushes:
         timestep: Physics step [s].
         axes: The axes' names.
     """
+
+    accelerates = False
 
     def __init__(self, pushes: Sequence[Push], timestep: float, axes: Sequence[str]) -> None:
         self._changes: dict[int, list[Scalar]] = {}

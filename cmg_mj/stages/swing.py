@@ -11,11 +11,11 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.outside import Outside
-from cmg_mj.inputs.types import STRICT, Duration, Instant
+from cmg_mj.inputs.types import STRICT, Duration, Held, Instant, Section, Start
 
 
 @dataclass(frozen=True, config=STRICT)
-class Swing:
+class Swing(Section):
     """A sinusoidal torque about the tilt axis, such as a gait's. Each sample holds the value at its middle.
 
     Attributes:
@@ -27,10 +27,10 @@ class Swing:
         axis: Name of the tilt axis, on a rig of several axes.
     """
 
-    frequency_hz: Annotated[float, Field(gt=0.0, le=20.0)]
+    frequency_hz: Annotated[float, Field(gt=0.0, le=20.0), Held("torque")]
     amplitude_n_m: float = 0.5
     phase_deg: float = 0.0
-    start_s: Instant = 0.0
+    start_s: Annotated[Instant, Section, Start()] = 0.0
     duration_s: Duration | None = None
     axis: str | None = None
 
@@ -52,6 +52,7 @@ class Swings:
     """
 
     edges: Collection[int] = ()
+    accelerates = False
 
     def __init__(self, swings: Sequence[Swing], timestep: float, axes: Sequence[str]) -> None:
         self._swings, self._timestep, self._axes = swings, timestep, axes

@@ -25,8 +25,8 @@ RATES = {
 """Whose rate the law uses, and the settings for that."""
 NO_RATE = ["controller.gains=[35.0, 0.0, -1.0, 0.3]"]
 PLACES = {
-    "mast": ["plant.bend_beyond=sensors", "plant.bend_share=0.2"],
-    "base": ["plant.bend_beyond=both", "plant.bend_share=0.5"],
+    "mast": ["bend.beyond=sensors", "bend.share=0.2"],
+    "base": ["bend.beyond=both", "bend.share=0.5"],
 }
 LOW_BANDWIDTH = "controller.lqr={state_cost=[405.6, 2.26, 0.223, 0.096], input_cost=10.0}"
 CURES = {
@@ -50,7 +50,7 @@ def cell(job: tuple[Sequence[str], int]) -> str:
 
 def bend(hz: float, place: str) -> list[str]:
     """The settings of a bend."""
-    return [f"plant.bend_frequency_hz={hz:g}", *PLACES[place]]
+    return [f"bend.frequency_hz={hz:g}", *PLACES[place]]
 
 
 Row = tuple[str, list[tuple[Sequence[str], int]]]
@@ -95,7 +95,7 @@ def border() -> None:
     print("| loop | bend [Hz] | check | nearest to -1 | simulation |")
     for name, (settings, frequencies) in NEAR_THE_BORDER.items():
         for hz in frequencies:
-            changes = [f"plant.bend_frequency_hz={hz:g}", *(setting.replace("{hz}", f"{hz:g}") for setting in settings)]
+            changes = [f"bend.frequency_hz={hz:g}", *(setting.replace("{hz}", f"{hz:g}") for setting in settings)]
             experiment = prepare(load_scenario("push_recovery", ["duration_s=12.0", "seed=23", *changes]))
             trial = judge_bend(experiment.design, experiment.plant)
             assert trial is not None

@@ -106,9 +106,9 @@ def grid() -> list[Cell]:
     for rms in (0.05, 0.2, 0.5):
         cells += [pivot("noise", rms, corner) for corner in (1.0, 5.0, 15.0)]
         cells += [pivot("sine", rms, frequency) for frequency in (1.0, 3.0, 10.0)]
-    mast = "plant.bend_beyond=sensors", "plant.bend_share=0.2"
+    mast = "bend.beyond=sensors", "bend.share=0.2"
     for hz in (10.0, 20.0, 40.0):
-        settings = (f"plant.bend_frequency_hz={hz}", *mast)
+        settings = (f"bend.frequency_hz={hz}", *mast)
         cells.append(Cell(f"bend of {hz:g} Hz", settings, loop=(f"controller.notch_hz={hz}",)))
     return cells
 

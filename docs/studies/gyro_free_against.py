@@ -74,11 +74,11 @@ def pivots() -> Iterator[Case]:
 def bends() -> Iterator[Case]:
     """Yield frames that bend: a fifth of the inertia on a mast with the sensors, or half of it above a base."""
     for frequency_hz in (8, 10, 14, 20, 40):
-        mast = (f"plant.bend_frequency_hz={frequency_hz}", "plant.bend_share=0.2", "plant.bend_beyond=sensors")
+        mast = (f"bend.frequency_hz={frequency_hz}", "bend.share=0.2", "bend.beyond=sensors")
         yield Case(f"mast of {frequency_hz} Hz", mast)
         if frequency_hz <= 20:
             yield Case(f"mast of {frequency_hz} Hz, notch", (*mast, f"controller.notch_hz={frequency_hz}"))
-    base = ("plant.bend_frequency_hz=10", "plant.bend_share=0.5", "plant.bend_beyond=both")
+    base = ("bend.frequency_hz=10", "bend.share=0.5", "bend.beyond=both")
     yield Case("base of 10 Hz", base)
     yield Case("base of 10 Hz, notch", (*base, "controller.notch_hz=10"))
 

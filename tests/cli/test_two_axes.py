@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj import InputError, load_plant
+from cmg_mj import InputError, controller, load_plant
 from cmg_mj.results.summary_keys import AXES, KEYS
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -260,10 +260,10 @@ def test_in_a_loop_of_ones_own() -> None:
 
     rig = load_plant(model="two_axes", equilibrium_bias_deg=0.3, turn_rate_rad_s=1.0)
     law = StateFeedback(dt=0.005, gains=(71.9, 9.54, -0.862, 0.223))
-    controller = rig.multi_axis_controller("gyro_free", seed=3, law=law)
+    made = controller(rig, "gyro_free", seed=3, law=law)
     data = rig.new_data()
     while data.time < 3.0:
-        control(rig, controller, data)
+        control(rig, made, data)
         mujoco.mj_step(rig.model, data)
     assert abs(rig.largest_tilt(data.qpos)) < 0.03
-    assert len(controller.parts) == 2
+    assert len(made.parts) == 2

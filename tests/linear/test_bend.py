@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from cmg_mj import Experiment, load_scenario, prepare
+from cmg_mj.features.bend import Bend
 from cmg_mj.features.bend.verdict import BentVerdict, judge_bend
 from cmg_mj.linear.plant import linearise
 from cmg_mj.linear.verdict import Verdict, margins
 from cmg_mj.plant.plant import load_plant
 from tests.command import cmg_mj
 
-MAST = ["plant.bend_beyond=sensors", "plant.bend_share=0.2", "observer.kind=gyro_free"]
+MAST = ["bend.beyond=sensors", "bend.share=0.2", "observer.kind=gyro_free"]
 QUIET = [
     *("plant.equilibrium_bias_deg=0", "plant.initial_tilt_deg=0.02", "push=[]", "open_loop_observers=[]"),
     *("sensors.accelerometer.noise_density_ug_rthz=0", "sensors.accelerometer.counts_per_g=0"),
@@ -38,7 +39,7 @@ def verdict_of(*settings: str) -> BentVerdict:
 @pytest.mark.parametrize(("hz", "is_stable", "distance"), [(22, False, None), (24, True, 0.112)])
 def test_a_mast_near_the_border_is_what_the_simulation_does(hz: int, is_stable: bool, distance: float | None) -> None:
     """The mode at the dominant pole grows or decays in MuJoCo as that pole says."""
-    settings = [f"plant.bend_frequency_hz={hz}", *MAST]
+    settings = [f"bend.frequency_hz={hz}", *MAST]
     verdict = verdict_of(*settings)
     assert verdict.is_stable == is_stable
     assert verdict.distance == (None if distance is None else pytest.approx(distance, abs=1e-3))
@@ -64,7 +65,7 @@ def test_a_mast_near_the_border_is_what_the_simulation_does(hz: int, is_stable: 
 
 
 def test_the_plant_with_its_bend_held_is_the_rigid_plant() -> None:
-    bent, rigid = linearise(load_plant(bend_frequency_hz=20.0), rigid=True), linearise(load_plant())
+    bent, rigid = linearise(load_plant(sections={"bend": Bend(20.0)}), rigid=True), linearise(load_plant())
     for hz in (0.7, 3.0, 8.0, 19.0, 33.0):
         s = 2j * math.pi * hz
         answers = [plant.C @ np.linalg.solve(s * np.eye(len(plant.A)) - plant.A, plant.B) for plant in (bent, rigid)]
@@ -86,12 +87,12 @@ def test_margins_are_those_of_an_integrator_behind_a_delay() -> None:
 @pytest.mark.parametrize("rate", ["fog", "homogeneous", "gyro_free"])
 @pytest.mark.parametrize("notched", [False, True])
 def test_its_verdict_is_that_of_the_simulation(hz: float, place: str, rate: str, notched: bool) -> None:
-    settings = [f"plant.bend_frequency_hz={hz}", f"plant.bend_beyond={place}", "plant.bend_share=0.5"]
+    settings = [f"bend.frequency_hz={hz}", f"bend.beyond={place}", "bend.share=0.5"]
     settings += ["controller.feedback=fog"] if rate == "fog" else [f"observer.kind={rate}"]
     settings += [f"controller.notch_hz={hz}"] if notched else []
     verdict = verdict_of(*settings)
     bending, rigid = (
-        experiment("duration_s=6.0", *settings, *more).run_many(3) for more in ([], ["plant.bend_frequency_hz=0"])
+        experiment("duration_s=6.0", *settings, *more).run_many(3) for more in ([], ["bend.frequency_hz=0"])
     )
     commands = [result.mean("command_rms_rad_s") or math.inf for result in (bending, rigid)]
     swings = bool(bending.fell.any()) or commands[0] > 1.2 * commands[1]
@@ -101,11 +102,11 @@ def test_its_verdict_is_that_of_the_simulation(hz: float, place: str, rate: str,
 
 @pytest.mark.usefixtures("elsewhere")
 def test_check_and_hints_say_what_the_bend_does() -> None:
-    Path("bend.toml").write_text('[plant]\nbend_frequency_hz = 20\n[observer]\nkind = "gyro_free"\n')
+    Path("bend.toml").write_text('[bend]\nfrequency_hz = 20\n[observer]\nkind = "gyro_free"\n')
     out = cmg_mj("check", "bend.toml").out
     assert "UNSTABLE" in out
-    assert "hint        plant.bend_frequency_hz = 20" in out
-    assert "UNSTABLE (with a rigid frame: UNSTABLE)" in verdict_of("plant.bend_frequency_hz=20", *SLOW).words
+    assert "hint        bend.frequency_hz = 20" in out
+    assert "UNSTABLE (with a rigid frame: UNSTABLE)" in verdict_of("bend.frequency_hz=20", *SLOW).words
 
 
 SLOW = ["observer.kind=linear", "observer.tau=0.3"]

@@ -31,7 +31,7 @@ def decay_of(*settings: str, scenario: str = "push_recovery") -> Decay:
 
 
 def test_a_rig_without_gains_falls() -> None:
-    assert decay_of("plant.bend_frequency_hz=20", "controller.gains=[0, 0, 0, 0]") == ("falls", "falls")
+    assert decay_of("bend.frequency_hz=20", "controller.gains=[0, 0, 0, 0]") == ("falls", "falls")
 
 
 @pytest.mark.slow
@@ -40,7 +40,7 @@ def test_a_rig_without_gains_falls() -> None:
 def test_with_the_true_rate_it_is_the_spectral_radius(hz: float, gain: float) -> None:
     """One sample of the linear closed loop as a matrix, of the plant and the integrator."""
     gains = [gain * k for k in (35.0, 4.0, -1.0, 0.3)]
-    settings = [f"plant.bend_frequency_hz={hz}", "controller.feedback=truth", f"controller.gains={gains}"]
+    settings = [f"bend.frequency_hz={hz}", "controller.feedback=truth", f"controller.gains={gains}"]
     subject = experiment(*settings)
     bend, law = linearise(subject.plant), subject.law
     assert isinstance(law, StateFeedback)
@@ -60,7 +60,7 @@ CASES = {
     "gyro_free": GYRO_FREE,
     "gyro_free, estimated angle": [*GYRO_FREE, "controller.angle_source=estimated"],
     "gyro_free, notch": [*GYRO_FREE, "controller.notch_hz={hz}"],
-    "gyro_free, base": [*GYRO_FREE, "plant.bend_beyond=both", "plant.bend_share=0.5"],
+    "gyro_free, base": [*GYRO_FREE, "bend.beyond=both", "bend.share=0.5"],
     "linear, slow": SLOW,
     "luenberger": ["observer.kind=luenberger"],
     "luenberger, no bias": ["observer.kind=luenberger", "plant.equilibrium_bias_deg=0"],
@@ -79,17 +79,17 @@ CASES = {
 def test_it_is_what_the_simulation_does(hz: int, name: str) -> None:
     """Stable is who neither falls nor swings in 12 s; a quiet loop's command has 0.3 to 0.8 rad/s."""
     settings = [setting.replace("{hz}", f"{hz or 20}") for setting in CASES[name]]
-    subject = experiment(*settings, f"plant.bend_frequency_hz={hz}", "duration_s=12")
+    subject = experiment(*settings, f"bend.frequency_hz={hz}", "duration_s=12")
     worlds = subject.run_many(2)
     swings = bool(worlds.fell.any()) or (worlds.mean("command_rms_rad_s") or 0.0) > 1.0
-    motions = decay_of(*settings, f"plant.bend_frequency_hz={hz or 20}")
+    motions = decay_of(*settings, f"bend.frequency_hz={hz or 20}")
     assert ((motions.bending if hz else motions.rigid) != "decays") == swings
 
 
 @pytest.mark.slow
 def test_a_motion_that_only_its_size_fells_is_told_apart() -> None:
     """`luenberger` takes the gimbals' angle for small, and falls by bias and push together, whatever the frame."""
-    settings = ["plant.bend_frequency_hz=20", "observer.kind=luenberger"]
+    settings = ["bend.frequency_hz=20", "observer.kind=luenberger"]
     assert decay_of(*settings) == ("decays if small", "decays if small")
     assert decay_of(*settings, "push=[]") == ("decays", "decays")
     assert experiment("observer.kind=luenberger", "duration_s=6").run().fell.all()
@@ -101,7 +101,7 @@ def test_a_motion_that_only_its_size_fells_is_told_apart() -> None:
 def test_the_push_that_fells_it_is_the_simulations(torque: float, stands: bool) -> None:
     """The accelerometers show a push at once: an observer that uses them is not late."""
     settings = ["observer.kind=gyro_free", f"push.0.torque_n_m={torque}"]
-    assert decay_of(*settings, "plant.bend_frequency_hz=60", "plant.bend_share=0.02").rigid == (
+    assert decay_of(*settings, "bend.frequency_hz=60", "bend.share=0.02").rigid == (
         "decays" if stands else "decays if small"
     )
     assert (not experiment(*settings, "duration_s=8").run_many(2).fell.any()) == stands
@@ -109,7 +109,7 @@ def test_the_push_that_fells_it_is_the_simulations(torque: float, stands: bool) 
 
 @pytest.mark.slow
 def test_sensors_that_are_late_are_in_the_loop() -> None:
-    settings = ["plant.bend_frequency_hz=20", "observer.kind=gyro_free", "controller.notch_hz=20"]
+    settings = ["bend.frequency_hz=20", "observer.kind=gyro_free", "controller.notch_hz=20"]
     assert decay_of(*settings) == ("decays", "decays")
     assert decay_of(*settings, "sensors.accelerometer.bandwidth_hz=44").rigid == "decays"
     assert decay_of(*settings, "sensors.accelerometer.latency_s=0.06").rigid == "swings"
@@ -120,20 +120,20 @@ def test_sensors_that_are_late_are_in_the_loop() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("hz", "bending"), [(16.5, "swings"), (17.0, "swings"), (17.5, "decays")])
 def test_a_mode_that_grows_by_a_thirtieth_in_a_second_is_unstable(hz: float, bending: str) -> None:
-    settings = ["observer.kind=kalman", "plant.bend_beyond=both", "plant.bend_share=0.5"]
-    assert decay_of(f"plant.bend_frequency_hz={hz}", *settings) == (bending, "decays")
+    settings = ["observer.kind=kalman", "bend.beyond=both", "bend.share=0.5"]
+    assert decay_of(f"bend.frequency_hz={hz}", *settings) == (bending, "decays")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", [1, 5])
 def test_a_control_rate_that_is_far_too_low(rate: int) -> None:
-    assert decay_of("plant.bend_frequency_hz=10", f"controller.rate_hz={rate}") == ("falls", "falls")
+    assert decay_of("bend.frequency_hz=10", f"controller.rate_hz={rate}") == ("falls", "falls")
 
 
 @pytest.mark.slow
 def test_a_swing_far_below_the_noise_is_rest() -> None:
     """`homogeneous` ends in one of 0.004 rad/s there; noise causes 0.05 rad/s."""
-    settings = ["plant.bend_frequency_hz=20", "plant.bend_beyond=both", "plant.bend_share=0.5"]
+    settings = ["bend.frequency_hz=20", "bend.beyond=both", "bend.share=0.5"]
     subject = prepare(load_scenario("single_gimbal", settings))
     assert decay_of(*settings, scenario="single_gimbal") == ("decays", "decays")
     assert (subject.run_many(2).mean("command_rms_rad_s") or 0.0) < 0.5

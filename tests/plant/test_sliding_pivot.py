@@ -12,11 +12,11 @@ import pytest
 
 from cmg_mj import mount
 from cmg_mj.core.errors import InputError
+from cmg_mj.features.bend import Bend, BendBeyond
 from cmg_mj.features.mounting.largest_push import ReducedPhysics
 from cmg_mj.linear.plant import linearise
 from cmg_mj.plant.elements import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.scenario.plant_settings import BendBeyond
 from tests.features.bend.test_bend import frequency, ring
 from tests.features.mounting.push_robots import cart_pole
 
@@ -32,7 +32,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Plant:
 @pytest.fixture(scope="module")
 def known(plant: Plant) -> Plant:
     """The cart again, whose tilt estimate knows that the pivot slides."""
-    return plant.changed(dataclasses.replace(plant.settings, pivot_slides=True))
+    return plant.with_settings(dataclasses.replace(plant.settings, pivot_slides=True))
 
 
 def cart(folder: Path, damping: float = 0.0, wheel_speed: float = 314.0) -> Plant:
@@ -103,8 +103,7 @@ def test_y1_of_a_frame_that_bends_on_a_cart_is_mujocos(
 ) -> None:
     """The output matrix against differences of what perfect accelerometers show, state by state."""
     settings = dataclasses.replace(plant.settings, pivot_slides=slides, tilt_damping_n_m_s=0.0)
-    bend = {"bend_frequency_hz": 20.0, "bend_beyond": beyond, "bend_share": share, "bend_damping_ratio": 0.0}
-    bending = load_plant(dataclasses.replace(settings, **bend))
+    bending = load_plant(settings, sections={"bend": Bend(20.0, 0.0, share, beyond)})
     model = bending.model
     y1 = linearise(bending).C[3]
 
@@ -181,7 +180,7 @@ def test_the_tilt_is_taken_about_the_mass_centre(plant: Plant, known: Plant) -> 
 def test_a_pivot_at_rest_is_what_it_was(model: str) -> None:
     """Its arm is exactly zero, its accelerometers' tilt that of the file; to say that it slides is a mistake."""
     plant = load_plant(model=model)
-    for axis, filed in zip(plant.axes, plant._axes_as_filed, strict=True):
+    for axis, filed in zip(plant.axes, plant.filed.axes, strict=True):
         assert axis.reduced.pivot_arm == 0.0
         assert axis.radial_tilt is filed.radial_tilt
         assert axis.reduced.measured_tilt(0.0, plant.gravity) == (1.0, 0.0)

@@ -163,8 +163,8 @@ def test_wheels_keep_their_speed_in_a_run() -> None:
 
 def test_changed_back_it_is_the_rig_it_was() -> None:
     plant = load_plant()
-    slow = plant.changed(PlantSettings(flywheel_speed_rad_s=100.0))
-    back = slow.changed(PlantSettings())
+    slow = plant.with_settings(PlantSettings(flywheel_speed_rad_s=100.0))
+    back = slow.with_settings(PlantSettings())
     assert (back.axis.modules, back.reduced) == (plant.axis.modules, plant.reduced)
     assert slow.reduced.omega_d == pytest.approx(100.0)
     np.testing.assert_array_equal(back.model.key_qvel, plant.model.key_qvel)
@@ -250,7 +250,10 @@ def test_one_of_them_alone() -> None:
     radial_tilt = load_plant().radial_tilt
     assert load_plant(accelerometer_outer_m=OUTER).radial_tilt == RadialTilt(radial_tilt.r_inner, OUTER)
     assert (
-        load_plant().changed(PlantSettings(accelerometer_inner_m=INNER)).changed(PlantSettings()).radial_tilt
+        load_plant()
+        .with_settings(PlantSettings(accelerometer_inner_m=INNER))
+        .with_settings(PlantSettings())
+        .radial_tilt
         == radial_tilt
     )
 

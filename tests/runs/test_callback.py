@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from mujoco import rollout
 
+import cmg_mj
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.reduced_model import ReducedModel
@@ -368,7 +369,7 @@ def test_rollout_runs_the_callback() -> None:
     full = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
     start = np.zeros(mujoco.mj_stateSize(plant.model, full))
     mujoco.mj_getState(plant.model, plant.new_data(), start, full)
-    with control_callback(plant, plant.controller("ltv")):
+    with control_callback(plant, cmg_mj.controller(plant, "ltv")):
         states, _ = rollout.rollout(plant.model, mujoco.MjData(plant.model), start[None], nstep=2000)
     lean = states[0, :, 1 + plant.tilt] - plant.tilt_zero  # after the time
     assert np.abs(np.degrees(lean)).max() < 3.0
@@ -379,7 +380,7 @@ def test_rollout_runs_the_callback() -> None:
 
 def test_leaving_steps_out_is_said() -> None:
     plant = load_plant(timestep_s=0.001)
-    controller, data = plant.controller("linear"), plant.new_data()
+    controller, data = cmg_mj.controller(plant, "linear"), plant.new_data()
     for _ in range(5):  # steps 0, 2, 4, 6, 8: step 5 is left out
         control(plant, controller, data)
         mujoco.mj_step(plant.model, data, 2)
@@ -389,7 +390,7 @@ def test_leaving_steps_out_is_said() -> None:
 
 def test_a_reset_in_a_users_own_loop_restarts_the_controller() -> None:
     plant = load_plant()
-    controller, data = plant.controller("linear", seed=4), plant.new_data()
+    controller, data = cmg_mj.controller(plant, "linear", seed=4), plant.new_data()
     ends = []
     for _ in range(2):
         plant.initialise(data)
@@ -402,7 +403,7 @@ def test_a_reset_in_a_users_own_loop_restarts_the_controller() -> None:
 
 def test_a_start_between_two_samples_of_a_slow_sensor() -> None:
     plant = load_plant()
-    controller = plant.controller("linear", sensors=Sensors(accelerometer=Accelerometer(rate_hz=100.0)))
+    controller = cmg_mj.controller(plant, "linear", sensors=Sensors(accelerometer=Accelerometer(rate_hz=100.0)))
     data = plant.new_data()
     data.time = 0.005
     assert control(plant, controller, data)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, welch
 
+import cmg_mj
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import NoiseStream
@@ -349,5 +350,5 @@ def test_a_controller_of_ones_own_is_refused_what_does_not_fit() -> None:
     plant = load_plant()
     for name, sensor in (("skew_s", Accelerometer(skew_s=0.0021)), ("bandwidth_hz", Accelerometer(bandwidth_hz=94.0))):
         with pytest.raises(InputError, match=rf"sensors\.accelerometer\.{name} = .*not a whole number"):
-            plant.controller(sensors=Sensors(accelerometer=sensor))
-    assert isinstance(plant.controller(sensors=Sensors(accelerometer=Accelerometer(skew_s=0.005))), Controller)
+            cmg_mj.controller(plant, sensors=Sensors(accelerometer=sensor))
+    assert isinstance(cmg_mj.controller(plant, sensors=Sensors(accelerometer=Accelerometer(skew_s=0.005))), Controller)

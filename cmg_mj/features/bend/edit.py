@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,9 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.plant.axis import Axis, find_axis
-from cmg_mj.plant.elements import BEND_JOINT, EQUILIBRIUM_KEY, SENSORS, element_id, joint_sizes
+from cmg_mj.features.bend import Bend
+from cmg_mj.plant.axis import Axis, ResolvedModel
+from cmg_mj.plant.elements import BEND_JOINT, SENSORS, element_id, joint_sizes
 from cmg_mj.plant.inertia import free_motions
 from cmg_mj.plant.mujoco_state import at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine
@@ -28,12 +29,8 @@ RIGID_SHARE = 0.999
 
 
 def bend_frame(
-    spec: mujoco.MjSpec,
-    rigid: mujoco.MjModel,
-    settings: PlantSettings,
-    axes: Mapping[str, Sequence[str]],
-    path: Path,
-) -> None:
+    spec: mujoco.MjSpec, rig: ResolvedModel, settings: PlantSettings, section: Bend
+) -> Callable[[mujoco.MjModel], None] | None:
     """Split the body that tilts in two, joined by a spring and a damper about the tilt axis.
 
     The modules stay on the body that has the tilt's joint. The other part is a new body with a share of that body's
@@ -41,20 +38,25 @@ def bend_frame(
 
     Args:
         spec: The parsed rig, which is changed.
-        rigid: The rig, compiled.
-        settings: The mode.
-        axes: The axes that are not locked, each with its modules.
-        path: The file, for messages.
+        rig: The rig, compiled.
+        settings: The plant's settings.
+        section: The mode.
+
+    Returns:
+        What gives the compiled model, and the joint of the parsed one, the spring and the damper; None for a rigid
+        frame.
 
     Raises:
         InputError: The rig has several axes or does not tilt about a hinge of its frame, the frame has not so much
             inertia to share, or that hinge has friction or a spring which would act beyond the bend.
     """
-    key = element_id(rigid, "key", EQUILIBRIUM_KEY)
-    axis, line = _axis_to_bend(rigid, key, settings, axes, path)
-    if settings.bend_beyond != "sensors":
-        _refuse_torques_of_hinge(rigid, line, settings, path)
-    part = _leaf_part(rigid, key, axis.frame, line, settings, path)
+    if not section.frequency_hz:
+        return None
+    rigid, key, path = rig.model, rig.key, rig.path
+    axis, line = _axis_to_bend(rig, section)
+    if section.beyond != "sensors":
+        _refuse_torques_of_hinge(rigid, line, settings, section, path)
+    part = _leaf_part(rigid, key, axis.frame, line, section, path)
     frame = next(body for body in spec.bodies if body.name == rigid.body(axis.frame).name)
     leaf = frame.add_body(name=BEND_JOINT)
     for body, share in ((frame, 1.0 - part), (leaf, part)):
@@ -66,30 +68,33 @@ def bend_frame(
     joint = leaf.add_joint(name=BEND_JOINT, type=hinge, pos=axis.point, axis=axis.direction)
     joint.limited, joint.armature, joint.frictionloss = mujoco.mjtLimited.mjLIMITED_FALSE, 0.0, 0.0
     joint.stiffness, joint.damping = np.zeros(3), np.zeros(3)
-    if settings.bend_beyond != "both":
+    if section.beyond != "both":
         _move_sites(spec, rigid, leaf, axis.prefix)
     _extend_keyframes(spec)
-    inertia = mode_inertia(spec.compile(), key, line, slides=axis.reduced.pivot_arm > 0.0)
-    omega = 2.0 * math.pi * settings.bend_frequency_hz
-    joint.stiffness[0] = inertia * omega**2
-    joint.damping[0] = 2.0 * settings.bend_damping_ratio * inertia * omega
+
+    def finish(model: mujoco.MjModel) -> None:
+        inertia = mode_inertia(model, key, line, slides=axis.reduced.pivot_arm > 0.0)
+        omega = 2.0 * math.pi * section.frequency_hz
+        joint.stiffness[0] = inertia * omega**2
+        joint.damping[0] = 2.0 * section.damping_ratio * inertia * omega
+        bend = model.joint(BEND_JOINT)
+        model.jnt_stiffness[bend.id] = joint.stiffness[0]
+        model.dof_damping[bend.dofadr[0]] = joint.damping[0]
+
+    return finish
 
 
-def _axis_to_bend(
-    rigid: mujoco.MjModel, key: int, settings: PlantSettings, axes: Mapping[str, Sequence[str]], path: Path
-) -> tuple[Axis, HingeLine]:
+def _axis_to_bend(rig: ResolvedModel, section: Bend) -> tuple[Axis, HingeLine]:
     """Find the only axis and its hinge, or say why the rig cannot bend."""
-    setting = f"plant.bend_frequency_hz = {settings.bend_frequency_hz:g}: {path}"
-    if len(axes) > 1:
-        last = list(axes)[-1]
+    setting, rigid = f"bend.frequency_hz = {section.frequency_hz:g}: {rig.path}", rig.model
+    if len(rig.axes) > 1:
         raise InputError(
             f"{setting} tilts about several axes, and a bend takes one; lock the others, as with "
-            f'--set plant.locked_axes=["{last}"]'
+            f'--set plant.locked_axes=["{rig.axes[-1].name}"]'
         )
     if element_id(rigid, "joint", BEND_JOINT) >= 0 or element_id(rigid, "body", BEND_JOINT) >= 0:
         raise InputError(f"{setting} has a body or joint {BEND_JOINT!r} already, which is what a bend adds")
-    (name, modules), *_ = axes.items()
-    axis = find_axis(rigid, key, name, modules)
+    (axis,) = rig.axes
     if not isinstance(axis.line, HingeLine) or int(rigid.jnt_bodyid[axis.line.joint]) != axis.frame:
         raise InputError(
             f"{setting} does not tilt about a hinge of the body that carries its sensors; a bend takes one"
@@ -97,9 +102,11 @@ def _axis_to_bend(
     return axis, axis.line
 
 
-def _refuse_torques_of_hinge(rigid: mujoco.MjModel, line: HingeLine, settings: PlantSettings, path: Path) -> None:
+def _refuse_torques_of_hinge(
+    rigid: mujoco.MjModel, line: HingeLine, settings: PlantSettings, section: Bend, path: Path
+) -> None:
     """Refuse what the model's file has at the tilt's hinge, which would act on the modules, beyond the bend."""
-    # The settings' own friction and damping replace the file's; `step_for_bend` refuses those.
+    # The settings' own friction and damping replace the file's; `limit_step` refuses those.
     torques = {
         "damping": settings.tilt_damping_n_m_s is None and rigid.dof_damping[line.dof],
         "frictionloss": settings.tilt_friction_n_m is None and rigid.dof_frictionloss[line.dof],
@@ -111,16 +118,17 @@ def _refuse_torques_of_hinge(rigid: mujoco.MjModel, line: HingeLine, settings: P
     for attribute, acts in torques.items():
         if acts:
             raise InputError(
-                f"plant.bend_beyond = {settings.bend_beyond!r}: {path}: the {attribute} of joint "
+                f"bend.beyond = {section.beyond!r}: {path}: the {attribute} of joint "
                 f"{rigid.joint(line.joint).name!r} would act on the part with the modules, beyond the bend; "
-                f"{cures.get(attribute, 'take it out of the file')}, or take plant.bend_beyond=sensors"
+                f"{cures.get(attribute, 'take it out of the file')}, or take bend.beyond=sensors"
             )
 
 
-def step_for_bend(settings: PlantSettings, step: float, path: Path) -> float:
+def limit_step(section: Bend, settings: PlantSettings, step: float, path: Path) -> float:
     """Return the longest physics step that follows the mode, and settings that go together with it.
 
     Args:
+        section: The mode.
         settings: The plant's settings.
         step: The longest step without a bend [s].
         path: The model's file, for messages.
@@ -132,10 +140,10 @@ def step_for_bend(settings: PlantSettings, step: float, path: Path) -> float:
         InputError: A step is named that does not follow the mode, an integrator that does not, or friction of a tilt
             joint that is beyond the bend.
     """
-    if not settings.bends:
+    if not section.frequency_hz:
         return step
-    hz = f"{settings.bend_frequency_hz:g}"
-    longest = STEP_SHARE / (2.0 * math.pi * settings.bend_frequency_hz)
+    hz = f"{section.frequency_hz:g}"
+    longest = STEP_SHARE / (2.0 * math.pi * section.frequency_hz)
     if settings.timestep_s is not None and settings.timestep_s > longest * (1.0 + 1e-9):
         raise InputError(
             f"plant.timestep_s = {settings.timestep_s:g}: does not follow a bend of {hz} Hz, which takes at most "
@@ -143,15 +151,14 @@ def step_for_bend(settings: PlantSettings, step: float, path: Path) -> float:
         )
     if settings.integrator != "RK4":
         raise InputError(
-            f"plant.integrator = {settings.integrator!r}: follows no bend (plant.bend_frequency_hz = {hz}) to 0.1 %; "
-            "take RK4"
+            f"plant.integrator = {settings.integrator!r}: follows no bend (bend.frequency_hz = {hz}) to 0.1 %; take RK4"
         )
     for name in ("tilt_friction_n_m", "tilt_damping_n_m_s"):
         value = getattr(settings, name)
-        if value and settings.bend_beyond != "sensors":
+        if value and section.beyond != "sensors":
             raise InputError(
                 f"plant.{name} = {value:g}: {path}: acts on the part with the modules, which lies beyond the bend with "
-                f"plant.bend_beyond = {settings.bend_beyond!r}; leave it out, or take plant.bend_beyond = 'sensors'"
+                f"bend.beyond = {section.beyond!r}; leave it out, or take bend.beyond = 'sensors'"
             )
     return min(step, longest)
 
@@ -176,9 +183,7 @@ def mode_inertia(model: mujoco.MjModel, key: int, line: HingeLine, *, slides: bo
     return float(1.0 / np.linalg.inv(dense[np.ix_(dofs, dofs)])[1, 1])
 
 
-def _leaf_part(
-    rigid: mujoco.MjModel, key: int, frame: int, line: HingeLine, settings: PlantSettings, path: Path
-) -> float:
+def _leaf_part(rigid: mujoco.MjModel, key: int, frame: int, line: HingeLine, section: Bend, path: Path) -> float:
     """Part of the frame's own inertia and mass that goes to the new body."""
     data = at_keyframe(rigid, key)
     dense = np.zeros((rigid.nv, rigid.nv))
@@ -187,13 +192,13 @@ def _leaf_part(
     turn = data.ximat[frame].reshape(3, 3).T @ data.xaxis[line.joint]
     arm = np.cross(data.xaxis[line.joint], data.xipos[frame] - data.xanchor[line.joint])
     own = float(rigid.body_inertia[frame] @ turn**2 + rigid.body_mass[frame] * arm @ arm)
-    is_mast = settings.bend_beyond == "sensors"
-    part = (settings.bend_share if is_mast else 1.0 - settings.bend_share) * whole / own if own > 0.0 else math.inf
+    is_mast = section.beyond == "sensors"
+    part = (section.share if is_mast else 1.0 - section.share) * whole / own if own > 0.0 else math.inf
     if part <= RIGID_SHARE:
         return part
     if own <= 0.0:
         raise InputError(
-            f"plant.bend_share: {path}: the body {rigid.body(frame).name!r} has no mass of its own to share (give the "
+            f"bend.share: {path}: the body {rigid.body(frame).name!r} has no mass of its own to share (give the "
             "model's compiler fusestatic=\"true\", so that the modules' halves become part of it)"
         )
     most = RIGID_SHARE * own / whole  # rounded so that it is allowed
@@ -201,8 +206,8 @@ def _leaf_part(
         f"at most {math.floor(1e3 * most) / 1e3:g}" if is_mast else f"at least {math.ceil(1e3 * (1 - most)) / 1e3:g}"
     )
     raise InputError(
-        f"plant.bend_share = {settings.bend_share:g}: {path}: gimbals and flywheels, which stay with the modules, have "
-        f"too much of the inertia; with plant.bend_beyond = {settings.bend_beyond!r} set plant.bend_share to {limit}"
+        f"bend.share = {section.share:g}: {path}: gimbals and flywheels, which stay with the modules, have "
+        f"too much of the inertia; with bend.beyond = {section.beyond!r} set bend.share to {limit}"
     )
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.features.bend import Bend, BendBeyond
+from cmg_mj.inputs.features import Judgement
 from cmg_mj.laws import LAWS
 from cmg_mj.linear.loop import ClosedLoop
 from cmg_mj.linear.march import MOTION_WORDS, Motion, march
@@ -15,7 +16,6 @@ from cmg_mj.linear.verdict import Verdict, judge, margins
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
-from cmg_mj.scenario.plant_settings import BendBeyond
 
 NEAR = 0.4
 """A transfer that comes nearer to -1 has little margin: disturbances at that frequency grow by 2.5."""
@@ -73,7 +73,7 @@ class BentVerdict(NamedTuple):
 
 def judge_bend(design: Design, plant: Plant) -> BentVerdict | None:
     """Judge the loop of a frame that bends; None for a rigid frame, and where only a march of a user's code could."""
-    if not plant.settings.bends:
+    if not plant.bends:
         return None
     bending, rigid = (linearise(plant, rigid=is_rigid) for is_rigid in (False, True))
     try:
@@ -98,38 +98,39 @@ def _words(verdict: Verdict | Motion) -> str:
     return f"{words}; {margins(verdict.transfer, verdict.omega).words}"
 
 
-def bend_hints(plant: Plant, verdict: BentVerdict | None) -> list[str]:
-    """Find the hints about a bend: settings without effect, or what it does to the loop."""
-    settings = plant.settings
-    if names := [f"plant.{name}" for name in settings.unused_bend_fields]:
-        return [f"{', '.join(names)}: without effect while plant.bend_frequency_hz = 0, a rigid frame"]
-    if verdict is None:
-        return []
-    if not verdict.is_stable_rigid:
-        return ["controller, observer: the loop is not stable with a rigid frame either; `cmg-mj check` says more"]
-    if not verdict.fault:
-        return []
-    return [
-        f"plant.bend_frequency_hz = {settings.bend_frequency_hz:g}: with that bend the loop {verdict.fault}; a notch "
-        "at that frequency, the estimated angle or less bandwidth may cure it"
+def describe_bend(design: Design, plant: Plant) -> Judgement:
+    """Describe the mode of a frame that bends and the loop around it, and what the bend does to the loop."""
+    bend: Bend = design.scenario.section("bend")
+    if not plant.bends:
+        unused = [
+            f"bend.{name}"
+            for name in ("damping_ratio", "share", "beyond")
+            if getattr(bend, name) != getattr(Bend(), name)
+        ]
+        return Judgement(
+            hints=[f"{', '.join(unused)}: without effect while bend.frequency_hz = 0, a rigid frame"] if unused else []
+        )
+    verdict, hz = judge_bend(design, plant), bend.frequency_hz
+    loss, numerical = -math.expm1(-4.0 * math.pi * bend.damping_ratio * hz), rk4_energy_loss(hz, plant.timestep)
+    rows = [
+        ("bend", f"{hz:g} Hz, damping ratio {bend.damping_ratio:g}, beyond it {bend.share:g} of the inertia"),
+        ("", BEYOND[bend.beyond]),
+        ("", f"loses {100.0 * loss:.3g} % of its energy a second, and {100.0 * numerical:.2g} % to the physics steps"),
     ]
-
-
-def bend_rows(design: Design, plant: Plant, verdict: BentVerdict | None) -> Iterator[tuple[str, str]]:
-    """Describe the mode of a frame that bends, and the loop around it, in rows of `cmg-mj check`."""
-    settings = plant.settings
-    if not settings.bends:
-        return
-    hz, ratio = settings.bend_frequency_hz, settings.bend_damping_ratio
-    loss, numerical = -math.expm1(-4.0 * math.pi * ratio * hz), rk4_energy_loss(hz, plant.timestep)
-    yield "bend", f"{hz:g} Hz, damping ratio {ratio:g}, beyond it {settings.bend_share:g} of the inertia"
-    yield "", BEYOND[settings.bend_beyond]
-    yield "", f"loses {100.0 * loss:.3g} % of its energy a second, and {100.0 * numerical:.2g} % to the physics steps"
-    feedback = design.scenario.controller.feedback
     if verdict is None:
-        yield "", "its loop is not computed for code of your own"
-    else:
-        yield "", f"the loop with it, feedback from the {feedback}: {verdict.words}"
+        return Judgement([*rows, ("", "its loop is not computed for code of your own")])
+    feedback = design.scenario.controller.feedback
+    rows.append(("", f"the loop with it, feedback from the {feedback}: {verdict.words}"))
+    if not verdict.is_stable_rigid:
+        hint = "controller, observer: the loop is not stable with a rigid frame either; `cmg-mj check` says more"
+        return Judgement(rows, [hint])
+    if not verdict.fault:
+        return Judgement(rows)
+    hint = (
+        f"bend.frequency_hz = {hz:g}: with that bend the loop {verdict.fault}; a notch at that frequency, the "
+        "estimated angle or less bandwidth may cure it"
+    )
+    return Judgement(rows, [hint])
 
 
 def rk4_energy_loss(frequency_hz: float, step: float) -> float:

@@ -16,19 +16,15 @@ import numpy as np
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.noise import NoiseStream, normals
-from cmg_mj.core.outside import Disturbance
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.types import IdealReading
-from cmg_mj.features.pivot.moving_pivot import pivot_directions, with_own_model
-from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
 from cmg_mj.plant.mujoco_state import quiet
 from cmg_mj.plant.physics import OneWorld
 from cmg_mj.results.baselines import MEMS_GYRO
+from cmg_mj.runs.disturbances import disturbances, outsides
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.stages.push import Pushes
-from cmg_mj.stages.swing import Swings
 
 try:
     import gymnasium
@@ -153,8 +149,9 @@ class ScissoredPairEnv(gymnasium.Env):
         self.experiment, part = experiment, experiment.require_single_axis("an environment")
         scenario = part.scenario.model_copy(update={"seed": seed, "open_loop_observers": []})
         plant, timestep = experiment.plant, experiment.plant.timestep
-        if scenario.pivot:
-            plant = with_own_model(plant)
+        acting = disturbances(outsides(scenario), [plant], seed, self._world)
+        if any(one.accelerates for one in acting):
+            plant = plant.with_own_model()
         self._physics = OneWorld(plant)
         self._controller = dataclasses.replace(part.design, scenario=scenario).controller(
             part.plant.interface, worlds=self._world
@@ -164,14 +161,7 @@ class ScissoredPairEnv(gymnasium.Env):
         self._read_gyro = gyro.make_reading_function(experiment.law.dt, noise)
         self._fall = np.radians(scenario.metrics.fall_angle_deg).item()
         self._steps = whole_steps(scenario.duration_s, timestep, "duration_s", f"{scenario.duration_s:g} s")
-        disturbances: list[Disturbance] = [
-            Pushes(scenario.push, timestep, plant.axis_names),
-            Swings(scenario.swing, timestep, plant.axis_names),
-        ]
-        if scenario.pivot:
-            pivot = PivotSignals(scenario.pivot, pivot_directions(plant, scenario.pivot), seed, self._world)
-            disturbances.append(MovingPivot(pivot, timestep))
-        self._loop = ControlLoop(self._physics, self._controller, self._steps, disturbances, self._fall)
+        self._loop = ControlLoop(self._physics, self._controller, self._steps, acting, self._fall)
         self._ticks = self._loop.ticks()
         self._running = True
         self._to_tick()

@@ -101,6 +101,7 @@ class _Held:
     """Torques that are held from one step to another: a `Disturbance`."""
 
     edges = ()
+    accelerates = False
 
     def __init__(self, push: Sequence[Scalar], none: Sequence[Scalar], pushed: range) -> None:
         self._push, self._none, self._pushed = push, none, pushed

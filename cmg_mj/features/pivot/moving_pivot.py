@@ -2,16 +2,77 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.pivot.settings import Pivot
+from cmg_mj.features.pivot import Pivot
+from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
+from cmg_mj.features.pivot.pivot_track import MAX_RECORDED_M_S2, read_track
+from cmg_mj.inputs.features import Judgement
 from cmg_mj.plant.mujoco_state import at_keyframe
-from cmg_mj.plant.plant import Plant
+from cmg_mj.plant.plant import Plant, check_axis
 from cmg_mj.plant.tilt_line import UP
+from cmg_mj.scenario.design import Design
+from cmg_mj.scenario.schema import Scenario
+
+
+def check_pivots(scenario: Scenario, plant: Plant) -> None:
+    """Refuse motions that do not fit a plant.
+
+    Raises:
+        InputError: The plant lacks an axis, the pivot cannot be moved, or its track cannot be read.
+    """
+    pivots: list[Pivot] = scenario.section("pivot")
+    for i, pivot in enumerate(pivots):
+        if pivot.direction != "vertical" or pivot.axis is not None:
+            check_axis(f"pivot.{i}.axis", pivot.axis, plant)
+        if pivot.axis in plant.settings.locked_axes:
+            raise InputError(
+                f"pivot.{i}.axis = {pivot.axis!r}: is locked, and gives no direction; name one of "
+                f"{', '.join(plant.axis_names)}"
+            )
+        if pivot.file is not None:
+            try:
+                track = read_track(pivot.file, pivot.column)
+            except InputError as error:
+                raise InputError(f"pivot.{i}.file: {error}") from error
+            largest = abs(pivot.scale) * float(abs(track.accelerations).max())
+            if largest > MAX_RECORDED_M_S2:
+                raise InputError(
+                    f"pivot.{i}.scale = {pivot.scale:g}: {pivot.file} times this reaches {largest:.3g} m/s2; at most "
+                    f"{MAX_RECORDED_M_S2:g}"
+                )
+    pivot_directions(plant, pivots)
+
+
+def moving_pivot(
+    pivots: Sequence[Pivot], plants: Sequence[Plant], seed: int, worlds: int | Sequence[int]
+) -> MovingPivot:
+    """Make the acceleration of the pivot as a disturbance; a size may be an array (n_worlds,)."""
+    for plant in dict.fromkeys(plants):
+        refuse_other_forces(plant)
+    signals = PivotSignals(pivots, pivot_directions(plants[0], pivots), seed, worlds)
+    return MovingPivot(signals, plants[0].timestep)
+
+
+def describe_pivots(design: Design, plant: Plant) -> Judgement:
+    """Describe the motions of the pivot."""
+    pivots: list[Pivot] = design.scenario.section("pivot")
+    rows = []
+    for pivot in pivots:
+        rows.append(("pivot", pivot.words))
+        if pivot.file is not None:
+            rows.append(("", read_track(pivot.file, pivot.column).words))
+    names = [f"pivot.{i}" for i, pivot in enumerate(pivots) if pivot.direction == "across" and np.any(pivot.size)]
+    if not names or not plant.reduced.pivot_arm:
+        return Judgement(rows)
+    hint = (
+        f"{', '.join(names)}: accelerates across what the pivot slides on, and moves the rig by no more than friction "
+        'and damping there hand on; direction = "vertical" does move it'
+    )
+    return Judgement(rows, [hint])
 
 
 def pivot_directions(plant: Plant, pivots: Sequence[Pivot]) -> list[list[float]]:
@@ -63,10 +124,3 @@ def refuse_other_forces(plant: Plant) -> None:
             f"pivot: {plant.path}: <option density, viscosity>: the air's drag depends on the pivot's velocity, which "
             "is not simulated: such a rig's pivot cannot be moved"
         )
-
-
-def with_own_model(plant: Plant) -> Plant:
-    """Copy a plant onto a model of its own, whose gravity may be shifted while it runs."""
-    other = copy.copy(plant)
-    other.model = copy.copy(plant.model)
-    return other

@@ -8,8 +8,8 @@ from collections.abc import Callable, Collection, Sequence
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.core.outside import Outside
+from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.pivot_track import read_track
-from cmg_mj.features.pivot.settings import Pivot
 
 POINTS_A_PERIOD = 40
 """Points of the noise in a period of its corner, between which it runs straight: its own grid, no sensor's."""
@@ -173,6 +173,7 @@ class MovingPivot:
     """
 
     edges: Collection[int] = ()
+    accelerates = True
 
     def __init__(self, signals: PivotSignals, timestep: float) -> None:
         self._signals, self._timestep = signals, timestep

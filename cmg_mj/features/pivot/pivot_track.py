@@ -14,7 +14,7 @@ from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.inputs.files import read_text, require_file
 
 MAX_BYTES = 100_000_000
-MOST_RECORDED_M_S2 = 1000.0
+MAX_RECORDED_M_S2 = 1000.0
 """A track with a larger acceleration is in another unit [m/s^2]."""
 
 
@@ -87,9 +87,9 @@ def _read_track(path: Path, column: str | None, _changed_ns: int, _size: int) ->
         line = lines[int(back[0]) + 1][0]
         raise InputError(f"{path}: line {line}: the time {times[back[0] + 1]:g} s does not follow {times[back[0]]:g} s")
     largest = int(np.argmax(np.abs(accelerations)))
-    if abs(accelerations[largest]) > MOST_RECORDED_M_S2:
+    if abs(accelerations[largest]) > MAX_RECORDED_M_S2:
         raise InputError(
-            f"{path}: line {lines[largest][0]}: {accelerations[largest]:g} m/s2: at most {MOST_RECORDED_M_S2:g}; "
+            f"{path}: line {lines[largest][0]}: {accelerations[largest]:g} m/s2: at most {MAX_RECORDED_M_S2:g}; "
             "accelerations are in m/s2"
         )
     times = times - times[0]

@@ -16,8 +16,8 @@ from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.runners import as_estimate
 from cmg_mj.features.plugin.model import INSTANCE
 from cmg_mj.features.plugin.sensors import check_noise
+from cmg_mj.plant.mjcf import OWN
 from cmg_mj.plant.physics import OneWorld
-from cmg_mj.plant.without_plugins import OWN
 
 SEED, WORLD, STATUS, STEPS = range(4)
 """Places in an instance's state, as state.h numbers them."""

@@ -189,9 +189,10 @@ class StudioSession:
         self._lines = [axis.line for axis in self.plant.axes]
         scenario = experiment.scenario
         self.pushes = Pushes(scenario, self.plant.axis_names, self.timestep)
-        self._pivot = PivotSignals(scenario.pivot, pivot_directions(self.plant, scenario.pivot), scenario.seed, 0)
+        pivots = scenario.section("pivot")
+        self._pivot = PivotSignals(pivots, pivot_directions(self.plant, pivots), scenario.seed, 0)
         self._still = self.model.opt.gravity.copy()
-        self._pivot_steps: tuple[int, int] | None = None if scenario.pivot else (0, sys.maxsize)
+        self._pivot_steps: tuple[int, int] | None = None if pivots else (0, sys.maxsize)
         """The steps between which the present acceleration of the pivot is held; for ever if it is at rest."""
         self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=PLOTTED_TICKS)
         self._begin(0)

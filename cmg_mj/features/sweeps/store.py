@@ -204,7 +204,7 @@ def hash_of(study: SweepStudy, fields: StudyFields) -> str:
         for model in varied or [study.scenario.plant.model]
         for path in model_files(find("models", model, ".xml", "plant.model ="))
     ]
-    files += [Path(pivot.file) for pivot in study.scenario.pivot if pivot.file is not None]
+    files += [Path(file) for parts in study.scenario.feature_sections.values() for part in parts for file in part.files]
     files += [Path(file) for axis in study.axes for file in varied_tracks(axis)]
     for path in files:
         try:

@@ -19,7 +19,7 @@ from cmg_mj.inputs.files import find
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.plant.build import load_scenario_plant
+from cmg_mj.plant.plant import load_scenario_plant
 from cmg_mj.results.baselines import RATES
 from cmg_mj.runs.batch import UNUSED, can_vary_in_batch
 from cmg_mj.runs.experiment import prepare

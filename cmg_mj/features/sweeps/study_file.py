@@ -13,9 +13,9 @@ from typing import TypedDict, get_args
 
 from cmg_mj.core.errors import InputError, TomlValue, nearest
 from cmg_mj.features.sweeps.study import FieldValue, SamplingDesign, VariedField, parse_axis
-from cmg_mj.inputs.files import bundled, find
+from cmg_mj.inputs.files import bundled, find, whole_path
 from cmg_mj.inputs.overrides import override
-from cmg_mj.scenario.loading import find_model, find_track, find_tracks, load_scenario, parse_scenario
+from cmg_mj.scenario.loading import find_files, find_model, load_scenario, parse_scenario
 from cmg_mj.scenario.schema import Scenario
 
 SECTIONS = ("sweep", "vary", "scenario")
@@ -84,7 +84,7 @@ def scenario_of(name: str, fields: StudyFile, settings: Sequence[str] = ()) -> S
     beside = find("scenarios", name, ".toml", "scenario").parent
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in settings):
         scenario = find_model(scenario, beside)
-    return find_tracks(scenario, beside)
+    return find_files(scenario, beside)
 
 
 def axes_of(name: str, fields: StudyFile) -> list[VariedField]:
@@ -114,7 +114,7 @@ def locate_tracks(axis: VariedField, beside: Path) -> VariedField:
         beside: The folder of the study file or of the scenario, from which a path may start.
     """
     for field in axis.fields:
-        change = partial(_replace_tracks, field, change=lambda file: find_track(file, beside))
+        change = partial(_replace_tracks, field, change=lambda file: whole_path(file, beside))
         axis = replace(axis, values=tuple(change(value) for value in axis.values))
     return axis
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.features.bend import Bend, BendBeyond
 from cmg_mj.features.bend.edit import STEP_SHARE
 from cmg_mj.features.bend.verdict import rk4_energy_loss
 from cmg_mj.plant.elements import BEND_JOINT
@@ -25,9 +26,9 @@ from tests.features.plugin.made import needs_compiler
 SENSORS = ("accelerometer_inner", "accelerometer_outer", "fog")
 
 
-def bending(hz: float, beyond: str = "sensors", share: float = 0.2, **more: Any) -> Plant:
+def bending(hz: float, beyond: BendBeyond = "sensors", share: float = 0.2, damping: float = 0.01, **more: Any) -> Plant:
     """The scissored pair with a bend."""
-    return load_plant(bend_frequency_hz=hz, bend_beyond=beyond, bend_share=share, **more)
+    return load_plant(sections={"bend": Bend(hz, damping, share, beyond)}, **more)
 
 
 def ring(plant: Plant, seconds: float = 1.0) -> tuple[np.ndarray, float]:
@@ -65,9 +66,9 @@ def frequency(angles: np.ndarray, step: float) -> float:
 @pytest.mark.parametrize("damping", [0.0, 0.02])
 @pytest.mark.parametrize("hz", [10, 20, 40])
 def test_frequency_and_energy_are_those_asked_for(
-    hz: float, damping: float, beyond: str, share: float, lock: bool
+    hz: float, damping: float, beyond: BendBeyond, share: float, lock: bool
 ) -> None:
-    plant = bending(hz, beyond, share, bend_damping_ratio=damping, lock_thrust_bearing=lock)
+    plant = bending(hz, beyond, share, damping, lock_thrust_bearing=lock)
     angles, left = ring(plant)
     damped = hz * math.sqrt(1.0 - damping**2)
     assert frequency(angles, plant.timestep) == pytest.approx(damped, rel=1e-3)
@@ -84,7 +85,7 @@ def test_a_step_that_is_too_long_would_take_the_energy() -> None:
 
 
 @pytest.mark.parametrize(("beyond", "share"), [("sensors", 0.2), ("both", 0.5)])
-def test_mass_and_inertia_are_split_and_not_changed(beyond: str, share: float) -> None:
+def test_mass_and_inertia_are_split_and_not_changed(beyond: BendBeyond, share: float) -> None:
     rigid, plant = load_plant(), bending(20.0, beyond, share)
     assert plant.model.body_subtreemass[0] == pytest.approx(rigid.model.body_subtreemass[0], rel=1e-14)
     for name in ("J1", "J2", "J_d", "omega_d", "gravity_torque"):
@@ -100,7 +101,7 @@ def test_mass_and_inertia_are_split_and_not_changed(beyond: str, share: float) -
 
 
 def test_the_bias_turns_the_whole_plants_centre_of_mass() -> None:
-    rigid, plant = (load_plant(equilibrium_bias_deg=1.5, bend_frequency_hz=hz) for hz in (0.0, 20.0))
+    rigid, plant = (load_plant(equilibrium_bias_deg=1.5, sections={"bend": Bend(hz)}) for hz in (0.0, 20.0))
     centres = []
     for other in (rigid, plant):
         data = mujoco.MjData(other.model)
@@ -113,7 +114,7 @@ def test_the_bias_turns_the_whole_plants_centre_of_mass() -> None:
 @pytest.mark.parametrize(
     ("beyond", "share", "body"), [("sensors", 0.2, BEND_JOINT), ("modules", 0.8, BEND_JOINT), ("both", 0.5, "frame")]
 )
-def test_where_the_sensors_sit(beyond: str, share: float, body: str) -> None:
+def test_where_the_sensors_sit(beyond: BendBeyond, share: float, body: str) -> None:
     plant = bending(20.0, beyond, share)
     for model in (plant.model, plant.drawn_model):
         assert {model.body(int(model.site_bodyid[model.site(name).id])).name for name in SENSORS} == {body}
@@ -159,16 +160,16 @@ def assert_same(one: Trajectory, other: Trajectory) -> None:
 def test_a_stiff_frame_moves_as_a_rigid_one() -> None:
     quiet = ("sensors.accelerometer.noise_density_ug_rthz=0", "duration_s=0.1")
     rigid = trajectory(short(*quiet, "plant.timestep_s=0.0005"))
-    stiff = trajectory(short(*quiet, "plant.timestep_s=0.000125", "plant.bend_frequency_hz=300"))
+    stiff = trajectory(short(*quiet, "plant.timestep_s=0.000125", "bend.frequency_hz=300"))
     np.testing.assert_allclose(stiff["x1_rad"], rigid["x1_rad"], rtol=2e-3)
 
 
 def test_without_a_frequency_the_other_fields_change_nothing() -> None:
-    assert_same(trajectory(short("plant.bend_share=0.5", "plant.bend_beyond=both")), trajectory(short()))
+    assert_same(trajectory(short("bend.share=0.5", "bend.beyond=both")), trajectory(short()))
 
 
 def test_one_world_a_batch_and_the_callback_are_the_same_bits() -> None:
-    experiment = short("plant.bend_frequency_hz=15", "controller.notch_hz=16", "observer.kind=homogeneous")
+    experiment = short("bend.frequency_hz=15", "controller.notch_hz=16", "observer.kind=homogeneous")
     one = trajectory(experiment, world=1)
     assert_same(one, trajectory(experiment, world=1, driver="callback"))
     assert_same(one, trajectory_of(experiment.run_many([1])))
@@ -178,13 +179,13 @@ def test_one_world_a_batch_and_the_callback_are_the_same_bits() -> None:
 @needs_compiler
 @pytest.mark.slow
 @pytest.mark.parametrize("beyond", ["sensors", "both"])
-def test_the_plugins_model_has_the_bend(beyond: str) -> None:
-    experiment = short("plant.bend_frequency_hz=15", f"plant.bend_beyond={beyond}", "plant.bend_share=0.5")
+def test_the_plugins_model_has_the_bend(beyond: BendBeyond) -> None:
+    experiment = short("bend.frequency_hz=15", f"bend.beyond={beyond}", "bend.share=0.5")
     assert_same(trajectory(experiment, driver="plugin"), trajectory(experiment))
 
 
 def test_floors_that_a_bend_would_belie_are_not_printed() -> None:
-    bending, rigid = (short(f"plant.bend_frequency_hz={hz}").run().summaries[0] for hz in (15, 0))
+    bending, rigid = (short(f"bend.frequency_hz={hz}").run().summaries[0] for hz in (15, 0))
     assert "floor_accel" not in section(bending, "references")
     assert "floor_accel" in section(rigid, "references")
 
@@ -193,35 +194,38 @@ def test_floors_that_a_bend_would_belie_are_not_printed() -> None:
     ("settings", "words"),
     [
         (
-            ["timestep_s=0.005"],
+            ["plant.timestep_s=0.005"],
             "plant.timestep_s = 0.005: does not follow a bend of 20 Hz, which takes at most 0.00",
         ),
-        (["integrator=implicitfast"], "plant.integrator = 'implicitfast': follows no bend"),
+        (["plant.integrator=implicitfast"], "plant.integrator = 'implicitfast': follows no bend"),
         (
-            ["bend_share=0.7"],
-            "plant.bend_share = 0.7: .* with plant.bend_beyond = 'sensors' set plant.bend_share to at most 0.694",
+            ["bend.share=0.7"],
+            "bend.share = 0.7: .* with bend.beyond = 'sensors' set bend.share to at most 0.694",
         ),
-        (["bend_beyond=both"], "plant.bend_share = 0.2: .* = 'both' set plant.bend_share to at least 0.306"),
-        (["bend_beyond=modules"], "plant.bend_share = 0.2: .* = 'modules' set plant.bend_share to at least 0.306"),
-        (["bend_beyond=modules", "bend_share=0.8", "tilt_friction_n_m=0.1"], "plant.tilt_friction_n_m = 0.1: .* leave"),
-        (["bend_beyond=top"], "plant.bend_beyond = 'top': "),
-        (["bend_frequency_hz=-1"], "plant.bend_frequency_hz = -1: "),
-        (["bend_share=0"], "plant.bend_share = 0: "),
+        (["bend.beyond=both"], "bend.share = 0.2: .* = 'both' set bend.share to at least 0.306"),
+        (["bend.beyond=modules"], "bend.share = 0.2: .* = 'modules' set bend.share to at least 0.306"),
         (
-            ["bend_damping_ratio=1"],
-            "plant.bend_damping_ratio = 1: ",
+            ["bend.beyond=modules", "bend.share=0.8", "plant.tilt_friction_n_m=0.1"],
+            "plant.tilt_friction_n_m = 0.1: ",
         ),
-        (["model=two_axes.xml"], "tilts about several axes, and a bend takes one; lock the others"),
+        (["bend.beyond=top"], "bend.beyond = 'top': "),
+        (["bend.frequency_hz=-1"], "bend.frequency_hz = -1: "),
+        (["bend.share=0"], "bend.share = 0: "),
+        (
+            ["bend.damping_ratio=1"],
+            "bend.damping_ratio = 1: ",
+        ),
+        (["plant.model=two_axes.xml"], "tilts about several axes, and a bend takes one; lock the others"),
     ],
 )
 def test_what_does_not_go_with_a_bend(settings: list[str], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        prepare(load_scenario("push_recovery", ["plant.bend_frequency_hz=20", *(f"plant.{one}" for one in settings)]))
+        prepare(load_scenario("push_recovery", ["bend.frequency_hz=20", *settings]))
 
 
 @pytest.mark.parametrize(("beyond", "share"), [("sensors", 0.694), ("modules", 0.306)])
-def test_the_share_that_a_refusal_names_is_allowed(beyond: str, share: float) -> None:
-    assert bending(20.0, beyond, share).settings.bends
+def test_the_share_that_a_refusal_names_is_allowed(beyond: BendBeyond, share: float) -> None:
+    assert bending(20.0, beyond, share).bends
 
 
 HINGE_TORQUES: dict[str, tuple[str, Any, str | None]] = {
@@ -241,7 +245,7 @@ def test_torques_of_the_hinge_in_the_file_do_not_act_beyond_a_bend(tmp_path: Pat
     setattr(spec.joint("tilt"), attribute, value)
     model = tmp_path / "rig.xml"
     model.write_text(spec.to_xml(), encoding="utf-8")
-    words = rf"plant.bend_beyond = 'both': .*rig.xml: the {torque} of joint 'tilt' would act on .*; "
+    words = rf"bend.beyond = 'both': .*rig.xml: the {torque} of joint 'tilt' would act on .*; "
     with pytest.raises(InputError, match=words + (f"set plant.{field}=0, or take" if field else "take it out of")):
         bending(20.0, "both", 0.5, model=str(model))
     bending(20.0, "sensors", 0.5, model=str(model))
@@ -252,7 +256,7 @@ def test_torques_of_the_hinge_in_the_file_do_not_act_beyond_a_bend(tmp_path: Pat
 
 
 def test_one_axis_of_two_may_bend() -> None:
-    settings = ["plant.bend_frequency_hz=20", 'plant.locked_axes=["roll"]', "push=[]", "swing=[]", "duration_s=0.2"]
+    settings = ["bend.frequency_hz=20", 'plant.locked_axes=["roll"]', "push=[]", "swing=[]", "duration_s=0.2"]
     experiment = prepare(load_scenario("two_axes", settings))
     assert experiment.plant.joint_names.count(BEND_JOINT) == 1
     angles, _ = ring(experiment.plant)

@@ -122,7 +122,9 @@ class Recording:
         controller.decide = decide_and_record  # type: ignore[method-assign]
         scenario = experiment.scenario
         observers = list(dict.fromkeys([kind, *scenario.open_loop_observers]))
-        simulate(experiment.plant, controller, scenario.duration_s, observers=observers, pushes=scenario.push)
+        simulate(
+            experiment.plant, controller, scenario.duration_s, observers=observers, outside={"push": scenario.push}
+        )
         self.samples, self.results, self.rate = np.array(samples), np.array(results), np.array(rates)
 
 

@@ -12,9 +12,9 @@ import pytest
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.outside import Outside, instants
 from cmg_mj.core.types import IdealReading
-from cmg_mj.features.pivot.moving_pivot import pivot_directions, with_own_model
+from cmg_mj.features.pivot import Pivot
+from cmg_mj.features.pivot.moving_pivot import pivot_directions
 from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
-from cmg_mj.features.pivot.settings import Pivot
 from cmg_mj.plant.physics import OneWorld
 from cmg_mj.results.summary_keys import section
 from cmg_mj.runs.callback import control
@@ -56,7 +56,7 @@ def signals(rig: Experiment, pivots: list[Pivot], worlds: int | list[int] = 0) -
 def test_equals_a_base_that_slide_joints_drive(scenario: str, settings: list[str]) -> None:
     """Half a second with the loop open and the gimbals turning: joints and accelerometers to 1e-9."""
     rig = experiment(*settings, scenario=scenario)
-    plant = with_own_model(rig.plant)
+    plant = rig.plant.with_own_model()
     axis = plant.axis_names[0] or None
     pivots = [Pivot(**{**vars_of(pivot), "axis": axis}) for pivot in ALL_WAYS]
     shifted, driven = OneWorld(plant), DrivenBase(plant)
@@ -93,7 +93,7 @@ def vars_of(pivot: Pivot) -> dict[str, object]:
 def test_a_pivot_at_rest_is_not_what_moves() -> None:
     """The driven base without a drive: the comparison above can fail."""
     rig = experiment()
-    plant = with_own_model(rig.plant)
+    plant = rig.plant.with_own_model()
     shifted, driven = OneWorld(plant), DrivenBase(plant)
     shifted.accelerate((0.01, 0.0, 0.0))
     shifted.advance(20)
@@ -104,7 +104,7 @@ def test_a_pivot_at_rest_is_not_what_moves() -> None:
 def test_an_acceleration_across_tilts_what_accelerometers_see() -> None:
     """y1 = x1 - a/g, to the first order, and gravity's amplitude grows to the root of the sum of the squares."""
     rig = experiment("plant.equilibrium_bias_deg=0", "plant.initial_tilt_deg=0")
-    physics = OneWorld(with_own_model(rig.plant))
+    physics = OneWorld(rig.plant.with_own_model())
     (across,) = pivot_directions(rig.plant, [Pivot("step", "across", 1.0)])
     assert across == pytest.approx([1.0, 0.0, 0.0])  # the bundled rig's tilt axis is y, and z leans to x
     physics.accelerate([0.5 * part for part in across])
@@ -158,7 +158,7 @@ def test_one_world_of_many_is_the_world_alone() -> None:
 def test_each_world_keeps_the_gravity_of_its_own_plant() -> None:
     """As on the moon, beside a world on the earth: the same as each with nothing that moves."""
     rig = experiment("duration_s=0.5", "controller.feedback=truth")
-    moon = with_own_model(rig.plant)
+    moon = rig.plant.with_own_model()
     moon.model.opt.gravity[2] = -1.62
     resting = experiment("duration_s=0.5", "controller.feedback=truth", f"pivot=[{STEP_OF_NONE}]")
     still, moved = (one.run_many(2, plants=[one.plant, moon]).values("tilt_rms_deg") for one in (rig, resting))
@@ -172,7 +172,7 @@ def test_a_pivot_of_size_zero_is_at_rest() -> None:
 
 def test_every_plant_of_a_batch_is_looked_at() -> None:
     rig = experiment(NOISE)
-    held = with_own_model(rig.plant)
+    held = rig.plant.with_own_model()
     held.model.body_gravcomp[2] = 1.0
     with pytest.raises(InputError, match="the body 'frame' has gravcomp"):
         rig.run_many(2, plants=[rig.plant, held])
@@ -190,7 +190,7 @@ def test_the_callback_sees_the_same() -> None:
 def test_a_users_own_loop_moves_it_as_the_docs_say() -> None:
     rig = experiment(NOISE, "duration_s=0.3")
     expected = rig.run().trajectory
-    plant, pivots = with_own_model(rig.plant), rig.scenario.pivot
+    plant, pivots = rig.plant.with_own_model(), rig.scenario.section("pivot")
     pivot = PivotSignals(pivots, pivot_directions(plant, pivots), seed=0, worlds=0)
     still = plant.model.opt.gravity.copy()
     controller, data = rig.controller(), plant.new_data()
@@ -304,11 +304,11 @@ def test_several_axes_need_a_name() -> None:
 
 def test_a_model_that_gravity_alone_does_not_pull_is_refused() -> None:
     pivots = [Pivot("step", "across", 1.0)]
-    in_air = with_own_model(experiment().plant)
+    in_air = experiment().plant.with_own_model()
     in_air.model.opt.density = 1.2
     with pytest.raises(InputError, match="the air's drag depends on the pivot's velocity"):
         pivot_directions(in_air, pivots)
-    held = with_own_model(experiment().plant)
+    held = experiment().plant.with_own_model()
     held.model.body_gravcomp[2] = 1.0
     with pytest.raises(InputError, match="the body 'frame' has gravcomp"):
         pivot_directions(held, pivots)

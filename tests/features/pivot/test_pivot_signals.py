@@ -10,9 +10,9 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import NoiseStream
+from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.pivot_signals import BandLimitedNoise, PivotSignals, pivot_signal
 from cmg_mj.features.pivot.pivot_track import read_track
-from cmg_mj.features.pivot.settings import Pivot
 from cmg_mj.scenario.loading import load_scenario
 
 H = 0.005
@@ -163,6 +163,6 @@ def test_a_scenario_file_names_its_track_from_where_it_lies(tmp_path: Path, monk
     scenario = tmp_path / "there" / "mine.toml"
     scenario.write_text('[[pivot]]\nkind = "track"\nfile = "track.csv"\n', encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    (pivot,) = load_scenario(str(scenario)).pivot
+    (pivot,) = load_scenario(str(scenario)).section("pivot")
     assert pivot.file == str(tmp_path / "there" / "track.csv")
     assert pivot.words == f"track, {pivot.file}, times 1, across, from 0 s"

@@ -11,8 +11,10 @@ import pytest
 
 from cmg_mj.features.mounting import mount
 from cmg_mj.features.plugin.model import plugin_mjcf
-from cmg_mj.plant.mjcf import compile_model, load_rig, parse
+from cmg_mj.plant.build import build
+from cmg_mj.plant.mjcf import compile_model, parse
 from cmg_mj.plant.plant import load_plant
+from cmg_mj.scenario.plant_settings import PlantSettings
 
 IN_FRAMES = """
 <mujoco>
@@ -56,7 +58,7 @@ def test_the_equilibrium_is_where_the_plant_balances(tmp_path: Path) -> None:
     """With the bias e in its masses, it does not where the file's keyframe has it."""
     plant = load_plant(equilibrium_bias_deg=0.5)
     (tmp_path / "plugin.xml").write_text(plugin_mjcf(plant, "cmg_mj.mine", {}), encoding="utf-8")
-    rig = load_rig(tmp_path / "plugin.xml", lock=False)  # as `cmg-mj check` does
+    rig = build(tmp_path / "plugin.xml", PlantSettings(), {})  # as `cmg-mj check` does
     (tilt,) = (axis.line for axis in plant.axes)
     assert tilt.lean(rig.model.key("equilibrium").qpos) == pytest.approx(-math.radians(0.5), rel=1e-12)
     assert [hint for hint in rig.hints if "cmg_mj.mine" in hint]

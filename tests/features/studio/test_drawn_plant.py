@@ -33,8 +33,7 @@ VARIATIONS = {
 }
 OUTSIDE_THE_MODEL = {"initial_tilt_deg", "gimbal_backlash_arcmin", "pivot_slides"}
 OPTIONS = {"timestep_s", "integrator"}
-BEND = {"bend_frequency_hz", "bend_damping_ratio", "bend_share", "bend_beyond"}
-COMPILE_OPTIONS = {"model", "lock_thrust_bearing", "locked_axes"} | BEND
+COMPILE_OPTIONS = {"model", "lock_thrust_bearing", "locked_axes"}
 VIEW_ARRAYS = ("cam_", "light_")
 
 
@@ -87,8 +86,8 @@ def test_only_visual_geoms_differ(scenario: str) -> None:
 
 
 def test_a_frame_that_bends_is_drawn_as_it_is_stepped() -> None:
-    settings = ("plant.bend_frequency_hz=20", "plant.bend_damping_ratio=0.01", "plant.bend_share=0.2")
-    plant = prepare(load_scenario("push_recovery", (*settings, "plant.bend_beyond=sensors"))).plant
+    settings = ("bend.frequency_hz=20", "bend.damping_ratio=0.01", "bend.share=0.2")
+    plant = prepare(load_scenario("push_recovery", (*settings, "bend.beyond=sensors"))).plant
     drawn = drawn_plant(plant)
     one, other = plant.new_data(), drawn.new_data()
     mujoco.mj_step(plant.model, one, 20)

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import RadialTilt
-from cmg_mj.features.bend.edit import step_for_bend
-from cmg_mj.plant.axis import Axis
+from cmg_mj.inputs.features import entries
+from cmg_mj.plant.axis import Axis, ResolvedModel, read_reduced
 from cmg_mj.plant.elements import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 
@@ -30,73 +34,107 @@ _INTEGRATORS = {
 YAW_SERVO = "yaw_servo"
 
 
-def vary(
-    model: mujoco.MjModel, settings: PlantSettings, path: Path, axes: Sequence[Axis], held: Sequence[Module] = ()
-) -> None:
-    """Change a compiled model as its settings say.
+class Varied(NamedTuple):
+    """A model with a scenario's settings.
+
+    Attributes:
+        model: The model, whose physics step is still that of its file, or the longest that a feature allows.
+        axes: Its axes.
+        largest_step: The largest physics step that is accurate enough [s].
+    """
+
+    model: mujoco.MjModel
+    axes: tuple[Axis, ...]
+    largest_step: float
+
+
+def apply(
+    rig: ResolvedModel,
+    settings: PlantSettings,
+    of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+    sections: Mapping[str, Any] = MappingProxyType({}),
+) -> Varied:
+    """Change a copy of a compiled model as settings say.
 
     Args:
-        model: The model, as its file has it.
+        rig: The model as its file has it.
         settings: The properties to change; a property without a value stays.
-        path: The file, for messages.
-        axes: What the rig tilts about.
-        held: Modules of axes that are locked.
+        of_axes: The settings of axes that have their own.
+        sections: Settings of the features that edit the model.
+
+    Returns:
+        The changed model.
 
     Raises:
         InputError: The body that tilts has no mass of its own to move or no joint for friction; a servo lacks a
-            property to change; or a bend does not go together with the rest.
+            property to change; or a feature does not go together with the rest.
     """
+    path, key, model, speed = rig.path, rig.key, copy.copy(rig.model), settings.flywheel_speed_rad_s
+    held, axes = rig.held, []
+    for axis in rig.axes:
+        axis_settings = of_axes.get(axis.name, settings)
+        changed = replace(
+            axis,
+            bias=math.radians(axis_settings.equilibrium_bias_deg),
+            initial_tilt=math.radians(axis_settings.initial_tilt_deg),
+            radial_tilt=place_accelerometers(model, axis_settings, axis, path),
+            misplaced=axis_settings.has_misplaced,
+        )
+        if speed is not None:
+            changed = replace(changed, modules=_set_flywheel_speed(model, key, axis.modules, speed, path))
+            changed = replace(changed, reduced=read_reduced(rig.model, key, changed))
+        axes.append(changed)
+    if speed is not None:
+        held = _set_flywheel_speed(model, key, held, speed, path)
+    if settings.turn_rate_rad_s:
+        _set_turn_rate(model, key, settings.turn_rate_rad_s, path)
+    modules = [*(module for axis in axes for module in axis.modules), *held]
+    _vary_masses_and_friction(model, settings, path, axes, modules)
+    for name, limit_step in entries("limit_step").items():
+        if name in sections:
+            model.opt.timestep = limit_step(sections[name], settings, model.opt.timestep, path)
+    mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
+    speeds = [abs(module.speed) for axis in axes for module in axis.modules]
+    shake_rate = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
+    return Varied(model, tuple(axes), largest_step(model, key, float(model.opt.timestep), shake_rate))
+
+
+def _vary_masses_and_friction(
+    model: mujoco.MjModel, settings: PlantSettings, path: Path, axes: Sequence[Axis], modules: Sequence[Module]
+) -> None:
+    """Set integrator, friction, servos, equilibrium bias and imbalance."""
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    modules = [*(module for axis in axes for module in axis.modules), *held]
-
-    def gimbals() -> list[int]:
-        return [module.gimbal_dof for module in modules]
-
-    def tilts() -> list[int]:
-        return [_hinge(axis, path) for axis in axes]
-
-    for field, joints, value in (
-        (model.dof_armature, gimbals, settings.gimbal_armature_kg_m2),
-        (model.dof_frictionloss, gimbals, settings.gimbal_friction_n_m),
-        (model.dof_damping, gimbals, settings.gimbal_damping_n_m_s),
-        (model.dof_frictionloss, tilts, settings.tilt_friction_n_m),
-        (model.dof_damping, tilts, settings.tilt_damping_n_m_s),
+    gimbals = [module.gimbal_dof for module in modules]
+    for field, value in (
+        (model.dof_armature, settings.gimbal_armature_kg_m2),
+        (model.dof_frictionloss, settings.gimbal_friction_n_m),
+        (model.dof_damping, settings.gimbal_damping_n_m_s),
     ):
         if value is not None:
-            field[joints()] = value
+            field[gimbals] = value
+    for field, value in (
+        (model.dof_frictionloss, settings.tilt_friction_n_m),
+        (model.dof_damping, settings.tilt_damping_n_m_s),
+    ):
+        if value is not None:
+            field[[_hinge(axis, path) for axis in axes]] = value
     _vary_servos(model, settings, path, modules)
-    shifts = [bias_shift(model, axis, axis.bias, path) for axis in axes if axis.bias]
-    for axis, shift in zip([axis for axis in axes if axis.bias], shifts, strict=True):
+    biased = [axis for axis in axes if axis.bias]
+    shifts = [bias_shift(model, axis, axis.bias, path) for axis in biased]
+    for axis, shift in zip(biased, shifts, strict=True):
         model.body_ipos[frame_bodies(model, axis)] += shift
     if settings.flywheel_imbalance_kg_m:
         for module in modules:
             body = int(model.dof_bodyid[module.flywheel_dof])
             model.body_ipos[body, 0] += settings.flywheel_imbalance_kg_m / model.body_mass[body]
-    if settings.bends:
-        model.opt.timestep = step_for_bend(settings, model.opt.timestep, path)
-    mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
 
 
-def with_flywheel_speed(
+def _set_flywheel_speed(
     model: mujoco.MjModel, key: int, modules: Sequence[Module], speed: float, path: Path
 ) -> tuple[Module, ...]:
-    """Let the flywheels turn at another speed from the start, each in its own direction.
-
-    Args:
-        model: The model, whose keyframe is changed.
-        key: The keyframe.
-        modules: The modules as the file has them.
-        speed: [rad/s].
-        path: The model's file, for messages.
-
-    Returns:
-        The modules at that speed.
-
-    Raises:
-        InputError: A motor takes no such command.
-    """
+    """Let the flywheels turn at another speed [rad/s] from the start, each in its own direction; return the modules."""
     result = []
     for module in modules:
         signed = math.copysign(speed, module.speed)
@@ -111,18 +149,8 @@ def with_flywheel_speed(
     return tuple(result)
 
 
-def set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> None:
-    """Let the rig turn about the vertical from the start.
-
-    Args:
-        model: The model, whose keyframe is changed.
-        key: The keyframe.
-        rate: [rad/s].
-        path: The model's file, for messages.
-
-    Raises:
-        InputError: There is no drive that holds the rate, or it takes no such command.
-    """
+def _set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> None:
+    """Let the rig turn about the vertical from the start, held by its drive [rad/s]."""
     prefix = f"plant.turn_rate_rad_s = {rate:g}: {path}"
     joint, servo = element_id(model, "joint", "yaw"), element_id(model, "actuator", YAW_SERVO)
     if joint < 0 or servo < 0 or int(model.actuator_trnid[servo, 0]) != joint:
@@ -133,9 +161,7 @@ def set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> N
     model.key_qvel[key, model.jnt_dofadr[joint]] = model.key_ctrl[key, servo] = rate
 
 
-def place_accelerometers(
-    model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path, above_centre: float = 0.0
-) -> RadialTilt:
+def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path) -> RadialTilt:
     """Move the accelerometers of an axis along the radial line.
 
     Args:
@@ -143,8 +169,6 @@ def place_accelerometers(
         settings: Their distances from the tilt axis, which stay without a value, and their offsets from these.
         axis: The axis, as its file has it.
         path: The model's file, for messages.
-        above_centre: Height above the common mass centre of the point that the tilt estimate of a pivot that slides
-            takes to be at rest [m].
 
     Returns:
         The tilt estimate for their new places, as far as it knows them.
@@ -153,7 +177,7 @@ def place_accelerometers(
         InputError: The outer one is no farther out than the inner one.
     """
     as_filed = axis.radial_tilt
-    height = _still_height(settings, axis, path, above_centre)
+    height = _rest_height(settings, axis, path)
     distances = {
         "accelerometer_inner": (settings.accelerometer_inner_m, as_filed.r_inner),
         "accelerometer_outer": (settings.accelerometer_outer_m, as_filed.r_outer),
@@ -183,14 +207,14 @@ def place_accelerometers(
     return RadialTilt(*known).about(height)
 
 
-def _still_height(settings: PlantSettings, axis: Axis, path: Path, above_centre: float) -> float:
+def _rest_height(settings: PlantSettings, axis: Axis, path: Path) -> float:
     """Height above the pivot of the point that the tilt estimate takes to be at rest [m]."""
     if not settings.pivot_slides:
         return 0.0
     if not axis.reduced.pivot_arm:
         about = f" of axis {axis.name!r}" if axis.name else ""
         raise InputError(f"plant.pivot_slides = true: {path}: the pivot{about} does not slide freely; leave it out")
-    return axis.reduced.pivot_arm + above_centre
+    return axis.reduced.pivot_arm
 
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:

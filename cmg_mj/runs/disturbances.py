@@ -1,0 +1,41 @@
+"""What acts on a rig from outside: torques about its axes, and what features add. The one place that lists it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cmg_mj.core.outside import Disturbance
+from cmg_mj.inputs.features import entries
+from cmg_mj.plant.plant import Plant
+from cmg_mj.scenario.schema import Scenario
+from cmg_mj.stages.push import Pushes
+from cmg_mj.stages.swing import Swings
+
+Outsides = Mapping[str, Sequence[Any]]
+"""Section of a scenario, such as `push` -> its settings; of many worlds a number may be an array (n_worlds,)."""
+TORQUES = {"push": Pushes, "swing": Swings}
+
+
+def outsides(scenario: Scenario) -> Outsides:
+    """Take what acts from outside from a scenario."""
+    return {name: tuple(scenario.section(name)) for name in (*TORQUES, *entries("disturbance"))}
+
+
+def disturbances(
+    settings: Outsides, plants: Sequence[Plant], seed: int, worlds: int | Sequence[int]
+) -> list[Disturbance]:
+    """Make what acts from outside.
+
+    Args:
+        settings: The settings; what is missing does not act.
+        plants: The plant of each world.
+        seed: The run's seed.
+        worlds: The number of one world, or the numbers of many.
+    """
+    first, given = plants[0], {name: parts for name, parts in settings.items() if parts}
+    made: list[Disturbance] = [
+        kind(given[name], first.timestep, first.axis_names) for name, kind in TORQUES.items() if name in given
+    ]
+    made += [make(given[name], plants, seed, worlds) for name, make in entries("disturbance").items() if name in given]
+    return made
