@@ -94,7 +94,7 @@ def _axis_to_bend(rig: ResolvedModel, section: Bend) -> tuple[Axis, HingeLine]:
         )
     if element_id(rigid, "joint", BEND_JOINT) >= 0 or element_id(rigid, "body", BEND_JOINT) >= 0:
         raise InputError(f"{setting} has a body or joint {BEND_JOINT!r} already, which is what a bend adds")
-    (axis,) = rig.axes
+    axis = next(iter(rig.axes))
     if not isinstance(axis.line, HingeLine) or int(rigid.jnt_bodyid[axis.line.joint]) != axis.frame:
         raise InputError(
             f"{setting} does not tilt about a hinge of the body that carries its sensors; a bend takes one"
