@@ -24,8 +24,7 @@ from cmg_mj import Experiment, load_scenario, prepare
 from cmg_mj.features.plugin.driver import initial_states
 from cmg_mj.features.plugin.make import make_plugin, unused_name, write_plugin
 from cmg_mj.features.plugin.model import START_KEY
-from cmg_mj.plant.mjcf import parse
-from cmg_mj.plant.mujoco_state import quiet
+from cmg_mj.plant.mjcf import parse, quiet
 
 REPEATS = 15
 STEPS = 400

@@ -32,10 +32,8 @@ from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.scenario.plant_settings import PlantSettings
 from cmg_mj.scenario.schema import CompareSettings, ControllerSettings, LqrSettings, MetricsSettings, Scenario
-from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.encoder import Encoder
-from cmg_mj.sensors.fog import Fog
-from cmg_mj.sensors.mems_gyro import MemsGyro
+from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
+from cmg_mj.sensors.gyros import Fog, MemsGyro
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
 

@@ -64,7 +64,7 @@ class RunArguments:
         world: int = 0,
     ) -> RunFolder:
         """Prepare the folder: --out, or one in runs/ named for the scenario, the label and the settings."""
-        from cmg_mj.scenario.differences import folder_suffix, safe_name
+        from cmg_mj.scenario.resolve import folder_suffix, safe_name
 
         label = safe_name(label) + ("-board" if driver == "board" else "")
         parts = (

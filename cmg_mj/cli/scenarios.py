@@ -145,7 +145,7 @@ def compare(
     from cmg_mj.runs import comparison
     from cmg_mj.runs import save as runs
     from cmg_mj.runs.statistics import standings
-    from cmg_mj.scenario.differences import describe_differences
+    from cmg_mj.scenario.resolve import describe_differences
     from cmg_mj.scenario.schema import CompareSettings
 
     scenario = arguments.scenario()

@@ -10,10 +10,9 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, clip, where
-from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import FeedbackState, Measurement
-from cmg_mj.core.zero_order_hold import hold_matrices
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.kalman import COLUMNS, Kalman
 

@@ -13,8 +13,7 @@ from cmg_mj.core.controller import Controller, PlantInterface
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.linear.plant import LinearPlant
-from cmg_mj.scenario.design import Design
-from cmg_mj.scenario.make_controller import make_controller
+from cmg_mj.scenario.design import Design, make_controller
 from cmg_mj.sensors.sampled import Sensors
 
 STARTS_RAD_S = (0.01, 0.05)

@@ -8,11 +8,10 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.zero_order_hold import hold_matrices
+from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
 from cmg_mj.plant.axis import Axis, pivot_rows
 from cmg_mj.plant.elements import BEND_JOINT, TILT_ELEMENT, element_id
-from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.mjcf import at_keyframe
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.step_limit import input_column, state_matrix
 from cmg_mj.plant.tilt_line import HingeLine

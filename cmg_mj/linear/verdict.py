@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.errors import InputError, shown
-from cmg_mj.core.reduced_model import MARGIN, ReducedModel, is_hurwitz
-from cmg_mj.core.zero_order_hold import hold_matrices
+from cmg_mj.core.reduced_model import MARGIN, ReducedModel, hold_matrices, is_hurwitz
 from cmg_mj.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.linear.loop import ClosedLoop, sensors_used
 from cmg_mj.linear.plant import linear_reduced, linearise

@@ -13,9 +13,8 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import Coefficients, FilterState, ReducedModel, second_order_rows, second_order_step
 from cmg_mj.core.types import Estimate, Measurement
-from cmg_mj.core.zero_order_hold import Coefficients, FilterState, second_order_rows, second_order_step
 from cmg_mj.inputs.types import STRICT, Positive
 
 

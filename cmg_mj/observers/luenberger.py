@@ -9,9 +9,8 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.reduced_model import MARGIN, ReducedModel, is_hurwitz
+from cmg_mj.core.reduced_model import MARGIN, ReducedModel, hold_matrices, is_hurwitz
 from cmg_mj.core.types import Estimate, Measurement
-from cmg_mj.core.zero_order_hold import hold_matrices
 from cmg_mj.inputs.types import STRICT, Positive
 
 

@@ -19,7 +19,7 @@ from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.inertia import inertia_about
-from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.mjcf import at_keyframe
 from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_at_site, line_of_joint
 from cmg_mj.sensors.accelerometer import Accelerometer
 

@@ -12,7 +12,7 @@ from cmg_mj.core.errors import shown
 from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, element_id
 from cmg_mj.plant.inertia import wheel_momentum
-from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.mjcf import at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 
 TRUE_DEG = 0.05

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.plant.elements import BEND_JOINT, ON_A_JOINT, element_id
-from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.mjcf import at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine, Line
 
 SMALL = 1e-9

@@ -27,12 +27,11 @@ from cmg_mj.plant.axis import Axis, ResolvedModel
 from cmg_mj.plant.build import build, drawn_spec
 from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.elements import BEND_JOINT, JOINT_KINDS, element_id
-from cmg_mj.plant.mjcf import compile_model
-from cmg_mj.plant.mujoco_state import quiet, set_control_callback
+from cmg_mj.plant.mjcf import compile_model, quiet, set_control_callback
 from cmg_mj.plant.settings import apply, place_accelerometers
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.turning import turning
-from cmg_mj.scenario.plant_parameters import PlantParameters
+from cmg_mj.scenario.design import PlantParameters
 from cmg_mj.scenario.plant_settings import COMPILED_FIELDS, FINEST_STEP_S, PlantSettings
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import TimeGrid, time_grid

@@ -18,7 +18,7 @@ from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.inputs.features import entries
 from cmg_mj.plant.axis import Axis, ResolvedModel, read_reduced
 from cmg_mj.plant.elements import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
-from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.mjcf import at_keyframe
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings

@@ -10,7 +10,7 @@ import numpy as np
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.elements import Module
 from cmg_mj.plant.inertia import wheel_momentum
-from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.mjcf import at_keyframe
 from cmg_mj.plant.tilt_line import UP
 from cmg_mj.stages.turning import YawCoupling
 

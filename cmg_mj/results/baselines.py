@@ -9,7 +9,7 @@ import numpy as np
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.results.floors import FLOORS
-from cmg_mj.sensors.mems_gyro import MemsGyro
+from cmg_mj.sensors.gyros import MemsGyro
 
 ZERO = "zero"
 MEMS_AS_BOUGHT, MEMS_GYRO, MEMS_FUSED = "mems_as_bought", "mems_gyro", "mems_fused"

@@ -26,8 +26,8 @@ from cmg_mj.results.summary_keys import (
     section,
 )
 from cmg_mj.results.tables import Row, Table
-from cmg_mj.scenario.differences import describe_differences
 from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.resolve import describe_differences
 
 ABOUT_COMPARISONS = """\
 Means over the worlds that stood to the end (settle time: that settled), with 95 % intervals.

@@ -12,7 +12,7 @@ import numpy as np
 from cmg_mj.core.axes import AnyController
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import ControlLoop
-from cmg_mj.plant.mujoco_state import set_control_callback
+from cmg_mj.plant.mjcf import set_control_callback
 from cmg_mj.plant.plant import Plant
 
 

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmg_mj.plant.mujoco_state import quiet
+from cmg_mj.plant.mjcf import quiet
 from cmg_mj.results.files import write_parquet
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.reports import run_title

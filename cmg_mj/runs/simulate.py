@@ -17,7 +17,7 @@ from cmg_mj.core.loop import ControlLoop, Ending
 from cmg_mj.core.outside import Disturbance
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.types import BIAS
-from cmg_mj.plant.mujoco_state import quiet
+from cmg_mj.plant.mjcf import quiet
 from cmg_mj.plant.physics import ManyWorlds, OneWorld
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import RATES, References
@@ -25,7 +25,7 @@ from cmg_mj.results.floors import Floors
 from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
-from cmg_mj.runs.batch_values import split_values
+from cmg_mj.runs.batch import split_values
 from cmg_mj.runs.callback import CallbackLoop, control_callback
 from cmg_mj.runs.disturbances import Outsides, disturbances
 from cmg_mj.runs.recorder import MultiAxisRecorder, TickRecorder

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple, Unpack
 
-from cmg_mj.core.controller import Controller, PlantInterface
-from cmg_mj.core.errors import InputError
+from cmg_mj.core.controller import Controller, ControllerOptions, ControllerSite, PlantInterface
+from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import RadialTilt, TiltNoise
 from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
 from cmg_mj.laws import LAWS, Law
 from cmg_mj.laws.registry import LAW_CLASSES
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.registry import OBSERVER_CLASSES
-from cmg_mj.scenario.make_controller import make_controller
-from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.sensors.sampled import Sensors
-from cmg_mj.stages.trim import integrator_trim
+from cmg_mj.stages.notch import notch
+from cmg_mj.stages.trim import integrator_trim, trim
 
 
 @dataclass(frozen=True)
@@ -152,3 +154,83 @@ def _check(scenario: Scenario) -> None:
                 f"controller.{name} = {value!r}: {kind} takes nothing of the observer and has no use "
                 f"for this; leave it out, or set controller.{name}={usual}"
             )
+
+
+class PlantParameters(NamedTuple):
+    """The parameters that a scenario's controller and observers are made from.
+
+    Attributes:
+        path: The model's file.
+        modules: Names of the plant's modules.
+        reduced: The reduced model.
+        tilt: The tilt estimate for the plant's accelerometers.
+        gravity: Gravitational acceleration [m/s^2].
+        timestep: The physics step [s].
+        largest_step: The largest physics step that is accurate enough [s].
+        hints: Clauses on what the reduced model does not know of the plant.
+    """
+
+    path: Path
+    modules: tuple[str, ...]
+    reduced: ReducedModel
+    tilt: RadialTilt
+    gravity: float
+    timestep: float
+    largest_step: float
+    hints: tuple[str, ...]
+
+    def noise(self, sensors: Sensors) -> TiltNoise:
+        """Return the noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""
+        gimbal = sensors.encoder.sample_sigma / math.sqrt(self.reduced.gimbals)
+        return replace(self.tilt.noise(sensors.accelerometer.sample_sigma, self.gravity), gimbal=gimbal)
+
+
+COMMANDS = (notch,)
+"""The effects on the law's command, the first one first: each makes what makes its stage, or None where it is off."""
+MEMORIES = (trim,)
+"""The effects on the law's memory, likewise."""
+
+
+class StageOptions(ControllerOptions, total=False):
+    """Options of a controller and of its stages."""
+
+    bias_trim_s: float
+    """For so long from the start, the integrator is held where the observer's bias estimate asks for it [s]."""
+    notch_hz: float
+    """The middle of a notch on the law's command; 0: none [Hz]."""
+
+
+def make_controller(
+    observer: Observer,
+    law: Law,
+    sensors: Sensors,
+    plant: PlantInterface,
+    make: Callable[..., Controller] = Controller,
+    **options: Unpack[StageOptions],
+) -> Controller:
+    """Make a fresh controller of one axis.
+
+    Args:
+        observer: The observer in the loop.
+        law: The control law.
+        sensors: The sensors between the ideal readings and the controller.
+        plant: The controller's knowledge of the plant.
+        make: Makes it of observer, law, sensors, plant and options: a controller of another kind.
+        **options: Options of `Controller`, and settings of its stages.
+
+    Returns:
+        The controller.
+
+    Raises:
+        InputError: A rate does not fit the physics step, or an option is unknown or does not fit the observer or the
+            law.
+    """
+    known = StageOptions.__annotations__
+    for name in options:
+        if name not in known:
+            raise InputError(f"controller: {name!r}: no such option; {nearest(name, known)}")
+    own: dict[str, Any] = {name: options[name] for name in options if name in ControllerOptions.__annotations__}
+    site = ControllerSite(law, plant.timestep, extra_signals(observer), options)
+    own["commands"] = [stage for start in COMMANDS if (stage := start(site)) is not None]
+    own["memories"] = [stage for start in MEMORIES if (stage := start(site)) is not None]
+    return make(observer, law, sensors, plant, **own)

@@ -13,10 +13,8 @@ from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.core.sensor import SampledSensor, Site
 from cmg_mj.core.types import Forces
 from cmg_mj.inputs.types import STRICT
-from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.encoder import Encoder
-from cmg_mj.sensors.fog import Fog
-from cmg_mj.sensors.mems_gyro import MemsGyro
+from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
+from cmg_mj.sensors.gyros import Fog, MemsGyro
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -24,7 +24,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj import mount
-from cmg_mj.core.zero_order_hold import hold_matrices
+from cmg_mj.core.reduced_model import hold_matrices
 from cmg_mj.features.mounting.largest_push import push_margin
 from cmg_mj.features.mounting.mount_files import write_scenario
 from cmg_mj.features.mounting.prospects import prospects

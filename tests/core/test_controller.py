@@ -20,11 +20,10 @@ from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
+from cmg_mj.scenario.design import make_controller
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
-from cmg_mj.scenario.make_controller import make_controller
-from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.encoder import Encoder
-from cmg_mj.sensors.fog import Fog
+from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
+from cmg_mj.sensors.gyros import Fog
 from cmg_mj.sensors.sampled import Sensors
 from tests.observers.reference import DT, GRAVITY_TORQUE, J1, J2, PAPER
 from tests.plant import paper_model as paper

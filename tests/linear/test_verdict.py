@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_plant, load_scenario, prepare
-from cmg_mj.core.zero_order_hold import hold_matrices
+from cmg_mj.core.reduced_model import hold_matrices
 from cmg_mj.inputs.files import bundled, folder
 from cmg_mj.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.linear.verdict import GainsVerdict, judge_gains

@@ -14,7 +14,7 @@ from cmg_mj.results.baselines import GYROS, RATE_START, FusedGyro
 from cmg_mj.results.summary_keys import open_loop_figures, section
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.sensors.mems_gyro import MemsGyro
+from cmg_mj.sensors.gyros import MemsGyro
 from tests.observers.reference import DT, NOISE
 
 GYRO = MemsGyro()

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.runs.batch import BATCHED_FIELDS
-from cmg_mj.runs.batch_values import batch_values, value_of_world
+from cmg_mj.runs.batch import BATCHED_FIELDS, batch_values, value_of_world
 from cmg_mj.runs.experiment import Experiment, prepare, run_batch
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.fog import Fog
+from cmg_mj.sensors.gyros import Fog
 from cmg_mj.sensors.sampled import Sensors
 
 N = 6

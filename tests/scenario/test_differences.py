@@ -11,8 +11,7 @@ import pytest
 
 from cmg_mj import load_scenario, parse_scenario, prepare
 from cmg_mj.core.errors import TomlValue
-from cmg_mj.scenario.differences import LONGEST_NAME, describe_differences, folder_suffix, safe_name
-from cmg_mj.scenario.resolve import differences
+from cmg_mj.scenario.resolve import LONGEST_NAME, describe_differences, differences, folder_suffix, safe_name
 from tests.command import cmg_mj
 from tests.run_folders import write
 

@@ -13,7 +13,7 @@ from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.results.baselines import GYROS, References
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.sensors.mems_gyro import MemsGyro
+from cmg_mj.sensors.gyros import MemsGyro
 from tests.sensors.test_sampled import assert_mean, assert_sigma
 
 DT = 0.005

@@ -20,9 +20,8 @@ from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.encoder import Encoder
-from cmg_mj.sensors.fog import Fog
+from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
+from cmg_mj.sensors.gyros import Fog
 
 G = 9.80665
 READING_AT_REST = IdealReading((0.0, G, 0.0, G), [0.0, 0.0], 0.0, 0.0)

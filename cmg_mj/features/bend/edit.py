@@ -15,7 +15,7 @@ from cmg_mj.features.bend import Bend
 from cmg_mj.plant.axis import Axis, ResolvedModel
 from cmg_mj.plant.elements import BEND_JOINT, SENSORS, element_id, joint_sizes
 from cmg_mj.plant.inertia import free_motions
-from cmg_mj.plant.mujoco_state import at_keyframe
+from cmg_mj.plant.mjcf import at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 

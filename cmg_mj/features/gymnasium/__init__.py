@@ -18,7 +18,7 @@ from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.types import IdealReading
-from cmg_mj.plant.mujoco_state import quiet
+from cmg_mj.plant.mjcf import quiet
 from cmg_mj.plant.physics import OneWorld
 from cmg_mj.results.baselines import MEMS_GYRO
 from cmg_mj.runs.disturbances import disturbances, outsides

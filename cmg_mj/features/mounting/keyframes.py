@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.features.mounting.servos import rest_controls
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, joint_sizes
-from cmg_mj.plant.mujoco_state import posed
+from cmg_mj.plant.mjcf import posed
 
 Poses = Mapping[str, np.ndarray]
 """Joint -> its position in qpos."""

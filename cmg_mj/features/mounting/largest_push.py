@@ -16,8 +16,7 @@ from cmg_mj.core.outside import Outside
 from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.core.types import IdealReading
 from cmg_mj.features.mounting.recoverable_states import ceiling
-from cmg_mj.scenario.design import Design
-from cmg_mj.scenario.plant_parameters import PlantParameters
+from cmg_mj.scenario.design import Design, PlantParameters
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import common_period
 

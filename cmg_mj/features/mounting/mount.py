@@ -32,8 +32,7 @@ from cmg_mj.features.mounting.stance import axes_along, check_unturned, find_pla
 from cmg_mj.inputs.files import folder
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, axes_of
-from cmg_mj.plant.mjcf import compile_model, parse
-from cmg_mj.plant.mujoco_state import posed, quiet, set_control_callback
+from cmg_mj.plant.mjcf import compile_model, parse, posed, quiet, set_control_callback
 
 
 def mount(

@@ -13,7 +13,7 @@ from cmg_mj.features.mounting.largest_push import PUSH_S, PushMargin, push_margi
 from cmg_mj.features.mounting.recoverable_states import RecoverableLimit, ceiling
 from cmg_mj.features.mounting.request import SCALES
 from cmg_mj.linear.verdict import SlidingPoles, sliding_poles
-from cmg_mj.plant.mujoco_state import quiet, set_control_callback
+from cmg_mj.plant.mjcf import quiet, set_control_callback
 from cmg_mj.runs.experiment import Experiment
 
 LOW_LIMIT_DEG = 2.0

@@ -12,9 +12,9 @@ import numpy as np
 from cmg_mj.core.loop import ControlLoop
 from cmg_mj.features.mounting.largest_push import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS
 from cmg_mj.features.mounting.prospects import Prospects
-from cmg_mj.plant.mujoco_state import quiet, set_control_callback
+from cmg_mj.plant.mjcf import quiet, set_control_callback
 from cmg_mj.plant.physics import ManyWorlds
-from cmg_mj.runs.batch_values import batch_values
+from cmg_mj.runs.batch import batch_values
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.stages.push import Push, Pushes
 

@@ -17,8 +17,7 @@ from cmg_mj.features.mounting.keyframes import as_qpos
 from cmg_mj.features.mounting.request import MountRequest
 from cmg_mj.features.mounting.settling import Support, stand
 from cmg_mj.plant.checks import TRUE_DEG
-from cmg_mj.plant.mjcf import compile_model
-from cmg_mj.plant.mujoco_state import posed
+from cmg_mj.plant.mjcf import compile_model, posed
 from cmg_mj.plant.tilt_line import UP
 
 SMALLEST_HEIGHT_M = 1e-3

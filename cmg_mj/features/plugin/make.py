@@ -24,7 +24,7 @@ from cmg_mj.features.plugin.tables import PluginCode, generate_plugin
 from cmg_mj.laws import StateFeedback
 from cmg_mj.linear.omissions import IN_THE_MODEL, omissions
 from cmg_mj.linear.verdict import require_stable_period
-from cmg_mj.plant.mujoco_state import set_control_callback
+from cmg_mj.plant.mjcf import set_control_callback
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.result import Result
 from cmg_mj.runs.experiment import Experiment, prepare

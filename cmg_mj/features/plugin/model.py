@@ -13,8 +13,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY
-from cmg_mj.plant.mjcf import as_mjcf, compile_model
-from cmg_mj.plant.mujoco_state import quiet, set_control_callback
+from cmg_mj.plant.mjcf import as_mjcf, compile_model, quiet, set_control_callback
 from cmg_mj.plant.plant import Plant
 
 Framed = (

@@ -13,10 +13,8 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import CORNERS_HZ, NoiseStream, spread_of
 from cmg_mj.core.sensor import steps_until, whole_steps
 from cmg_mj.core.types import STANDARD_GRAVITY
-from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.encoder import Encoder
-from cmg_mj.sensors.fog import Fog
-from cmg_mj.sensors.mems_gyro import PIECE, MemsGyro
+from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
+from cmg_mj.sensors.gyros import PIECE, Fog, MemsGyro
 from cmg_mj.stages.low_pass import INSIDE_HZ
 from cmg_mj.stages.turning import YawCoupling
 

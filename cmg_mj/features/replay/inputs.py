@@ -13,9 +13,8 @@ from cmg_mj.features.replay.log_replay import SETTLE_S, OnShare, ReplayResult, r
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.observers.parameter_options import Parameters, numbers
 from cmg_mj.runs.experiment import prepare
-from cmg_mj.scenario.design import design
+from cmg_mj.scenario.design import PlantParameters, design
 from cmg_mj.scenario.loading import parse_scenario
-from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
 
 NUMBERS = {

@@ -19,8 +19,7 @@ from cmg_mj.features.replay.log import Log, LogNoise, WhiteNoise
 from cmg_mj.features.replay.sampling import EVEN, Part
 from cmg_mj.observers.parameter_options import numbers
 from cmg_mj.results.summary_keys import SummaryValue
-from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.encoder import Encoder
+from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
 
 SEGMENT = 128
 """Rows of a segment of Welch's spectrum; segments overlap by half, under Hann's window."""

@@ -19,7 +19,7 @@ from cmg_mj.features.replay.report import log_figures, replay_figures
 from cmg_mj.observers.parameter_options import Parameters
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.summary_keys import finite
-from cmg_mj.scenario.differences import safe_name
+from cmg_mj.scenario.resolve import safe_name
 
 SETTINGS = "replay.toml"
 

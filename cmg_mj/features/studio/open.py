@@ -23,7 +23,7 @@ from mujoco.studio import (
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.studio.panel import StudioPanel
 from cmg_mj.features.studio.stepping import Stepping
-from cmg_mj.plant.mujoco_state import quiet
+from cmg_mj.plant.mjcf import quiet
 from cmg_mj.runs.experiment import Experiment
 
 HISTORY_S = 10.0

@@ -19,7 +19,7 @@ from cmg_mj.core.sensor import whole_steps
 from cmg_mj.features.pivot.moving_pivot import pivot_directions
 from cmg_mj.features.pivot.pivot_signals import PivotSignals
 from cmg_mj.features.studio.settings import FieldValues, changed_fields
-from cmg_mj.plant.mujoco_state import set_control_callback
+from cmg_mj.plant.mjcf import set_control_callback
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.tilt_line import apply_torques
 from cmg_mj.runs.callback import control

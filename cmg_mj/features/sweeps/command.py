@@ -84,7 +84,7 @@ def sweep(
     from cmg_mj.features.sweeps.store import Store
     from cmg_mj.features.sweeps.store import run as run_here
     from cmg_mj.features.sweeps.study import MOST_TRIALS, check_values, counted
-    from cmg_mj.scenario.differences import safe_name
+    from cmg_mj.scenario.resolve import safe_name
 
     if cluster is not None:
         local_workers(cluster)

@@ -178,7 +178,7 @@ def tune_log(
     from cmg_mj.features.tuning.closed_loop import loop_scenario
     from cmg_mj.observers.parameter_options import parameters_of
     from cmg_mj.runs.save import file_name
-    from cmg_mj.scenario.differences import safe_name
+    from cmg_mj.scenario.resolve import safe_name
 
     for setting in settings:
         if not setting.startswith("observer."):

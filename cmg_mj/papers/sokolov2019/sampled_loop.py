@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.zero_order_hold import hold_matrices
+from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
 from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.observers import Measurement, Observer
 

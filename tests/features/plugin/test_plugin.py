@@ -17,7 +17,7 @@ from cmg_mj.features.plugin.build import common_files
 from cmg_mj.features.plugin.driver import FAILED, STATUS, initial_states, instance_states, set_world
 from cmg_mj.features.plugin.make import describe_rig
 from cmg_mj.features.plugin.tables import NAMES_IN_USE, generate_plugin
-from cmg_mj.plant.mujoco_state import quiet
+from cmg_mj.plant.mjcf import quiet
 from tests.features.plugin.made import check_against_runner, needs_compiler, quick, run
 
 pytestmark = needs_compiler

@@ -9,7 +9,7 @@ from pathlib import Path
 import mujoco
 import pytest
 
-from cmg_mj.plant.mujoco_state import quiet
+from cmg_mj.plant.mjcf import quiet
 from tests.command import cmg_mj
 from tests.features.plugin.made import make, needs_compiler
 
