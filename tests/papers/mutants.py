@@ -94,8 +94,8 @@ MUTANTS = [
     Mutant("what does not settle counts", D + "figures.py",
            "in_order = (thousand < ten) & (ten <= tenth) & np.isfinite(thousand)",
            "in_order = (thousand <= ten) & (ten <= tenth)", DAO + "test_settling_order_needs_both_steps"),
-    Mutant("(10) or (14), the other way round", D + "theory.py", "rearranged=bool(by_14 < by_10)",
-           "rearranged=bool(by_14 > by_10)", DAO + "test_what_the_observer_finds_decides_what_is_meant"),
+    Mutant("(10) or (14), the other way round", D + "theory.py", "if by_14 < by_10 else",
+           "if by_14 > by_10 else", DAO + "test_what_the_observer_finds_decides_what_is_meant"),
     # --- andrieu2009 ---
     Mutant("(19) without the spread of A", A + "lyapunov.py", "(1.0 + spread) * part)", "part)",
            EQUATIONS + "test_19_holds_for_every_a_within_the_spread"),

@@ -108,8 +108,7 @@ def test_what_the_observer_finds_decides_what_is_meant(monkeypatch: pytest.Monke
 
 
 def test_an_explicit_step_that_stays_bounded_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(theory, "explicit_escape", lambda *args: np.inf)
-    monkeypatch.setattr(theory, "DURATION_S", 80.0)
+    monkeypatch.setattr(theory, "explicit_escape", lambda: np.inf)
     claim = theory.sampling_claim(lambda share: None)
     assert claim.verdict == WITHIN
     assert claim.figures["explicit_step_escapes_after_s"] is None

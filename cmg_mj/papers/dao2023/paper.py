@@ -57,23 +57,21 @@ def exosystem_state(t: np.ndarray | float) -> np.ndarray:
     return np.concatenate([constant, np.cos(OMEGA * t)[..., None], np.sin(OMEGA * t)[..., None]], axis=-1)
 
 
-def system(q: np.ndarray | float, u: np.ndarray | float, *, with_disturbance: bool = True) -> System:
-    """Return the matrices of (14), (15) at a measured angle and a torque.
+def system(q: np.ndarray | float, u: np.ndarray | float) -> System:
+    """Return the matrices of (14), (15) at a measured angle and a torque, r being (theta1, theta2, d).
 
     Args:
         q: Angle of the arm, (...,) [rad].
         u: Torque, (...,) [N m].
-        with_disturbance: Whether r is (theta1, theta2, d) or, as the conventional observer has it, (theta1, theta2).
 
     Returns:
         The matrices; B0 has the leading dimensions of q.
     """
     q, u = np.broadcast_arrays(np.asarray(q, dtype=float), np.asarray(u, dtype=float))
-    lower = [-np.sin(q), u, np.ones_like(q)] if with_disturbance else [-np.sin(q), u]
-    B0 = np.zeros((*q.shape, 2, len(lower)))
-    B0[..., 1, :] = np.stack(lower, axis=-1)
+    B0 = np.zeros((*q.shape, 2, 3))
+    B0[..., 1, :] = np.stack([-np.sin(q), u, np.ones_like(q)], axis=-1)
     A = np.array([[0.0, 1.0], [0.0, 0.0]])
-    return System(A, B0, np.zeros((2, 1)), np.array([[1.0, 0.0]]), np.zeros((1, len(lower))))
+    return System(A, B0, np.zeros((2, 1)), np.array([[1.0, 0.0]]), np.zeros((1, 3)))
 
 
 def error_matrix() -> np.ndarray:
