@@ -99,7 +99,7 @@ MUTANTS = [
     # --- andrieu2009 ---
     Mutant("(19) without the spread of A", A + "lyapunov.py", "(1.0 + spread) * part)", "part)",
            EQUATIONS + "test_19_holds_for_every_a_within_the_spread"),
-    Mutant("Fig. 2: in order in any seed", A + "figures.py", "holds=share >= LEAST_SEEDS", "holds=share > 0.0",
+    Mutant("Fig. 2: in order in any seed", A + "figures.py", "holds=share >= MIN_SEEDS", "holds=share > 0.0",
            ANDRIEU + "test_order_of_figure_2_is_needed_in_nearly_every_seed"),
     Mutant("on the rig: another observer's falls", A + "on_the_rig.py", 'holds=standing_counts["high_gain"] == worlds',
            'holds=standing_counts["linear"] == worlds', ANDRIEU + "test_a_fall_on_the_rig_is_not_hidden"),

@@ -109,6 +109,6 @@ def test_what_the_observer_finds_decides_what_is_meant(monkeypatch: pytest.Monke
 
 def test_an_explicit_step_that_stays_bounded_changes_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(theory, "explicit_escape", lambda: np.inf)
-    claim = theory.sampling_claim(lambda share: None)
+    claim = theory.sampling_claim()
     assert claim.verdict == WITHIN
     assert claim.figures["explicit_step_escapes_after_s"] is None

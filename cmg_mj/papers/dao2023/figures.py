@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.dao2023 import paper
+from cmg_mj.papers.dao2023.observer import Array
 from cmg_mj.papers.dao2023.robot import (
     ASSUMED,
     SETTLED,
@@ -41,7 +42,7 @@ def figures_claims(on_share: OnShare) -> list[Claim]:
     return [part(results) for part in parts]
 
 
-def _panel(title: str, t: np.ndarray, errors: np.ndarray, labels: Sequence[str], limit: float) -> Panel:
+def _panel(title: str, t: Array, errors: Array, labels: Sequence[str], limit: float) -> Panel:
     """Draw the errors (n_times, n_labels) of one motion."""
     lines = [Line(t, errors[:, i], label, color=i, width=0.8) for i, label in enumerate(labels)]
     return Panel("estimate less truth", lines, title, y_range=(-limit, limit))
@@ -111,7 +112,7 @@ def speed_claim(study: Study) -> Claim:
     )
 
 
-def state_settle_times(errors: Errors) -> tuple[np.ndarray, np.ndarray]:
+def state_settle_times(errors: Errors) -> tuple[Array, Array]:
     """Find when the state's error, as a vector, stays below `SETTLED`, with the first of the weights.
 
     Args:

@@ -16,13 +16,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+Array = np.ndarray
 
-def times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+
+def times(matrix: Array, vector: Array) -> Array:
     """Multiply matrix and vector, (..., a, b) and (..., b) -> (..., a)."""
     return (matrix @ vector[..., None])[..., 0]
 
 
-def solve(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+def solve(matrix: Array, vector: Array) -> Array:
     """Solve for one right-hand side, (..., a, a) and (..., a) -> (..., a)."""
     if matrix.shape[-1] == 1:
         return vector / matrix[..., 0]
@@ -32,30 +34,30 @@ def solve(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
 class System(NamedTuple):
     """The matrices of (1), (2) at one time. Leading dimensions, if any, number plants."""
 
-    A: np.ndarray
+    A: Array
     """State matrix, (..., n, n)."""
-    B0: np.ndarray
+    B0: Array
     """Input matrix of r, (..., n, r)."""
-    B2: np.ndarray
+    B2: Array
     """Input matrix of u, (..., n, m)."""
-    C2: np.ndarray
+    C2: Array
     """Output matrix of x, (..., p, n)."""
-    D20: np.ndarray
+    D20: Array
     """Output matrix of r, (..., p, r)."""
 
 
 class State(NamedTuple):
     """The estimates, the solution of (8), the turned Gamma of (9), and the last measurement."""
 
-    x: np.ndarray
+    x: Array
     """Estimate of x, (..., n)."""
-    xm: np.ndarray
+    xm: Array
     """Estimate of xm, (..., nm)."""
-    T: np.ndarray
+    T: Array
     """T of (8), (..., n, nm)."""
-    P: np.ndarray
+    P: Array
     """exp(Am t) Gamma exp(Am^T t), (..., nm, nm)."""
-    y: np.ndarray
+    y: Array
     """The last measurement, (..., p)."""
 
 
@@ -90,14 +92,14 @@ class FriedlandTacker:
     """
 
     dt: float
-    Am: np.ndarray
-    Cm: np.ndarray
-    L: np.ndarray
-    Gamma: np.ndarray
-    Sigma: np.ndarray
+    Am: Array
+    Cm: Array
+    L: Array
+    Gamma: Array
+    Sigma: Array
 
     @classmethod
-    def conventional(cls, dt: float, L: np.ndarray, Gamma: np.ndarray, Sigma: np.ndarray) -> FriedlandTacker:
+    def conventional(cls, dt: float, L: Array, Gamma: Array, Sigma: Array) -> FriedlandTacker:
         """Make the adaptive observer of Zhang (2002) and Liu, Zhang, Su (2011): r constant, Am = 0, Cm = I.
 
         Args:
@@ -113,17 +115,17 @@ class FriedlandTacker:
         return cls(dt, np.zeros((r, r)), np.eye(r), L, Gamma, Sigma)
 
     @cached_property
-    def _turn(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _turn(self) -> tuple[Array, Array, Array]:
         """F = exp(Am h) and its inverse, (nm, nm), and Cm (F + I)/2, (r, nm)."""
         F = expm(self.Am * self.dt)
         return F, expm(-self.Am * self.dt), self.Cm @ ((F + np.eye(len(F))) / 2.0)
 
     def init(
         self,
-        y: np.ndarray,
-        x: np.ndarray | None = None,
-        xm: np.ndarray | None = None,
-        T: np.ndarray | None = None,
+        y: Array,
+        x: Array | None = None,
+        xm: Array | None = None,
+        T: Array | None = None,
     ) -> State:
         """Return the state at the first sample.
 
@@ -141,7 +143,7 @@ class FriedlandTacker:
         xm = np.zeros(nm) if xm is None else xm
         return State(x, xm, np.zeros((n, nm)) if T is None else T, self.Gamma, y)
 
-    def step(self, state: State, system: System, u: np.ndarray, y: np.ndarray, D20: np.ndarray | None = None) -> State:
+    def step(self, state: State, system: System, u: Array, y: Array, D20: Array | None = None) -> State:
         """Advance by one sample period.
 
         Args:
@@ -175,8 +177,8 @@ class FriedlandTacker:
         return State(x + times(T, step), xm + step, T, P, y)
 
     def slope(
-        self, t: float, x: np.ndarray, xm: np.ndarray, T: np.ndarray, system: System, u: np.ndarray, y: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        self, t: float, x: Array, xm: Array, T: Array, system: System, u: Array, y: Array
+    ) -> tuple[Array, Array, Array]:
         """Evaluate the observer in continuous time, (7) to (9) as they are printed, with B2 u and the hats put back.
 
         Args:
@@ -195,10 +197,8 @@ class FriedlandTacker:
         n, nm = T.shape
         turn = expm(Am * t)
         Lm = -turn @ self.Gamma @ turn.T @ (C2 @ T + D20 @ Cm).T @ self.Sigma  # (9)
-        augmented_A = np.block([[A, B0 @ Cm], [np.zeros((nm, n)), Am]])
-        augmented_B = np.vstack([B2, np.zeros((nm, B2.shape[1]))])
-        augmented_C = np.hstack([C2, D20 @ Cm])
-        augmented_L = np.vstack([L + T @ Lm, Lm])
-        estimates = np.concatenate([x, xm])
-        estimates = augmented_A @ estimates + augmented_B @ u + augmented_L @ (augmented_C @ estimates - y)  # (7)
-        return estimates[:n], estimates[n:], (A + L @ C2) @ T - T @ Am + (B0 + L @ D20) @ Cm  # (8)
+        both = np.concatenate([x, xm])
+        innovation = np.hstack([C2, D20 @ Cm]) @ both - y
+        known = np.block([[A, B0 @ Cm], [np.zeros((nm, n)), Am]]) @ both + np.concatenate([B2 @ u, np.zeros(nm)])
+        both = known + np.vstack([L + T @ Lm, Lm]) @ innovation  # (7)
+        return both[:n], both[n:], (A + L @ C2) @ T - T @ Am + (B0 + L @ D20) @ Cm  # (8)

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from cmg_mj.papers.claim import Assumption, OnShare
 from cmg_mj.papers.dao2023 import paper
-from cmg_mj.papers.dao2023.observer import FriedlandTacker
+from cmg_mj.papers.dao2023.observer import Array, FriedlandTacker
 
 SIGMAS = (*paper.SIGMAS, 10_000.0)
 """The paper's three weights, in the order of Fig. 3, and one beyond."""
@@ -36,13 +36,13 @@ def make_single(dt: float, sigma: float) -> FriedlandTacker:
     return FriedlandTacker(dt, paper.A_M, paper.C_M, paper.L, paper.GAMMA, np.array([[sigma]]))
 
 
-def starts(seed: int, n: int) -> np.ndarray:
+def starts(seed: int, n: int) -> Array:
     """Return the initial angles within half a turn and rates within 2 rad/s, (n, 2) [rad, rad/s]."""
     rng = np.random.default_rng(seed)
     return np.stack([rng.uniform(-np.pi, np.pi, n), rng.uniform(-2.0, 2.0, n)], axis=-1)
 
 
-def motion(start: np.ndarray, t: np.ndarray, coefficient: float = 1.0) -> np.ndarray:
+def motion(start: Array, t: Array, coefficient: float = 1.0) -> Array:
     """Integrate the arm's own motion.
 
     It is chaotic: after some time two integrators no longer agree. Each computed motion is still, to the tolerance,
@@ -58,7 +58,7 @@ def motion(start: np.ndarray, t: np.ndarray, coefficient: float = 1.0) -> np.nda
     """
     n = len(start)
 
-    def slope(time: float, x: np.ndarray) -> np.ndarray:
+    def slope(time: float, x: Array) -> Array:
         return np.concatenate([x[n:], paper.acceleration(x[:n], time, coefficient)])
 
     solution = solve_ivp(slope, (t[0], t[-1]), start.T.ravel(), "DOP853", t, rtol=1e-10, atol=1e-10)
@@ -68,27 +68,26 @@ def motion(start: np.ndarray, t: np.ndarray, coefficient: float = 1.0) -> np.nda
 class Errors(NamedTuple):
     """An observer's errors along the motions."""
 
-    t: np.ndarray
+    t: Array
     """Times, (n_times,) [s]."""
-    state: np.ndarray
+    state: Array
     """Errors of q and its rate, (n_times, n_sigmas, n, 2) [rad, rad/s]."""
-    exogenous: np.ndarray
+    exogenous: Array
     """Errors of theta1, theta2 and, if it is estimated, d, (n_times, n_sigmas, n, 2 or 3)."""
 
-    def tail_rms(self) -> np.ndarray:
+    def tail_rms(self) -> Array:
         """Return the RMS of the state error's norm over the last fifth, (n_sigmas, n)."""
         tail = self.t >= self.t[0] + 0.8 * (self.t[-1] - self.t[0])
         return np.sqrt(np.mean(np.sum(self.state[tail] ** 2, axis=-1), axis=0))
 
 
-def follow(observer: FriedlandTacker, t: np.ndarray, x: np.ndarray, on_share: OnShare = lambda share: None) -> Errors:
+def follow(observer: FriedlandTacker, t: Array, x: Array) -> Errors:
     """Let observers, from zero, follow all motions.
 
     Args:
         observer: The paper's, or the conventional one, which knows of no disturbance.
         t: Sample times, one observer.dt apart, (n_times,) [s].
         x: The motions at these times, (n_times, n, 2).
-        on_share: Called with the share done.
 
     Returns:
         Their errors.
@@ -105,13 +104,11 @@ def follow(observer: FriedlandTacker, t: np.ndarray, x: np.ndarray, on_share: On
         state = observer.step(state, system._replace(B0=all_B0[k - 1]), inputs[k - 1 : k], y[k])
         estimates.append(state.x)
         exosystem.append(state.xm)
-        if k % 1000 == 0:
-            on_share(k / len(t))
     truth = (paper.exosystem_state(t) @ paper.C_M.T)[:, None, None, :r]
     return Errors(t, np.array(estimates) - x[:, None], np.array(exosystem) @ observer.Cm.T - truth)
 
 
-def settle_times(size: np.ndarray, t: np.ndarray, band: float) -> np.ndarray:
+def settle_times(size: Array, t: Array, band: float) -> Array:
     """Find the time from which a quantity stays inside a band: infinite if it is outside at the end.
 
     Args:
@@ -144,17 +141,18 @@ def study(seed: int = 0, on_share: OnShare = lambda share: None) -> Study:
     rate = 400.0
     t = np.arange(round(200.0 * rate) + 1) / rate
     x = motion(starts(seed, 10), t)
-    proposed = follow(make_proposed(1.0 / rate, *SIGMAS), t, x, lambda s: on_share(0.1 + 0.65 * s))
+    on_share(0.1)
+    proposed = follow(make_proposed(1.0 / rate, *SIGMAS), t, x)
+    on_share(0.75)
     plain = FriedlandTacker.conventional(2.0 / rate, paper.L, paper.GAMMA[:2, :2], np.array([[[[10.0]]]]))
-    conventional = follow(plain, t[::2], x[::2], lambda s: on_share(0.75 + 0.25 * s))
-    return Study(proposed, conventional, float(np.abs(x[..., 0]).max()))
+    return Study(proposed, follow(plain, t[::2], x[::2]), float(np.abs(x[..., 0]).max()))
 
 
-def exogenous_settle_times(errors: Errors, band: float = SETTLED) -> np.ndarray:
+def exogenous_settle_times(errors: Errors, band: float = SETTLED) -> Array:
     """Find when the errors of theta1, theta2 and d settle, (n_sigmas, n) [s]; infinite if they do not."""
     return settle_times(np.linalg.norm(errors.exogenous, axis=-1), errors.t, band)
 
 
-def finite_times(times: Sequence[float] | np.ndarray) -> list[float | None]:
+def finite_times(times: Sequence[float] | Array) -> list[float | None]:
     """Return settling times as JSON can hold them."""
     return [float(time) if math.isfinite(time) else None for time in times]

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim, OnShare, obtain
 from cmg_mj.papers.dao2023 import paper
-from cmg_mj.papers.dao2023.observer import FriedlandTacker
+from cmg_mj.papers.dao2023.observer import Array, FriedlandTacker
 from cmg_mj.papers.dao2023.robot import finite_times, follow, make_proposed, make_single, motion, starts
 
 # --- The misprints, and the settings of the simulation that the paper leaves open ---
@@ -20,14 +20,14 @@ DT, DURATION_S = 0.005, 80.0
 
 def as_printed_claims(on_share: OnShare) -> list[Claim]:
     """Judge the sampling and the misprints."""
-    return [sampling_claim(lambda share: on_share(0.6 * share)), misprint_claim()]
+    return obtain([sampling_claim, misprint_claim], on_share)
 
 
-def sampling_claim(on_share: OnShare) -> Claim:
+def sampling_claim() -> Claim:
     """Judge a sampled observer at Sigma = 1000; an explicit step is shown beside it, and does not count."""
     t = DT * np.arange(round(DURATION_S / DT) + 1)
     x = motion(starts(1, 4), t)
-    rms = follow(make_proposed(DT, 1000.0), t, x, on_share).tail_rms()[0]
+    rms = follow(make_proposed(DT, 1000.0), t, x).tail_rms()[0]
     escape = explicit_escape()
     return Claim(
         place="Section 3.2, simulation",
@@ -41,7 +41,7 @@ def sampling_claim(on_share: OnShare) -> Claim:
     )
 
 
-def observer_slope(observer: FriedlandTacker, t: float, s: np.ndarray, q: float) -> np.ndarray:
+def observer_slope(observer: FriedlandTacker, t: float, s: Array, q: float) -> Array:
     """Evaluate (7) to (9) on the arm at the angle q; s is x, xm and T in a row, (14,)."""
     system = paper.system(q, paper.torque(t))
     parts = observer.slope(t, s[:2], s[2:6], s[6:].reshape(2, 4), system, np.zeros(1), np.array([q]))
@@ -93,7 +93,7 @@ def misprint_claim() -> Claim:
     )
 
 
-def amplitude_under_10() -> np.ndarray:
+def amplitude_under_10() -> Array:
     """Estimate the amplitude of the disturbance on an arm that moves by (10), one a motion [rad/s^2]."""
     t = DT * np.arange(round(DURATION_S / DT) + 1)
     x = motion(starts(3, 3), t, coefficient=paper.THETA[1])
@@ -107,15 +107,15 @@ def amplitude_under_10() -> np.ndarray:
 
 def identities_claims(on_share: OnShare) -> list[Claim]:
     """Judge the separated errors and Upsilon."""
-    return [separated_errors(on_share), upsilon()]
+    return obtain([separated_errors, upsilon], on_share)
 
 
-def separated_errors(on_share: OnShare) -> Claim:
+def separated_errors() -> Claim:
     """Judge whether the error of the state parts from that of the exosystem."""
-    found = {}
-    for i, (sigma, duration) in enumerate(((0.1, 6.0), (10.0, 6.0), (1000.0, 1.5))):
-        found[f"continuous_sigma_{sigma:g}"] = continuous_deviation(sigma, duration)
-        on_share(0.2 * (i + 1))
+    found = {
+        f"continuous_sigma_{sigma:g}": continuous_deviation(sigma, duration)
+        for sigma, duration in ((0.1, 6.0), (10.0, 6.0), (1000.0, 1.5))
+    }
     found["200_hz_sigma_1000"] = sampled_deviation(40.0)
     errors = {name: error for name, (error, _) in found.items()}
     return Claim(
@@ -131,9 +131,7 @@ def separated_errors(on_share: OnShare) -> Claim:
     )
 
 
-def continuous_run(
-    sigma: float, start: np.ndarray, state: np.ndarray, t: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def continuous_run(sigma: float, start: Array, state: Array, t: Array) -> tuple[Array, Array, Array, Array]:
     """Integrate the arm and (7) to (9) in continuous time, as one.
 
     Args:
@@ -147,7 +145,7 @@ def continuous_run(
     """
     observer = make_single(1.0, sigma)
 
-    def slope(time: float, s: np.ndarray) -> np.ndarray:
+    def slope(time: float, s: Array) -> Array:
         arm = [s[1], paper.acceleration(s[0], time)]
         return np.concatenate([arm, observer_slope(observer, time, s[2:], s[0])])
 
