@@ -113,17 +113,6 @@ def test_converges_to_the_continuous_observer() -> None:
     np.testing.assert_allclose(orders[-1], [1.0, 1.0, 2.0], atol=0.1)
 
 
-def test_gamma_turns_with_the_exosystem() -> None:
-    rng = np.random.default_rng(2)
-    matrices, L = plant(rng)
-    observer = build(rng, L, 0.02)
-    state = observer.init(np.zeros(P))
-    for k in range(50):
-        state = observer.step(state, matrices(0.02 * k), np.zeros(M), np.zeros(P))
-    turn = expm(AM * 1.0)
-    np.testing.assert_allclose(state.P, turn @ observer.Gamma @ turn.T, rtol=0.0, atol=1e-12)
-
-
 # --- the conventional observer, and what the proposed one has to do with it ----------------------------
 
 

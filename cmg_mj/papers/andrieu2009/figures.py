@@ -52,21 +52,21 @@ def claims(on_share: OnShare) -> list[Claim]:
 # --- Fig. 1: the local incremental rate of f2 and its three estimates ---
 
 
-def rates_by_window(run: Run, replays: Replays) -> np.ndarray:
-    """Return the mean of the observers' estimates of the rate, (3 observers, 4 windows)."""
-    return np.array([window_means(run, replays[kind].rate) for kind in KINDS])
+def by_window(run: Run, replays: Replays, field: str) -> np.ndarray:
+    """Return the mean of a field of `Replay`, (3 observers, 4 windows)."""
+    return np.array([window_means(run, getattr(replays[kind], field)) for kind in KINDS])
 
 
 def ordered_rates(study: Study) -> tuple[np.ndarray, np.ndarray]:
     """Return the means of `RATES` over windows and seeds, (4 rates, 4 windows), and the windows in order."""
-    means = np.vstack([rates_by_window(study.run, study.nominal), window_means(study.run, study.rate)])
+    means = np.vstack([by_window(study.run, study.nominal, "rate"), window_means(study.run, study.rate)])
     return means, np.all(np.diff(means, axis=0) <= 0.0, axis=0)
 
 
 def figure_1(study: Study) -> Claim:
     """Judge the estimates of the local incremental rate."""
     means, in_order = ordered_rates(study)
-    gains = np.array([window_means(study.run, study.nominal[kind].L) for kind in KINDS[1:]])
+    gains = by_window(study.run, study.nominal, "L")[1:]
     curves = [*(study.nominal[kind].rate[:, 0] for kind in KINDS), study.rate[:, 0]]
     middles = [(start + end) / 2.0 for start, end in WINDOWS]
 
@@ -140,14 +140,10 @@ def figure_2(study: Study) -> Claim:
     )
 
 
-def biases(run: Run, replays: Replays) -> np.ndarray:
-    """Return the mean error of eta2, (3 observers, 4 windows)."""
-    return np.array([window_means(run, replays[kind].eta2_error) for kind in KINDS])
-
-
 def bias(study: Study) -> Claim:
     """Judge the order of the biases in Fig. 2."""
-    noisy, quiet = biases(study.run, study.nominal), biases(study.quiet_run, study.quiet)
+    noisy = by_window(study.run, study.nominal, "eta2_error")
+    quiet = by_window(study.quiet_run, study.quiet, "eta2_error")
     return Claim(
         place="Section 3.1, bias in Fig. 2",
         statement="The larger an observer's estimate of the rate, the larger the bias of its error.",
@@ -160,7 +156,8 @@ def bias(study: Study) -> Claim:
 
 def bias_left(study: Study) -> np.ndarray:
     """Return the share of the bias that is left where the observers know hbar, (3 observers, 4 windows)."""
-    return np.abs(biases(study.run, study.exact) / biases(study.run, study.nominal))
+    exact, nominal = (by_window(study.run, replays, "eta2_error") for replays in (study.exact, study.nominal))
+    return np.abs(exact / nominal)
 
 
 def bias_of_constant_gain(study: Study) -> Claim:
@@ -198,7 +195,7 @@ def bias_of_updated_gains(study: Study) -> Claim:
 def spread(study: Study) -> Claim:
     """Judge the thickness of the curves in Fig. 2: the standard deviation of the errors beside the estimates used."""
     spreads = np.array([window_spreads(study.run, study.nominal[kind].eta2_error) for kind in KINDS])
-    rates = rates_by_window(study.run, study.nominal)
+    rates = by_window(study.run, study.nominal, "rate")
 
     def correlation(columns: slice) -> float:
         a, b = rates[:, columns].ravel().round(6), spreads[:, columns].ravel()

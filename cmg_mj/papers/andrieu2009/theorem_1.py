@@ -105,8 +105,8 @@ def no_observer_beyond_1() -> Claim:
         Panel(
             "|error of x2|/x2 [-]",
             [
-                Line(1.0 / share_left, error, f"x2(0) = {STARTS[i]:g}", color=i)
-                for i, (share_left, error) in enumerate(escapes)
+                Line(1.0 / share_left, error, f"x2(0) = {start:g}")
+                for start, (share_left, error) in zip(STARTS, escapes, strict=True)
             ],
             f"({letter}) p = {p}",
             "time of existence over what is left of it [-]",
@@ -193,30 +193,26 @@ def theorem_1() -> Claim:
     """Judge the three observers from large errors, and with a disturbance."""
     n = len(START_ERRORS)
     columns = [*(Column(error=error) for error in START_ERRORS), *(Column(noise=size) for size in AMPLITUDES)]
-    runs = {}
-    for kind in (PLAIN, UPDATED, HOMOGENEOUS):
-        (_, error), L = follow(kind, columns)
-        runs[kind] = error, L
+    results = {kind: follow(kind, columns) for kind in (PLAIN, UPDATED, HOMOGENEOUS)}
+    errors = {kind: np.abs(error) for kind, ((_, error), _) in results.items()}
+    gains = {kind: L[:, :n] for kind, (_, L) in results.items()}
     ends = {
-        kind: [abs(end) if math.isfinite(end) else None for end in error[-1, :n].tolist()]
-        for kind, (error, _) in runs.items()
+        kind: [end if math.isfinite(end) else None for end in error[-1, :n].tolist()] for kind, error in errors.items()
     }
-    failures = {kind: sum(value is None or value > 1e-3 for value in values) for kind, values in ends.items()}
-    largest = {kind: float(np.nanmax(L[:, :n])) for kind, (_, L) in runs.items()}
-    balls = np.abs(runs[HOMOGENEOUS][0][TIMES > 5.0, n:]).max(axis=0).tolist()
+    failures = {kind: sum(end is None or end > 1e-3 for end in row) for kind, row in ends.items()}
+    largest = {kind: float(np.nanmax(L)) for kind, L in gains.items()}
+    balls = errors[HOMOGENEOUS][TIMES > 5.0, n:].max(axis=0).tolist()
     shrinks = all(a > 5.0 * b for a, b in itertools.pairwise(balls))
     by_simulation = (
         "By simulation, for one p, one g and one solution, with phi1 = 0.5, phi2 = 2, phi3 = 1, l = (2, 1), b = 0.5."
     )
-    errors = [
-        Line(TIMES, np.abs(error[:, n - 1]), kind, color=i, style=("--", "-", "-")[i])
-        for i, (kind, (error, _)) in enumerate(runs.items())
-    ]
-    gains = [Line(TIMES, L[:, n - 1], kind, color=i) for i, (kind, (_, L)) in enumerate(runs.items())]
+    styles = zip(errors.items(), ("--", "-", "-"), strict=True)
+    error_lines = [Line(TIMES, error[:, n - 1], kind, style) for (kind, error), style in styles]
+    gain_lines = [Line(TIMES, L[:, -1], kind) for kind, L in gains.items()]
     time, top = "time [normalised]", 1.1 * max(largest.values())
     panels = [
-        Panel("|error of x2| [-]", errors, "(a) from an error of 1000", time, y_scale="log", y_range=(1e-8, 1e6)),
-        Panel("gain L [-]", gains, "(b) its gain", time, y_range=(0.0, top)),
+        Panel("|error of x2| [-]", error_lines, "(a) from an error of 1000", time, y_scale="log", y_range=(1e-8, 1e6)),
+        Panel("gain L [-]", gain_lines, "(b) its gain", time, y_range=(0.0, top)),
     ]
     title = "andrieu2009, Theorem 1 on system (1): |error of x2| after the largest errors at the start"
     return Claim(

@@ -44,7 +44,7 @@ def figures_claims(on_share: OnShare) -> list[Claim]:
 
 def _panel(title: str, t: Array, errors: Array, labels: Sequence[str], limit: float) -> Panel:
     """Draw the errors (n_times, n_labels) of one motion."""
-    lines = [Line(t, errors[:, i], label, color=i, width=0.8) for i, label in enumerate(labels)]
+    lines = [Line(t, errors[:, i], label, width=0.8) for i, label in enumerate(labels)]
     return Panel("estimate less truth", lines, title, y_range=(-limit, limit))
 
 
@@ -193,8 +193,8 @@ def larger_gains(study: Study) -> Claim:
     in_order = bool(thousand < ten <= tenth)
     size = np.linalg.norm(study.proposed.exogenous / np.array([*paper.THETA, 1.0]), axis=-1)  # d has the amplitude 1
     lines = [
-        Line(study.proposed.t[::80], np.median(size[::80, i], axis=-1), f"Sigma = {SIGMAS[i]:g}", color=int(c))
-        for c, i in enumerate(np.argsort(SIGMAS))
+        Line(study.proposed.t[::80], np.median(size[::80, i], axis=-1), f"Sigma = {SIGMAS[i]:g}")
+        for i in np.argsort(SIGMAS)
     ]
     title = "dao2023, section 3.2: error of (theta1, theta2, d), each over its true size, median of ten motions"
     return Claim(

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from cmg_mj.papers.claim import Claim, OnShare, obtain
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.observer import Array, FriedlandTacker
-from cmg_mj.papers.dao2023.robot import finite_times, follow, make_proposed, make_single, motion, starts
+from cmg_mj.papers.dao2023.robot import Errors, finite_times, follow, make_proposed, make_single, motion, starts
 
 # --- The misprints, and the settings of the simulation that the paper leaves open ---
 
@@ -23,12 +23,15 @@ def as_printed_claims(on_share: OnShare) -> list[Claim]:
     return obtain([sampling_claim, misprint_claim], on_share)
 
 
+def follow_at_1000(start: Array, coefficient: float = 1.0) -> Errors:
+    """Let the observer with Sigma = 1000 follow the arm from its starts (n, 2) at 200 Hz; see `motion`."""
+    t = DT * np.arange(round(DURATION_S / DT) + 1)
+    return follow(make_proposed(DT, 1000.0), t, motion(start, t, coefficient))
+
+
 def sampling_claim() -> Claim:
     """Judge a sampled observer at Sigma = 1000; an explicit step is shown beside it, and does not count."""
-    t = DT * np.arange(round(DURATION_S / DT) + 1)
-    x = motion(starts(1, 4), t)
-    rms = follow(make_proposed(DT, 1000.0), t, x).tail_rms()[0]
-    escape = explicit_escape()
+    rms = follow_at_1000(starts(1, 4)).tail_rms()[0]
     return Claim(
         place="Section 3.2, simulation",
         statement="The observer is simulated at Sigma = 1000 (the paper does not say how).",
@@ -36,7 +39,7 @@ def sampling_claim() -> Claim:
         holds=bool(rms.max() < 0.1),
         figures={
             "state_rms_64_80_s": rms.tolist(),
-            "explicit_step_escapes_after_s": finite_times([escape])[0],
+            "explicit_step_escapes_after_s": finite_times([explicit_escape()])[0],
         },
     )
 
@@ -95,11 +98,10 @@ def misprint_claim() -> Claim:
 
 def amplitude_under_10() -> Array:
     """Estimate the amplitude of the disturbance on an arm that moves by (10), one a motion [rad/s^2]."""
-    t = DT * np.arange(round(DURATION_S / DT) + 1)
-    x = motion(starts(3, 3), t, coefficient=paper.THETA[1])
+    t, _, exogenous = follow_at_1000(starts(3, 3), paper.THETA[1])
     late = t >= 0.8 * DURATION_S
-    error = follow(make_proposed(DT, 1000.0), t, x).exogenous[late, 0, :, 2]
-    return np.sqrt(2.0 * np.mean((error + paper.disturbance(t[late])[:, None]) ** 2, axis=0))
+    amplitude = exogenous[late, 0, :, 2] + paper.disturbance(t[late])[:, None]
+    return np.sqrt(2.0 * np.mean(amplitude**2, axis=0))
 
 
 # --- The consequences of (7) to (9) along the robot ---
@@ -131,29 +133,6 @@ def separated_errors() -> Claim:
     )
 
 
-def continuous_run(sigma: float, start: Array, state: Array, t: Array) -> tuple[Array, Array, Array, Array]:
-    """Integrate the arm and (7) to (9) in continuous time, as one.
-
-    Args:
-        sigma: The weight Sigma.
-        start: q and its rate, (2,).
-        state: The observer's x and xm, (6,); T starts at zero.
-        t: Times, (n_times,) [s].
-
-    Returns:
-        The arm's x (n_times, 2), the observer's x (n_times, 2), xm (n_times, 4) and T (n_times, 2, 4).
-    """
-    observer = make_single(1.0, sigma)
-
-    def slope(time: float, s: Array) -> Array:
-        arm = [s[1], paper.acceleration(s[0], time)]
-        return np.concatenate([arm, observer_slope(observer, time, s[2:], s[0])])
-
-    begin = np.concatenate([start, state, np.zeros(8)])
-    s = solve_ivp(slope, (t[0], t[-1]), begin, "DOP853", t, rtol=1e-11, atol=1e-11).y.T
-    return s[:, :2], s[:, 2:4], s[:, 4:8], s[:, 8:].reshape(-1, 2, 4)
-
-
 def continuous_deviation(sigma: float, duration: float, seed: int = 0) -> tuple[float, float]:
     """Measure the deviation of z = (x^ - x) - T (xm^ - xm) from exp((A + L C2) t) z(0), along the chaotic arm.
 
@@ -165,9 +144,16 @@ def continuous_deviation(sigma: float, duration: float, seed: int = 0) -> tuple[
     Returns:
         The largest deviation, and the largest |z| for comparison.
     """
-    t = np.linspace(0.0, duration, 21)
-    x, x_hat, xm, T = continuous_run(sigma, starts(seed, 1)[0], np.random.default_rng(seed).normal(0.0, 1.0, 6), t)
-    z = x_hat - x - np.einsum("kij,kj->ki", T, xm - paper.exosystem_state(t))
+    observer, t = make_single(1.0, sigma), np.linspace(0.0, duration, 21)
+
+    def slope(time: float, s: Array) -> Array:
+        arm = [s[1], paper.acceleration(s[0], time)]
+        return np.concatenate([arm, observer_slope(observer, time, s[2:], s[0])])
+
+    begin = np.concatenate([starts(seed, 1)[0], np.random.default_rng(seed).normal(0.0, 1.0, 6), np.zeros(8)])
+    s = solve_ivp(slope, (0.0, duration), begin, "DOP853", t, rtol=1e-11, atol=1e-11).y.T
+    T, xm_errors = s[:, 8:].reshape(-1, 2, 4), s[:, 4:8] - paper.exosystem_state(t)
+    z = s[:, 2:4] - s[:, :2] - np.einsum("kij,kj->ki", T, xm_errors)
     exact_z = np.array([expm(paper.error_matrix() * time) @ z[0] for time in t])
     return float(np.abs(z - exact_z).max()), float(np.abs(z).max())
 
@@ -204,9 +190,28 @@ def sampled_deviation(duration: float, seed: int = 0) -> tuple[float, float]:
     return largest, size
 
 
-def upsilon() -> Claim:
-    """Judge the relation between Upsilon and T."""
-    matrix_gap, estimate_gap = upsilon_gaps(15.0)
+def upsilon(duration: float = 15.0, seed: int = 0) -> Claim:
+    """Judge the relation between Upsilon and T at Sigma = 10, 200 Hz.
+
+    Beside the observer runs the conventional one of the constant xm(0), whose regressor is B0 Cm exp(Am t).
+
+    Args:
+        duration: Simulated time [s].
+        seed: Seed of the initial values.
+    """
+    t = DT * np.arange(round(duration / DT) + 1)
+    y = motion(starts(seed, 1), t)[:, 0, :1]
+    proposed = make_single(DT, 10.0)
+    plain = FriedlandTacker.conventional(DT, paper.L, paper.GAMMA, proposed.Sigma)
+    a, b = proposed.init(y[0]), plain.init(y[0])
+    mean = paper.C_M @ (expm(paper.A_M * DT) + np.eye(4)) / 2.0
+    gaps = []
+    for k in range(1, len(t)):
+        system = paper.system((y[k - 1, 0] + y[k, 0]) / 2.0, paper.torque(t[k] - DT / 2.0))
+        turned_system = system._replace(B0=system.B0 @ mean @ expm(paper.A_M * t[k - 1]), D20=np.zeros((1, 4)))
+        a, b = proposed.step(a, system, np.zeros(1), y[k]), plain.step(b, turned_system, np.zeros(1), y[k])
+        gaps.append((np.abs(b.T - a.T @ expm(paper.A_M * t[k])).max(), np.abs(a.x - b.x).max()))
+    matrix_gap, estimate_gap = np.max(gaps, axis=0).tolist()
     correction = (
         "For any system, of which the pendulum robot was tried. Upsilon's equation must have "
         "(B0 + L D20) Cm exp(Am t), not (B0 + L D20), unless Am = 0. So read, the proposed observer is the "
@@ -221,29 +226,3 @@ def upsilon() -> Claim:
         otherwise=correction,
         figures={"upsilon_gap": matrix_gap, "state_gap": estimate_gap},
     )
-
-
-def upsilon_gaps(duration: float, seed: int = 0) -> tuple[float, float]:
-    """Run the observer beside the conventional one of the constant xm(0), whose regressor is B0 Cm exp(Am t).
-
-    Args:
-        duration: Simulated time [s].
-        seed: Seed of the initial values.
-
-    Returns:
-        The largest |Upsilon - T exp(Am t)| and the largest difference of the estimates of x, at Sigma = 10, 200 Hz.
-    """
-    t = DT * np.arange(round(duration / DT) + 1)
-    y = motion(starts(seed, 1), t)[:, 0, :1]
-    proposed = make_single(DT, 10.0)
-    plain = FriedlandTacker.conventional(DT, paper.L, paper.GAMMA, proposed.Sigma)
-    a, b = proposed.init(y[0]), plain.init(y[0])
-    mean = paper.C_M @ (expm(paper.A_M * DT) + np.eye(4)) / 2.0
-    gaps = []
-    for k in range(1, len(t)):
-        system = paper.system((y[k - 1, 0] + y[k, 0]) / 2.0, paper.torque(t[k] - DT / 2.0))
-        turned_system = system._replace(B0=system.B0 @ mean @ expm(paper.A_M * t[k - 1]), D20=np.zeros((1, 4)))
-        a, b = proposed.step(a, system, np.zeros(1), y[k]), plain.step(b, turned_system, np.zeros(1), y[k])
-        gaps.append((np.abs(b.T - a.T @ expm(paper.A_M * t[k])).max(), np.abs(a.x - b.x).max()))
-    by_T, by_x = np.max(gaps, axis=0).tolist()
-    return by_T, by_x
