@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj.papers.dao2023 import figures, robot, theory
-from cmg_mj.papers.dao2023.robot import SETTLED, SIGMAS, Study, exogenous_settle_times, study
+from cmg_mj.papers.dao2023 import figures, theory
+from cmg_mj.papers.dao2023.figures import SETTLED, SIGMAS, Study, exogenous_settle_times, study
 
 SEED = 7
 
@@ -39,10 +39,10 @@ def test_too_large_a_gain_is_slow_at_a_finer_step_too(results: Study) -> None:
     """No effect of sampling: at 1 kHz Sigma = 10000 is no faster than at 400 Hz, and slower than 1000."""
     assert SIGMAS[1::2] == (1000.0, 10_000.0)
     t = np.arange(40_001) / 1000.0
-    x = robot.motion(robot.starts(SEED, 10), t)
-    finer = robot.follow(robot.make_proposed(0.001, *SIGMAS[1::2]), t, x)
+    x = figures.motion(figures.starts(SEED, 10), t)
+    finer = figures.follow(figures.make_proposed(0.001, *SIGMAS[1::2]), t, x)
 
-    def medians(errors: robot.Errors) -> np.ndarray:
+    def medians(errors: figures.Errors) -> np.ndarray:
         late = (errors.t > 30.0) & (errors.t <= 40.0)
         return np.median(np.linalg.norm(errors.exogenous[late], axis=-1), axis=(0, 2))
 
@@ -73,8 +73,8 @@ def test_stable_at_200_hz() -> None:
     """At Sigma = 1000 a Runge-Kutta step of (7) to (9) at the same rate is far outside its stability region."""
     sigmas = (10.0, 1000.0, 1e6)
     t = np.arange(20_001) * 0.005
-    x = robot.motion(np.array([[0.5, 0.0], [-2.0, 1.0]]), t)
-    errors = robot.follow(robot.make_proposed(0.005, *sigmas), t, x)
+    x = figures.motion(np.array([[0.5, 0.0], [-2.0, 1.0]]), t)
+    errors = figures.follow(figures.make_proposed(0.005, *sigmas), t, x)
     assert np.isfinite(errors.state).all()
     tail = np.sqrt(np.mean(errors.state[16_000:] ** 2, axis=(0, 3)))
     print(f"at 200 Hz: state error RMS over 80-100 s {dict(zip(sigmas, tail.tolist(), strict=True))}")
@@ -85,4 +85,4 @@ def test_stable_at_200_hz() -> None:
 def test_settle_times() -> None:
     t = np.array([0.0, 1.0, 2.0, 3.0])
     sizes = np.array([[2.0, 0.0, 2.0, 0.5], [0.0, 0.0, 2.0, 2.0], [0.5, 0.0, 2.0, 0.0], [0.0, 0.0, 2.0, 0.0]])
-    assert robot.settle_times(sizes, t, 1.0).tolist() == [1.0, 0.0, np.inf, 2.0]
+    assert figures.settle_times(sizes, t, 1.0).tolist() == [1.0, 0.0, np.inf, 2.0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.papers.dao2023 import figures, theory
-from cmg_mj.papers.dao2023.robot import SIGMAS, Errors, Study
+from cmg_mj.papers.dao2023.figures import SIGMAS, Errors, Study
 
 T = np.linspace(0.0, 200.0, 401)
 WITHIN = "reproduced within stated conditions"

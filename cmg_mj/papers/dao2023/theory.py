@@ -10,8 +10,8 @@ from scipy.linalg import expm
 
 from cmg_mj.papers.claim import Claim, OnShare, obtain
 from cmg_mj.papers.dao2023 import paper
+from cmg_mj.papers.dao2023.figures import Errors, finite_times, follow, make_proposed, make_single, motion, starts
 from cmg_mj.papers.dao2023.observer import Array, FriedlandTacker
-from cmg_mj.papers.dao2023.robot import Errors, finite_times, follow, make_proposed, make_single, motion, starts
 
 # --- The misprints, and the settings of the simulation that the paper leaves open ---
 
