@@ -60,7 +60,7 @@ def test_discrete_identity_whatever_the_weights(seed: int, sigma: float) -> None
     x, xm = random_matrix(rng, N), random_matrix(rng, NM)
     system = matrices(0.0)
     y = system.C2 @ x + system.D20 @ CM @ xm
-    state = observer.init(y, x=random_matrix(rng, N), xm=random_matrix(rng, NM), T=random_matrix(rng, N, NM))
+    state = observer.init(y, x=random_matrix(rng, N), xm=random_matrix(rng, NM))._replace(T=random_matrix(rng, N, NM))
     z = (state.x - x) - state.T @ (state.xm - xm)
     largest = 0.0
     for k in range(300):

@@ -36,7 +36,6 @@ def theorem_2() -> Claim:
         is_general=True,
         holds=max(ends.values()) < 1e-3 and all(a > b > c for a, b, c in limits.values()),
         conditions=by_simulation,
-        otherwise=by_simulation,
         figures={
             "largest_final_error_ratio": ends,
             "deviation_from_limits_ratio": limits,

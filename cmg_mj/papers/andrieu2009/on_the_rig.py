@@ -65,7 +65,6 @@ def comparison_claim(results: dict[str, Result]) -> Claim:
         assumes=PUSH_RECOVERY,
         holds=standing_counts["high_gain"] == worlds,
         conditions=remark,
-        otherwise=remark,
         figures={
             "stood_count": standing_counts,
             VELOCITY: {label: result.mean(VELOCITY) for label, result in results.items()},
@@ -94,7 +93,6 @@ def idle_claim(result: Result) -> Claim:
         statement="On the scissored pair, whose f2 hardly depends on the rate, the update of the gain is idle.",
         assumes=PUSH_RECOVERY,
         holds=largest_L < 1.05 * observer.phi2,
-        otherwise="L moves by more than 5 %.",
         figures={
             "largest_Omega_1_s": float(np.nanmax(Omega)),
             "rms_Omega_1_s": float(np.sqrt(np.nanmean(Omega**2))),

@@ -120,18 +120,18 @@ def integrate(model: Bioreactor, start: Array, u: Array, dt: float) -> Array:
     return eta
 
 
-def make_observer(kind: str, model: Bioreactor, dt: float, *, p: float = P, b: float = B) -> UpdatedHighGain:
-    """Make one of the three observers with the paper's parameters.
+def replay(kind: str, run: Run, model: Bioreactor, *, p: float = P, b: float = B) -> Replay:
+    """Let one of the three observers, with the paper's parameters, estimate a run.
 
     Args:
         kind: CONSTANT, UPDATED or HOMOGENEOUS.
+        run: The run.
         model: The bioreactor as the observer knows it.
-        dt: Sample period.
         p: d_inf of the homogeneous one; with 0 its correction is linear, while its gain keeps Omega_2.
         b: Exponent of its scaling.
 
     Returns:
-        The observer.
+        Its estimates.
     """
 
     def saturate(y: Signals, x: Signals) -> tuple[Signals, Signals]:
@@ -146,19 +146,12 @@ def make_observer(kind: str, model: Bioreactor, dt: float, *, p: float = P, b: f
         UPDATED: (linear, lambda u, y, x: model.Omega1(u, y[0], x[0]), 1.0, phi),
         HOMOGENEOUS: (BiLimitCorrection((L1, L2), p), lambda u, y, x: model.Omega2(u, y[0], x[0], P), b, phi),
     }[kind]
-    return UpdatedHighGain(dt, f, correction, Omega, b, *phi, saturate=saturate)
-
-
-def replay(kind: str, run: Run, model: Bioreactor, *, p: float = P, b: float = B) -> Replay:
-    """Let an observer estimate a run. Arguments as of `make_observer`."""
-    observer = make_observer(kind, model, float(run.t[1]), p=p, b=b)
+    observer = UpdatedHighGain(float(run.t[1]), f, correction, Omega, b, *phi, saturate=saturate)
     _, x2 = model.limit(run.start[0], model.to_x2(*run.start))
     x, L = observer.follow((run.y,), (run.y[0], x2), run.u[:, 0].tolist())
     eta2_error = run.eta[1] - model.to_eta2(*model.limit(*x))
-    rate = observer.Omega(run.u, *observer.saturate((run.y,), (x[1],)))
-    if kind == CONSTANT:
-        rate = np.full_like(run.y, model.df2_max)
-    return Replay(eta2_error, rate, L, np.abs(L1 * (x[0] - run.y)) / L**observer.b)
+    rate = np.full_like(run.y, model.df2_max) if kind == CONSTANT else Omega(run.u, *saturate((run.y,), (x[1],)))
+    return Replay(eta2_error, rate, L, np.abs(L1 * (x[0] - run.y)) / L**b)
 
 
 def replays(run: Run, model: Bioreactor) -> Replays:
@@ -194,9 +187,8 @@ class Study(NamedTuple):
     """Runs with the paper's noise and error of hbar."""
     loud: Replays
     """Runs with noise of 10 % of the domain."""
-    quiet_run: Run
     quiet: Replays
-    """Replays without noise, on one run."""
+    """Replays without noise, of one run."""
     exact: Replays
     """Runs with noise, without error of hbar."""
     rate: Array
@@ -205,20 +197,16 @@ class Study(NamedTuple):
 
 def study(seeds: int, seed: int = 0) -> Study:
     """Simulate. All noise levels are columns of the same arrays, which costs no time."""
-    whole_run = run_plant([*range(seed, seed + seeds)] * 2 + [seed], [NOISE] * seeds + [LOUD] * seeds + [0.0])
+    t, u, *whole_run = run_plant([*range(seed, seed + seeds)] * 2 + [seed], [NOISE] * seeds + [LOUD] * seeds + [0.0])
     model = Bioreactor(HBAR_OF_OBSERVERS)
-    whole_replays = replays(whole_run, model)
-
-    def columns(part: slice) -> tuple[Run, Replays]:
-        t, u, *others = whole_run
-        by_kind = {kind: Replay(*(a[..., part] for a in whole)) for kind, whole in whole_replays.items()}
-        return Run(t, u, *(a[..., part] for a in others)), by_kind
-
-    run, nominal = columns(slice(seeds))
-    _, loud = columns(slice(seeds, 2 * seeds))
-    exact = replays(run, Bioreactor(HBAR))
-    rate = model.f2_slope(run.u, *model.limit(run.eta[0], Bioreactor(HBAR).to_x2(*run.eta)))
-    return Study(run, nominal, loud, *columns(slice(2 * seeds, None)), exact, rate)
+    whole_replays = replays(Run(t, u, *whole_run), model)
+    nominal, loud, quiet = (
+        {kind: Replay(*(a[..., part] for a in whole)) for kind, whole in whole_replays.items()}
+        for part in (slice(seeds), slice(seeds, 2 * seeds), slice(2 * seeds, None))
+    )
+    run = Run(t, u, *(a[..., :seeds] for a in whole_run))
+    rate = model.f2_slope(u, *model.limit(run.eta[0], Bioreactor(HBAR).to_x2(*run.eta)))
+    return Study(run, nominal, loud, quiet, replays(run, Bioreactor(HBAR)), rate)
 
 
 def rms_by_kind(run: Run, by_kind: Replays) -> Array:

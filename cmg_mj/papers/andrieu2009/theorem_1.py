@@ -129,7 +129,6 @@ def no_observer_beyond_1() -> Claim:
         is_general=True,
         holds=max(ends[str(INSIDE)]) < FOUND and misses[-1],
         conditions=one_observer,
-        otherwise=one_observer,
         figures={
             "x2_at_start": list(STARTS),
             "relative_error_of_x2_at_the_end_by_p": ends,
@@ -222,7 +221,6 @@ def theorem_1() -> Claim:
         is_general=True,
         holds=failures[HOMOGENEOUS] == 0 and shrinks,
         conditions=by_simulation,
-        otherwise=by_simulation,
         figures={
             "final_error_x2": ends,
             "largest_gain": largest,
@@ -271,7 +269,6 @@ def equations_11_12_claims() -> list[Claim]:
             is_general=True,
             holds=shrink and bool(ends.max() < 1e-5),
             conditions=one_observer,
-            otherwise="It does not fade, or does not shrink with the disturbance.",
             figures={
                 "late_scaled_error": dict(zip(KINDS, balls.tolist(), strict=True)),
                 "final_scaled_error": ends.tolist(),
@@ -284,7 +281,6 @@ def equations_11_12_claims() -> list[Claim]:
             is_general=True,
             holds=bool(relative_spread < 1e-3 and np.isfinite(peaks).all() and np.isfinite(by_solution).all()),
             conditions=one_observer,
-            otherwise="L does not forget its start.",
             figures={
                 "largest_gain_by_error": peaks.tolist(),
                 "largest_late_gain_by_error": by_error.tolist(),

@@ -107,7 +107,6 @@ def exponent_of_6() -> Claim:
         is_general=True,
         holds=max(quotients.values()) <= 1.0 + 1e-9,
         conditions=(corrected if is_misprint else "") + "For all p in (0, 1), of which three were tried.",
-        otherwise="Neither exponent bounds the increments.",
         figures={"worst_quotient_by_p": quotients, "worst_quotient_as_printed_by_p": printed},
     )
 
@@ -134,7 +133,6 @@ def scaling_conditions() -> Claim:
         place="Section 4.3, (21), (22)",
         statement="Every small enough b satisfies (21) and (22), whichever d_inf and v_j Theorem 1 allows.",
         holds=is_a_bound_on_b() and math.isclose(bound, 1.0 / P - 1.0, rel_tol=1e-9),
-        otherwise="(21) is no bound on b, or not this one.",
         figures={"b": B, "largest_b": bound, "violated_count": len(list_violations(2, P, B, (P,)))},
     )
 

@@ -209,7 +209,6 @@ def conventional(study: Study) -> Claim:
         assumes=ASSUMED,
         holds=rms.min() > 0.2,
         conditions=UNSTATED,
-        otherwise=UNSTATED,
         figures={"conventional_state_rms_160_200_s": rms.tolist()},
         pictures=[Picture("dao2023-fig-2", title, panels)],
     )
@@ -224,7 +223,6 @@ def proposed(study: Study) -> Claim:
         assumes=ASSUMED,
         holds=rms.max() < 0.1 and bool((rms < plain).all()),
         conditions=UNSTATED,
-        otherwise=UNSTATED,
         figures={"proposed_state_rms_160_200_s": rms.tolist(), "largest_angle_rad": study.largest_angle},
     )
 
@@ -297,7 +295,6 @@ def settling_order(study: Study) -> Claim:
         assumes={**ASSUMED, "threshold": f"settled is below {SETTLED:g}"},
         holds=in_order.sum() >= 0.9 * n,
         conditions=meaning,
-        otherwise=meaning,
         figures={
             f"settles_below_0_1_sigma_{sigma:g}_s": finite_times(row)
             for sigma, row in zip(paper.SIGMAS, times, strict=True)
@@ -317,7 +314,6 @@ def parameters(study: Study) -> Claim:
         assumes={**ASSUMED, "control rate": "400 Hz"},
         holds=errors.max() < 1e-3,
         conditions=sampling_remark,
-        otherwise=sampling_remark,
         figures={
             "theta1_error_1_s2": errors[:, 0].tolist(),
             "theta2_error_1_kg_m2": errors[:, 1].tolist(),

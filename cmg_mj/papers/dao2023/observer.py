@@ -120,28 +120,20 @@ class FriedlandTacker:
         F = expm(self.Am * self.dt)
         return F, expm(-self.Am * self.dt), self.Cm @ ((F + np.eye(len(F))) / 2.0)
 
-    def init(
-        self,
-        y: Array,
-        x: Array | None = None,
-        xm: Array | None = None,
-        T: Array | None = None,
-    ) -> State:
-        """Return the state at the first sample.
+    def init(self, y: Array, x: Array | None = None, xm: Array | None = None) -> State:
+        """Return the state at the first sample, with T = 0.
 
         Args:
             y: The first measurement, (..., p).
             x: Estimate of x, (..., n); zero if not given.
             xm: Estimate of xm, (..., nm); zero if not given.
-            T: T(0), (..., n, nm); zero if not given.
 
         Returns:
             The state.
         """
         n, nm = self.L.shape[-2], self.Am.shape[0]
-        x = np.zeros(n) if x is None else x
-        xm = np.zeros(nm) if xm is None else xm
-        return State(x, xm, np.zeros((n, nm)) if T is None else T, self.Gamma, y)
+        x, xm = np.zeros(n) if x is None else x, np.zeros(nm) if xm is None else xm
+        return State(x, xm, np.zeros((n, nm)), self.Gamma, y)
 
     def step(self, state: State, system: System, u: Array, y: Array, D20: Array | None = None) -> State:
         """Advance by one sample period.

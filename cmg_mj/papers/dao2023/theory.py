@@ -88,7 +88,6 @@ def misprint_claim() -> Claim:
         statement="L = -[1 1] makes A + L C2 Hurwitz, and (14) is (10) rearranged.",
         holds=paper.L.shape[1] == outputs and bool(np.all(polynomial > 0.0)) and bool(min(by_10, by_14) < 0.025),
         conditions=" ".join(filter(None, corrections)),
-        otherwise="L does not make it Hurwitz, or the observer finds another disturbance than (10) or (14) has.",
         figures={
             "polynomial_of_A_plus_L_C2": polynomial.tolist(),
             "disturbance_amplitude_found_if_10_holds_rad_s2": amplitude.tolist(),
@@ -223,6 +222,5 @@ def upsilon(duration: float = 15.0, seed: int = 0) -> Claim:
         is_general=True,
         holds=matrix_gap < 1e-9 and estimate_gap < 1e-9,
         conditions=correction,
-        otherwise=correction,
         figures={"upsilon_gap": matrix_gap, "state_gap": estimate_gap},
     )
