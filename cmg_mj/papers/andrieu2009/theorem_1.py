@@ -242,22 +242,21 @@ SOLUTIONS = (1.0, 2.0, 4.0)
 """Amplitudes of x1."""
 
 
+def respond(columns: Sequence[Column]) -> tuple[np.ndarray, np.ndarray]:
+    """Return |L^-1 e| with the matrix of (10), and L, each (n_times, n_columns)."""
+    (e1, e2), L = follow(HOMOGENEOUS, columns)
+    return np.hypot(e1 / L**B, e2 / L ** (1.0 + B)), L
+
+
 def equations_11_12_claims() -> list[Claim]:
     """Judge (11), then (12)."""
-    groups = [
-        [Column(**{kind: size}) for kind in KINDS for size in AMPLITUDES],
-        [Column(error=e) for e in ERRORS],
-        [Column(gain=g) for g in GAINS],
-        [Column(amplitude=a) for a in SOLUTIONS],
-    ]
-    (e1, e2), L = follow(HOMOGENEOUS, list(itertools.chain(*groups)))
-    scaled = np.hypot(e1 / L**B, e2 / L ** (1.0 + B))  # |L^-1 e| with the matrix of (10)
-    parts = np.cumsum([len(group) for group in groups])[:-1]
     late = TIMES > 6.0
-    balls = np.split(scaled[late].max(axis=0), parts)[0].reshape(len(KINDS), -1)
-    ends = np.split(scaled[-1], parts)[1]
-    peaks = np.split(L.max(axis=0), parts)[1]
-    _, by_error, by_gain, by_solution = np.split(L[late].max(axis=0), parts)
+    disturbed, _ = respond([Column(**{kind: size}) for kind in KINDS for size in AMPLITUDES])
+    fading, L = respond([Column(error=error) for error in ERRORS])
+    balls, ends = disturbed[late].max(axis=0).reshape(len(KINDS), -1), fading[-1]
+    peaks, by_error = L.max(axis=0), L[late].max(axis=0)
+    by_gain = respond([Column(gain=gain) for gain in GAINS])[1][late].max(axis=0)
+    by_solution = respond([Column(amplitude=amplitude) for amplitude in SOLUTIONS])[1][late].max(axis=0)
     shrink = all(a > 3.0 * b for row in balls for a, b in itertools.pairwise(row))
     relative_spread = max(np.ptp(by_error) / by_error[0], np.ptp(by_gain) / by_gain[0])
     one_observer = "By simulation of system (1), p = 0.5, x1 = sin t, one observer: see Theorem 1."

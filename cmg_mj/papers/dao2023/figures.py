@@ -91,7 +91,7 @@ class Errors(NamedTuple):
 
     def tail_rms(self) -> Array:
         """Return the RMS of the state error's norm over the last fifth, (n_sigmas, n)."""
-        tail = self.t >= self.t[0] + 0.8 * (self.t[-1] - self.t[0])
+        tail = self.t >= 0.8 * self.t[-1]
         return np.sqrt(np.mean(np.sum(self.state[tail] ** 2, axis=-1), axis=0))
 
 
