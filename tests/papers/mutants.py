@@ -97,7 +97,7 @@ MUTANTS = [
     Mutant("(10) or (14), the other way round", D + "theory.py", "if by_14 < by_10 else",
            "if by_14 > by_10 else", DAO + "test_what_the_observer_finds_decides_what_is_meant"),
     # --- andrieu2009 ---
-    Mutant("(19) without the spread of A", A + "lyapunov.py", "(1.0 + spread) * part)", "part)",
+    Mutant("(19) without the spread of A", A + "theory.py", "(1.0 + spread) * part)", "part)",
            EQUATIONS + "test_19_holds_for_every_a_within_the_spread"),
     Mutant("Fig. 2: in order in any seed", A + "figures.py", "holds=share >= MIN_SEEDS", "holds=share > 0.0",
            ANDRIEU + "test_order_of_figure_2_is_needed_in_nearly_every_seed"),

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from cmg_mj.papers.andrieu2009 import lyapunov, theorem_1, theory
-from cmg_mj.papers.andrieu2009.lyapunov import Lyapunov, decay, states
+from cmg_mj.papers.andrieu2009 import theorem_1, theory
 from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection
+from cmg_mj.papers.andrieu2009.theory import Lyapunov, decay, states
 
 WITHIN = "reproduced within stated conditions"
 
@@ -59,13 +59,13 @@ def test_w_is_homogeneous_in_the_bi_limit(d_inf: float) -> None:
 @pytest.mark.parametrize("d_inf", [0.0, 0.5, 0.9])
 def test_w_falls_along_motions_as_19_says(d_inf: float) -> None:
     """Integrated, with A1 and A2 that swing within (17), from other states than those of the grid."""
-    pair = lyapunov.search(d_inf)
+    pair = theory.search(d_inf)
     assert pair is not None
     W = pair.W
 
     def slope(tau: float, e: np.ndarray) -> list[float]:
         k1, k2 = W.K(float(e[0]))
-        spread = lyapunov.SPREAD
+        spread = theory.SPREAD
         return [(1.0 + spread * np.sin(7.0 * tau)) * (e[1] + k1), (1.0 + spread * np.cos(3.0 * tau)) * k2]
 
     for start in ([1.0, -2.0], [-30.0, 5.0], [0.01, 0.02]):
@@ -93,15 +93,15 @@ def test_20_with_a_b_of_its_own(b: float) -> None:
 
 
 def test_constants_hold_on_a_finer_grid() -> None:
-    claim = lyapunov.claim()
+    claim = theory.equations_19_20()
     assert claim.verdict == "illustrated"
     for d_inf in (0.0, 0.5, 0.9):
-        pair = lyapunov.search(d_inf)
+        pair = theory.search(d_inf)
         assert pair is not None
         finer = decay(
             pair.W,
             pair.b,
-            lyapunov.SPREAD,
+            theory.SPREAD,
             states(np.geomspace(1e-9, 1e8, 501), 97),
         )
         assert min(finer) > 0.0
@@ -128,8 +128,8 @@ def test_a_poor_w_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Too little weight on e2 fails (20), too little l1 (19)."""
     assert decay(make_lyapunov(0.5, sigma=0.03), 0.5)[1] < 0.0
     assert decay(make_lyapunov(0.5, l1=0.5), 0.5, 0.3)[0] < 0.0
-    monkeypatch.setattr(lyapunov, "L1", (0.5,))
-    assert lyapunov.claim().verdict == "not reproduced"
+    monkeypatch.setattr(theory, "L1", (0.5,))
+    assert theory.equations_19_20().verdict == "not reproduced"
 
 
 # --- (11), (12) ---------------------------------------------------------------------------------------------
