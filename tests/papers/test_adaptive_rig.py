@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from cmg_mj.papers.dao2023 import on_the_rig as rig
-from cmg_mj.papers.dao2023.on_the_rig import OTHERS, share_within
-from cmg_mj.results.intervals import mean_interval
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 
@@ -16,42 +13,37 @@ TOLERANCE_FACTOR = 2.53
 
 
 def test_bias_is_found_in_95_percent_of_seeds() -> None:
-    """0.3 to 1.5 degrees of either sign, default noise, no push: RMS over seconds 5 to 10 at most 0.15 degrees."""
-    errors = rig.bias_errors(60_000, rig.signed_biases(60_000, 16))
-    print(f"bias RMS error: mean {errors.mean():.3f}, largest {errors.max():.3f} deg")
-    assert share_within(errors, 0.15) >= 0.95
+    """0.3 to 1.5 degrees of either sign, default noise, no push: RMS over seconds 5 to 10 at most 0.15 degrees.
+
+    The accelerometers' bias is part of what is found: e less the tilt that the offsets make, by aranovskiy2020's
+    reference [8]: weights 3/2 and -1/2 of the sites.
+    """
+    claim = rig.bias(60_000, 16)
+    assert claim.holds
+    errors, found, expected, offsets = (
+        np.array(claim.figures[name])
+        for name in ("bias_rms_error_deg", "found_less_e_deg", "expected_less_e_deg", "accelerometer_bias_mg")
+    )
+    tilt = np.degrees((1.5 * offsets[0] - 0.5 * offsets[1]) * 1e-3 * 9.80665 / 9.81)
+    print(
+        f"bias RMS error: {errors.mean():.3f}, largest {errors.max():.3f} deg; with offsets {found}, small {tilt:.3f}"
+    )
     assert errors.mean() + TOLERANCE_FACTOR * errors.std(ddof=1) <= 0.15
+    np.testing.assert_allclose(expected, tilt, atol=0.01)
+    np.testing.assert_allclose(found, expected, atol=0.05)
 
 
 def test_velocity_error_is_the_smallest_from_half_a_degree_up() -> None:
-    """The least of these biases with either sign, as it is the nearest to none."""
-    biases = (0.5, -0.5, -1.5)
-    errors = rig.velocity_errors(61_000, 3, ("adaptive", *OTHERS), biases)
-    for name in OTHERS:
-        intervals = [mean_interval(row) for row in errors[name] - errors["adaptive"]]
-        print(f"{name} less adaptive: {intervals} rad/s at e = {biases} deg")
-        assert all(interval.low > 0.0 for interval in intervals)
-
-
-@pytest.mark.parametrize("offsets", [(5.0, -3.0), (-4.0, 6.0)])
-def test_accelerometer_bias_is_part_of_what_is_found(offsets: tuple[float, float]) -> None:
-    """e less the tilt that the offsets make, by aranovskiy2020's reference [8]: weights 3/2 and -1/2 of the sites."""
-    biases = np.array([-1.0, 0.5, 0.9])
-    result = rig.learnt_bias(62_000, biases.tolist(), offsets)
-    excess, expected = result.values("bias_estimate_deg") - biases, result.values("bias_deg") - biases
-    tilt = np.degrees((1.5 * offsets[0] - 0.5 * offsets[1]) * 1e-3 * 9.80665 / 9.81)
-    print(f"found less e {excess}, expected {expected}, small angles {tilt:.3f} deg")
-    np.testing.assert_allclose(expected, tilt, atol=0.01)
-    np.testing.assert_allclose(excess, expected, atol=0.05)
-    assert rig.errors(result, "bias_rms_error_deg").max() < 0.15
+    """Biases of the other sign than the report's."""
+    assert rig.velocity(61_000, 3, [0.0, -0.5, -1.5]).holds
 
 
 def test_a_gait_and_a_torque_are_found() -> None:
-    gait = rig.learnt_gait(63_000, [0.4, -1.2, 1.0])
-    assert (gait["knowing_rad_s"] < 0.5 * gait["not_knowing_rad_s"]).all()
-    assert gait["disturbance_n_m"].max() < 0.06
-    assert gait["bias_deg"].max() < 0.15
-    assert rig.learnt_torque(64_000, 3, torque_n_m=-0.15, bias_deg=-0.6).max() < 0.02
+    figures = {name: np.array(values) for name, values in rig.torques(63_000, 3).figures.items()}
+    assert (figures["knowing_rad_s"] < 0.5 * figures["not_knowing_rad_s"]).all()
+    assert figures["disturbance_n_m"].max() < 0.06
+    assert figures["bias_deg"].max() < 0.15
+    assert figures["constant_torque_rms_error_n_m"].max() < 0.02
 
 
 def test_trimming_spares_the_gimbals_and_the_time_to_settle() -> None:

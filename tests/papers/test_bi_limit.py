@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from cmg_mj.core.errors import InputError
 from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, largest_b, list_violations, weights
 
 E1 = (-3.0, -0.4, -1e-3, 0.0, 1e-3, 0.7, 20.0)
@@ -58,13 +56,6 @@ def test_weights_are_those_of_18(n: int) -> None:
 @pytest.mark.parametrize("e1", E1)
 def test_without_degree_it_is_linear(e1: float) -> None:
     assert BiLimitCorrection((4.0, 2.0, 1.0))(e1) == pytest.approx((-4.0 * e1, -8.0 * e1, -8.0 * e1), rel=1e-15)
-
-
-@pytest.mark.parametrize("e1", E1)
-def test_the_sum_read_literally_doubles_every_l(e1: float) -> None:
-    """q_i(s) = s + s for d_inf = 0; a tiny d_inf is that case."""
-    literal = BiLimitCorrection((4.0, 2.0, 1.0), 1e-12)(e1)
-    assert literal == pytest.approx(BiLimitCorrection((8.0, 4.0, 2.0))(e1), rel=1e-9)
 
 
 @pytest.mark.parametrize(("n", "d_inf"), [(1, 0.7), (2, 0.5), (2, 0.9), (3, 0.25), (3, 0.45), (4, 0.2)])
@@ -171,44 +162,5 @@ def test_largest_b_is_where_the_printed_inequalities_begin_to_fail(n: int, d_inf
 
 def test_the_papers_own_parameters_violate_21_and_22() -> None:
     lines = list_violations(2, 0.9, 0.410, (0.9,))
-    assert [line[:4] for line in lines] == ["(21)", "(21)", "(21)", "(22)"]
-    assert "i = 1, j = 1" in lines[0]
-    assert "= 10 is not below" in lines[0]
+    assert lines == [*(f"(21) for i = {i}, j = {j}" for i, j in ((1, 1), (2, 1), (2, 2))), "(22) for j = 2"]
     assert list_violations(2, 0.9, 0.11, (0.9,)) == []
-
-
-@pytest.mark.parametrize(
-    ("l", "d_inf", "message"),
-    [
-        ((), 0.0, r"^l: must have one number a dimension"),
-        ((1.0, 0.0), 0.0, r"^l_2 = 0\.0: must be a number greater than 0"),
-        ((1.0, -1.0), 0.0, r"^l_2 = -1\.0"),
-        ((math.nan, 1.0), 0.0, r"^l_1 = nan"),
-        ((1.0, 1.0), 1.0, r"^d_inf = 1: must be in \[0, 1/\(n - 1\)\) = \[0, 1\) for n = 2 \(Theorem 1\)"),
-        ((4.0, 2.0, 1.0), 0.5, r"^d_inf = 0\.5: .*\[0, 0\.5\) for n = 3"),
-        ((1.0, 1.0), -0.1, r"^d_inf = -0\.1"),
-        ((1.0, 1.0), math.nan, r"^d_inf = nan"),
-        ((1.0,), math.inf, r"^d_inf = inf"),
-        ((1.0, 1.0), "x", r"^d_inf = 'x': must be a number$"),
-        (5, 0.0, r"^l: must have one number a dimension"),
-        ("ab", 0.0, r"^l_1 = 'a': must be a number greater than 0"),
-        ((1.0, 1j), 0.0, r"^l_2 = 1j: must be a number greater than 0"),
-        ((1.0, 2.0, 3.0), 0.0, r"^l: .* must be Hurwitz; its roots are"),
-        ((1.0, 1.0, 1.0), 0.3, r"^l: .* must be Hurwitz"),
-    ],
-)
-def test_what_the_theorem_does_not_allow_is_refused(l: Any, d_inf: Any, message: str) -> None:  # noqa: E741
-    with pytest.raises(InputError, match=message) as caught:
-        BiLimitCorrection(l, d_inf)
-    assert "\n" not in str(caught.value)
-
-
-def test_numpys_numbers_are_taken() -> None:
-    zero: Any = np.int64(0)
-    assert BiLimitCorrection(tuple(np.array([4.0, 2.0])), zero) == BiLimitCorrection((4.0, 2.0))
-
-
-def test_the_edges_are_taken() -> None:
-    BiLimitCorrection((1.0,), 5.0)
-    BiLimitCorrection((1.0, 1.0), 0.999)
-    BiLimitCorrection((4.0, 2.0, 1.0), 0.499)

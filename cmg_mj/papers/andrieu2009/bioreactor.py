@@ -5,11 +5,11 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from cmg_mj.core.arrays import Scalar, signed_power
+from cmg_mj.core.arrays import Scalar, clip, signed_power
 from cmg_mj.papers.claim import Claim, OnShare, obtain
 
 # --- andrieu2009 as printed: system (1), and the bioreactor's and its observers' parameters of section 3 ---
@@ -49,35 +49,27 @@ Array = Any
 
 @dataclass(frozen=True)
 class Bioreactor:
-    """(14) with one value of hbar, and the set M_eta in which it stays.
-
-    Attributes:
-        hbar: Parameter of the Contois model.
-        u_min: Least input.
-        u_max: Largest input.
-    """
+    """(14) with one value of hbar, and the set M_eta in which it stays."""
 
     hbar: float
-    u_min: float = U_MIN
-    u_max: float = U_MAX
 
     @cached_property
     def eps2(self) -> float:
         """The largest epsilon_2 that u_min >= eps2/(hbar (1 - eps2) + eps2) allows."""
-        return self.u_min * self.hbar / (1.0 - self.u_min + self.u_min * self.hbar)
+        return U_MIN * self.hbar / (1.0 - U_MIN + U_MIN * self.hbar)
 
     @cached_property
     def eps1(self) -> float:
         """epsilon_1 that belongs to it."""
-        return (1.0 - self.u_max) * self.eps2 / (self.hbar * self.u_max)
+        return (1.0 - U_MAX) * self.eps2 / (self.hbar * U_MAX)
 
     def slope(self, eta1: Array, eta2: Array, u: Array) -> tuple[Array, Array]:
         """Return the right-hand side of (14)."""
-        growth = eta1 * eta2 / (self.hbar * eta1 + eta2)
+        growth = self.to_x2(eta1, eta2)
         return growth - u * eta1, -growth + u * (1.0 - eta2)
 
     def to_x2(self, eta1: Array, eta2: Array) -> Array:
-        """Return the second component of F."""
+        """Return the second component of F, the growth in (14)."""
         return eta1 * eta2 / (self.hbar * eta1 + eta2)
 
     def to_eta2(self, x1: Array, x2: Array) -> Array:
@@ -86,47 +78,36 @@ class Bioreactor:
 
     def x2_bounds(self, x1: Array) -> tuple[Array, Array]:
         """Return the least and largest x2 of M_x at an x1 that lies in [eps1, 1 - eps2]."""
-        part, remainder = self.hbar * x1, 1.0 - x1
-        return x1 * self.eps2 / (part + self.eps2), x1 * remainder / (remainder + part)
+        return self.to_x2(x1, self.eps2), self.to_x2(x1, 1.0 - x1)
 
-    def limit_x1(self, x1: Array) -> Array:
-        """Return x_1s."""
-        return np.minimum(np.maximum(x1, self.eps1), 1.0 - self.eps2)
+    def limit(self, x1: Array, x2: Array) -> tuple[Array, Array]:
+        """Return x_1s and x_2s."""
+        x1 = clip(x1, self.eps1, 1.0 - self.eps2)
+        return x1, clip(x2, *self.x2_bounds(x1))
 
-    def limit_x2(self, x1: Array, x2: Array) -> Array:
-        """Return x_2s for an x1 that is x_1s."""
-        low, high = self.x2_bounds(x1)
-        return np.maximum(low, np.minimum(high, x2))
-
-    def coefficients(self, x1: Array, u: Array) -> tuple[Array, Array, Array, Array]:
+    def coefficients(self, u: Array, x1: Array) -> tuple[Array, Array, Array, Array]:
         """Return m0 to m3 of (15)."""
-        hbar = self.hbar
-        first, second = hbar * x1, hbar * x1**2
-        return (
-            u / hbar,
-            -u - 1.0 / hbar - 2.0 * u / first,
-            2.0 / first + u / second,
-            (hbar - 1.0) / second,
-        )
+        hbar, first, second = self.hbar, self.hbar * x1, self.hbar * x1**2
+        return u / hbar, -u - 1.0 / hbar - 2.0 * u / first, 2.0 / first + u / second, (hbar - 1.0) / second
 
-    def f2(self, x1: Array, x2: Array, u: Array) -> Array:
+    def f2(self, u: Array, x1: Array, x2: Array) -> Array:
         """Return f2 of (15)."""
-        m0, m1, m2, m3 = self.coefficients(x1, u)
+        m0, m1, m2, m3 = self.coefficients(u, x1)
         return m0 + x2 * (m1 + x2 * (m2 + x2 * m3))
 
-    def f2_slope(self, x1: Array, x2: Array, u: Array) -> Array:
+    def f2_slope(self, u: Array, x1: Array, x2: Array) -> Array:
         """Return df2/dx2."""
-        _, m1, m2, m3 = self.coefficients(x1, u)
+        _, m1, m2, m3 = self.coefficients(u, x1)
         return m1 + x2 * (2.0 * m2 + 3.0 * m3 * x2)
 
     def domain(self, points: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return a grid of M_u x M_x with its corners, denser at small x1: x1, x2, u, each (points, points, points)."""
+        """Return a grid of M_u x M_x with its corners, denser at small x1: u, x1, x2, each (points, points, points)."""
         x1 = np.geomspace(self.eps1, 1.0 - self.eps2, points)[:, None, None]
         low, high = self.x2_bounds(x1)
         x2 = low + (high - low) * np.linspace(0.0, 1.0, points)[None, :, None]
-        u = np.linspace(self.u_min, self.u_max, points)[None, None, :]
-        x1, x2, u = np.broadcast_arrays(x1, x2, u)
-        return x1, x2, u
+        u = np.linspace(U_MIN, U_MAX, points)[None, None, :]
+        u, x1, x2 = np.broadcast_arrays(u, x1, x2)
+        return u, x1, x2
 
     @cached_property
     def df2_max(self) -> float:
@@ -146,10 +127,10 @@ class Bioreactor:
         Returns:
             The bound.
         """
-        _, m1, m2, m3 = self.coefficients(x1, u)
+        _, m1, m2, m3 = self.coefficients(u, x1)
         low, high = self.x2_bounds(x1)
         m = m2 + m3 * x2_hat
-        vertex = np.minimum(np.maximum(-0.5 * m / _not_zero(m3), low), high)
+        vertex = clip(-0.5 * m / _not_zero(m3), low, high)
         return _largest(lambda x2: m1 + m * (x2_hat + x2) + m3 * x2**2, low, high, vertex)
 
     def Omega2(self, u: Array, x1: Array, x2_hat: Array, p: float, *, with_misprint: bool = False) -> Array:
@@ -168,32 +149,21 @@ class Bioreactor:
         Returns:
             The bound.
         """
-        _, m1, m2, m3 = self.coefficients(x1, u)
+        _, m1, m2, m3 = self.coefficients(u, x1)
         low, high = self.x2_bounds(x1)
-        m, last_coefficient = m2 + m3 * x2_hat, m2 if with_misprint else m3
-        stationary = -m * (1.0 - p) / (_not_zero(last_coefficient) * (2.0 - p))
-        stationary = np.minimum(np.maximum(stationary, low), high)
-        rate_at_estimate = m1 + m * x2_hat
-        share = x2_hat**p
+        m, last = m2 + m3 * x2_hat, m2 if with_misprint else m3
+        stationary = clip(-m * (1.0 - p) / (_not_zero(last) * (2.0 - p)), low, high)
+        at_estimate, share = m1 + m * x2_hat, x2_hat**p
+        return _largest(lambda x2: at_estimate + share * x2 ** (1.0 - p) * (m + last * x2), low, high, stationary)
 
-        def incremental_rate(x2: Array) -> Array:
-            return rate_at_estimate + share * x2 ** (1.0 - p) * (m + last_coefficient * x2)
-
-        return _largest(incremental_rate, low, high, stationary)
-
-    def c_inf(self, p: float, points: int = 40) -> float:
-        """Return c_inf of the same bound, over a grid of the domain."""
-        x1, x2, u = (grid[..., None] for grid in self.domain(points))
-        lowest, _ = self.x2_bounds(self.eps1)
-        _, highest = self.x2_bounds(1.0 - self.eps2)
-        x2_hat = np.linspace(float(lowest), float(highest), points)
-        _, _, m2, m3 = self.coefficients(x1, u)
-        return float(np.abs((m2 + m3 * x2_hat) * x2 ** (1.0 - p) + m3 * x2 ** (2.0 - p)).max())
+    def local_c_inf(self, u: Array, x1: Array, x2: Array, x2_hat: Array, p: float) -> Array:
+        """Return what c_inf of the same bound is the largest value of."""
+        _, _, m2, m3 = self.coefficients(u, x1)
+        return np.abs((m2 + m3 * x2_hat) * x2 ** (1.0 - p) + m3 * x2 ** (2.0 - p))
 
 
 def _largest(function: Any, *arguments: Array) -> Array:
-    values = [np.abs(function(x2)) for x2 in arguments]
-    return np.maximum(np.maximum(values[0], values[1]), values[2])
+    return functools.reduce(np.maximum, (np.abs(function(x2)) for x2 in arguments))
 
 
 def _not_zero(m: Array) -> Array:
@@ -211,57 +181,52 @@ def claims(on_share: OnShare) -> list[Claim]:
     return obtain([invariance, coordinates, increments, order_of_bounds, noise_level], on_share)
 
 
-def least_inflow(reactor: Bioreactor, u_min: float, u_max: float, points: int = 401) -> float:
+def least_inflow(reactor: Bioreactor, u_min: float, u_max: float) -> float:
     """Return the least component of the flow into M_eta over its boundary and all inputs, not below 0 if invariant."""
-    u = np.linspace(u_min, u_max, points)[:, None]
-    share = np.linspace(0.0, 1.0, points)[None, :]
+    u = np.linspace(u_min, u_max, 401)[:, None]
     eps1, eps2 = reactor.eps1, reactor.eps2
-    left_inflow, _ = reactor.slope(eps1, eps2 + (1.0 - eps1 - eps2) * share, u)
-    _, lower_inflow = reactor.slope(eps1 + (1.0 - eps1 - eps2) * share, eps2, u)
-    eta1 = eps1 + (1.0 - eps1 - eps2) * share
-    outer_flow = np.add(*reactor.slope(eta1, 1.0 - eta1, u))
+    along = (1.0 - eps1 - eps2) * np.linspace(0.0, 1.0, 401)[None, :]
+    left_inflow, _ = reactor.slope(eps1, eps2 + along, u)
+    _, lower_inflow = reactor.slope(eps1 + along, eps2, u)
+    outer_flow = np.add(*reactor.slope(eps1 + along, 1.0 - (eps1 + along), u))
     return float(min(left_inflow.min(), lower_inflow.min(), -outer_flow.max()))
 
 
 def invariance() -> Claim:
     """Judge M_eta."""
-    inflow = {hbar: least_inflow(Bioreactor(hbar), Bioreactor(hbar).u_min, U_MAX) for hbar in (HBAR, HBAR_OF_OBSERVERS)}
-    inflow_at_larger_input = least_inflow(Bioreactor(HBAR), Bioreactor(HBAR).u_min, 1.1 * U_MAX)
     reactor = Bioreactor(HBAR)
+    inflow = {str(hbar): least_inflow(Bioreactor(hbar), U_MIN, U_MAX) for hbar in (HBAR, HBAR_OF_OBSERVERS)}
     return Claim(
         place="Section 3, (14), M_eta",
         statement="M_eta = {eta1 >= eps1, eta2 >= eps2, eta1 + eta2 <= 1} is forward invariant for u in [u_min, "
         "u_max].",
         holds=min(inflow.values()) > -ROUNDING,
         figures={
-            "least_inflow_per_time": {str(hbar): value for hbar, value in inflow.items()},
-            "least_inflow_too_large_input_per_time": inflow_at_larger_input,
+            "least_inflow_per_time": inflow,
+            "least_inflow_too_large_input_per_time": least_inflow(reactor, U_MIN, 1.1 * U_MAX),
             "eps1": reactor.eps1,
             "eps2": reactor.eps2,
         },
     )
 
 
-def coordinate_errors(hbar: float, count: int = 2000, seed: int = 0) -> tuple[float, float]:
+def coordinate_errors(hbar: float) -> tuple[float, float]:
     """Return the largest relative errors of (15) along (14), by central differences of F, and of F's inverse."""
-    reactor = Bioreactor(hbar)
-    rng = np.random.default_rng(seed)
+    reactor, count, span = Bioreactor(hbar), 2000, 1e-4
+    rng = np.random.default_rng(0)
     eta1, eta2, _ = 0.02 + 0.94 * rng.dirichlet((1.0, 1.0, 1.0), count).T
-    u = rng.uniform(reactor.u_min, reactor.u_max, count)
+    u = rng.uniform(U_MIN, U_MAX, count)
     x2 = reactor.to_x2(eta1, eta2)
     slope1, slope2 = reactor.slope(eta1, eta2, u)
-    span = 1e-4
-    x2_ahead = reactor.to_x2(eta1 + span * slope1, eta2 + span * slope2)
-    x2_behind = reactor.to_x2(eta1 - span * slope1, eta2 - span * slope2)
-    numeric_slope = (x2_ahead - x2_behind) / (2.0 * span)
-    error = np.abs(reactor.f2(eta1, x2, u) - numeric_slope).max() / np.abs(numeric_slope).max()
+    ahead, behind = (reactor.to_x2(eta1 + h * slope1, eta2 + h * slope2) for h in (span, -span))
+    numeric_slope = (ahead - behind) / (2.0 * span)
+    error = np.abs(reactor.f2(u, eta1, x2) - numeric_slope).max() / np.abs(numeric_slope).max()
     return float(error), float(np.abs(reactor.to_eta2(eta1, x2) / eta2 - 1.0).max())
 
 
 def coordinates() -> Claim:
     """Judge (15)."""
-    errors = [coordinate_errors(hbar) for hbar in (HBAR, HBAR_OF_OBSERVERS)]
-    slope, inverse = (max(column) for column in zip(*errors, strict=True))
+    slope, inverse = map(max, coordinate_errors(HBAR), coordinate_errors(HBAR_OF_OBSERVERS))
     return Claim(
         place="Section 3, (15)",
         statement="In the coordinates x = F(eta) the system has the explicit observability canonical form, with f2 a "
@@ -271,68 +236,59 @@ def coordinates() -> Claim:
     )
 
 
-class Increments(NamedTuple):
-    """Quotients of |f2(x2) - f2(x2_hat)| and its bounds, and of the bounds, over a grid of the domain."""
-
-    by_Omega1: float
-    by_Omega2: float
-    by_Omega2_printed: float
-    """Omega_2 ending in m2 x2^(2-p), as printed."""
-    by_Omega2_local: float
-    """Omega_2 with c_inf at each point in place of its maximum."""
-    by_Omega2_local_printed: float
-    c_inf: float
-    slope_over_Omega2: float
-    """The largest |df2/dx2| over Omega_2 at the same point."""
-    slope_over_Omega2_printed: float
-    Omega2_over_Omega1: float
-    share_Omega2_above_Omega1: float
-    Omega1_over_largest: float
-
-
 @functools.cache
-def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> Increments:
-    """Evaluate both inequalities of section 3 over a grid of (u, x1, x2, x2_hat)."""
+def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> dict[str, float]:
+    """Evaluate both inequalities of section 3 over a grid of (u, x1, x2, x2_hat).
+
+    Args:
+        hbar: Parameter of the bioreactor.
+        p: Power of the error term.
+        points: Points of the grid along each.
+
+    Returns:
+        Largest quotients: of |f2(x2) - f2(x2_hat)| and its bounds, `by_...`; of |df2/dx2| and Omega_2 at one point; of
+        the bounds. `printed` is Omega_2 ending in m2 x2^(2-p), `local` has c_inf at each point, not its maximum.
+    """
     reactor = Bioreactor(hbar)
-    x1, x2, u = (grid[..., None] for grid in reactor.domain(points))
+    u, x1, x2 = (grid[..., None] for grid in reactor.domain(points))
     low, high = reactor.x2_bounds(x1)
     x2_hat = low + (high - low) * np.linspace(0.0, 1.0, points)
     d = np.abs(x2 - x2_hat)
     distinct = d > 1e-9  # nearer, the increments are rounding errors
-    increment = np.where(distinct, np.abs(reactor.f2(x1, x2, u) - reactor.f2(x1, x2_hat, u)), 0.0)
-    _, _, m2, m3 = reactor.coefficients(x1, u)
-    c_inf = reactor.c_inf(p, points)
-    local = np.abs((m2 + m3 * x2_hat) * x2 ** (1.0 - p) + m3 * x2 ** (2.0 - p))
+    increment = np.where(distinct, np.abs(reactor.f2(u, x1, x2) - reactor.f2(u, x1, x2_hat)), 0.0)
+    local = reactor.local_c_inf(u, x1, x2, x2_hat, p)
+    any_x2_hat = np.linspace(reactor.x2_bounds(reactor.eps1)[0], reactor.x2_bounds(1.0 - reactor.eps2)[1], points)
+    c_inf = float(reactor.local_c_inf(u, x1, x2, any_x2_hat, p).max())
     # The bounds do not depend on x2: one value of it will do.
     point = u[:, :1], x1[:, :1], x2_hat[:, :1]
     Omega1 = reactor.Omega1(*point)
-    Omega2, Omega2_printed = (reactor.Omega2(*point, p, with_misprint=flag) for flag in (False, True))
-    slope = np.abs(reactor.f2_slope(*point[1:], point[0]))
+    Omega2, printed = (reactor.Omega2(*point, p, with_misprint=flag) for flag in (False, True))
+    slope = np.abs(reactor.f2_slope(*point))
+    ratio = Omega2 / Omega1
 
     def largest_quotient(Omega: np.ndarray, c: np.ndarray | float) -> float:
         return float((increment / np.where(distinct, Omega * d + c * d ** (1.0 + p), 1.0)).max())
 
-    ratio = Omega2 / Omega1
-    return Increments(
-        largest_quotient(Omega1, 0.0),
-        largest_quotient(Omega2, c_inf),
-        largest_quotient(Omega2_printed, c_inf),
-        largest_quotient(Omega2, local),
-        largest_quotient(Omega2_printed, local),
-        c_inf,
-        float((slope / Omega2).max()),
-        float((slope / Omega2_printed).max()),
-        float(ratio.max()),
-        float((ratio > 1.0 + ROUNDING).mean()),
-        float(Omega1.max() / reactor.df2_max),
-    )
+    return {
+        "by_Omega1_ratio": largest_quotient(Omega1, 0.0),
+        "by_Omega2_ratio": largest_quotient(Omega2, c_inf),
+        "by_Omega2_printed_ratio": largest_quotient(printed, c_inf),
+        "by_Omega2_local_ratio": largest_quotient(Omega2, local),
+        "by_Omega2_local_printed_ratio": largest_quotient(printed, local),
+        "c_inf": c_inf,
+        "slope_over_Omega2_ratio": float((slope / Omega2).max()),
+        "slope_over_Omega2_printed_ratio": float((slope / printed).max()),
+        "Omega2_over_Omega1_ratio": float(ratio.max()),
+        "share_Omega2_above_Omega1_ratio": float((ratio > 1.0 + ROUNDING).mean()),
+        "Omega1_over_largest_ratio": float(Omega1.max() / reactor.df2_max),
+    }
 
 
 def increments() -> Claim:
     """Judge the two inequalities, and the misprint."""
     quotients = increments_over_domain(HBAR_OF_OBSERVERS)
-    bounds_hold = max(quotients.by_Omega1, quotients.by_Omega2, quotients.by_Omega2_local) <= 1.0 + ROUNDING
-    misprint = max(quotients.by_Omega2_local_printed, quotients.slope_over_Omega2_printed) > 1.0 + ROUNDING
+    bounds = [quotients[name] for name in ("by_Omega1_ratio", "by_Omega2_ratio", "by_Omega2_local_ratio")]
+    printed = max(quotients["by_Omega2_local_printed_ratio"], quotients["slope_over_Omega2_printed_ratio"])
     correction = (
         "With m3, not m2, in the last term of Omega_2: only then is it the first of the two terms into which the "
         "secant's slope is parted."
@@ -341,41 +297,36 @@ def increments() -> Claim:
         place="Section 3, Omega_1, Omega_2, c_inf",
         statement="|f2(x2) - f2(x2_hat)| is at most Omega_1 |x2 - x2_hat|, and at most Omega_2 |x2 - x2_hat| + c_inf "
         "|x2 - x2_hat|^(1+p).",
-        holds=bounds_hold,
-        conditions=correction if misprint else "",
+        holds=max(bounds) <= 1.0 + ROUNDING,
+        conditions=correction if printed > 1.0 + ROUNDING else "",
         otherwise=correction,
-        figures={f"{name}_ratio" if name != "c_inf" else name: value for name, value in quotients._asdict().items()},
+        figures=quotients,
     )
 
 
 def order_of_bounds() -> Claim:
     """Judge df2/dx2 <= Omega_2 <= Omega_1 <= df2_max."""
     quotients = increments_over_domain(HBAR_OF_OBSERVERS)
-    exact_quotients = increments_over_domain(HBAR)
-    df2_max = Bioreactor(HBAR_OF_OBSERVERS).df2_max
-    excess = quotients.Omega2_over_Omega1 - 1.0
-    violation = (
-        f"Omega_2 <= Omega_1 fails at {1e2 * quotients.share_Omega2_above_Omega1:.2g} % of the points for hbar = 0.8, "
-        f"by at most {1e2 * excess:.2g} %; the largest quotient for hbar = 1 is "
-        f"{exact_quotients.Omega2_over_Omega1:.6f}."
-    )
+    figures = {
+        "df2_max_per_time": Bioreactor(HBAR_OF_OBSERVERS).df2_max,
+        "slope_over_Omega2_ratio": quotients["slope_over_Omega2_ratio"],
+        "Omega2_over_Omega1_ratio": quotients["Omega2_over_Omega1_ratio"],
+        "share_Omega2_above_Omega1": quotients["share_Omega2_above_Omega1_ratio"],
+        "Omega1_over_df2_max_ratio": quotients["Omega1_over_largest_ratio"],
+    }
     return Claim(
         place="Section 3, order of the bounds",
         statement="df2/dx2 <= Omega_2 <= Omega_1 <= df2_max over the whole domain.",
         holds={
-            "df2/dx2 <= Omega_2": quotients.slope_over_Omega2 <= 1.0 + ROUNDING,
-            "Omega_2 <= Omega_1": excess <= ROUNDING,
-            "Omega_1 <= df2_max": quotients.Omega1_over_largest <= 1.0 + ROUNDING,
+            "df2/dx2 <= Omega_2": figures["slope_over_Omega2_ratio"] <= 1.0 + ROUNDING,
+            "Omega_2 <= Omega_1": figures["Omega2_over_Omega1_ratio"] <= 1.0 + ROUNDING,
+            "Omega_1 <= df2_max": figures["Omega1_over_df2_max_ratio"] <= 1.0 + ROUNDING,
         },
         conditions="With m3, not m2, in the last term of Omega_2.",
-        otherwise=violation,
-        figures={
-            "df2_max_per_time": df2_max,
-            "slope_over_Omega2_ratio": quotients.slope_over_Omega2,
-            "Omega2_over_Omega1_ratio": quotients.Omega2_over_Omega1,
-            "share_Omega2_above_Omega1": quotients.share_Omega2_above_Omega1,
-            "Omega1_over_df2_max_ratio": quotients.Omega1_over_largest,
-        },
+        otherwise=f"Omega_2 <= Omega_1 fails at {1e2 * figures['share_Omega2_above_Omega1']:.2g} % of the points for "
+        f"hbar = 0.8, by at most {1e2 * (figures['Omega2_over_Omega1_ratio'] - 1.0):.2g} %; the largest quotient for "
+        f"hbar = 1 is {increments_over_domain(HBAR)['Omega2_over_Omega1_ratio']:.6f}.",
+        figures=figures,
     )
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmg_mj.papers.dao2023.observer import System
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.papers.dao2023.observer import Array, System
 
 # Section 3.2, the arm.
 MASS, LENGTH, INERTIA, GRAVITY = 1.0, 1.0, 0.5, 9.81  # kg, m, kg m^2, m/s^2
@@ -26,17 +27,17 @@ SIGMAS = (10.0, 1000.0, 0.1)
 """Weights of Fig. 3(a), (b), (c); the first is that of Fig. 2, too."""
 
 
-def torque(t: np.ndarray | float) -> np.ndarray:
+def torque(t: Scalar) -> Scalar:
     """Return the arm's torque u(t), section 3.2 [N m]."""
-    return 5.0 * (np.sin(2.0 * np.asarray(t)) + np.cos(20.0 * np.asarray(t)))
+    return 5.0 * (np.sin(2.0 * t) + np.cos(20.0 * t))
 
 
-def disturbance(t: np.ndarray | float) -> np.ndarray:
+def disturbance(t: Scalar) -> Scalar:
     """Return d(t) as (14) has it, an acceleration [rad/s^2]."""
-    return np.sin(OMEGA * np.asarray(t))
+    return np.sin(OMEGA * t)
 
 
-def acceleration(q: np.ndarray | float, t: float, coefficient: float = 1.0) -> np.ndarray:
+def acceleration(q: Scalar, t: float, coefficient: float = 1.0) -> Scalar:
     """Return the arm's q'', (14); with theta2 for the coefficient of d it is that of (10).
 
     Args:
@@ -50,33 +51,31 @@ def acceleration(q: np.ndarray | float, t: float, coefficient: float = 1.0) -> n
     return THETA[1] * torque(t) + coefficient * disturbance(t) - THETA[0] * np.sin(q)
 
 
-def exosystem_state(t: np.ndarray | float) -> np.ndarray:
+def exosystem_state(t: Scalar) -> Array:
     """Return the true xm(t), (..., 4): theta1, theta2 and the two states of the sinusoid."""
     t = np.asarray(t)
     constant = np.broadcast_to(THETA, (*t.shape, 2))
     return np.concatenate([constant, np.cos(OMEGA * t)[..., None], np.sin(OMEGA * t)[..., None]], axis=-1)
 
 
-def system(q: np.ndarray | float, u: np.ndarray | float, *, with_disturbance: bool = True) -> System:
-    """Return the matrices of (14), (15) at a measured angle and a torque.
+def system(q: Scalar, u: Scalar) -> System:
+    """Return the matrices of (14), (15) at a measured angle and a torque, r being (theta1, theta2, d).
 
     Args:
         q: Angle of the arm, (...,) [rad].
         u: Torque, (...,) [N m].
-        with_disturbance: Whether r is (theta1, theta2, d) or, as the conventional observer has it, (theta1, theta2).
 
     Returns:
         The matrices; B0 has the leading dimensions of q.
     """
-    q, u = np.broadcast_arrays(np.asarray(q, dtype=float), np.asarray(u, dtype=float))
-    lower = [-np.sin(q), u, np.ones_like(q)] if with_disturbance else [-np.sin(q), u]
-    B0 = np.zeros((*q.shape, 2, len(lower)))
-    B0[..., 1, :] = np.stack(lower, axis=-1)
+    q, u = np.broadcast_arrays(q, u)
+    B0 = np.zeros((*q.shape, 2, 3))
+    B0[..., 1, :] = np.stack([-np.sin(q), u, np.ones_like(q)], axis=-1)
     A = np.array([[0.0, 1.0], [0.0, 0.0]])
-    return System(A, B0, np.zeros((2, 1)), np.array([[1.0, 0.0]]), np.zeros((1, len(lower))))
+    return System(A, B0, np.zeros((2, 1)), np.array([[1.0, 0.0]]), np.zeros((1, 3)))
 
 
-def error_matrix() -> np.ndarray:
+def error_matrix() -> Array:
     """Return A + L C2, (2, 2)."""
     matrices = system(0.0, 0.0)
     return matrices.A + L @ matrices.C2
