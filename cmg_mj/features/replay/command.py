@@ -110,8 +110,7 @@ def log_options(command: Command) -> Command:
 
     @functools.wraps(command)
     def with_options(**given: Any) -> None:
-        from cmg_mj.features.replay.log import ReadOptions
-        from cmg_mj.features.replay.table import assignments
+        from cmg_mj.features.replay.log import ReadOptions, assignments
 
         options = {field.name: given.pop(field.name) for field in fields(ReadOptions) if field.name in given}
         for name in ("columns", "units", "scale", "offset"):

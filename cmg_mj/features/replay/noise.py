@@ -15,8 +15,7 @@ import numpy as np
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import STANDARD_GRAVITY
-from cmg_mj.features.replay.log import Log, LogNoise, WhiteNoise
-from cmg_mj.features.replay.sampling import EVEN, Part
+from cmg_mj.features.replay.log import EVEN, Log, LogNoise, Part, WhiteNoise
 from cmg_mj.observers.parameter_options import numbers
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.sensors.accelerometer import Accelerometer

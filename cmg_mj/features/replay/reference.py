@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.features.replay.log import REFERENCE, Log, WhiteNoise
+from cmg_mj.features.replay.log import REFERENCE, UNITS, Log, WhiteNoise
 from cmg_mj.features.replay.noise import noise_in
 from cmg_mj.features.replay.scores import STRETCHES, Piece, jackknife_stretches, lag_with_error
-from cmg_mj.features.replay.table import UNITS
 
 SPAN_S = 0.2
 """Time over which increments of the tilt and of the integrated reference are compared [s]; slopes are mostly noise."""

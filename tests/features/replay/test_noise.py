@@ -11,12 +11,10 @@ import pytest
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.core.tilt import RadialTilt
-from cmg_mj.features.replay.inputs import replay_prepared
-from cmg_mj.features.replay.log import Log, ReadOptions
-from cmg_mj.features.replay.log_replay import replay_log
+from cmg_mj.features.replay.log import ACCELEROMETERS, Log, ReadOptions
+from cmg_mj.features.replay.log_replay import replay_log, replay_prepared
 from cmg_mj.features.replay.noise import noise_figures, noise_in, noise_of, noise_remarks
 from cmg_mj.features.replay.reading import read_log
-from cmg_mj.features.replay.table import ACCELEROMETERS
 from cmg_mj.scenario.schema import Scenario
 from tests.features.replay.motion import COLUMNS, DT, N, sine, write_csv
 

@@ -13,9 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.replay.log import Log, ReadOptions
+from cmg_mj.features.replay.log import ACCELEROMETERS, Log, ReadOptions, assignments, unit_of_name
 from cmg_mj.features.replay.reading import read_log
-from cmg_mj.features.replay.table import ACCELEROMETERS, assignments, unit_of_name
 from tests.features.replay.motion import COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
 
 SIGNALS = ("time_s", "y1_rad", "reference_rad_s")

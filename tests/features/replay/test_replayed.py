@@ -14,9 +14,8 @@ import pytest
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
 from cmg_mj.core.tilt import RadialTilt, TiltNoise
 from cmg_mj.core.types import needs
-from cmg_mj.features.replay.inputs import model_of, observer_inputs, replay_prepared
 from cmg_mj.features.replay.log import Log, ReadOptions
-from cmg_mj.features.replay.log_replay import NO_MODEL, replay_log
+from cmg_mj.features.replay.log_replay import NO_MODEL, model_of, observer_inputs, replay_log, replay_prepared
 from cmg_mj.features.replay.noise import noise_numbers, noise_of
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer

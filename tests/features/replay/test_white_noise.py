@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
-from cmg_mj.features.replay.log import LogNoise, WhiteNoise
+from cmg_mj.features.replay.log import LogNoise, Part, WhiteNoise
 from cmg_mj.features.replay.noise import white_noise_of
-from cmg_mj.features.replay.sampling import Part
 
 DT, SIGMA, N = 0.005, 0.004, 4000
 CLOCK = DT * np.arange(N)
