@@ -1,4 +1,4 @@
-"""A log: what was measured, evenly sampled, in the names and units of a trajectory; and the columns of its file."""
+"""A log: what was measured, evenly sampled, in a trajectory's names and units; the roles and units of its columns."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -15,15 +14,10 @@ from cmg_mj.core.errors import InputError, TomlValue, nearest, shortened
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.stages.push import Push, Window, push_windows
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from cmg_mj.stages.push import Window
 
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
-
-
 EVEN = 0.02
 """Deviation from an even grid, in periods, up to which stamps count as even."""
 
@@ -32,7 +26,7 @@ Values = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Part:
+class Segment:
     """Rows without a gap, evenly sampled.
 
     Attributes:
@@ -50,12 +44,11 @@ class Part:
     rows: Values
 
     def when(self, stamps: np.ndarray) -> np.ndarray:
-        """Convert other rows' stamps to times in this part, beyond its ends too, (k,) [s]."""
+        """Convert other rows' stamps to times in this segment, beyond its ends too, (k,) [s]."""
         before, after = self.stamps[0] - self.placed[0], self.stamps[-1] - self.placed[-1]
         inside = np.interp(stamps, self.stamps, self.placed)
-        return np.where(
-            stamps < self.stamps[0], stamps - before, np.where(stamps > self.stamps[-1], stamps - after, inside)
-        )
+        inside = np.where(stamps > self.stamps[-1], stamps - after, inside)
+        return np.where(stamps < self.stamps[0], stamps - before, inside)
 
 
 class WhiteNoise(NamedTuple):
@@ -169,7 +162,7 @@ class Log:
         return f"{self.name}: {len(self):,} samples at {1.0 / self.dt:.6g} Hz, {self.duration_s:.6g} s{parts}"
 
     def trajectory(self, part: slice) -> Trajectory:
-        """Return one part, as `cmg_mj.features.replay.log_replay` takes it."""
+        """Return one part, as `cmg_mj.runs.open_loop` takes it."""
         return Trajectory({name: values[part] for name, values in self.columns.items()})
 
     def scored(self, settle_s: float) -> np.ndarray:
@@ -181,9 +174,8 @@ class Log:
 
     def broken(self, values: np.ndarray) -> np.ndarray:
         """Put a NaN between two parts of values, (n,): no line is drawn across a gap."""
-        first, *others = self.parts
-        pieces = [piece for part in others for piece in ([np.nan], values[part])]
-        return np.concatenate([values[first], *pieces]) if others else values[first]
+        pieces = [piece for part in self.parts for piece in (values[part], [np.nan])]
+        return np.concatenate(pieces[:-1])
 
     def broken_time(self) -> np.ndarray:
         """Return the times of `broken` values [s]."""
@@ -196,37 +188,6 @@ class Log:
         parts = [slice(max(p.start, start) - start, min(p.stop, stop) - start) for p in self.parts]
         columns = {name: values[start:stop] for name, values in self.columns.items()}
         return replace(self, columns=columns, parts=[part for part in parts if part.stop - part.start > 1])
-
-
-def log_of_run(path: Path) -> Log:
-    """Read a run's own recording, whose columns, pushes and scenario are known.
-
-    Raises:
-        InputError: The file is no recording of a run about one axis.
-    """
-    try:
-        trajectory = Trajectory.load(path)
-        scenario = trajectory.metadata["scenario"]
-    except (InputError, LookupError) as error:
-        raise InputError(f"{path}: say which columns are what, --columns tilt=HEADING,rate=HEADING,...") from error
-    if trajectory.axes:
-        raise InputError(
-            f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; save one of them "
-            f"from Python: Trajectory.load(path).along({trajectory.axes[0]!r}).save(...)"
-        )
-    if len(trajectory) < 2:
-        raise InputError(f"{path}: a run that ended before its second tick")
-    columns = {name: trajectory[name] for name in ("time_s", "y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2")}
-    columns[REFERENCE] = trajectory["x2_rad_s"]
-    return Log(
-        path.parent.name if path.stem == "trajectory" and path.parent.name else path.stem,
-        1.0 / float(scenario["controller"]["rate_hz"]),
-        columns,
-        [slice(0, len(trajectory))],
-        frozenset({"gimbals", "acceleration", "reference"}),
-        windows=push_windows([Push(**push) for push in scenario.get("push", ())]),
-        scenario=scenario,
-    )
 
 
 Quantity = Literal["angle", "rate", "angular acceleration", "acceleration", "time"]
@@ -285,52 +246,33 @@ _ASSIGNMENT = re.compile(
 """ROLE=HEADING or ROLE="HEADING"; the heading ends at a comma before another ROLE=, a quoted one at its quote."""
 
 
-@dataclass(frozen=True)
-class Column:
-    """One column of a log.
+class Column(NamedTuple):
+    """One column of a file: its heading, its unit, and factor and addend that convert it to SI units and radians."""
 
-    Attributes:
-        role: One of `ROLES`.
-        name: Heading in the file.
-        unit: Unit of its numbers.
-        factor: Factor to SI and radians, the user's scale included.
-        offset: Addend after the factor, in SI and radians.
-        unit_known: Whether the unit was given or is in the heading; else it is assumed.
-    """
-
-    role: str
     name: str
-    unit: str
+    unit: str | None
+    """None for a time whose unit is not known: it is taken as seconds."""
     factor: float
-    offset: float = 0.0
-    unit_known: bool = True
-
-    @property
-    def scale(self) -> float:
-        """The user's own factor."""
-        return self.factor / UNITS[ROLES[self.role]][self.unit]
+    offset: float
 
 
-def assignments(texts: str | Iterable[str], option: str) -> dict[str, str]:
+def assignments(texts: Iterable[str], option: str) -> dict[str, str]:
     """Parse `tilt=pitch_deg,rate=gyro dps` into role -> heading; a heading may contain commas.
 
     A heading with a comma before something like `x=` goes into quotes as in a CSV: `tilt="roll,x=1 (deg)"`, where a
     quote is written twice.
 
     Args:
-        texts: One text or several.
+        texts: Such texts.
         option: The option's name, for messages.
 
-    Returns:
-        Role -> value, in their order.
-
     Raises:
-        InputError: A text has another form, or a role is unknown or given twice.
+        InputError: A text has another form, or a role is given twice.
     """
     values: dict[str, str] = {}
-    for text in [texts] if isinstance(texts, str) else texts:
-        rest = text.strip().lstrip(",")
-        while True:
+    for text in texts:
+        rest = text
+        while rest:
             part = _ASSIGNMENT.match(rest)
             if part is None:
                 raise InputError(
@@ -338,20 +280,11 @@ def assignments(texts: str | Iterable[str], option: str) -> dict[str, str]:
                     'heading with a comma in it goes into quotes, tilt="roll,x (deg)"'
                 )
             role, quoted = part["role"], part["quoted"]
-            check_role(role, option)
             if role in values:
                 raise InputError(f"{option}: {role} is given twice")
             values[role] = (part["plain"] if quoted is None else quoted.replace('""', '"')).strip()
             rest = rest[part.end() :]
-            if not rest:
-                break
     return values
-
-
-def check_role(role: str, option: str) -> None:
-    """Refuse an unknown role."""
-    if role not in ROLES:
-        raise InputError(f"{option} {role}: no such role; {nearest(role, ROLES)}")
 
 
 def columns_of(options: ReadOptions) -> dict[str, Column]:
@@ -364,46 +297,36 @@ def columns_of(options: ReadOptions) -> dict[str, Column]:
         InputError: A role is unknown, roles do not go together, or a column has no known unit.
     """
     names = options.columns
-    given = {"--units": options.units, "--scale": options.scale, "--offset": options.offset}
-    for option, roles in {"--columns": names, **given}.items():
+    given = {"columns": names, "units": options.units, "scale": options.scale, "offset": options.offset}
+    for option, roles in given.items():
         for role in roles:
-            check_role(role, option)
+            if role not in ROLES:
+                raise InputError(f"--{option} {role}: no such role; {nearest(role, ROLES)}")
             if role not in names:
-                raise InputError(f"{option} {role}: there is no such column; --columns names {', '.join(names)}")
-    _check_together(set(names))
-    columns = {}
-    for role, name in names.items():
-        quantity = ROLES[role]
-        unit = unit_of_name(quantity, name)
-        if role in options.units:
-            unit = _plain(options.units[role])
-            if unit not in UNITS[quantity]:
-                known = nearest(unit, UNITS[quantity])
-                raise InputError(f"--units {role}={options.units[role]}: no unit of this quantity; {known}")
-        if unit is None and role != "time":
-            allowed = ", ".join(UNITS[quantity])
-            raise InputError(
-                f"--columns {role}={name}: the name does not end in a unit; say --units {role}=UNIT, one of {allowed}"
-            )
-        scale, offset = options.scale.get(role, 1.0), options.offset.get(role, 0.0)
-        if not math.isfinite(scale) or scale == 0.0:
-            raise InputError(f"--scale {role}={scale:g}: must be a finite number other than 0")
-        if not math.isfinite(offset):
-            raise InputError(f"--offset {role}={offset:g}: must be a finite number")
-        size = UNITS[quantity][unit or "s"]
-        columns[role] = Column(role, name, unit or "s", size * scale, size * offset, unit is not None)
-    return columns
-
-
-def _check_together(names: set[str]) -> None:
-    """Refuse roles that leave the tilt unknown, or determine it twice."""
-    sources = [source for source in (("tilt",), ONE_ACCELEROMETER, ACCELEROMETERS) if names & set(source)]
-    if len(sources) != 1 or not names.issuperset(sources[0]):
+                raise InputError(f"--{option} {role}: there is no such column; --columns names {', '.join(names)}")
+    sources = [source for source in (("tilt",), ONE_ACCELEROMETER, ACCELEROMETERS) if names.keys() & set(source)]
+    if len(sources) != 1 or not names.keys() >= set(sources[0]):
         raise InputError("--columns: name the tilt, or ax and az, or inner_x, inner_z, outer_x and outer_z")
     if "acceleration" in names and sources[0] == ACCELEROMETERS:
         raise InputError("--columns: two accelerometers show the angular acceleration; leave acceleration out")
-    if names & {"gimbal", "gimbal1", "gimbal2"} not in (set(), {"gimbal"}, {"gimbal1", "gimbal2"}):
+    if names.keys() & {"gimbal", "gimbal1", "gimbal2"} not in (set(), {"gimbal"}, {"gimbal1", "gimbal2"}):
         raise InputError("--columns: name either gimbal, or gimbal1 and gimbal2")
+    return {role: _column(role, name, options) for role, name in names.items()}
+
+
+def _column(role: str, name: str, options: ReadOptions) -> Column:
+    units, told = UNITS[ROLES[role]], options.units.get(role)
+    unit = unit_of_name(ROLES[role], name) if told is None else _plain(told)
+    if unit not in units and (told is not None or role != "time"):
+        wrong = f"--columns {role}={name}: the name does not end in a unit; say --units {role}=UNIT"
+        if told is not None:
+            wrong = f"--units {role}={told}: no unit of this quantity"
+        raise InputError(f"{wrong}; {nearest(unit or '', units)}")
+    scale = options.scale.get(role, 1.0)
+    if not math.isfinite(scale) or not scale:
+        raise InputError(f"--scale {role}={scale:g}: must be a finite number other than 0")
+    size = units[unit or "s"]
+    return Column(name, unit, size * scale, size * options.offset.get(role, 0.0))
 
 
 def _plain(text: str) -> str:
@@ -422,90 +345,3 @@ def unit_of_name(quantity: Quantity, name: str) -> str | None:
     parts = [bracketed[1]] if bracketed else _plain(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name)).split("_")
     ends = (_plain("_".join(parts[start:])) for start in range(len(parts)))  # the longest first: deg_s before s
     return next((end for end in ends if end in UNITS[quantity]), None)
-
-
-def read_table(path: Path, columns: Mapping[str, Column], options: ReadOptions) -> tuple[dict[str, np.ndarray], bool]:
-    """Read columns of a log.
-
-    Args:
-        path: A CSV (with a heading) or a Parquet file.
-        columns: Role -> column.
-        options: How a CSV is written.
-
-    Returns:
-        Role -> values in SI units and radians, (n_rows,), NaN where there is no number; whether the time holds dates,
-        which become seconds from the first.
-
-    Raises:
-        InputError: The file cannot be read, lacks a column, or has text among the numbers.
-    """
-    import pyarrow as pa
-
-    try:
-        table = _read(path, [column.name.strip() for column in columns.values()], options)
-    except InputError:
-        raise
-    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
-        text = " ".join(str(getattr(error, "strerror", None) or error).split())
-        raise InputError(
-            f"{path}: cannot be read: {shortened(text)}. A CSV is read with --delimiter, --encoding and --decimal"
-        ) from error
-    if not table.num_rows:
-        raise InputError(f"{path}: has no row")
-    values, dated, numbers = {}, False, None
-    for role, column in columns.items():
-        numbers = table[column.name.strip()]
-        if role == "time" and pa.types.is_timestamp(numbers.type):
-            values[role], dated = _seconds(numbers), True
-            continue
-        if not (pa.types.is_integer(numbers.type) or pa.types.is_floating(numbers.type)):
-            raise InputError(f"{path}: column {column.name!r} holds {numbers.type}, not numbers")
-        floats = numbers.cast(pa.float64(), safe=False).to_numpy()
-        with np.errstate(over="ignore", invalid="ignore"):
-            values[role] = np.where(np.isfinite(floats), floats, np.nan) * column.factor + column.offset
-    del table, numbers
-    pa.default_memory_pool().release_unused()  # of a long log, as much as all its signals
-    return values, dated
-
-
-def _read(path: Path, names: list[str], options: ReadOptions) -> pa.Table:
-    """Read the named columns; spaces around a heading do not count."""
-    import pyarrow as pa
-    import pyarrow.csv as pacsv
-    import pyarrow.parquet as pq
-
-    def spelled(known: list[str]) -> list[str]:
-        headings = {heading.strip(): heading for heading in known}
-        for name in names:
-            if name not in headings:
-                raise InputError(f"{path}: has no column {name!r}; {nearest(name, list(headings), 'it has')}")
-        return list(dict.fromkeys(headings[name] for name in names))
-
-    with path.open("rb") as file:
-        is_parquet = file.read(4) == b"PAR1"
-        file.seek(0)
-        if is_parquet:
-            table = pq.ParquetFile(file).read(columns=spelled(pq.ParquetFile(file).schema_arrow.names))
-        else:
-            read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False)
-            parse = pacsv.ParseOptions(delimiter=options.delimiter)
-            headings = spelled(pacsv.open_csv(file, read, parse).schema.names)
-            file.seek(0)
-            time = options.columns.get("time", "").strip()
-            convert = pacsv.ConvertOptions(
-                include_columns=headings,
-                column_types={name: pa.float64() for name in headings if name.strip() != time},
-                decimal_point=options.decimal,
-            )
-            table = pacsv.read_csv(file, read, parse, convert)
-    return table.rename_columns([heading.strip() for heading in table.column_names])
-
-
-def _seconds(column: pa.ChunkedArray) -> np.ndarray:
-    """Convert dates to seconds from the first; nanoseconds are subtracted as integers."""
-    import pyarrow as pa
-
-    counts = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64())
-    known = counts.drop_null()
-    start = known[0].as_py() if len(known) else 0
-    return np.where(np.asarray(counts.is_valid()), (counts.fill_null(0).to_numpy() - start) * 1e-9, np.nan)

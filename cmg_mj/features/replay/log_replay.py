@@ -17,7 +17,7 @@ from cmg_mj.core.types import extra_signals, needs
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reference import Alignment, alignment_of, model_misfit
-from cmg_mj.features.replay.scores import Figures, ZeroPhase, noise_gain, scores, zero_phase
+from cmg_mj.features.replay.scores import Figures, ZeroPhase, rms, scores, zero_phase
 from cmg_mj.inputs.users_line import in_users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
 from cmg_mj.observers.parameter_options import Parameters, numbers
@@ -147,9 +147,10 @@ def replay_log(
         estimates[name] = signals
         disturbed = _estimates(observer, noisy)
         rate = signals["x2_rad_s"]
-        gain = None if isinstance(disturbed, str) else noise_gain(disturbed["x2_rad_s"], rate, noise.tilt, scored)
-        summaries[name] = {**scores(log, rate, scored), "noise_gain_1_s": gain}
-    zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
+        response = None if isinstance(disturbed, str) else rms((disturbed["x2_rad_s"] - rate)[scored])
+        gain = None if response is None or not noise.tilt > 0.0 else response / noise.tilt
+        summaries[name] = scores(log, rate, scored, gain)
+    zero = scores(log, np.zeros(len(log)), scored, 0.0)
     return ReplayResult(
         log,
         estimates,

@@ -182,8 +182,13 @@ def replay_markdown(replays: Sequence[ReplayResult]) -> str:
 def remarks(replayed: ReplayResult) -> list[str]:
     """Return the remarks on a log and its reference, and the observers left out."""
     lines = remarks_on(replayed.log, replayed.alignment) + noise_remarks(replayed.log, replayed.noise)
-    if replayed.zero_phase is not None:
-        lines.append(replayed.zero_phase.remark)
+    if (smoother := replayed.zero_phase) is not None:
+        best = "-" if smoother.best_rms_error_rad_s is None else f"{smoother.best_rms_error_rad_s:.4f}"
+        lines.append(
+            f"{ZERO_PHASE} is no observer: it sees the future. It smooths the tilt to both sides of each sample, below "
+            f"{smoother.cutoff_hz:.3g} Hz, chosen by the tilt alone; with {smoother.best_cutoff_hz:.3g} Hz, the best "
+            f"for the reference, its error is {best} rad/s."
+        )
     if doubt := model_remark(replayed.misfit):
         lines.append(doubt)
     reasons: dict[str, list[str]] = {}

@@ -54,7 +54,7 @@ def test_known_delays_in_noise() -> None:
 def test_short_logs(rows: int) -> None:
     """So short that the correlation cannot be smoothed, or hardly: three samples late, or nothing is said."""
     t = np.arange(rows)
-    result = lag([np.sin(0.5 * (t - 3.0))], [np.sin(0.5 * t)], 1.0, longest_s=100.0)
+    result = lag([np.sin(0.5 * (t - 3.0))], [np.sin(0.5 * t)], 1.0, max_lag_s=100.0)
     assert result is None or result == pytest.approx(3.0, abs=0.1)
     assert (result is None) == (rows < 20)
 

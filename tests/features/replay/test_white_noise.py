@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
-from cmg_mj.features.replay.log import LogNoise, Part, WhiteNoise
+from cmg_mj.features.replay.log import LogNoise, Segment, WhiteNoise
 from cmg_mj.features.replay.noise import white_noise_of
 
 DT, SIGMA, N = 0.005, 0.004, 4000
@@ -24,7 +24,7 @@ def motion(t: np.ndarray) -> np.ndarray:
 def noise_of_rows(t: np.ndarray, *parts: slice, **signals: np.ndarray) -> LogNoise:
     return white_noise_of(
         [
-            Part(t[some], {}, t[some], t[some], {name: values[some] for name, values in signals.items()})
+            Segment(t[some], {}, t[some], t[some], {name: values[some] for name, values in signals.items()})
             for some in parts or [slice(None)]
         ],
         DT,
