@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,9 +30,6 @@ from cmg_mj.features.replay.log import (
 from cmg_mj.features.replay.noise import white_noise_of
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.stages.push import Push, Window, inside, push_windows
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 SAME_PERIOD = 1e-3
 """Relative difference up to which the line through the rows has their period."""
@@ -190,18 +186,27 @@ def _windows_inside(path: Path, windows: Sequence[Window], time: np.ndarray) -> 
 
 
 def _read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> dict[str, np.ndarray]:
-    """Read columns of a log.
+    """Read columns of a log; spaces around a heading do not count.
 
     Returns:
         Role -> values in SI units and radians, (n_rows,), NaN where there is no number. Dates become seconds from the
         first, the unit that their column then has.
     """
     import pyarrow as pa
+    import pyarrow.csv as pacsv
+    import pyarrow.parquet as pq
 
     try:
-        table = _read(path, [column.name.strip() for column in columns.values()], options)
-    except InputError:
-        raise
+        with path.open("rb") as file:
+            is_parquet = file.read(4) == b"PAR1"
+            file.seek(0)
+            if is_parquet:
+                table = pq.read_table(file)
+            else:
+                read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False)
+                parse = pacsv.ParseOptions(delimiter=options.delimiter)
+                table = pacsv.read_csv(file, read, parse, pacsv.ConvertOptions(decimal_point=options.decimal))
+        headings = [heading.strip() for heading in table.column_names]
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
         text = shortened(" ".join(str(error).split()))
         raise InputError(
@@ -209,56 +214,23 @@ def _read_table(path: Path, columns: dict[str, Column], options: ReadOptions) ->
         ) from error
     if not table.num_rows:
         raise InputError(f"{path}: has no row")
-    values, numbers = {}, None
-    for role, column in list(columns.items()):
-        numbers = table[column.name.strip()]
+    values = {}
+    for role, (name, _, factor, offset) in list(columns.items()):
+        if name.strip() not in headings:
+            raise InputError(f"{path}: has no column {name!r}; {nearest(name, headings, 'it has')}")
+        numbers = table[headings.index(name.strip())]
         if role == "time" and pa.types.is_timestamp(numbers.type):
             stamps = numbers.cast(pa.timestamp("ns", numbers.type.tz)).to_numpy()
             # Nanoseconds are subtracted as integers: a double has a quarter of a microsecond in 2026.
             values[role] = (stamps - np.fmin.reduce(stamps)) / np.timedelta64(1, "ns") * 1e-9
-            columns[role] = column._replace(unit="s")
+            columns[role] = columns[role]._replace(unit="s")
             continue
-        if not (pa.types.is_integer(numbers.type) or pa.types.is_floating(numbers.type)):
-            raise InputError(f"{path}: column {column.name!r} holds {numbers.type}, not numbers")
+        if not any(check(numbers.type) for check in (pa.types.is_integer, pa.types.is_floating, pa.types.is_null)):
+            raise InputError(f"{path}: column {name!r} holds {numbers.type}, not numbers (--delimiter, --decimal)")
         floats = numbers.cast(pa.float64(), safe=False).to_numpy()
         with np.errstate(over="ignore", invalid="ignore"):
-            values[role] = np.where(np.isfinite(floats), floats, np.nan) * column.factor + column.offset
-    del table, numbers
-    pa.default_memory_pool().release_unused()  # of a long log, as much as all its signals
+            values[role] = np.where(np.isfinite(floats), floats, np.nan) * factor + offset
     return values
-
-
-def _read(path: Path, names: list[str], options: ReadOptions) -> pa.Table:
-    """Read the named columns; spaces around a heading do not count."""
-    import pyarrow as pa
-    import pyarrow.csv as pacsv
-    import pyarrow.parquet as pq
-
-    def spelled(known: list[str]) -> list[str]:
-        headings = {heading.strip(): heading for heading in known}
-        for name in names:
-            if name not in headings:
-                raise InputError(f"{path}: has no column {name!r}; {nearest(name, list(headings), 'it has')}")
-        return list(dict.fromkeys(headings[name] for name in names))
-
-    with path.open("rb") as file:
-        is_parquet = file.read(4) == b"PAR1"
-        file.seek(0)
-        if is_parquet:
-            table = pq.ParquetFile(file).read(columns=spelled(pq.ParquetFile(file).schema_arrow.names))
-        else:
-            read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False)
-            parse = pacsv.ParseOptions(delimiter=options.delimiter)
-            headings = spelled(pacsv.open_csv(file, read, parse).schema.names)
-            file.seek(0)
-            time = options.columns.get("time", "").strip()
-            convert = pacsv.ConvertOptions(
-                include_columns=headings,
-                column_types={name: pa.float64() for name in headings if name.strip() != time},
-                decimal_point=options.decimal,
-            )
-            table = pacsv.read_csv(file, read, parse, convert)
-    return table.rename_columns([heading.strip() for heading in table.column_names])
 
 
 def _times(

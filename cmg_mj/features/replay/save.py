@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ from cmg_mj.features.replay.reading import check_distinct_logs, read_log
 from cmg_mj.features.replay.report import figure_text, log_figures, replay_figures, replay_markdown, shown_first
 from cmg_mj.features.replay.scores import Figures
 from cmg_mj.observers.parameter_options import Parameters
-from cmg_mj.results.folder import RunFolder, claimed, write_text
+from cmg_mj.results.folder import RunFolder, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.scenario.differences import safe_name
 from cmg_mj.view.plots.figure import pyplot, save_figure
@@ -120,7 +120,7 @@ def _rms(figures: Figures) -> str:
     return "" if value is None else figure_text(key, value)
 
 
-def write_replay(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:
+def write_recording(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:
     """Write the replays of some logs as one recording; whole or not at all.
 
     Args:
@@ -180,9 +180,6 @@ def series(replayed: ReplayResult) -> Iterator[Series]:
         yield row("gimbal/y2", "measured", np.degrees(log["y2_rad"]), MODULES[0])
 
 
-SETTINGS = "replay.toml"
-
-
 @dataclass
 class LogReplays:
     """Request to replay some logs, and the replays that are done. The logs are read at once.
@@ -203,10 +200,10 @@ class LogReplays:
     paths: Sequence[str]
     observers: Sequence[str]
     options: ReadOptions
-    model: str | None = None
-    noises: Mapping[str, float] = field(default_factory=dict)
-    parameters: Parameters = field(default_factory=dict)
-    settle_s: float | None = None
+    model: str | None
+    noises: Mapping[str, float]
+    parameters: Parameters
+    settle_s: float | None
 
     def __post_init__(self) -> None:
         for kind in self.parameters:
@@ -215,26 +212,24 @@ class LogReplays:
         self._model = None if self.model is None else model_of(self.model)
         check_distinct_logs(self.paths)
         self.logs: list[Log] = [read_log(path, self.options) for path in self.paths]
-        self.names = distinct_names([log.name for log in self.logs])
+        self.names = _distinct_names([log.name for log in self.logs])
         self.results: list[ReplayResult] = []
 
-    def as_toml(self) -> str:
+    def _as_toml(self) -> str:
         """Return the request as TOML."""
-        replay = {
-            "observers": list(self.observers),
-            "model": self.model,
-            "parameters": self.parameters,
-            "noise": self.noises,
-            "settle_s": self.settle_s,
+        parts = {
+            "logs": list(self.paths),
+            "log": self.options.as_toml(),
+            "replay": {
+                "observers": list(self.observers),
+                "model": self.model,
+                "parameters": self.parameters,
+                "noise": self.noises,
+                "settle_s": self.settle_s,
+            },
         }
-        options = self.options.as_toml()
-        return tomli_w.dumps(
-            {
-                "logs": list(self.paths),
-                **({"log": options} if options else {}),
-                "replay": {name: value for name, value in replay.items() if value not in (None, {})},
-            }
-        )
+        parts["replay"] = {name: value for name, value in parts["replay"].items() if value not in (None, {})}
+        return tomli_w.dumps({name: part for name, part in parts.items() if part})
 
     @property
     def complete(self) -> bool:
@@ -266,32 +261,26 @@ class LogReplays:
                 )
             )
 
-    def save(self, folder: RunFolder | Path) -> Path:
+    def save(self, folder: RunFolder) -> Path:
         """Write summary.json, replay.toml, recording.rrd, and of every log that is done its signals and plot, at once.
 
-        Args:
-            folder: The folder. Files in it that cmg_mj did not write stay.
-
-        Returns:
-            The folder of the files: the given one, or one in it (see `RunFolder.write`).
-
-        Raises:
-            InputError: The folder, or a file, cannot be written.
+        Returns the folder of the files: see `RunFolder.write`.
         """
-        names = self.names[: len(self.results)]
-        writers: list[Callable[[Path], None]] = [
-            lambda path: write_text(path, json.dumps(finite(replay_figures(self.results)), indent=2)),
-            lambda path: write_text(path, self.as_toml()),
-            lambda path: write_replay(path, self.results, names, self.as_toml()),
-        ]
-        for replayed in self.results:
+        names, toml = self.names[: len(self.results)], self._as_toml()
+        files: dict[str, Callable[[Path], None]] = {
+            "summary.json": lambda path: write_text(path, json.dumps(finite(replay_figures(self.results)), indent=2)),
+            "replay.toml": lambda path: write_text(path, toml),
+            "recording.rrd": lambda path: write_recording(path, self.results, names, toml),
+        }
+        for name, replayed in zip(names, self.results, strict=True):
+            suffix = f"-{name}" if len(names) > 1 else ""
             signals = replace(replayed.trajectory, metadata={"replay": finite(log_figures(replayed))})
-            writers += [signals.save, lambda path, replayed=replayed: plot_replay(path, replayed)]
-        with claimed(folder) as claim:
-            return claim.write(dict(zip(files_of_replay(names), writers, strict=True)), complete=self.complete)
+            files[f"signals{suffix}.parquet"] = signals.save
+            files[f"plot{suffix}.png"] = lambda path, replayed=replayed: plot_replay(path, replayed)
+        return folder.write(files, complete=self.complete)
 
 
-def distinct_names(names: Sequence[str]) -> list[str]:
+def _distinct_names(names: Sequence[str]) -> list[str]:
     """Return logs' names as parts of file names, the repeated ones numbered."""
     distinct: list[str] = []
     for name in map(safe_name, names):
@@ -301,11 +290,3 @@ def distinct_names(names: Sequence[str]) -> list[str]:
             candidate = f"{name}-{number}"
         distinct.append(candidate)
     return distinct
-
-
-def files_of_replay(names: Sequence[str]) -> list[str]:
-    """Return the names of the files of a replay of some logs."""
-    files = ["summary.json", SETTINGS, "recording.rrd"]
-    for suffix in [""] if len(names) == 1 else [f"-{name}" for name in names]:
-        files += [f"signals{suffix}.parquet", f"plot{suffix}.png"]
-    return files
