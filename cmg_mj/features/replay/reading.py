@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -387,27 +388,20 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
 
 def _segment(time: np.ndarray, values: Values, period: float, dt: float, resampled: bool) -> Segment:
     """Sample rows without a gap every dt."""
-    if resampled:
-        grid = dt * np.arange(int((time[-1] - time[0]) / dt + 1e-6) + 1)
-        stamps, gap = time - time[0], GAP_PERIODS * period
-        sampled = {
-            name: _held(grid, stamps, column) if name == HELD else _resample(grid, stamps, column, gap)
-            for name, column in values.items()
-        }
-        return Segment(time[0] + grid, sampled, time, time, values)
-    if len(time) == round((time[-1] - time[0]) / dt) + 1:
-        grid = time[0] + dt * np.arange(len(time))
-        return Segment(grid, values, time, grid, values)
-    # Rows stay where they are, and those that are missing come between them.
-    places = np.maximum.accumulate(np.rint((time - time[0]) / dt).astype(int))
-    later = np.concatenate([[True], np.diff(places) > 0])
-    time, places, values = time[later], places[later], _select(values, later)
-    stamps, grid = places * dt, dt * np.arange(places[-1] + 1)
-    filled = {
-        name: _held(grid, stamps, column) if name == HELD else np.interp(grid, stamps, column)
-        for name, column in values.items()
-    }
-    return Segment(time[0] + grid, filled, time, time[0] + stamps, values)
+    stamps, placed, interpolate = time - time[0], time, partial(_resample, gap=GAP_PERIODS * period)
+    places = np.arange(int(stamps[-1] / dt + 1e-6) + 1)
+    if not resampled:
+        # Rows stay where they are, and those that are missing come between them.
+        places = np.arange(len(time))
+        if len(time) != round(stamps[-1] / dt) + 1:
+            places = np.maximum.accumulate(np.rint(stamps / dt).astype(int))
+            later = np.concatenate([[True], np.diff(places) > 0])
+            time, places, values = time[later], places[later], _select(values, later)
+        stamps, interpolate = places * dt, np.interp
+        placed = time[0] + stamps
+    grid = dt * np.arange(places[-1] + 1)
+    sampled = {name: (_held if name == HELD else interpolate)(grid, stamps, column) for name, column in values.items()}
+    return Segment(time[0] + grid, sampled, time, placed, values)
 
 
 def _resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float) -> np.ndarray:

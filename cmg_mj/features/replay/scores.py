@@ -110,9 +110,7 @@ def rms(values: np.ndarray) -> float | None:
         return finite_or_none(math.sqrt(float(np.mean(values**2))))
 
 
-def lag(
-    behind: Sequence[np.ndarray], ahead: Sequence[np.ndarray], dt: float, max_lag_s: float = MAX_LAG_S
-) -> float | None:
+def lag(behind: Sequence[np.ndarray], ahead: Sequence[np.ndarray], dt: float) -> float | None:
     """Find how long one signal comes after another: the peak of their correlation, between the samples too.
 
     For every whole number of samples the coefficient is that of all pairs there are. Before its peak is sought, all
@@ -124,21 +122,20 @@ def lag(
         behind: Pieces of the later signal, each (n,); NaN where it is unknown.
         ahead: Pieces of the other signal at the same times.
         dt: Sample period [s].
-        max_lag_s: Longest lag that is searched, either way [s].
 
     Returns:
         The lag [s], negative if the signal comes before the other. None for no motion, a low correlation (`ALIKE`), a
         peak at the end, or a standard error (jackknife over `STRETCHES`) above a sample and above half of the lag.
     """
-    return lag_with_error([piece.__getitem__ for piece in behind], ahead, dt, max_lag_s)[0]
+    return lag_with_error([piece.__getitem__ for piece in behind], ahead, dt)[0]
 
 
 def lag_with_error(
-    behind: Sequence[Piece], ahead: Sequence[np.ndarray], dt: float, max_lag_s: float = MAX_LAG_S
+    behind: Sequence[Piece], ahead: Sequence[np.ndarray], dt: float
 ) -> tuple[float, float] | tuple[None, None]:
     """Find a lag as `lag` does, with its standard error [s]."""
     size = max((len(piece) for piece in ahead), default=0)
-    reach = min(math.ceil(max_lag_s / dt), (size - 1) // 4)
+    reach = min(math.ceil(MAX_LAG_S / dt), (size - 1) // 4)
     if reach < 1:
         return None, None
     stretches = _sums(behind, ahead, reach)

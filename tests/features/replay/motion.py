@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from cmg_mj.features.replay.log import Log, ReadOptions
+from cmg_mj.features.replay.reading import read_log
 
 DT = 0.005
 AMPLITUDE, OMEGA = 0.2, 2.0 * np.pi
@@ -35,3 +39,10 @@ def write_csv(path: Path | str, columns: Mapping[str, Sequence | np.ndarray], de
 
 def _cell(value: object) -> str:
     return "" if value is None else repr(float(value)) if isinstance(value, (float, np.floating)) else str(value)
+
+
+def read(
+    folder: Path, columns: Mapping[str, Sequence | np.ndarray], roles: Mapping[str, str] = COLUMNS, **options: Any
+) -> Log:
+    """Read columns back as a log."""
+    return read_log(write_csv(folder / "log.csv", columns), ReadOptions(roles, **options))

@@ -59,12 +59,6 @@ def test_it_starts_at_the_first_row_it_is_given() -> None:
     np.testing.assert_array_equal(x3[0], part["y2_rad"][0])
 
 
-def test_some_worlds_of_many() -> None:
-    selection = record(3).of_worlds(np.array([True, False, True]))
-    np.testing.assert_array_equal(selection["y1_rad"], record(3)["y1_rad"][:, [0, 2]])
-    np.testing.assert_array_equal(selection["time_s"], record(3)["time_s"])
-
-
 def test_a_world_that_fell_is_nan_from_there_and_leaves_the_others_alone() -> None:
     columns = {name: values.copy() for name, values in record(3).columns.items()}
     for name in columns:
