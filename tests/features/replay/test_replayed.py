@@ -69,15 +69,6 @@ def test_a_runs_parameters_model_and_noise_can_be_changed(run: Path) -> None:
         assert np.abs(changed.estimates[name]["x2_rad_s"] - original.estimates[name]["x2_rad_s"]).max() > 1e-3
 
 
-def test_a_runs_recording_as_any_parquet(run: Path) -> None:
-    """With --columns it is a log like others: the same estimates of those that need no more."""
-    path = run / "trajectory.parquet"
-    plain = read_log(path, ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
-    result = replay_log(plain, ["linear"], settle_s=0.0)
-    trajectory = Trajectory.load(path)["estimate/linear/x2_rad_s"]
-    np.testing.assert_allclose(result.estimates["linear"]["x2_rad_s"], trajectory, atol=1e-9)
-
-
 @pytest.mark.slow
 def test_who_takes_part(tmp_path: Path) -> None:
     """The observer's needs and the log's signals decide, for every combination."""
