@@ -17,7 +17,6 @@ from cmg_mj.features.replay.log import REFERENCE, Log, ReadOptions
 from cmg_mj.features.replay.log_replay import ReplayResult, model_of, replay_prepared
 from cmg_mj.features.replay.reading import check_distinct_logs, read_log
 from cmg_mj.features.replay.report import figure_text, log_figures, replay_figures, replay_markdown, shown_first
-from cmg_mj.features.replay.scores import Figures
 from cmg_mj.observers.parameter_options import Parameters
 from cmg_mj.results.folder import RunFolder, write_text
 from cmg_mj.results.summary_keys import finite
@@ -58,11 +57,11 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         path: The PNG to write.
         replayed: The replay.
     """
-    log, few = replayed.log, shown_first(replayed)
+    log, few, key = replayed.log, shown_first(replayed), "velocity_rms_error_rad_s"
     rates = {name: estimates["x2_rad_s"] for name, estimates in replayed.estimates.items()}
-    palette = {name: hexadecimal(rgb) for name, rgb in colours(list(rates)).items()}
+    palette = {name: hexadecimal(rgb) for name, rgb in colours(rates).items()}
     labels = {name: label.lstrip("_") for name, label in short_names(list(rates)).items()}
-    scores = {name: _rms(replayed.summaries[name]) for name in rates}
+    titles = {name: f"{label} {figure_text(key, replayed.summaries[name].get(key))}" for name, label in labels.items()}
     reference = [log[REFERENCE]] if "reference" in log.has else []
     others = [name for name in rates if name not in few]
     tall, rows = 3 + len(reference), -(-len(others) // SMALL_COLUMNS)
@@ -70,14 +69,13 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     figure = pyplot().figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
     grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
     panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
-    span = liveliest_span(log)
-    time = log.broken_time()
+    small = [figure.add_subplot(grid[tall + i // SMALL_COLUMNS, i % SMALL_COLUMNS]) for i in range(len(others))]
+    span, time = liveliest_span(log), log.broken_time()
     detail = slice(*np.searchsorted(time, span).tolist())
 
-    def line(axes: Axes, values: np.ndarray, color: str, width: float, label: str = "") -> None:
+    def line(axes: Axes, values: np.ndarray, color: str, width: float, label: str | None = None) -> None:
         rows = slice(None) if axes in panels[:-1] else detail
-        x, y = thinned(time[rows], log.broken(values)[rows])
-        axes.plot(x, y, color=color, linewidth=width, label=label or None)
+        axes.plot(*thinned(time[rows], log.broken(values)[rows]), color=color, linewidth=width, label=label)
 
     line(panels[0], np.degrees(log["y1_rad"]), MEASURED, 0.8, "measured")
     panels[0].set_ylabel("tilt [deg]")
@@ -90,17 +88,17 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     for true in reference:
         panels[2].plot([], [], " ", label="RMS:")
         for name in few:
-            line(panels[2], rates[name] - true, palette[name], 0.6, f"{labels[name]} {scores[name]}")
+            line(panels[2], rates[name] - true, palette[name], 0.6, titles[name])
         panels[2].set_ylabel("estimate less\nreference [rad/s]")
     for axes in panels[:-1]:
         axes.axvspan(*span, color="0.5", alpha=0.15, linewidth=0, zorder=0)
         axes.set_xlim(log["time_s"][0], log["time_s"][-1])
-    small = [figure.add_subplot(grid[tall + i // SMALL_COLUMNS, i % SMALL_COLUMNS]) for i in range(len(others))]
     for axes, name in zip(small, others, strict=True):
         line(axes, rates[name], palette[name], 0.7)
         for values in reference:
             line(axes, values, INK, 0.8)
-        axes.set_title(f"{labels[name]} {scores[name]}", loc="left", fontsize="small", parse_math=False, pad=2.0)
+        title = titles[name] if reference else labels[name]
+        axes.set_title(title, loc="left", fontsize="small", parse_math=False, pad=2.0)
         axes.tick_params(labelsize="small")
         axes.set_ylim(*panels[1].get_ylim())
     for axes in (panels[-1], *small):
@@ -112,12 +110,6 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     panels[-1].set_xlabel(f"time [s], {DETAIL_S:g} s in detail")
     figure.align_ylabels(panels)
     save_figure(path, figure, log.title, dpi=110)
-
-
-def _rms(figures: Figures) -> str:
-    key = "velocity_rms_error_rad_s"
-    value = figures.get(key)
-    return "" if value is None else figure_text(key, value)
 
 
 def write_recording(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:

@@ -205,19 +205,13 @@ def _peak_of(sums: np.ndarray) -> float | None:
         r = (sxy - sx * sy / n) / np.sqrt((sxx - sx * sx / n) * (syy - sy * sy / n))
     if not np.isfinite(r).all() or r.max() <= ALIKE:
         return None
-    r = np.convolve(r, _half_band(min(TAPS, len(r) // 2 // 4)), mode="valid")
+    taps = min(TAPS, len(r) // 2 // 4)
+    if taps >= 3:  # a low-pass at a quarter of the sampling rate; with few taps, none
+        weights = np.sinc(np.arange(-taps, taps + 1) / 2.0) * np.kaiser(2 * taps + 1, 5.0)
+        r = np.convolve(r, weights / weights.sum(), mode="valid")
     lags = np.arange(len(r)) - len(r) // 2
     peaks = [i for i in range(1, len(r) - 1) if r[i - 1] < r[i] >= r[i + 1] and r[i] >= AS_GOOD * r.max()]
     return _between(lags, r, min(peaks, key=lambda i: abs(lags[i]))) if peaks else None
-
-
-def _half_band(taps: int) -> np.ndarray:
-    """Return a symmetric low-pass at a quarter of the sampling rate, (2 taps + 1,); with few taps, no filter."""
-    if taps < 3:
-        return np.ones(1)
-    places = np.arange(-taps, taps + 1)
-    weights = np.sinc(places / 2.0) * np.kaiser(2 * taps + 1, 5.0)
-    return weights / weights.sum()
 
 
 def _between(lags: np.ndarray, r: np.ndarray, at: int) -> float:
@@ -254,6 +248,10 @@ class ZeroPhase:
 def zero_phase(log: Log, scored: np.ndarray) -> ZeroPhase | None:
     """Choose the smoother's cut-off on a log with a reference, and score it.
 
+    Generalised cross-validation chooses it on the tilt alone: with the share R(f) = 1 - response that the smoother
+    takes away, mean(R^2 |y|^2)/mean(R)^2 estimates the error at samples that the smoother is not shown, if the tilt's
+    noise is white.
+
     Args:
         log: The log.
         scored: Which samples count, (n,).
@@ -270,15 +268,19 @@ def zero_phase(log: Log, scored: np.ndarray) -> ZeroPhase | None:
         blocks = [blocks[i] for i in np.unique(np.linspace(0, len(blocks) - 1, BLOCKS).round().astype(int))]
     longest = max(min(part.stop - part.start, BLOCK) for part in log.parts) * log.dt
     cutoffs = np.geomspace(min(MIN_PERIODS / longest, 0.25 / log.dt), 0.5 / log.dt, CUTOFFS)
-    cutoff = chosen_cutoff([log["y1_rad"][block] for block in blocks], log.dt, cutoffs)
-    squares = np.zeros(len(cutoffs))
+    frequencies, powers, squares = [], [], np.zeros(len(cutoffs))
     for block in blocks:
-        tilt, reference = log["y1_rad"][block], log[REFERENCE][block]
+        tilt, reference, n = log["y1_rad"][block], log[REFERENCE][block], block.stop - block.start
+        frequencies.append(np.fft.rfftfreq(2 * (n - 1), log.dt)[1:-1])
+        powers.append(np.abs(np.fft.rfft(_continued(tilt))[1:-1]) ** 2 / n)
         counted = scored[block] & np.isfinite(reference)
         for i, candidate in enumerate(cutoffs):
             error = (smoothed_rate(tilt, log.dt, float(candidate)) - reference)[counted]
             squares[i] += float(np.sum(error**2))
-    best = float(cutoffs[int(np.argmin(squares))])
+    frequency, power = np.concatenate(frequencies), np.concatenate(powers)
+    taken = [1.0 / (1.0 + (candidate / frequency) ** 6) for candidate in cutoffs]
+    risks = [float(np.mean(share**2 * power) / np.mean(share) ** 2) for share in taken]
+    cutoff, best = (float(cutoffs[int(np.argmin(losses))]) for losses in (risks, squares))
     own, best_figures = (
         scores(log, _smoothed_log(log, chosen), scored, noise_gain_of(chosen, log.dt)) for chosen in (cutoff, best)
     )
@@ -313,33 +315,6 @@ def _continued(tilt: np.ndarray) -> np.ndarray:
     """Continue the tilt less the line through its ends oddly to one period, (2 n - 2,)."""
     bent = tilt - np.linspace(tilt[0], tilt[-1], len(tilt))
     return np.concatenate([bent, -bent[-2:0:-1]])
-
-
-def chosen_cutoff(pieces: Sequence[np.ndarray], dt: float, cutoffs: np.ndarray) -> float:
-    """Choose a cut-off by generalised cross-validation, on the tilt alone.
-
-    With the share R(f) = 1 - response that the smoother takes away, it minimises mean(R^2 |y|^2)/mean(R)^2: an
-    estimate of the error at samples that the smoother is not shown. White noise in the tilt is assumed.
-
-    Args:
-        pieces: Pieces of the tilt, each (n,) [rad].
-        dt: Sample period [s].
-        cutoffs: Candidates, growing (m,) [Hz].
-
-    Returns:
-        One of them [Hz].
-    """
-    frequencies, powers = [], []
-    for tilt in pieces:
-        n = len(tilt)
-        frequencies.append(np.fft.rfftfreq(2 * (n - 1), dt)[1:-1])
-        powers.append(np.abs(np.fft.rfft(_continued(tilt))[1:-1]) ** 2 / n)
-    frequency, power = np.concatenate(frequencies), np.concatenate(powers)
-    risks = []
-    for cutoff in cutoffs:
-        taken = 1.0 / (1.0 + (cutoff / frequency) ** 6)
-        risks.append(float(np.mean(taken**2 * power) / np.mean(taken) ** 2))
-    return float(cutoffs[int(np.argmin(risks))])
 
 
 def noise_gain_of(cutoff_hz: float, dt: float) -> float:
