@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from pathlib import Path
 
 import numpy as np
@@ -72,13 +71,6 @@ def test_its_recording() -> None:
     replay("sine.csv", "--columns", PLAIN, "--out", "it", "--observers", "linear")
     entities = {str(chunk.entity_path) for chunk in RrdReader("it/recording.rrd").stream()}
     assert {"/sine/tilt/measured", "/sine/rate/true", "/sine/rate_estimate/linear", "/summary", "/settings"} <= entities
-
-
-@pytest.mark.slow
-def test_the_same_replay_goes_to_the_same_folder() -> None:
-    for folder in ("runs/replay-sine", "runs/replay-sine", "runs/replay-sine-2"):
-        settle = ("--settle-s", "0.5") if folder.endswith("2") else ()
-        assert re.search(rf"Written to {folder}[.;] ", replay("sine.csv", "--columns", PLAIN, *settle).err)
 
 
 @pytest.mark.slow

@@ -50,17 +50,6 @@ def test_a_straight_line_has_its_slope_everywhere() -> None:
     np.testing.assert_allclose(smoothed_rate(0.3 - 2.0 * DT * np.arange(300), DT, CUTOFF), -2.0, rtol=1e-9)
 
 
-@pytest.mark.slow
-def test_it_is_what_scipy_filters_to_and_fro() -> None:
-    """Butterworth of third order, twice as the response squared says; its bilinear form at a far higher rate."""
-    from scipy.signal import butter, sosfiltfilt
-
-    t = 1e-3 * np.arange(8000)
-    y = np.cumsum(np.random.default_rng(0).standard_normal(8000)) * 1e-3 + np.sin(5.0 * t)
-    expected = np.gradient(sosfiltfilt(butter(3, CUTOFF, fs=1e3, output="sos"), y), 1e-3)
-    np.testing.assert_allclose(smoothed_rate(y, 1e-3, CUTOFF)[1000:-1000], expected[1000:-1000], atol=5e-4)
-
-
 def test_what_white_noise_becomes() -> None:
     noise = np.random.default_rng(0).standard_normal(50_000)
     assert np.std(smoothed_rate(noise, DT, CUTOFF)) == pytest.approx(noise_gain_of(CUTOFF, DT), rel=0.02)
