@@ -77,10 +77,10 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
 def _rows(replayed: ReplayResult) -> dict[str, Figures]:
     """Return the figures of a table's rows: the observers, the smoother that is none, and the baseline."""
     rows = dict(replayed.summaries)
-    zero = rows.pop(ZERO)
     if replayed.zero_phase is not None:
         rows[ZERO_PHASE] = replayed.zero_phase.figures
-    return {**rows, ZERO: zero}
+        rows[ZERO] = rows.pop(ZERO)
+    return rows
 
 
 def _means(replays: Sequence[ReplayResult]) -> dict[str, dict[str, SummaryValue]]:
