@@ -1,4 +1,4 @@
-"""A log: what was measured, evenly sampled, in a trajectory's names and units; the roles and units of its columns."""
+"""A log: what was measured, evenly sampled, in a trajectory's names and units; the columns of its file."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -345,3 +346,51 @@ def unit_of_name(quantity: Quantity, name: str) -> str | None:
     parts = [bracketed[1]] if bracketed else _plain(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name)).split("_")
     ends = (_plain("_".join(parts[start:])) for start in range(len(parts)))  # the longest first: deg_s before s
     return next((end for end in ends if end in UNITS[quantity]), None)
+
+
+def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> dict[str, np.ndarray]:
+    """Read columns of a log; spaces around a heading do not count.
+
+    Returns:
+        Role -> values in SI units and radians, (n_rows,), NaN where there is no number. Dates become seconds from the
+        first, the unit that their column then has.
+    """
+    import pyarrow as pa
+    import pyarrow.csv as pacsv
+    import pyarrow.parquet as pq
+
+    try:
+        with path.open("rb") as file:
+            is_parquet = file.read(4) == b"PAR1"
+            file.seek(0)
+            if is_parquet:
+                table = pq.read_table(file)
+            else:
+                read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False)
+                parse = pacsv.ParseOptions(delimiter=options.delimiter)
+                table = pacsv.read_csv(file, read, parse, pacsv.ConvertOptions(decimal_point=options.decimal))
+        headings = [heading.strip() for heading in table.column_names]
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
+        text = shortened(" ".join(str(error).split()))
+        raise InputError(
+            f"{path}: cannot be read: {text}. A CSV is read with --delimiter, --encoding and --decimal"
+        ) from error
+    if not table.num_rows:
+        raise InputError(f"{path}: has no row")
+    values = {}
+    for role, (name, _, factor, offset) in list(columns.items()):
+        if name.strip() not in headings:
+            raise InputError(f"{path}: has no column {name!r}; {nearest(name, headings, 'it has')}")
+        numbers = table[headings.index(name.strip())]
+        if role == "time" and pa.types.is_timestamp(numbers.type):
+            stamps = numbers.cast(pa.timestamp("ns", numbers.type.tz)).to_numpy()
+            # Nanoseconds are subtracted as integers: a double has a quarter of a microsecond in 2026.
+            values[role] = (stamps - np.fmin.reduce(stamps)) / np.timedelta64(1, "ns") * 1e-9
+            columns[role] = columns[role]._replace(unit="s")
+            continue
+        if not any(check(numbers.type) for check in (pa.types.is_integer, pa.types.is_floating, pa.types.is_null)):
+            raise InputError(f"{path}: column {name!r} holds {numbers.type}, not numbers (--delimiter, --decimal)")
+        floats = numbers.cast(pa.float64(), safe=False).to_numpy()
+        with np.errstate(over="ignore", invalid="ignore"):
+            values[role] = np.where(np.isfinite(floats), floats, np.nan) * factor + offset
+    return values

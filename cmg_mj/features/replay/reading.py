@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cmg_mj.core.errors import InputError, nearest, shortened
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import (
@@ -27,6 +27,7 @@ from cmg_mj.features.replay.log import (
     Segment,
     Values,
     columns_of,
+    read_table,
 )
 from cmg_mj.features.replay.noise import white_noise_of
 from cmg_mj.results.trajectory import Trajectory
@@ -87,7 +88,7 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         raise InputError(f"--delay {options.delay_s:g}: must be from -{MAX_DELAY_S:g} to {MAX_DELAY_S:g} s")
     if "rate" not in columns and (options.delay_s or options.windows_s):
         raise InputError("--delay, --window: there is no reference; name it, --columns rate=...")
-    time, signals = _times(path, _read_table(path, columns, options), options)
+    time, signals = _times(path, read_table(path, columns, options), options)
     notes: list[str] = []
     unit_known = "time" not in columns or columns["time"].unit is not None
     if not unit_known:
@@ -182,54 +183,6 @@ def _windows_inside(path: Path, windows: Sequence[Window], time: np.ndarray) -> 
             ends = f"{time[0]:.6g} to {time[-1]:.6g} s"
             raise InputError(f"--window {start:g}:{end:g}: {path} has no sample there; it goes from {ends}")
     return tuple(windows)
-
-
-def _read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> dict[str, np.ndarray]:
-    """Read columns of a log; spaces around a heading do not count.
-
-    Returns:
-        Role -> values in SI units and radians, (n_rows,), NaN where there is no number. Dates become seconds from the
-        first, the unit that their column then has.
-    """
-    import pyarrow as pa
-    import pyarrow.csv as pacsv
-    import pyarrow.parquet as pq
-
-    try:
-        with path.open("rb") as file:
-            is_parquet = file.read(4) == b"PAR1"
-            file.seek(0)
-            if is_parquet:
-                table = pq.read_table(file)
-            else:
-                read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False)
-                parse = pacsv.ParseOptions(delimiter=options.delimiter)
-                table = pacsv.read_csv(file, read, parse, pacsv.ConvertOptions(decimal_point=options.decimal))
-        headings = [heading.strip() for heading in table.column_names]
-    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
-        text = shortened(" ".join(str(error).split()))
-        raise InputError(
-            f"{path}: cannot be read: {text}. A CSV is read with --delimiter, --encoding and --decimal"
-        ) from error
-    if not table.num_rows:
-        raise InputError(f"{path}: has no row")
-    values = {}
-    for role, (name, _, factor, offset) in list(columns.items()):
-        if name.strip() not in headings:
-            raise InputError(f"{path}: has no column {name!r}; {nearest(name, headings, 'it has')}")
-        numbers = table[headings.index(name.strip())]
-        if role == "time" and pa.types.is_timestamp(numbers.type):
-            stamps = numbers.cast(pa.timestamp("ns", numbers.type.tz)).to_numpy()
-            # Nanoseconds are subtracted as integers: a double has a quarter of a microsecond in 2026.
-            values[role] = (stamps - np.fmin.reduce(stamps)) / np.timedelta64(1, "ns") * 1e-9
-            columns[role] = columns[role]._replace(unit="s")
-            continue
-        if not any(check(numbers.type) for check in (pa.types.is_integer, pa.types.is_floating, pa.types.is_null)):
-            raise InputError(f"{path}: column {name!r} holds {numbers.type}, not numbers (--delimiter, --decimal)")
-        floats = numbers.cast(pa.float64(), safe=False).to_numpy()
-        with np.errstate(over="ignore", invalid="ignore"):
-            values[role] = np.where(np.isfinite(floats), floats, np.nan) * factor + offset
-    return values
 
 
 def _times(
