@@ -10,10 +10,9 @@ import pytest
 
 from cmg_mj.features.replay import replay
 from cmg_mj.features.replay.log_replay import ReplayResult, replay_log
-from cmg_mj.features.replay.reference import alignment_of
 from cmg_mj.observers import make_observer
 from cmg_mj.results.trajectory import Trajectory
-from tests.features.replay.motion import AMPLITUDE, DT, OMEGA, N, rate, read, sine, tilt
+from tests.features.replay.motion import AMPLITUDE, DT, OMEGA, read, sine
 from tests.observers.reference import PAPER
 
 PEAK = AMPLITUDE * OMEGA
@@ -66,29 +65,3 @@ def test_without_a_reference(tmp_path: Path) -> None:
     whole_periods = math.degrees(AMPLITUDE / math.sqrt(2.0))
     assert result["zero"]["reconstruction_rms_deg"] == pytest.approx(whole_periods, rel=0.01)
     assert result["zero"]["roughness_rad_s"] == 0.0
-
-
-def test_roughness_of_white_noise_is_its_size(tmp_path: Path) -> None:
-    """A tilt that is summed white noise has white differences."""
-    steps = np.random.default_rng(1).standard_normal(N) * 0.01
-    columns = {"t_s": DT * np.arange(N), "tilt_rad": np.cumsum(steps) * DT}
-    result = replay_log(read(tmp_path, columns, {"time": "t_s", "tilt": "tilt_rad"})).summaries
-    assert result["finite_difference"]["roughness_rad_s"] == pytest.approx(0.01, rel=0.05)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("late", [0.012, -0.0031, 0.0])
-def test_a_late_reference_is_noticed_and_taken_back(tmp_path: Path, late: float) -> None:
-    t = DT * np.arange(N)
-    columns = {"t_s": t, "tilt_rad": tilt(t), "gyro_rad_s": rate(t - late) / 1.015 - 0.02}
-    result = alignment_of(read(tmp_path, columns))
-    assert result is not None
-    assert result.lag_s == pytest.approx(late, abs=2e-5)
-    assert result.scale == pytest.approx(1.015, rel=1e-3)
-    assert result.offset_rad_s == pytest.approx(1.015 * 0.02, rel=1e-2)
-    log = read(tmp_path, columns, delay_s=late, scale={"rate": 1.015}, offset={"rate": 1.015 * 0.02})
-    expected = replay_log(read(tmp_path, sine())).summaries
-    for name, figures in replay_log(log).summaries.items():
-        assert figures["velocity_rms_error_rad_s"] == pytest.approx(
-            expected[name]["velocity_rms_error_rad_s"], rel=1e-3
-        )

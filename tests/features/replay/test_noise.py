@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.core.tilt import RadialTilt
-from cmg_mj.features.replay.log import ACCELEROMETERS, Log, ReadOptions
+from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.features.replay.log import Log, ReadOptions
 from cmg_mj.features.replay.log_replay import replay_log, replay_prepared
 from cmg_mj.features.replay.noise import noise_figures, noise_in, noise_of, noise_remarks
 from cmg_mj.features.replay.reading import read_log
-from tests.features.replay.motion import DT, N, read, sine
+from tests.features.replay.motion import DT, N, read, sine, two_accelerometers
 
-PLACES = RadialTilt(0.1, 0.3)
 RUN_COLUMNS = {
     "time": "time_s",
     "tilt": "y1_rad",
@@ -34,17 +33,8 @@ def noisy_log(folder: Path, degrees: float) -> Log:
     return read(folder, {**sine(), "tilt_rad": sine()["tilt_rad"] + noise})
 
 
-def two_accelerometers(folder: Path, density: float) -> Log:
-    """Write a log of two accelerometers at 200 Hz that swing at 0.7 Hz."""
-    random, t = np.random.default_rng(1), DT * np.arange(N)
-    w, sigma = 1.4 * np.pi, density * 1e-6 * 9.80665 * math.sqrt(100.0)
-    y, rate = 0.1 * np.sin(w * t), 0.1 * w * np.cos(w * t)
-    columns = {"t_s": t}
-    for name, r in (("inner", PLACES.r_inner), ("outer", PLACES.r_outer)):
-        columns[f"{name}_x"] = -r * w**2 * y - 9.81 * np.sin(y) + sigma * random.standard_normal(N)
-        columns[f"{name}_z"] = 9.81 * np.cos(y) - r * rate**2 + sigma * random.standard_normal(N)
-    names = {name: name for name in ACCELEROMETERS}
-    return read(folder, columns, {"time": "t_s", **names}, units=dict.fromkeys(names, "m_s2"), radii_m=(0.1, 0.3))
+def accelerometers_of_800_ug(folder: Path) -> Log:
+    return two_accelerometers(folder, 0.1, noise=800e-6 * STANDARD_GRAVITY * math.sqrt(0.5 / DT))
 
 
 @pytest.mark.slow
@@ -78,7 +68,7 @@ def test_a_noise_is_told_or_else_the_logs(tmp_path: Path) -> None:
 
 def test_the_noise_of_two_accelerometers(tmp_path: Path) -> None:
     """Tilt and acceleration as the two make them, with the model's correlation."""
-    log = two_accelerometers(tmp_path, 800.0)
+    log = accelerometers_of_800_ug(tmp_path)
     noise, expected = noise_of(log), noise_of(log, {"accelerometer": 800.0})
     assert noise.tilt == pytest.approx(expected.tilt, rel=0.04)
     assert noise.acceleration == pytest.approx(expected.acceleration, rel=0.04)
@@ -107,7 +97,7 @@ def test_resampled_noise_has_the_density_that_observers_assume(rate: float, jitt
 
 def test_a_told_density_is_that_of_the_rows(tmp_path: Path) -> None:
     """A sample at a slower rate than the rows' has all of a row's noise, since nothing filters it."""
-    log = two_accelerometers(tmp_path, 800.0)
+    log = accelerometers_of_800_ug(tmp_path)
     told = {"accelerometer": 800.0}
     slow, quick = replace(log, dt=2.0 * log.dt), replace(log, dt=log.dt / 2.0)
     assert noise_of(slow, told) == noise_of(log, told)

@@ -16,7 +16,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import ACCELEROMETERS, Log, ReadOptions, assignments, unit_of_name
 from cmg_mj.features.replay.reading import read_log
-from tests.features.replay.motion import COLUMNS, DT, OMEGA, N, rate, read, sine, tilt, write_csv
+from tests.features.replay.motion import COLUMNS, DT, OMEGA, N, rate, read, sine, tilt, two_accelerometers, write_csv
 
 T = DT * np.arange(N)
 ONE = {"time": "t_s", "tilt": "tilt_rad"}
@@ -311,21 +311,10 @@ def test_one_accelerometer(tmp_path: Path) -> None:
         assert (log.has, log.tilt, len(log.notes)) == (frozenset(), None, 1)
 
 
-def accelerometers(folder: Path, swing: float, units: dict[str, str], factor: float = 1.0) -> Log:
-    """Two accelerometers in m/s^2, read in other units: a = r alpha tangentially, -r w^2 radially, less gravity."""
-    y, w, alpha = (swing / 0.2 * values for values in (tilt(T), rate(T), -(OMEGA**2) * tilt(T)))
-    columns = {"t_s": T}
-    for place, r in (("inner", 0.1), ("outer", 0.3)):
-        columns[f"{place}_x"] = factor * (r * alpha - STANDARD_GRAVITY * np.sin(y))
-        columns[f"{place}_z"] = factor * (STANDARD_GRAVITY * np.cos(y) - r * w**2)
-    roles = {"time": "t_s", **{name: name for name in ACCELEROMETERS}}
-    return read(folder, columns, roles, units={**PAIR_SI, **units}, radii_m=(0.1, 0.3))
-
-
 def test_two_accelerometers_give_tilt_and_acceleration(tmp_path: Path) -> None:
     """For any motion, and in any unit."""
     for unit, factor in (("m_s2", 1.0), ("mg", 1e3 / STANDARD_GRAVITY)):
-        log = accelerometers(tmp_path, 0.2, dict.fromkeys(ACCELEROMETERS, unit), factor)
+        log = two_accelerometers(tmp_path, 0.2, factor, **dict.fromkeys(ACCELEROMETERS, unit))
         np.testing.assert_allclose(log["y1_rad"], tilt(T), atol=1e-9)
         np.testing.assert_allclose(log["acceleration_rad_s2"], -(OMEGA**2) * tilt(T), atol=1e-9)
         assert (log.has, log.notes) == ({"acceleration"}, ())
@@ -334,9 +323,9 @@ def test_two_accelerometers_give_tilt_and_acceleration(tmp_path: Path) -> None:
 @pytest.mark.parametrize("swing", [1e-5, 0.2])
 def test_accelerometers_in_a_wrong_unit(swing: float, tmp_path: Path) -> None:
     """The cure that is named is one."""
-    inner, outer = accelerometers(tmp_path, swing, dict.fromkeys(ACCELEROMETERS, "g")).notes
+    inner, outer = two_accelerometers(tmp_path, swing, **dict.fromkeys(ACCELEROMETERS, "g")).notes
     assert inner.endswith(": --units inner_x=m_s2,inner_z=m_s2")
     assert outer.endswith(": --units outer_x=m_s2,outer_z=m_s2")
-    (wrong,) = accelerometers(tmp_path, swing, {"outer_x": "mm_s2", "outer_z": "mm_s2"}).notes
+    (wrong,) = two_accelerometers(tmp_path, swing, outer_x="mm_s2", outer_z="mm_s2").notes
     assert wrong.endswith(": --units outer_x=m_s2,outer_z=m_s2")
-    assert "--scale inner_x=0.00059" in accelerometers(tmp_path, swing, {}, 16384.0 / STANDARD_GRAVITY).notes[0]
+    assert "--scale inner_x=0.00059" in two_accelerometers(tmp_path, swing, 16384.0 / STANDARD_GRAVITY).notes[0]
