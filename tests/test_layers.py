@@ -30,7 +30,7 @@ MOST_ENTRIES = 18
 
 HEAVY = dict(re.findall(r"^\| ([\w.]+) \| `([\w/, `]+)` \|$", ARCHITECTURE, re.MULTILINE))
 """Library -> the only sub-package or module that imports it, because it costs time."""
-EAGER = ("cmg_mj.view.recording", "cmg_mj.runs.live", "cmg_mj.features.replay.recording", "cmg_mj.features.gymnasium")
+EAGER = ("cmg_mj.view.recording", "cmg_mj.runs.live", "cmg_mj.features.gymnasium")
 """These import theirs when they are imported; the others when they need it."""
 
 

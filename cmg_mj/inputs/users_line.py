@@ -26,9 +26,3 @@ def users_line(traceback: TracebackType | None) -> str | None:
             line = f"{path.name}, line {traceback.tb_lineno}"
         traceback = traceback.tb_next
     return line
-
-
-def in_users_line(error: BaseException) -> str:
-    """Return ` (own.py, line 12)`, to follow what an error raised; nothing if no line is the user's."""
-    line = users_line(error.__traceback__)
-    return "" if line is None else f" ({line})"

@@ -110,14 +110,14 @@ def log_options(command: Command) -> Command:
 
     @functools.wraps(command)
     def with_options(**given: Any) -> None:
-        from cmg_mj.features.replay.log import ReadOptions
-        from cmg_mj.features.replay.table import assignments
+        from cmg_mj.features.replay.log import ROLES, ReadOptions, assignments
+        from cmg_mj.observers.parameter_options import numbers
 
         options = {field.name: given.pop(field.name) for field in fields(ReadOptions) if field.name in given}
-        for name in ("columns", "units", "scale", "offset"):
+        for name in ("columns", "units"):
             options[name] = assignments(options[name], f"--{name}")
         for name in ("scale", "offset"):
-            options[name] = {role: _number(text, f"--{name} {role}") for role, text in options[name].items()}
+            options[name] = numbers(",".join(options[name]), f"--{name}", ROLES) if options[name] else {}
         if options["radii_m"] is not None:
             options["radii_m"] = _pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
         if options["time_range_s"] is not None:
@@ -125,13 +125,6 @@ def log_options(command: Command) -> Command:
         command(options=ReadOptions(**options), **given)
 
     return all_of(*_OPTIONS)(with_options)
-
-
-def _number(text: str, option: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{option}={text}: must be a number") from None
 
 
 def _pair(text: str, separator: str, option: str, example: str) -> tuple[float, float]:

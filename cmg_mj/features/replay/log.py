@@ -1,22 +1,55 @@
-"""A log: what was measured, evenly sampled, in the names and units of a trajectory."""
+"""A log: what was measured, evenly sampled, in a trajectory's names and units; the columns of its file."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.errors import InputError, TomlValue
+from cmg_mj.core.errors import InputError, TomlValue, nearest, shortened
 from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.stages.push import Push, Window, push_windows
+from cmg_mj.stages.push import Window
 
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
+EVEN = 0.02
+"""Deviation from an even grid, in periods, up to which stamps count as even."""
+
+Values = Mapping[str, np.ndarray]
+"""Name -> (n_rows,)."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Rows without a gap, evenly sampled.
+
+    Attributes:
+        time: (n,) [s].
+        values: Name -> (n,).
+        stamps: The rows' own times, (m,) [s].
+        placed: The rows' times in `time`, which differ from rounded stamps, (m,) [s].
+        rows: Name -> the rows' own values, (m,).
+    """
+
+    time: np.ndarray
+    values: Values
+    stamps: np.ndarray
+    placed: np.ndarray
+    rows: Values
+
+    def when(self, stamps: np.ndarray) -> np.ndarray:
+        """Convert other rows' stamps to times in this segment, beyond its ends too, (k,) [s]."""
+        before, after = self.stamps[0] - self.placed[0], self.stamps[-1] - self.placed[-1]
+        inside = np.interp(stamps, self.stamps, self.placed)
+        inside = np.where(stamps > self.stamps[-1], stamps - after, inside)
+        return np.where(stamps < self.stamps[0], stamps - before, inside)
 
 
 class WhiteNoise(NamedTuple):
@@ -130,7 +163,7 @@ class Log:
         return f"{self.name}: {len(self):,} samples at {1.0 / self.dt:.6g} Hz, {self.duration_s:.6g} s{parts}"
 
     def trajectory(self, part: slice) -> Trajectory:
-        """Return one part, as `cmg_mj.features.replay.log_replay` takes it."""
+        """Return one part, as `cmg_mj.runs.open_loop` takes it."""
         return Trajectory({name: values[part] for name, values in self.columns.items()})
 
     def scored(self, settle_s: float) -> np.ndarray:
@@ -142,9 +175,8 @@ class Log:
 
     def broken(self, values: np.ndarray) -> np.ndarray:
         """Put a NaN between two parts of values, (n,): no line is drawn across a gap."""
-        first, *others = self.parts
-        pieces = [piece for part in others for piece in ([np.nan], values[part])]
-        return np.concatenate([values[first], *pieces]) if others else values[first]
+        pieces = [piece for part in self.parts for piece in (values[part], [np.nan])]
+        return np.concatenate(pieces[:-1])
 
     def broken_time(self) -> np.ndarray:
         """Return the times of `broken` values [s]."""
@@ -159,32 +191,206 @@ class Log:
         return replace(self, columns=columns, parts=[part for part in parts if part.stop - part.start > 1])
 
 
-def log_of_run(path: Path) -> Log:
-    """Read a run's own recording, whose columns, pushes and scenario are known.
+Quantity = Literal["angle", "rate", "angular acceleration", "acceleration", "time"]
+
+_DEG, _TURN = math.pi / 180.0, 2.0 * math.pi
+_RATES = {"rad_s": 1.0, "mrad_s": 1e-3, "deg_s": _DEG, "dps": _DEG, "mdps": 1e-3 * _DEG}
+_FORCES = {"g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY, "ug": 1e-6 * STANDARD_GRAVITY}
+UNITS: dict[Quantity, dict[str, float]] = {
+    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": _DEG, "mdeg": 1e-3 * _DEG, "rev": _TURN},
+    "rate": {**_RATES, "rpm": _TURN / 60.0, "rev_s": _TURN},
+    "angular acceleration": {"rad_s2": 1.0, "deg_s2": _DEG},
+    "acceleration": {"m_s2": 1.0, "mm_s2": 1e-3, **_FORCES},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+}
+"""Quantity -> unit -> its size in rad, rad/s, rad/s^2, m/s^2 or s. The first of each is that."""
+_SPELLINGS = {
+    "rad": "radian radians",
+    "deg": "° degree degrees",
+    "rad_s": "rads rps radps rad_sec",
+    "deg_s": "degs degps deg_sec °_s",
+    "rad_s2": "rad_ss",
+    "deg_s2": "°_s2",
+    "m_s2": "ms2 mps2 m_ss",
+    "s": "sec secs second seconds",
+    "ms": "msec millis",
+    "us": "usec µs μs micros",
+    "ns": "nsec nanos",
+}
+_UNIT_OF_SPELLING = {spelling: unit for unit, others in _SPELLINGS.items() for spelling in others.split()}
+
+ACCELEROMETERS = ("inner_x", "inner_z", "outer_x", "outer_z")
+ONE_ACCELEROMETER = ("ax", "az")
+ROLES: dict[str, Quantity] = {
+    "time": "time",
+    "tilt": "angle",
+    **dict.fromkeys(ACCELEROMETERS, "acceleration"),
+    **dict.fromkeys(ONE_ACCELEROMETER, "acceleration"),
+    "acceleration": "angular acceleration",
+    "gimbal": "angle",
+    "gimbal1": "angle",
+    "gimbal2": "angle",
+    "command": "rate",
+    "rate": "rate",
+}
+"""Role -> quantity of its column.
+
+`tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `RadialTilt` takes them, `ax` and
+`az` one accelerometer: along the motion of a growing tilt, and outward (upward while upright), `acceleration` the
+angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright place (or `gimbal1` and
+`gimbal2`, whose half difference it is), `command` their rate, `rate` the reference.
+"""
+
+_ASSIGNMENT = re.compile(
+    r"""\s*(?P<role>\w+)\s*=\s*(?:"(?P<quoted>(?:[^"]|"")*)"\s*|(?P<plain>[^"].*?))(?:,(?=\s*\w+\s*=)|$)""", re.DOTALL
+)
+"""ROLE=HEADING or ROLE="HEADING"; the heading ends at a comma before another ROLE=, a quoted one at its quote."""
+
+
+class Column(NamedTuple):
+    """One column of a file: its heading, its unit, and factor and addend that convert it to SI units and radians."""
+
+    name: str
+    unit: str | None
+    """None for a time whose unit is not known: it is taken as seconds."""
+    factor: float
+    offset: float
+
+
+def assignments(texts: Iterable[str], option: str) -> dict[str, str]:
+    """Parse `tilt=pitch_deg,rate=gyro dps` into role -> heading; a heading may contain commas.
+
+    A heading with a comma before something like `x=` goes into quotes as in a CSV: `tilt="roll,x=1 (deg)"`, where a
+    quote is written twice.
+
+    Args:
+        texts: Such texts.
+        option: The option's name, for messages.
 
     Raises:
-        InputError: The file is no recording of a run about one axis.
+        InputError: A text has another form, or a role is given twice.
     """
+    values: dict[str, str] = {}
+    for text in texts:
+        rest = text
+        while rest:
+            part = _ASSIGNMENT.match(rest)
+            if part is None:
+                raise InputError(
+                    f"{option} {shortened(text)!r}: write ROLE=VALUE with commas between, such as tilt=pitch_deg; a "
+                    'heading with a comma in it goes into quotes, tilt="roll,x (deg)"'
+                )
+            role, quoted = part["role"], part["quoted"]
+            if role in values:
+                raise InputError(f"{option}: {role} is given twice")
+            values[role] = (part["plain"] if quoted is None else quoted.replace('""', '"')).strip()
+            rest = rest[part.end() :]
+    return values
+
+
+def columns_of(options: ReadOptions) -> dict[str, Column]:
+    """Find the columns' units, factors and offsets.
+
+    Returns:
+        Role -> column.
+
+    Raises:
+        InputError: A role is unknown, roles do not go together, or a column has no known unit.
+    """
+    names = options.columns
+    given = {"columns": names, "units": options.units, "scale": options.scale, "offset": options.offset}
+    for option, roles in given.items():
+        for role in roles:
+            if role not in ROLES:
+                raise InputError(f"--{option} {role}: no such role; {nearest(role, ROLES)}")
+            if role not in names:
+                raise InputError(f"--{option} {role}: there is no such column; --columns names {', '.join(names)}")
+    sources = [source for source in (("tilt",), ONE_ACCELEROMETER, ACCELEROMETERS) if names.keys() & set(source)]
+    if len(sources) != 1 or not names.keys() >= set(sources[0]):
+        raise InputError("--columns: name the tilt, or ax and az, or inner_x, inner_z, outer_x and outer_z")
+    if "acceleration" in names and sources[0] == ACCELEROMETERS:
+        raise InputError("--columns: two accelerometers show the angular acceleration; leave acceleration out")
+    if names.keys() & {"gimbal", "gimbal1", "gimbal2"} not in (set(), {"gimbal"}, {"gimbal1", "gimbal2"}):
+        raise InputError("--columns: name either gimbal, or gimbal1 and gimbal2")
+    return {role: _column(role, name, options) for role, name in names.items()}
+
+
+def _column(role: str, name: str, options: ReadOptions) -> Column:
+    units, told = UNITS[ROLES[role]], options.units.get(role)
+    unit = unit_of_name(ROLES[role], name) if told is None else _plain(told)
+    if unit not in units and (told is not None or role != "time"):
+        wrong = f"--columns {role}={name}: the name does not end in a unit; say --units {role}=UNIT"
+        if told is not None:
+            wrong = f"--units {role}={told}: no unit of this quantity"
+        raise InputError(f"{wrong}; {nearest(unit or '', units)}")
+    scale = options.scale.get(role, 1.0)
+    if not math.isfinite(scale) or not scale:
+        raise InputError(f"--scale {role}={scale:g}: must be a finite number other than 0")
+    size = units[unit or "s"]
+    return Column(name, unit, size * scale, size * options.offset.get(role, 0.0))
+
+
+def _plain(text: str) -> str:
+    """Spell `Deg/s^2`, `deg.s-2` and `deg_s2` alike."""
+    text = text.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
+    text = re.sub(r"[\s./*·]+", "_", text).replace("_s-1", "_s").replace("_s-2", "_s2").strip("_")
+    return _UNIT_OF_SPELLING.get(text, text)
+
+
+def unit_of_name(quantity: Quantity, name: str) -> str | None:
+    """Return the unit that a column's name ends in, after `_`, a space, or in brackets; None if it ends in none.
+
+    A name that is a unit and nothing else, such as `ms`, is one too.
+    """
+    bracketed = re.search(r"[\[({]([^\[\](){}]+)[\])}]\s*$", name)
+    parts = [bracketed[1]] if bracketed else _plain(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name)).split("_")
+    ends = (_plain("_".join(parts[start:])) for start in range(len(parts)))  # the longest first: deg_s before s
+    return next((end for end in ends if end in UNITS[quantity]), None)
+
+
+def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> dict[str, np.ndarray]:
+    """Read columns of a log; spaces around a heading do not count.
+
+    Returns:
+        Role -> values in SI units and radians, (n_rows,), NaN where there is no number. Dates become seconds from the
+        first, the unit that their column then has.
+    """
+    import pyarrow as pa
+    import pyarrow.csv as pacsv
+    import pyarrow.parquet as pq
+
     try:
-        trajectory = Trajectory.load(path)
-        scenario = trajectory.metadata["scenario"]
-    except (InputError, LookupError) as error:
-        raise InputError(f"{path}: say which columns are what, --columns tilt=HEADING,rate=HEADING,...") from error
-    if trajectory.axes:
+        with path.open("rb") as file:
+            is_parquet = file.read(4) == b"PAR1"
+            file.seek(0)
+            if is_parquet:
+                table = pq.read_table(file)
+            else:
+                read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False)
+                parse = pacsv.ParseOptions(delimiter=options.delimiter)
+                table = pacsv.read_csv(file, read, parse, pacsv.ConvertOptions(decimal_point=options.decimal))
+        headings = [heading.strip() for heading in table.column_names]
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
+        text = shortened(" ".join(str(error).split()))
         raise InputError(
-            f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; save one of them "
-            f"from Python: Trajectory.load(path).along({trajectory.axes[0]!r}).save(...)"
-        )
-    if len(trajectory) < 2:
-        raise InputError(f"{path}: a run that ended before its second tick")
-    columns = {name: trajectory[name] for name in ("time_s", "y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2")}
-    columns[REFERENCE] = trajectory["x2_rad_s"]
-    return Log(
-        path.parent.name if path.stem == "trajectory" and path.parent.name else path.stem,
-        1.0 / float(scenario["controller"]["rate_hz"]),
-        columns,
-        [slice(0, len(trajectory))],
-        frozenset({"gimbals", "acceleration", "reference"}),
-        windows=push_windows([Push(**push) for push in scenario.get("push", ())]),
-        scenario=scenario,
-    )
+            f"{path}: cannot be read: {text}. A CSV is read with --delimiter, --encoding and --decimal"
+        ) from error
+    if not table.num_rows:
+        raise InputError(f"{path}: has no row")
+    values = {}
+    for role, (name, _, factor, offset) in list(columns.items()):
+        if name.strip() not in headings:
+            raise InputError(f"{path}: has no column {name!r}; {nearest(name, headings, 'it has')}")
+        numbers = table[headings.index(name.strip())]
+        if role == "time" and pa.types.is_timestamp(numbers.type):
+            stamps = numbers.cast(pa.timestamp("ns", numbers.type.tz)).to_numpy()
+            # Nanoseconds are subtracted as integers: a double has a quarter of a microsecond in 2026.
+            values[role] = (stamps - np.fmin.reduce(stamps)) / np.timedelta64(1, "ns") * 1e-9
+            columns[role] = columns[role]._replace(unit="s")
+            continue
+        if not any(check(numbers.type) for check in (pa.types.is_integer, pa.types.is_floating, pa.types.is_null)):
+            raise InputError(f"{path}: column {name!r} holds {numbers.type}, not numbers (--delimiter, --decimal)")
+        floats = numbers.cast(pa.float64(), safe=False).to_numpy()
+        with np.errstate(over="ignore", invalid="ignore"):
+            values[role] = np.where(np.isfinite(floats), floats, np.nan) * factor + offset
+    return values

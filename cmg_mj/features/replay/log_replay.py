@@ -1,12 +1,12 @@
-"""Replay of observers on a user's log, and their scores."""
+"""Replay of observers on a user's log, their inputs and their scores."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,13 +17,17 @@ from cmg_mj.core.types import extra_signals, needs
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reference import Alignment, alignment_of, model_misfit
-from cmg_mj.features.replay.scores import Figures, ZeroPhase, noise_gain, scores, zero_phase
-from cmg_mj.inputs.users_line import in_users_line
+from cmg_mj.features.replay.scores import Figures, ZeroPhase, rms, scores, zero_phase
+from cmg_mj.inputs.users_line import users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
-from cmg_mj.observers.parameter_options import Parameters
+from cmg_mj.observers.parameter_options import Parameters, numbers
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.trajectory import ESTIMATES, Layout, NamedColumns, Trajectory
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay_all
+from cmg_mj.scenario.design import PlantParameters, design
+from cmg_mj.scenario.loading import parse_scenario
+from cmg_mj.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,6 +41,13 @@ NEEDS_IN_WORDS = {
     "gimbals": "the gimbal angle and the command (--columns gimbal=...,command=...)",
     "acceleration": "two accelerometers (--columns inner_x=...) or the angular acceleration",
 }
+NUMBERS = {
+    "inertia": "tilt inertia about the pivot, J1 [kg m^2]",
+    "gravity_torque": "mass x gravity x height of its centre, positive if it falls over [N m]",
+    "momentum": "spin momentum of the flywheels together, J_d omega_d [N m s]",
+    "gimbal_inertia": "what the gimbals' turn by 90 degrees adds to the inertia, J2 [kg m^2]",
+}
+"""Numbers of `--model`. The first two are required; the others are 0 for a pendulum without gimbals."""
 SEED = 0
 """Seed of the noise for noise gains."""
 
@@ -121,34 +132,37 @@ def replay_log(
     Raises:
         InputError: An observer does not exist or refuses its parameters, or nothing is left to score.
     """
-    names = list(OBSERVERS) if observers is None else list(dict.fromkeys(observers))
-    parameters = dict(parameters or {})
-    noise = noise or noise_of(log)
+    noise, parameters = noise or noise_of(log), dict(parameters or {})
     if not 0.0 <= settle_s < math.inf:
         raise InputError(f"--settle-s {settle_s:g}: must be a number of seconds not below 0")
     scored = log.scored(settle_s)
-    _check_scored(log, scored, settle_s)
-    ready, left_out = _ready(log, names, model, noise, parameters)
+    if scored.sum() < 10:
+        raise InputError(
+            f"{log.name}: nothing is left to score: {log.duration_s:.3g} s in {len(log.parts)} "
+            f"part{'' if len(log.parts) == 1 else 's'}, without the first {settle_s:g} s of each (--settle-s)"
+        )
+    if "reference" in log.has and np.isfinite(log[REFERENCE][scored]).sum() < 10:
+        raise InputError(f"{log.name}: the reference has no number where estimates are scored")
+    ready, left_out = _ready(log, OBSERVERS if observers is None else observers, model, noise, parameters)
     estimates: dict[str, Mapping[str, np.ndarray]] = {}
     summaries: dict[str, Figures] = {}
     noisy = _with_noise(log, noise)
     for i, (name, observer) in enumerate(ready.items()):
         if on_share:
             on_share(i / len(ready))
-        signals = _estimates(observer, log)
+        signals, disturbed = _estimates(observer, log), _estimates(observer, noisy)
         if isinstance(signals, str):
             left_out[name] = signals
             continue
-        estimates[name] = signals
-        disturbed = _estimates(observer, noisy)
-        rate = signals["x2_rad_s"]
-        gain = None if isinstance(disturbed, str) else noise_gain(disturbed["x2_rad_s"], rate, noise.tilt, scored)
-        summaries[name] = {**scores(log, rate, scored), "noise_gain_1_s": gain}
-    zero = {**scores(log, np.zeros(len(log)), scored), "noise_gain_1_s": 0.0}
+        estimates[name], rate = signals, signals["x2_rad_s"]
+        response = None if isinstance(disturbed, str) else rms((disturbed["x2_rad_s"] - rate)[scored])
+        gain = None if response is None or not noise.tilt > 0.0 else response / noise.tilt
+        summaries[name] = scores(log, rate, scored, gain)
+    summaries[ZERO] = scores(log, np.zeros(len(log)), scored, 0.0)
     return ReplayResult(
         log,
         estimates,
-        {**summaries, ZERO: zero},
+        summaries,
         left_out,
         alignment_of(log),
         settle_s,
@@ -161,42 +175,25 @@ def replay_log(
 
 def misfit_of(log: Log, model: ReducedModel | None) -> float | None:
     """Return the model's misfit; None without a model, or where its gimbals are not in the log."""
-    if model is None or (gimbals_matter(model) and "gimbals" not in log.has):
+    if model is None or (_gimbals_matter(model) and "gimbals" not in log.has):
         return None
     return model_misfit(log, model)
 
 
-def _check_scored(log: Log, scored: np.ndarray, settle_s: float) -> None:
-    if scored.sum() < 10:
-        raise InputError(
-            f"{log.name}: nothing is left to score: {log.duration_s:.3g} s in {len(log.parts)} "
-            f"part{'' if len(log.parts) == 1 else 's'}, without the first {settle_s:g} s of each (--settle-s)"
-        )
-    if "reference" in log.has and not np.isfinite(log[REFERENCE][scored]).sum() >= 10:
-        raise InputError(f"{log.name}: the reference has no number where estimates are scored")
-
-
-def gimbals_matter(model: ReducedModel | None) -> bool:
+def _gimbals_matter(model: ReducedModel | None) -> bool:
     """Return whether gimbals move the tilt; in the model of a pendulum without any, J2 = J_d omega_d = 0."""
     return model is None or model.J2 != 0.0 or model.J_d * model.omega_d != 0.0
 
 
 def _ready(
-    log: Log,
-    names: Sequence[str],
-    model: ReducedModel | None,
-    noise: TiltNoise,
-    parameters: Parameters,
+    log: Log, names: Iterable[str], model: ReducedModel | None, noise: TiltNoise, parameters: Parameters
 ) -> tuple[dict[str, Observer], dict[str, str]]:
     """Make the observers that can take part, and say why the others cannot."""
-    available = set(log.has) | ({"model"} if model is not None else set())
-    if not gimbals_matter(model):
-        available.add("gimbals")
+    available = {*log.has, *(["model"] if model else []), *([] if _gimbals_matter(model) else ["gimbals"])}
     ready: dict[str, Observer] = {}
     left_out: dict[str, str] = {}
-    for name in names:
-        cls = OBSERVER_CLASSES.find(name)
-        lacks = [need for need in needs(cls) if need not in available]
+    for name in dict.fromkeys(names):
+        lacks = [need for need in needs(OBSERVER_CLASSES.find(name)) if need not in available]
         if lacks:
             OBSERVER_CLASSES.check_names(name, parameters.get(name, {}))
             left_out[name] = "needs " + " and ".join(NEEDS_IN_WORDS[need] for need in lacks)
@@ -221,7 +218,8 @@ def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
             with np.errstate(all="ignore"):
                 signals = replay_all(observer, log.trajectory(part))
         except Exception as error:  # a user's observer may fail in any way
-            return f"raised {raised(error)}{in_users_line(error)}"
+            line = users_line(error.__traceback__)
+            return f"raised {raised(error)}" + (f" ({line})" if line else "")
         for name, values in signals.items():
             if not np.isfinite(values).all():
                 time = log["time_s"][part][int(np.argmin(np.isfinite(values)))]
@@ -240,3 +238,97 @@ def _with_noise(log: Log, noise: TiltNoise) -> Log:
         "acceleration_rad_s2": log["acceleration_rad_s2"] + noise.acceleration * second,
     }
     return replace(log, columns={**log.columns, **noisy})
+
+
+def model_of(text: str) -> ReducedModel:
+    """Return the reduced model of a user's pendulum.
+
+    Args:
+        text: Path or bundled name of a plant's MJCF, or numbers, `inertia=0.06,gravity_torque=3.4,...` (`NUMBERS`).
+
+    Returns:
+        The reduced model.
+
+    Raises:
+        InputError: There is no such file, or a number is missing or impossible.
+    """
+    if "=" not in text:
+        return _plant_of(parse_scenario({"plant": {"model": text}}, f"--model {text}")).reduced
+    values = numbers(text, "--model", NUMBERS)
+    for name in ("inertia", "gravity_torque"):
+        if name not in values:
+            raise InputError(f"--model: {name} is missing: {NUMBERS[name]}")
+    inertia, added = values["inertia"], values.get("gimbal_inertia", 0.0)
+    if not inertia > 0.0 or not inertia + added > 0.0:
+        raise InputError("--model: inertia, and inertia + gimbal_inertia, must be greater than 0 [kg m^2]")
+    return ReducedModel(inertia, added, values.get("momentum", 0.0), 1.0, values["gravity_torque"])
+
+
+def _plant_of(scenario: Scenario) -> PlantParameters:
+    experiment = prepare(scenario)
+    experiment.require_single_axis("replay")
+    return experiment.plant.parameters
+
+
+class ObserverInputs(NamedTuple):
+    """Inputs of the observers of a log, as `replay_log` takes them: model, noise and parameters."""
+
+    model: ReducedModel | None
+    noise: TiltNoise
+    parameters: Parameters
+
+
+def observer_inputs(
+    log: Log,
+    *,
+    model: ReducedModel | None = None,
+    noises: Mapping[str, float] | None = None,
+    parameters: Parameters | None = None,
+) -> ObserverInputs:
+    """Collect the inputs of the observers of a log.
+
+    A run's recording brings its plant, its sensors' noise, and the parameters of its loop's observer.
+
+    Args:
+        log: The log.
+        model: The pendulum, which replaces the run's.
+        noises: Noises from `noise_numbers`, which replace the default or the run's.
+        parameters: Observer -> parameter -> value, which take precedence over the run's.
+
+    Raises:
+        InputError: An option does not fit the log.
+    """
+    noises, parameters = noises or {}, dict(parameters or {})
+    if log.scenario is None:
+        return ObserverInputs(model, noise_of(log, noises), parameters)
+    scenario = parse_scenario(dict(log.scenario), log.name)
+    plant, loop = _plant_of(scenario), scenario.observer
+    _, run_model, noise = design(scenario, plant).constructor_arguments
+    if "accelerometer" in noises:  # the sensors' other errors stay
+        if len(noises) > 1:
+            raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
+        noise = plant.noise(scenario.sensors.with_noise_density(noises["accelerometer"]))
+    elif noises:
+        noise = noise_of(log, noises)
+    parameters[loop.kind] = {**loop.parameters, **parameters.get(loop.kind, {})}
+    return ObserverInputs(model or run_model, noise, parameters)
+
+
+def replay_prepared(
+    log: Log,
+    observers: Sequence[str] | None = None,
+    *,
+    model: ReducedModel | None = None,
+    noises: Mapping[str, float] | None = None,
+    parameters: Parameters | None = None,
+    settle_s: float | None = None,
+    on_share: OnShare | None = None,
+) -> ReplayResult:
+    """Replay observers on a log with the inputs of `observer_inputs`, whose arguments it takes.
+
+    The others are those of `replay_log`; by default a run's recording is scored from its start.
+    """
+    inputs = observer_inputs(log, model=model, noises=noises, parameters=parameters)
+    if settle_s is None:
+        settle_s = SETTLE_S if log.scenario is None else 0.0
+    return replay_log(log, observers, **inputs._asdict(), settle_s=settle_s, on_share=on_share)

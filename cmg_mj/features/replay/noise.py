@@ -7,16 +7,16 @@ row rate. White noise has the same density in all; a filter, a fusion or a quant
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import STANDARD_GRAVITY
-from cmg_mj.features.replay.log import Log, LogNoise, WhiteNoise
-from cmg_mj.features.replay.sampling import EVEN, Part
+from cmg_mj.features.replay.log import EVEN, Log, LogNoise, Segment, Values, WhiteNoise
 from cmg_mj.observers.parameter_options import numbers
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
@@ -29,7 +29,7 @@ CUTOFF = 0.29
 below 0.2, nothing above 0.38."""
 RESPONSE = 16
 """Rows for which an angular acceleration follows a command."""
-FEWEST_RESPONSES = 20
+MIN_RESPONSES = 20
 """Fewest rows to fit it, in times that."""
 BANDS = np.arange(0.4, 0.95, 0.1)
 """Lower ends of the bands, each a tenth of half the row rate wide."""
@@ -41,10 +41,10 @@ WALK = -np.log(np.sin(math.pi / 2.0 * (BANDS + 0.05)))
 must be flatter than this; and what rises more steeply below a floor is motion."""
 HANN = 0.947
 """Share of the rows' information that half-overlapping Hann windows keep."""
-FEWEST = 1024
+MIN_ROWS = 1024
 """Fewest rows for an estimate, those counted for which `_without_motion` knows the motion."""
 BLOCK = 16384
-MOST_BLOCKS = 8
+MAX_BLOCKS = 8
 """Blocks of rows, spread evenly, that a longer log gives."""
 OUTLIER = 5.0
 """Segments with more than so many times the median power hold a spike or a blow, and do not count."""
@@ -64,54 +64,49 @@ ACCELERATION_NOISE_RAD_S2 = 1.0
 """Assumed noise of an angular acceleration that does not come from two accelerometers [rad/s^2]."""
 NOISE_DENSITY_UG_RTHZ = 400.0
 """Assumed noise density of two accelerometers, the bench's own [ug/sqrt(Hz)]."""
-NOISES = ("accelerometer", "tilt", "acceleration")
-"""Names of `--noise`."""
 APART = 1.5
 """Ratio of the noise that is used and the noise that the log shows, from which it is reported."""
 
 
-def white_noise_of(parts: Sequence[Part], period: float) -> LogNoise:
+def white_noise_of(segments: Sequence[Segment], period: float) -> LogNoise:
     """Estimate the white noise of a log's tilt and angular acceleration.
 
     Args:
-        parts: The log's parts, with the file's own rows.
+        segments: The log's segments, with the file's own rows.
         period: Period of these rows [s].
 
     Returns:
         The noise of one row.
     """
-    names = [name for name in ("y1_rad", "acceleration_rad_s2") if name in parts[0].rows]
+    names = [name for name in ("y1_rad", "acceleration_rad_s2") if name in segments[0].rows]
     residuals: list[np.ndarray] = []
-    steps, sizes = dict.fromkeys(names, math.inf), dict.fromkeys(names, 0.0)
-    for places, values in _blocks(parts, period):
-        for name in names:
-            steps[name] = min(steps[name], _smallest_step(values[name]))
-            sizes[name] = max(sizes[name], float(np.std(values[name])))
-        if names[-1] == "acceleration_rad_s2" and "u_rad_s" in values:
+    steps, sizes = [], []
+    for places, values in _blocks(segments, period):
+        steps.append([_smallest_step(values[name]) for name in names])
+        sizes.append([float(np.std(values[name])) for name in names])
+        if len(names) > 1 and "u_rad_s" in values:
             places, values = _without_response(places, values)
         if len(places) >= 2 * TAPS + SEGMENT:
             residuals.append(np.stack([_without_motion(places, values[name]) for name in names]))
     n_rows = sum(residual.shape[1] for residual in residuals)
-    if n_rows < FEWEST:
-        short = f"it takes {FEWEST:,} rows, without the first and the last {TAPS} of each part; there are {n_rows:,}"
+    if n_rows < MIN_ROWS:
+        short = f"it takes {MIN_ROWS:,} rows, without the first and the last {TAPS} of each part; there are {n_rows:,}"
         return LogNoise(short, short if len(names) > 1 else None, 0.0)
     spectra = np.concatenate([_spectra(residual) for residual in residuals], axis=1)
-    tilt, *others = (
-        _floor(np.abs(one) ** 2, steps[name], sizes[name]) for name, one in zip(names, spectra, strict=True)
-    )
+    tilt, *others = map(_floor, np.abs(spectra) ** 2, np.min(steps, axis=0), np.max(sizes, axis=0))
     acceleration = others[0] if others else None
     known = isinstance(tilt, WhiteNoise) and isinstance(acceleration, WhiteNoise)
     return LogNoise(tilt, acceleration, _correlation(spectra) if known else 0.0)
 
 
-def _blocks(parts: Sequence[Part], period: float) -> Iterator[tuple[np.ndarray, Mapping[str, np.ndarray]]]:
+def _blocks(segments: Sequence[Segment], period: float) -> Iterator[tuple[np.ndarray, Values]]:
     """Yield blocks of successive rows: their places in periods, and their values."""
-    blocks = [(p, start) for p in parts for start in range(0, len(p.placed), BLOCK)]
-    few = np.unique(np.linspace(0, len(blocks) - 1, MOST_BLOCKS).round().astype(int))
-    for part, start in blocks if len(blocks) <= MOST_BLOCKS else [blocks[i] for i in few]:
+    blocks = [(one, start) for one in segments for start in range(0, len(one.placed), BLOCK)]
+    for i in np.unique(np.linspace(0, len(blocks) - 1, min(len(blocks), MAX_BLOCKS)).round().astype(int)):
+        segment, start = blocks[i]
         rows = slice(start, start + BLOCK)
-        placed = part.placed[rows]
-        yield (placed - placed[0]) / period, {name: values[rows] for name, values in part.rows.items()}
+        placed = segment.placed[rows]
+        yield (placed - placed[0]) / period, {name: values[rows] for name, values in segment.rows.items()}
 
 
 def _smallest_step(values: np.ndarray) -> float:
@@ -121,9 +116,7 @@ def _smallest_step(values: np.ndarray) -> float:
     return float(steps.min()) if len(steps) else math.inf
 
 
-def _without_response(
-    places: np.ndarray, values: Mapping[str, np.ndarray]
-) -> tuple[np.ndarray, Mapping[str, np.ndarray]]:
+def _without_response(places: np.ndarray, values: Values) -> tuple[np.ndarray, Values]:
     """Subtract what the acceleration owes to the commands of the last rows, which go up to half the row rate too.
 
     A command knows the noise of rows before, and none of the rows after it: least squares on it alone leave white noise
@@ -131,7 +124,7 @@ def _without_response(
     """
     acceleration, command = values["acceleration_rad_s2"], values["u_rad_s"] * np.cos(values.get("y2_rad", 0.0))
     n_rows = len(places) - RESPONSE
-    if n_rows < FEWEST_RESPONSES * RESPONSE or np.abs(places - np.arange(len(places))).max() >= EVEN:
+    if n_rows < MIN_RESPONSES * RESPONSE or np.abs(places - np.arange(len(places))).max() >= EVEN:
         return places, values
     before = np.stack([np.ones(n_rows), *(command[RESPONSE - k : -k] for k in range(1, RESPONSE + 1))], axis=1)
     rest = acceleration[RESPONSE:]
@@ -251,31 +244,29 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> TiltNoise:
     Raises:
         InputError: A noise belongs to another sensor than the log's.
     """
-    noises, estimate = noises or {}, noise_in(log)
-    if log.tilt is not None:
-        if {"tilt", "acceleration"} & noises.keys():
-            raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
-        gimbal = Encoder().sample_sigma
-        if isinstance(estimate.tilt, WhiteNoise) and not noises:
-            if isinstance(estimate.acceleration, WhiteNoise):
-                tilt, acceleration = estimate.tilt.sigma, estimate.acceleration.sigma
-                return TiltNoise(tilt, acceleration, estimate.correlation, gimbal)
-            sigma = estimate.tilt.sigma / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
-            return replace(log.tilt.noise(sigma, STANDARD_GRAVITY), gimbal=gimbal)
+    noises, shown, gimbal = noises or {}, noise_in(log), Encoder().sample_sigma
+    tilt, acceleration = (
+        noise.sigma if isinstance(noise, WhiteNoise) else None for noise in (shown.tilt, shown.acceleration)
+    )
+    if log.tilt is None:
+        if "accelerometer" in noises:
+            raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
+        if tilt is None or "tilt" in noises:
+            tilt = math.radians(noises.get("tilt", TILT_NOISE_DEG))
+        if acceleration is None or "acceleration" in noises:
+            acceleration = noises.get("acceleration", ACCELERATION_NOISE_RAD_S2)
+        correlation = 0.0 if {"tilt", "acceleration"} <= noises.keys() else shown.correlation
+        return TiltNoise(tilt, acceleration, correlation, gimbal)
+    if noises.keys() - {"accelerometer"}:
+        raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
+    if tilt is None or noises:
         density = noises.get("accelerometer", NOISE_DENSITY_UG_RTHZ)
-        sensor = Accelerometer(rate_hz=_sampling_rate(log), noise_density_ug_rthz=density)
-        return replace(log.tilt.noise(sensor.sample_sigma, STANDARD_GRAVITY), gimbal=gimbal)
-    if "accelerometer" in noises:
-        raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
-    tilt = _told_or_estimated(math.radians(noises.get("tilt", TILT_NOISE_DEG)), "tilt" in noises, estimate.tilt)
-    acceleration = noises.get("acceleration", ACCELERATION_NOISE_RAD_S2)
-    acceleration = _told_or_estimated(acceleration, "acceleration" in noises, estimate.acceleration)
-    correlation = 0.0 if {"tilt", "acceleration"} <= noises.keys() else estimate.correlation
-    return TiltNoise(tilt, acceleration, correlation, Encoder().sample_sigma)
-
-
-def _told_or_estimated(value: float, is_told: bool, estimate: WhiteNoise | str | None) -> float:
-    return estimate.sigma if isinstance(estimate, WhiteNoise) and not is_told else value
+        sigma = Accelerometer(rate_hz=_sampling_rate(log), noise_density_ug_rthz=density).sample_sigma
+    elif acceleration is None:
+        sigma = tilt / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
+    else:
+        return TiltNoise(tilt, acceleration, shown.correlation, gimbal)
+    return replace(log.tilt.noise(sigma, STANDARD_GRAVITY), gimbal=gimbal)
 
 
 def noise_in(log: Log) -> LogNoise:
@@ -294,30 +285,23 @@ def noise_in(log: Log) -> LogNoise:
     if noise is None:
         return LogNoise("the sensors are known", None, 0.0)
     factor = math.sqrt(max(1.0, (log.row_period_s or log.dt) / log.dt))
+    return LogNoise(_scaled(noise.tilt, factor), _scaled(noise.acceleration, factor), noise.correlation)
 
-    acceleration = noise.acceleration and _scaled(noise.acceleration, factor.__mul__)
-    return LogNoise(_scaled(noise.tilt, factor.__mul__), acceleration, noise.correlation)
+
+Other = TypeVar("Other")
+
+
+def _scaled(noise: WhiteNoise | Other, factor: float) -> WhiteNoise | Other:
+    return WhiteNoise(*(factor * size for size in noise)) if isinstance(noise, WhiteNoise) else noise
 
 
 def noise_numbers(text: str) -> dict[str, float]:
     """Parse `--noise tilt=0.05,acceleration=2` [ug/rtHz, deg, rad/s^2]."""
-    noises = numbers(text, "--noise", NOISES) if text.strip() else {}
+    noises = numbers(text, "--noise", ("accelerometer", "tilt", "acceleration")) if text.strip() else {}
     for name, value in noises.items():
         if not value > 0.0:
             raise InputError(f"--noise {name}={value:g}: must be greater than 0")
     return noises
-
-
-def density_of(log: Log, tilt: float) -> float:
-    """Return the density of two accelerometers that makes a noise of the tilt of one sample [ug/sqrt(Hz)].
-
-    Args:
-        log: A log of two accelerometers.
-        tilt: Standard deviation [rad].
-    """
-    assert log.tilt is not None
-    sigma = tilt / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
-    return sigma / (1e-6 * STANDARD_GRAVITY * math.sqrt(_sampling_rate(log) / 2.0))
 
 
 def _sampling_rate(log: Log) -> float:
@@ -338,31 +322,27 @@ def noise_remarks(log: Log, noise: TiltNoise) -> list[str]:
     """
     if log.white_noise is None:
         return []
-    shown, tilt_name, unit = noise_in(log), "tilt", "deg"
-    size = math.degrees
+    shown = noise_in(log)
     if log.tilt is not None:
-        tilt_name, unit = "accelerometer", "ug/rtHz"
-        size = lambda tilt: density_of(log, tilt)  # noqa: E731  (one of two units)
-    lines = [_remark(tilt_name, size(noise.tilt), _scaled(shown.tilt, size), unit)]
-    if shown.acceleration is not None and log.tilt is None:
-        lines.append(_remark("acceleration", noise.acceleration, shown.acceleration, "rad/s^2"))
+        density = 1e-6 * STANDARD_GRAVITY * math.sqrt(_sampling_rate(log) / 2.0)
+        of_tilt = 1.0 / (log.tilt.noise(1.0, STANDARD_GRAVITY).tilt * density)
+        return [_remark("accelerometer", noise.tilt, shown.tilt, of_tilt, "ug/rtHz")]
+    lines = [_remark("tilt", noise.tilt, shown.tilt, math.degrees(1.0), "deg")]
+    if shown.acceleration is not None:
+        lines.append(_remark("acceleration", noise.acceleration, shown.acceleration, 1.0, "rad/s^2"))
     return lines
 
 
-def _remark(name: str, used: float, estimate: WhiteNoise | str, unit: str) -> str:
-    """Describe one noise of `--noise`, in its unit."""
-    start = f"Noise of the {name}: {used:.3g} {unit} is used; the log"
-    if isinstance(estimate, str):
-        return f"{start} cannot tell: {estimate}."
-    remark = f"{start} shows {estimate.sigma:.3g} ({estimate.low:.3g} to {estimate.high:.3g})"
-    ratio = estimate.sigma / used
-    if max(ratio, 1.0 / ratio) < APART:
+def _remark(name: str, used: float, shown: WhiteNoise | str, factor: float, unit: str) -> str:
+    """Describe one noise of `--noise`, converted by a factor to its unit."""
+    start = f"Noise of the {name}: {factor * used:.3g} {unit} is used; the log"
+    if isinstance(shown, str):
+        return f"{start} cannot tell: {shown}."
+    sigma, low, high = (factor * size for size in shown)
+    remark = f"{start} shows {sigma:.3g} ({low:.3g} to {high:.3g})"
+    if 1.0 / APART < shown.sigma / used < APART:
         return f"{remark}."
-    return f"{remark}: give --noise {name}={estimate.sigma:.3g}, or no {name} for the log's own."
-
-
-def _scaled(noise: WhiteNoise | str, size: Callable[[float], float]) -> WhiteNoise | str:
-    return noise if isinstance(noise, str) else WhiteNoise(*map(size, noise))
+    return f"{remark}: give --noise {name}={sigma:.3g}, or no {name} for the log's own."
 
 
 def noise_figures(log: Log, noise: TiltNoise) -> dict[str, SummaryValue]:
@@ -377,7 +357,7 @@ def noise_figures(log: Log, noise: TiltNoise) -> dict[str, SummaryValue]:
     return {"noise_by_the_log": figures}
 
 
-def _figures(estimate: WhiteNoise | str, used: float) -> dict[str, SummaryValue]:
-    if isinstance(estimate, str):
-        return {"sigma": None, "reason": estimate, "used": False}
-    return {**estimate._asdict(), "used": math.isclose(used, estimate.sigma, rel_tol=1e-9)}
+def _figures(shown: WhiteNoise | str, used: float) -> dict[str, SummaryValue]:
+    if isinstance(shown, str):
+        return {"sigma": None, "reason": shown, "used": False}
+    return {**shown._asdict(), "used": math.isclose(used, shown.sigma, rel_tol=1e-9)}

@@ -6,6 +6,8 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +15,48 @@ import numpy as np
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
-from cmg_mj.features.replay.log import REFERENCE, Log, ReadOptions, log_of_run
+from cmg_mj.features.replay.log import (
+    ACCELEROMETERS,
+    EVEN,
+    ONE_ACCELEROMETER,
+    REFERENCE,
+    UNITS,
+    Column,
+    Log,
+    ReadOptions,
+    Segment,
+    Values,
+    columns_of,
+    read_table,
+)
 from cmg_mj.features.replay.noise import white_noise_of
-from cmg_mj.features.replay.sampling import SAME_TIME, Part, Sampler, sampled_where_known
-from cmg_mj.features.replay.table import ACCELEROMETERS, ONE_ACCELEROMETER, ROLES, UNITS, Column, columns_of, read_table
-from cmg_mj.stages.push import Window, inside
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.stages.push import Push, Window, inside, push_windows
 
+SAME_PERIOD = 1e-3
+"""Relative difference up to which the line through the rows has their period."""
+GAP_PERIODS = 1.5
+"""A gap is longer than so many periods."""
+MIN_SAMPLES = 20
+"""A segment with fewer samples is discarded."""
+BRIDGED = 5
+"""Longest gap that is bridged by default, in rows."""
+FEW_REPEATED = 0.05
+"""Share of rows with the stamp of the row before, up to which these rows are discarded; more are a mistake."""
+SAME_TIME = 1e-6
+"""Distance of two rows, in usual steps, up to which they have the same time."""
+MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 1e6
+BALANCED_HZ = 5.0
+"""Rate below which nothing balances: milliseconds taken as seconds have at most this, up to 5 kHz [Hz]."""
+MAX_SAMPLES = 5_000_000
+"""More samples of a log take hours."""
+HELD = "u_rad_s"
+"""The signal that holds until the next row."""
 UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
-LONGEST_DELAY_S = 1e6
+MAX_DELAY_S = 1e6
 """Longest delay of a reference [s]."""
-FARTHEST_M = 10.0
+MAX_RADIUS_M = 10.0
 """Largest distance of an accelerometer from the pivot; millimetres taken as metres are larger [m]."""
 NEAR = (0.7, 1.4)
 """A size is plausible if it is within these factors of the right one."""
@@ -50,52 +83,72 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if not options.columns:
         return _read_run(path, options)
     columns = columns_of(options)
-    geometry = accelerometer_geometry(columns, options.radii_m)
-    if not abs(options.delay_s) <= LONGEST_DELAY_S:
-        raise InputError(f"--delay {options.delay_s:g}: must be from -{LONGEST_DELAY_S:g} to {LONGEST_DELAY_S:g} s")
+    geometry = _geometry(columns, options.radii_m)
+    if not abs(options.delay_s) <= MAX_DELAY_S:
+        raise InputError(f"--delay {options.delay_s:g}: must be from -{MAX_DELAY_S:g} to {MAX_DELAY_S:g} s")
     if "rate" not in columns and (options.delay_s or options.windows_s):
         raise InputError("--delay, --window: there is no reference; name it, --columns rate=...")
-    signals, dated = read_table(path, columns, options)
-    time = signals.pop("time", None)
-    if options.time_range_s is not None:
-        time, signals = _cut(path, time, signals, options)
+    time, signals = _times(path, read_table(path, columns, options), options)
     notes: list[str] = []
-    unit_known = time is None or dated or columns["time"].unit_known
+    unit_known = "time" not in columns or columns["time"].unit is not None
     if not unit_known:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
     measured = _measured(signals, geometry, notes)
-    sampler = Sampler(str(path), options.rate_hz, options.max_gap_s, notes, ("u_rad_s",), unit_known)
-    dt, parts = sampler.parts(time, measured)
-    joined = _join(parts)
+    period, dt, segments = _sample(path, time, measured, options, unit_known, notes)
+    joined = _join(segments)
     if "rate" in signals:
-        joined[REFERENCE] = _reference(parts, time, signals["rate"], options)
+        joined[REFERENCE] = _reference(segments, time, signals["rate"], options.delay_s)
     _check_motion(path, joined, "rate" in signals)
-    ends = np.cumsum([len(part.time) for part in parts]).tolist()
-    slices = [slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
-    notes += gravity_remarks(columns, signals)
+    notes += _gravity_remarks(columns, signals, options.scale)
     if "ax" in signals:
         notes.append("the tilt is atan2(-ax, az): an acceleration of the sensor by 0.1 g puts it off by 5.7 deg")
     present = {
-        "gimbals": {"y2_rad", "u_rad_s"} <= measured.keys(),
+        "gimbals": {"y2_rad", HELD} <= measured.keys(),
         "acceleration": "acceleration_rad_s2" in measured,
         "reference": "rate" in signals,
     }
-    has = frozenset(name for name, known in present.items() if known)
-    windows = _windows_inside(path, options.windows_s, joined["time_s"])
-    options = replace(options, units={role: column.unit for role, column in columns.items()})
-    period = sampler.period or dt
-    noise = white_noise_of(parts, period)
-    return Log(path.stem, dt, joined, slices, has, geometry, windows, tuple(notes), options, None, period, noise)
+    ends = np.cumsum([0, *(len(segment.time) for segment in segments)]).tolist()
+    return Log(
+        path.stem,
+        dt,
+        joined,
+        [slice(start, end) for start, end in pairwise(ends)],
+        frozenset(name for name, known in present.items() if known),
+        tilt=geometry,
+        windows=_windows_inside(path, options.windows_s, joined["time_s"]),
+        notes=tuple(notes),
+        options=replace(options, units={role: column.unit or "s" for role, column in columns.items()}),
+        row_period_s=period,
+        white_noise=white_noise_of(segments, period),
+    )
 
 
 def _read_run(path: Path, options: ReadOptions) -> Log:
-    log = log_of_run(path)
+    """Read a run's own recording, whose columns, pushes and scenario are known."""
+    try:
+        trajectory = Trajectory.load(path)
+        scenario = trajectory.metadata["scenario"]
+    except (InputError, LookupError) as error:
+        raise InputError(f"{path}: say which columns are what, --columns tilt=HEADING,rate=HEADING,...") from error
+    if trajectory.axes:
+        raise InputError(
+            f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; save one of them "
+            f"from Python: Trajectory.load(path).along({trajectory.axes[0]!r}).save(...)"
+        )
     given = [field for field in options.as_toml() if field != "windows_s"]
     if given:
         raise InputError(f"{path}: {given[0]} is for other logs than a run's own recording; read it with --columns")
-    if not options.windows_s:
-        return log
-    return replace(log, windows=_windows_inside(path, options.windows_s, log["time_s"]))
+    columns = {name: trajectory[name] for name in ("time_s", "y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2")}
+    return Log(
+        path.parent.name if path.stem == "trajectory" and path.parent.name else path.stem,
+        1.0 / float(scenario["controller"]["rate_hz"]),
+        {**columns, REFERENCE: trajectory["x2_rad_s"]},
+        [slice(0, len(trajectory))],
+        frozenset({"gimbals", "acceleration", "reference"}),
+        windows=_windows_inside(path, options.windows_s, trajectory["time_s"])
+        or push_windows([Push(**push) for push in scenario.get("push", ())]),
+        scenario=scenario,
+    )
 
 
 def check_distinct_logs(paths: Sequence[str]) -> None:
@@ -108,17 +161,17 @@ def check_distinct_logs(paths: Sequence[str]) -> None:
         known.add(path)
 
 
-def accelerometer_geometry(columns: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:
+def _geometry(columns: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:
     """Return the geometry of two accelerometers; None if there are none."""
     if ("inner_x" in columns) != (radii is not None):
         raise InputError("--radii INNER,OUTER [m] and --columns inner_x, inner_z, outer_x, outer_z go together")
     if radii is None:
         return None
     inner, outer = radii
-    if not 0.0 <= inner < outer <= FARTHEST_M:
+    if not 0.0 <= inner < outer <= MAX_RADIUS_M:
         raise InputError(
             f"--radii {inner:g},{outer:g}: must be two distances from the pivot, the smaller first, at most "
-            f"{FARTHEST_M:g} m"
+            f"{MAX_RADIUS_M:g} m"
         )
     return RadialTilt(inner, outer)
 
@@ -132,142 +185,288 @@ def _windows_inside(path: Path, windows: Sequence[Window], time: np.ndarray) -> 
     return tuple(windows)
 
 
-def _check_motion(path: Path, columns: Mapping[str, np.ndarray], referred: bool) -> None:
-    """Refuse a log without motion."""
-    tilt, reference = columns["y1_rad"], columns[REFERENCE]
-    known = reference[np.isfinite(reference)]
-    if np.ptp(tilt) == 0.0:
-        raise InputError(f"{path}: the tilt is {tilt[0]:g} rad in every row: nothing moves")
-    if referred and not len(known):
-        raise InputError(f"{path}: the reference has no number where the tilt has one")
-    if referred and np.ptp(known) == 0.0:
-        raise InputError(f"{path}: the reference is {known[0]:g} rad/s in every row: leave it out")
-
-
-def _cut(
-    path: Path, time: np.ndarray | None, signals: Mapping[str, np.ndarray], options: ReadOptions
-) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
-    """Return the rows between two times, counted from the earliest."""
-    assert options.time_range_s is not None
+def _times(
+    path: Path, signals: dict[str, np.ndarray], options: ReadOptions
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return the rows' times, (n_rows,) [s], and their other signals, of the time range alone."""
+    time = signals.pop("time", None)
+    if time is None and options.rate_hz is None:
+        raise InputError(f"{path}: no time: name its column, --columns time=..., or give --rate HZ")
+    counted = np.arange(len(next(iter(signals.values())))) / (options.rate_hz or 1.0)
+    if options.time_range_s is None:
+        return counted if time is None else time, signals
     start, end = options.time_range_s
-    if time is None:
-        clock = np.arange(len(next(iter(signals.values())))) / (options.rate_hz or 1.0)
-    else:
-        clock = time - np.nanmin(time)
+    clock = counted if time is None else time - np.nanmin(time)
     rows = (clock >= start - 1e-9) & (clock <= end + 1e-9)
     if not rows.any():
         raise InputError(f"--time-range {start:g}:{end:g}: {path} has no row there; it lasts {np.nanmax(clock):.6g} s")
-    return None if time is None else time[rows], {role: values[rows] for role, values in signals.items()}
+    return counted[: rows.sum()] if time is None else time[rows], _select(signals, rows)
 
 
-def _measured(
-    signals: Mapping[str, np.ndarray], geometry: RadialTilt | None, notes: list[str]
-) -> dict[str, np.ndarray]:
+def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) -> dict[str, np.ndarray]:
     """Return row by row the observers' measurements, by their names in a trajectory."""
-    measured = {}
+    acceleration = signals.get("acceleration")
     if geometry is not None:
-        angle = geometry(*(signals[role] for role in ACCELEROMETERS))
-        measured["acceleration_rad_s2"] = geometry.acceleration(signals["inner_x"], signals["outer_x"])
+        angle = np.asarray(geometry(*(signals[role] for role in ACCELEROMETERS)))
+        acceleration = np.asarray(geometry.acceleration(signals["inner_x"], signals["outer_x"]))
     else:
-        angle = tilt_of_one(signals["ax"], signals["az"]) if "ax" in signals else signals["tilt"]
-        if "acceleration" in signals:
-            measured["acceleration_rad_s2"] = signals["acceleration"]
-    measured = {"y1_rad": unwrapped(np.asarray(angle), notes), **measured}
+        angle = np.arctan2(-signals["ax"], signals["az"]) if "ax" in signals else signals["tilt"]
+    measured = {"y1_rad": _unwrapped(angle, notes)}
+    if acceleration is not None:
+        measured["acceleration_rad_s2"] = acceleration
     if "gimbal" in signals:
         measured["y2_rad"] = signals["gimbal"]
     elif "gimbal1" in signals:
         measured["y2_rad"] = (signals["gimbal1"] - signals["gimbal2"]) / 2.0
     if "command" in signals:
-        measured["u_rad_s"] = signals["command"]
-    if ("y2_rad" in measured) != ("u_rad_s" in measured):
+        measured[HELD] = signals["command"]
+    if ("y2_rad" in measured) != (HELD in measured):
         notes.append("observers that need the gimbals need both gimbal and command; there is one of them")
     return measured
 
 
-def _join(parts: Sequence[Part]) -> dict[str, np.ndarray]:
-    """Join all parts, with every column of a log."""
-    time = np.concatenate([part.time for part in parts])
-    columns = {"time_s": time - time[0] if abs(time[0]) > 1e6 else time}
-    absent = {"y1_rad": 0.0, "y2_rad": 0.0, "u_rad_s": 0.0, "acceleration_rad_s2": math.nan, REFERENCE: math.nan}
-    for name, value in absent.items():
-        columns[name] = np.concatenate([part.values.get(name, np.full(len(part.time), value)) for part in parts])
-    return columns
-
-
-def _reference(
-    parts: Sequence[Part], time: np.ndarray | None, reference: np.ndarray, options: ReadOptions
-) -> np.ndarray:
-    """Sample the reference where the parts are."""
-    stamps = np.arange(len(reference)) / (options.rate_hz or 1.0) if time is None else time
-    known = np.isfinite(stamps)
-    stamps, reference = stamps[known], reference[known]
-    order = np.argsort(stamps, kind="stable")
-    stamps, reference = stamps[order], reference[order]
-    step = float(parts[0].time[1] - parts[0].time[0])
-    first = np.concatenate([[True], np.diff(stamps) > SAME_TIME * step])
-    stamps, reference = stamps[first], reference[first]
-    delayed = (sampled_where_known(part.time, part.when(stamps) - options.delay_s, reference) for part in parts)
-    return np.concatenate(list(delayed))
-
-
-def unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
+def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
     """Unwrap an angle that starts again after a turn, and note it."""
     known = np.isfinite(angle)
     jumps = int((np.abs(np.diff(angle[known])) > UNWRAP_STEP).sum())
     if not jumps:
         return angle
-    notes.append(f"the tilt jumps by a turn {jumps:,} time{'' if jumps == 1 else 's'}: made to run on")
+    notes.append(f"the tilt jumps by a turn {_counted(jumps, 'time')}: made to run on")
     out = angle.copy()
     out[known] = np.unwrap(angle[known])
     return out
 
 
-def tilt_of_one(ax: np.ndarray, az: np.ndarray) -> np.ndarray:
-    """Return the tilt that one accelerometer at rest shows.
+def _sample(
+    path: Path, time: np.ndarray, measured: Values, options: ReadOptions, unit_known: bool, notes: list[str]
+) -> tuple[float, float, list[Segment]]:
+    """Divide the complete rows at long gaps, and resample them if they are uneven.
 
     Args:
-        ax: Specific force along the motion of a growing tilt, -g sin(tilt) at rest, (n,) [m/s^2].
-        az: Specific force outward along the tilting line, g cos(tilt) at rest, (n,) [m/s^2].
+        path: The file, for messages.
+        time: Stamps, (n_rows,) [s].
+        measured: Name -> values, (n_rows,).
+        options: The rate to resample to, and the longest gap.
+        unit_known: Whether the unit of the times is known; else milliseconds taken as seconds are refused.
+        notes: Takes what was changed.
 
     Returns:
-        (n,) [rad].
+        The period of the rows [s], that of the samples [s], and the segments.
     """
-    return np.arctan2(-ax, az)
+    time, values = _complete(path, time, measured, notes)
+    steps = np.diff(time)
+    period = float(steps[steps <= GAP_PERIODS * float(np.median(steps))].mean())
+    if not 1.0 / MAX_RATE_HZ <= period <= 1.0 / (MIN_RATE_HZ if unit_known else BALANCED_HZ):
+        raise InputError(
+            f"{path}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz: is the time's unit right? "
+            "Say it, --units time=ms or time=s"
+        )
+    round_rate = float(f"{1.0 / period:.6g}")
+    if abs(period * round_rate - 1.0) < 1e-9:
+        period = 1.0 / round_rate
+    dt = period if options.rate_hz is None else 1.0 / options.rate_hz
+    max_gap = BRIDGED * period if options.max_gap_s is None else options.max_gap_s
+    gaps = steps > GAP_PERIODS * period
+    divided = steps > max(GAP_PERIODS * period, max_gap + period)
+    stretches = [slice(start, end) for start, end in pairwise([0, *(np.flatnonzero(divided) + 1), len(time)])]
+    resolution = _resolution(time)
+    even = all(_is_even(time[rows], period, resolution) for rows in stretches)
+    resampled = not even or abs(dt - period) > 1e-6 * dt
+    shortest, longest = (1e3 * float(step) for step in (steps[~gaps].min(), steps[~gaps].max()))
+    if resampled:
+        rows = f"{1.0 / period:.6g} Hz" if even else f"uneven steps, {shortest:.4g} to {longest:.4g} ms, are"
+        notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by cubic splines")
+    elif np.ptp(steps[~gaps]) > EVEN * period:
+        notes.append(f"steps of {shortest:.4g} to {longest:.4g} ms taken as even sampling at {1.0 / period:.6g} Hz")
+    for what, which in (
+        ("bridged by straight lines", gaps & ~divided),
+        ("not bridged: observers start anew after each", divided),
+    ):
+        if which.any():
+            at = int(np.argmax(np.where(which, steps, 0.0)))
+            notes.append(
+                f"{_counted(which.sum(), 'gap')} {what}; the longest is {steps[at] * 1e3:.4g} ms at {time[at]:.6g} s"
+            )
+    lengths = [(time[rows][-1] - time[rows][0]) / dt for rows in stretches]
+    if sum(lengths) > MAX_SAMPLES:
+        raise InputError(f"{path}: {sum(lengths):,.0f} samples at {1.0 / dt:g} Hz; at most {MAX_SAMPLES:,}")
+    segments = [
+        _segment(time[rows], _select(values, rows), period, dt, resampled)
+        for rows, length in zip(stretches, lengths, strict=True)
+        if length >= MIN_SAMPLES - 1.5
+    ]
+    if not segments:
+        raise InputError(
+            f"{path}: no part of {MIN_SAMPLES} samples at {1.0 / dt:g} Hz without a gap longer than {max_gap:.3g} s"
+        )
+    if len(segments) < len(stretches):
+        notes.append(f"{len(stretches) - len(segments)} parts with fewer than {MIN_SAMPLES} samples discarded")
+    return period, dt, segments
 
 
-def gravity_remarks(columns: Mapping[str, Column], signals: Mapping[str, np.ndarray]) -> list[str]:
+def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) -> tuple[np.ndarray, Values]:
+    """Return the rows that have all numbers and a time after that of the row before."""
+    present = np.isfinite(time) & np.logical_and.reduce([np.isfinite(column) for column in values.values()])
+    missing = np.flatnonzero(~present)
+    if len(missing):
+        notes.append(
+            f"{_counted(len(missing), 'row')} of {len(present):,} without a number discarded, first row "
+            f"{missing[0] + 1}"
+        )
+        time, values = time[present], _select(values, present)
+    if len(time) < MIN_SAMPLES:
+        raise InputError(f"{path}: {_counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}")
+    steps = np.diff(time)
+    if (steps < 0.0).any():
+        at = int(np.argmax(steps < 0.0))
+        raise InputError(
+            f"{path}: time goes back from {time[at]:.9g} s to {time[at + 1]:.9g} s: cut the log there, or leave time "
+            "out and give --rate"
+        )
+    again = steps <= SAME_TIME * np.median(steps)
+    if again.mean() > FEW_REPEATED:
+        raise InputError(
+            f"{path}: {again.sum():,} of {len(time):,} rows have the same time as the row before: the stamps are too "
+            "coarse; leave time out and give --rate"
+        )
+    if again.any():
+        rows, first = _counted(again.sum(), "row"), time[1:][again][0]
+        notes.append(f"{rows} with the time of the row before discarded, first at {first:.6g} s")
+        later = np.concatenate([[True], ~again])
+        time, values = time[later], _select(values, later)
+    return time, values
+
+
+def _segment(time: np.ndarray, values: Values, period: float, dt: float, resampled: bool) -> Segment:
+    """Sample rows without a gap every dt."""
+    stamps, placed, interpolate = time - time[0], time, partial(_resample, gap=GAP_PERIODS * period)
+    places = np.arange(int(stamps[-1] / dt + 1e-6) + 1)
+    if not resampled:
+        # Rows stay where they are, and those that are missing come between them.
+        places = np.arange(len(time))
+        if len(time) != round(stamps[-1] / dt) + 1:
+            places = np.maximum.accumulate(np.rint(stamps / dt).astype(int))
+            later = np.concatenate([[True], np.diff(places) > 0])
+            time, places, values = time[later], places[later], _select(values, later)
+        stamps, interpolate = places * dt, np.interp
+        placed = time[0] + stamps
+    grid = dt * np.arange(places[-1] + 1)
+    sampled = {name: (_held if name == HELD else interpolate)(grid, stamps, column) for name, column in values.items()}
+    return Segment(time[0] + grid, sampled, time, placed, values)
+
+
+def _resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float) -> np.ndarray:
+    """Interpolate by a cubic spline, and by straight lines between times that are further apart than a gap [s]."""
+    from scipy.interpolate import CubicSpline
+
+    after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
+    in_gap = time[after] - time[after - 1] > gap
+    return np.where(in_gap, np.interp(grid, time, values), CubicSpline(time, values)(grid))
+
+
+def _held(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return values[np.clip(np.searchsorted(time, grid + 1e-9, side="right") - 1, 0, len(values) - 1)]
+
+
+def _resolution(time: np.ndarray) -> float:
+    """Return the largest of 1, 0.1, 0.01 ... s that divides all stamps from the first on [s]; 0 if none does."""
+    for power in range(0, 8):
+        counts = (time - time[0]) * 10.0**power
+        if np.abs(counts - np.rint(counts)).max() < 1e-3:
+            return 10.0**-power
+    return 0.0
+
+
+def _is_even(time: np.ndarray, period: float, resolution: float) -> bool:
+    """Return whether the rows are on an even grid, as far as stamps of this resolution show."""
+    steps = np.diff(time)
+    if len(time) < 3 or np.ptp(steps) < EVEN * period:
+        return True
+    slack = max(EVEN * period, 0.75 * resolution if resolution < period else 0.0)
+    order = np.arange(len(time)) if steps.max() < GAP_PERIODS * period else np.rint((time - time[0]) / period)
+    fit = np.polynomial.polynomial.polyfit(order, time - time[0], 1)
+    off = time - time[0] - (fit[0] + fit[1] * order)
+    return bool(np.abs(off).max() <= slack and abs(fit[1] / period - 1.0) < SAME_PERIOD)
+
+
+def _select(values: Values, rows: slice | np.ndarray) -> dict[str, np.ndarray]:
+    return {name: column[rows] for name, column in values.items()}
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def _join(segments: Sequence[Segment]) -> dict[str, np.ndarray]:
+    """Join all segments, with every column of a log."""
+    time = np.concatenate([segment.time for segment in segments])
+    columns = {"time_s": time - time[0] if abs(time[0]) > 1e6 else time}
+    absent = {"y1_rad": 0.0, "y2_rad": 0.0, HELD: 0.0, "acceleration_rad_s2": math.nan, REFERENCE: math.nan}
+    for name, value in absent.items():
+        columns[name] = np.concatenate([some.values.get(name, np.full(len(some.time), value)) for some in segments])
+    return columns
+
+
+def _reference(segments: Sequence[Segment], time: np.ndarray, reference: np.ndarray, delay_s: float) -> np.ndarray:
+    """Interpolate the reference at the samples' times; NaN before it, after it and in its gaps."""
+    order = np.argsort(time, kind="stable")[: np.isfinite(time).sum()]  # NaN comes last
+    time, reference = time[order], reference[order]
+    step = float(segments[0].time[1] - segments[0].time[0])
+    known = np.concatenate([[True], np.diff(time) > SAME_TIME * step]) & np.isfinite(reference)
+    time, reference = time[known], reference[known]
+    if len(time) < MIN_SAMPLES:
+        return np.full(sum(len(segment.time) for segment in segments), np.nan)
+    sampled = []
+    for segment in segments:
+        grid, stamps = segment.time, segment.when(time) - delay_s
+        gap = GAP_PERIODS * float(np.median(np.diff(stamps)))
+        slack = 1e-6 * gap
+        after = np.clip(np.searchsorted(stamps, grid, side="right"), 1, len(stamps) - 1)
+        near = np.minimum(np.abs(grid - stamps[after - 1]), np.abs(stamps[after] - grid)) <= slack
+        known = (grid >= stamps[0] - slack) & (grid <= stamps[-1] + slack)
+        known &= (stamps[after] - stamps[after - 1] <= gap) | near
+        values = _resample(np.clip(grid, stamps[0], stamps[-1]), stamps, reference, gap)
+        sampled.append(np.where(known, values, np.nan))
+    return np.concatenate(sampled)
+
+
+def _check_motion(path: Path, columns: Values, has_reference: bool) -> None:
+    """Refuse a log without motion."""
+    tilt, known = columns["y1_rad"], columns[REFERENCE][np.isfinite(columns[REFERENCE])]
+    if np.ptp(tilt) == 0.0:
+        raise InputError(f"{path}: the tilt is {tilt[0]:g} rad in every row: nothing moves")
+    if has_reference and not len(known):
+        raise InputError(f"{path}: the reference has no number where the tilt has one")
+    if has_reference and np.ptp(known) == 0.0:
+        raise InputError(f"{path}: the reference is {known[0]:g} rad/s in every row: leave it out")
+
+
+def _gravity_remarks(columns: Mapping[str, Column], signals: Values, scale: Mapping[str, float]) -> list[str]:
     """Compare the size and the sign of each accelerometer's specific force with gravity's, by their medians.
-
-    Args:
-        columns: Role -> column.
-        signals: Role -> values in SI units, (n_rows,).
 
     Returns:
         A line for each that is wrong, with the options that cure it.
     """
     remarks = []
+    units = UNITS["acceleration"]
     for x, z in (ACCELEROMETERS[:2], ACCELEROMETERS[2:], ONE_ACCELEROMETER):
         if x not in signals:
             continue
         size = float(np.nanmedian(np.hypot(signals[x], signals[z]))) / STANDARD_GRAVITY
         upward = float(np.nanmedian(signals[z]))
+        scales = {role: scale.get(role, 1.0) for role in (x, z)}
         if size > 0.0 and not NEAR[0] <= size <= NEAR[1]:
-            unit = _unit_of_size(columns[z].unit, size)
-            cures = (f"{role}={columns[role].scale / size:.4g}" for role in (x, z))
-            cure = f"--units {x}={unit},{z}={unit}" if unit else f"--scale {','.join(cures)}"
+            now = units[columns[z].unit or ""]
+            fits = {unit: abs(math.log(now / units[unit] / size)) for unit in units}
+            unit = min(units, key=lambda unit: fits[unit])
+            cure = f"--units {x}={unit},{z}={unit}"
+            if not fits[unit] < math.log(NEAR[1]):
+                cure = "--scale " + ",".join(f"{role}={factor / size:.4g}" for role, factor in scales.items())
             remarks.append(f"the specific force of {x} and {z} is {size:.4g} times gravity's 9.81 m/s^2: {cure}")
         elif upward < 0.0:
-            turned = ",".join(f"{role}={-columns[role].scale:g}" for role in (x, z))
+            turned = ",".join(f"{role}={-factor:g}" for role, factor in scales.items())
             remarks.append(
                 f"the median of {z} is {upward / STANDARD_GRAVITY:.2g} g, so the tilt is beyond 90 deg: --scale "
-                f"{turned} if the sensor shows gravity itself, --scale {z}={-columns[z].scale:g} if it is upside down"
+                f"{turned} if the sensor shows gravity itself, --scale {z}={-scales[z]:g} if it is upside down"
             )
     return remarks
-
-
-def _unit_of_size(unit: str, size: float) -> str | None:
-    """Return the unit in which a specific force is gravity's, if it is that many times gravity in another."""
-    units = UNITS[ROLES["ax"]]
-    fits = {other: abs(math.log(units[unit] / other_size / size)) for other, other_size in units.items()}
-    best = min(fits, key=lambda other: fits[other])
-    return best if fits[best] < math.log(NEAR[1]) else None

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.features.replay.log import REFERENCE, Log, WhiteNoise
+from cmg_mj.features.replay.log import REFERENCE, UNITS, Log, WhiteNoise
 from cmg_mj.features.replay.noise import noise_in
-from cmg_mj.features.replay.scores import STRETCHES, Piece, jackknife_stretches, lag_with_error
-from cmg_mj.features.replay.table import UNITS
+from cmg_mj.features.replay.scores import STRETCHES, Piece, jackknife_error, jackknife_stretches, lag_with_error
 
 SPAN_S = 0.2
 """Time over which increments of the tilt and of the integrated reference are compared [s]; slopes are mostly noise."""
@@ -38,9 +37,9 @@ nor scale is meaningful."""
 RATE_SPAN_S = 0.04
 """Time over which increments of the tilt give the rate in the model's damping term [s]."""
 WIDTH_S = 0.25
-"""Length of a stretch for the tilt's second derivative [s], of at least `FEWEST_SAMPLES` samples."""
-FEWEST_SAMPLES = 12
-FEWEST = 20
+"""Length of a stretch for the tilt's second derivative [s], of at least `MIN_SAMPLES` samples."""
+MIN_SAMPLES = 12
+MIN_STRETCHES = 20
 """Fewest stretches for a comparison."""
 MISFIT = 1.5
 """Misfit from which a model is doubted. Right models have at most 1.15: docs/studies/model_misfit.py."""
@@ -83,109 +82,78 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
     span = max(2, round(SPAN_S / dt))
     pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
     rises = [y[span:] - y[:-span] for y, _ in pieces]
-    late = lag_with_error([_Travels(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
-    lag_s, lag_error = late or (None, None)
-    fit = _Fit.of(rises, [_Travels(rate, span, dt, lag_s or 0.0) for _, rate in pieces])
-    line = fit and fit.line(fit.sums.sum(axis=0))
-    if fit is None or line is None:
+    lag_s, lag_error = lag_with_error([partial(_travelled, rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
+    sums, middle = _pair_sums([partial(_travelled, rate, span, dt, lag_s or 0.0) for _, rate in pieces], rises)
+    whole = sums.sum(axis=0)
+    line = _line(whole, middle)
+    if line is None:
         return Alignment(lag_s, None, None, None)
-    errors = fit.errors(span * dt)
-    return Alignment(lag_s, line.slope, line.start / (span * dt), line.correlation, lag_error, *errors)
+    others = [_line(whole - stretch, middle) for stretch in sums if stretch[0, 0]]
+    errors = jackknife_error([other and (other.slope, other.start / (span * dt)) for other in others])
+    scale_error, offset_error = (None, None) if errors is None else errors.tolist()
+    offset = line.start / (span * dt)
+    return Alignment(lag_s, line.slope, offset, line.correlation, lag_error, scale_error, offset_error, line.residual)
 
 
-@dataclass(frozen=True)
-class _Travels:
-    """Increments of the integrated reference, shifted by its lag: see `_travelled`."""
+def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float, rows: slice) -> np.ndarray:
+    """Integrate a rate, shifted by its lag, over each span of samples; NaN where it is unknown, (n - span,)[rows]."""
+    start, stop, _ = rows.indices(len(rate) - span)
+    margin = math.ceil(abs(lag_s) / dt) + 2
+    first = max(0, start - margin)
+    rate = rate[first : stop + span + margin]
+    clock = np.arange(len(rate)) * dt
+    steps = (rate[1:] + rate[:-1]) * dt / 2.0
+    travelled, unknown = (
+        np.interp(clock + lag_s, clock, np.concatenate([[0.0], np.cumsum(values)]), left=np.nan, right=np.nan)
+        for values in (np.nan_to_num(steps), np.isnan(steps))
+    )
+    known = unknown[span:] == unknown[:-span]
+    return np.where(known, travelled[span:] - travelled[:-span], np.nan)[start - first : stop - first]
 
-    rate: np.ndarray
-    span: int
-    dt: float
-    lag_s: float
 
-    def __len__(self) -> int:
-        return len(self.rate) - self.span
+def _pair_sums(travels: Sequence[Piece], rises: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Sum the known pairs of each stretch of a log.
 
-    def __getitem__(self, rows: slice) -> np.ndarray:
-        start, stop, _ = rows.indices(len(self))
-        margin = math.ceil(abs(self.lag_s) / self.dt) + 2
-        first = max(0, start - margin)
-        rate = self.rate[first : stop + self.span + margin]
-        return _travelled(rate, self.span, self.dt, self.lag_s)[start - first : stop - first]
+    Returns:
+        Products of 1, travel and rise, less the following, (`STRETCHES`, 3, 3); numbers that are subtracted from the
+        three, since sums of numbers near zero lose nothing, (3,).
+    """
+    sums, middle = np.zeros((STRETCHES, 3, 3)), np.zeros(3)
+    for number, piece, rows in jackknife_stretches([len(rise) for rise in rises], 0):
+        pairs = np.stack([np.ones(rows.stop - rows.start), travels[piece](rows), rises[piece][rows]])
+        pairs = pairs[:, np.isfinite(pairs[1])]
+        if not pairs.shape[1]:
+            continue
+        if not sums.any():
+            middle = np.array([0.0, *pairs[1:].mean(axis=1)])
+        pairs -= middle[:, None]
+        sums[number] += pairs @ pairs.T
+    return sums, middle
 
 
 class _Line(NamedTuple):
-    """A fitted line, rise = start + slope travel."""
+    """A fitted line, rise = start + slope travel, and the RMS of the rises less the line."""
 
     slope: float
     start: float
     correlation: float
     residual: float
-    """RMS of the rises less the line."""
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """Sums over the stretches of a log, from which lines are fitted.
-
-    Attributes:
-        middle: Numbers that are subtracted from 1, travel and rise: sums of numbers near zero lose nothing, (3,).
-        sums: Products of these, (`STRETCHES`, 3, 3).
-    """
-
-    middle: np.ndarray
-    sums: np.ndarray
-
-    @classmethod
-    def of(cls, rises: Sequence[Piece], travels: Sequence[Piece]) -> _Fit | None:
-        """Sum the known pairs; None if there are none."""
-        sums, middle = np.zeros((STRETCHES, 3, 3)), None
-        for number, piece, rows in jackknife_stretches([len(rise) for rise in rises], 0):
-            pairs = np.stack([np.ones(rows.stop - rows.start), travels[piece][rows], rises[piece][rows]])
-            pairs = pairs[:, np.isfinite(pairs[1])]
-            if not pairs.shape[1]:
-                continue
-            if middle is None:
-                middle = np.array([0.0, *pairs[1:].mean(axis=1)])
-            pairs -= middle[:, None]
-            sums[number] += pairs @ pairs.T
-        return None if middle is None else cls(middle, sums)
-
-    def line(self, sums: np.ndarray) -> _Line | None:
-        """Fit a line to some sums, (3, 3); None if there is too little motion."""
-        n = sums[0, 0]
-        if n < 3:
-            return None
-        means = sums[0, 1:] / n
-        (xx, xy), (_, yy) = sums[1:, 1:] - n * np.outer(means, means)
-        rounding = n * (n * np.finfo(float).eps * (means + self.middle[1:])) ** 2
-        if not xx > rounding[0] or not yy > rounding[1]:
-            return None
-        slope = xy / xx
-        start = (means[1] + self.middle[2]) - slope * (means[0] + self.middle[1])
-        residual = math.sqrt(max(0.0, yy - slope * xy) / n)
-        return _Line(float(slope), float(start), float(xy / math.sqrt(xx * yy)), residual)
-
-    def errors(self, span_s: float) -> tuple[float | None, float | None, float | None]:
-        """Return standard errors of the slope and of the start by the span [rad/s], and the RMS of the residual."""
-        whole = self.sums.sum(axis=0)
-        line = self.line(whole)
-        others = [self.line(whole - sums) for sums in self.sums if sums[0, 0]]
-        known = [(other.slope, other.start / span_s) for other in others if other]
-        if line is None or len(known) < max(2, len(others)):
-            return None, None, line and line.residual
-        slope, start = np.sqrt((len(known) - 1) * np.var(known, axis=0)).tolist()
-        return slope, start, line.residual
-
-
-def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float) -> np.ndarray:
-    """Integrate a rate, shifted by its lag, over each span of samples; NaN where it is unknown, (n - span,)."""
-    clock = np.arange(len(rate)) * dt
-    steps = (rate[1:] + rate[:-1]) * dt / 2.0
-    unknown = np.concatenate([[0], np.cumsum(np.isnan(steps))])
-    travelled = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
-    when = clock + lag_s
-    travelled, unknown = (np.interp(when, clock, sums, left=np.nan, right=np.nan) for sums in (travelled, unknown))
-    return np.where(unknown[span:] == unknown[:-span], travelled[span:] - travelled[:-span], np.nan)
+def _line(sums: np.ndarray, middle: np.ndarray) -> _Line | None:
+    """Fit a line to sums of pairs, (3, 3); None if there is too little motion."""
+    n = sums[0, 0]
+    if n < 3:
+        return None
+    means = sums[0, 1:] / n
+    (xx, xy), (_, yy) = sums[1:, 1:] - n * np.outer(means, means)
+    rounding = n * (n * np.finfo(float).eps * (means + middle[1:])) ** 2
+    if not xx > rounding[0] or not yy > rounding[1]:
+        return None
+    slope = xy / xx
+    start = (means[1] + middle[2]) - slope * (means[0] + middle[1])
+    residual = math.sqrt(max(0.0, yy - slope * xy) / n)
+    return _Line(float(slope), float(start), float(xy / math.sqrt(xx * yy)), residual)
 
 
 def alignment_of(log: Log) -> Alignment | None:
@@ -274,7 +242,7 @@ def model_misfit(log: Log, model: ReducedModel) -> float | None:
     Returns:
         The misfit; None for too few stretches, or if nothing moves.
     """
-    half = max(FEWEST_SAMPLES // 2, round(WIDTH_S / 2.0 / log.dt))
+    half = max(MIN_SAMPLES // 2, round(WIDTH_S / 2.0 / log.dt))
     s = np.arange(-half, half + 1) / (half + 1.0)
     weights = (1.0 - s**2) ** 4
     second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * log.dt) ** 2
@@ -292,7 +260,7 @@ def model_misfit(log: Log, model: ReducedModel) -> float | None:
             differences.append(smoothed - derived)
             measured.append(derived)
     size = _spread(np.concatenate(measured))
-    if sum(map(len, measured)) < FEWEST or not size > 0.0:
+    if sum(map(len, measured)) < MIN_STRETCHES or not size > 0.0:
         return None
     stiffness = model.gravity_torque / model.J1
     of_noise = float(np.linalg.norm(stiffness * weights - second) / np.linalg.norm(second))

@@ -23,12 +23,12 @@ FIGURES = {
     "velocity_fit": Key("fit", "", "{:.3f}", better="more", positive=False),
     "velocity_rms_error_push_rad_s": Key("error in windows", "rad/s", "{:.4f}"),
     "velocity_fit_push": Key("fit in windows", "", "{:.3f}", better="more", positive=False),
-    "lag_s": Key("lag", "s", "{:.5f}", positive=False),
+    "lag_s": Key("lag", "ms", "{:.2f}", positive=False),
     "reconstruction_rms_deg": Key("reconstruction error", "deg", "{:.4f}"),
     "roughness_rad_s": Key("roughness", "rad/s", "{:.4f}"),
     "noise_gain_1_s": Key("noise gain", "1/s", "{:.1f}"),
 }
-"""Figures of a replay, in the order of its table."""
+"""Figures of a replay, in the order of its table, and the units there: a lag is in ms."""
 
 
 def shown_first(replayed: ReplayResult) -> list[str]:
@@ -46,9 +46,8 @@ def replay_figures(replays: Sequence[ReplayResult]) -> dict[str, SummaryValue]:
 
 def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
     """Return the figures of one log."""
-    log, noise = replayed.log, replayed.noise
-    acceleration = {"acceleration_rad_s2": noise.acceleration, "correlation": noise.correlation}
-    return {
+    log, noise, smoother = replayed.log, replayed.noise, replayed.zero_phase
+    figures: dict[str, SummaryValue] = {
         "log": log.name,
         "samples": len(log),
         "rate_hz": 1.0 / log.dt,
@@ -57,133 +56,114 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
         "has": sorted(log.has),
         "notes": list(log.notes),
         "settle_s": replayed.settle_s,
-        **({"windows_s": [list(window) for window in log.windows]} if log.windows else {}),
-        "noise": {
-            "tilt_rad": noise.tilt,
-            **(acceleration if "acceleration" in log.has else {}),
-        },
-        **noise_figures(log, noise),
-        **({"reference": replayed.alignment._asdict()} if replayed.alignment else {}),
-        "observers": {name: dict(figures) for name, figures in replayed.summaries.items()},
-        **_zero_phase_figures(replayed),
-        **({} if replayed.misfit is None else {"model_misfit": replayed.misfit}),
-        "left_out": dict(replayed.left_out),
     }
+    if log.windows:
+        figures["windows_s"] = [list(window) for window in log.windows]
+    figures["noise"] = {"tilt_rad": noise.tilt}
+    if "acceleration" in log.has:
+        figures["noise"] |= {"acceleration_rad_s2": noise.acceleration, "correlation": noise.correlation}
+    figures |= noise_figures(log, noise)
+    if replayed.alignment:
+        figures["reference"] = replayed.alignment._asdict()
+    figures["observers"] = dict(replayed.summaries)
+    if smoother is not None:
+        more = {"best_cutoff_hz": smoother.best_cutoff_hz, "best_rms_error_rad_s": smoother.best_rms_error_rad_s}
+        figures[ZERO_PHASE] = {**smoother.figures, "cutoff_hz": smoother.cutoff_hz, **more}
+    if replayed.misfit is not None:
+        figures["model_misfit"] = replayed.misfit
+    return {**figures, "left_out": dict(replayed.left_out)}
 
 
-def _zero_phase_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
-    """Return the figures of the smoother that sees the future, if there are any."""
-    smoother = replayed.zero_phase
-    if smoother is None:
-        return {}
-    more = {"best_cutoff_hz": smoother.best_cutoff_hz, "best_rms_error_rad_s": smoother.best_rms_error_rad_s}
-    return {ZERO_PHASE: {**smoother.figures, "cutoff_hz": smoother.cutoff_hz, **more}}
-
-
-def _figures_by_row(replayed: ReplayResult) -> dict[str, Figures]:
+def _rows(replayed: ReplayResult) -> dict[str, Figures]:
     """Return the figures of a table's rows: the observers, the smoother that is none, and the baseline."""
     rows = dict(replayed.summaries)
-    zero = rows.pop(ZERO)
     if replayed.zero_phase is not None:
         rows[ZERO_PHASE] = replayed.zero_phase.figures
-    return {**rows, ZERO: zero}
+        rows[ZERO] = rows.pop(ZERO)
+    return rows
 
 
 def _means(replays: Sequence[ReplayResult]) -> dict[str, dict[str, SummaryValue]]:
     """Return every row's number of logs, and its figures' means over the logs that have them, the baseline's last."""
-    rows = [_figures_by_row(replayed) for replayed in replays]
-    last = [name for name in (ZERO_PHASE, ZERO) if any(name in row for row in rows)]
-    names = [name for name in dict.fromkeys(n for row in rows for n in row) if name not in last]
+    rows = [_rows(replayed) for replayed in replays]
+    names = dict.fromkeys(name for row in rows for name in row)
     means = {}
-    for name in [*names, *last]:
+    for name in sorted(names, key=lambda name: (name == ZERO, name == ZERO_PHASE)):
         summaries = [row[name] for row in rows if name in row]
-        figures = {key: _mean_of(summaries, key) for key in _keys(replays)}
-        means[name] = {"logs": len(summaries), **figures}
+        means[name] = {"logs": len(summaries)}
+        for key in _keys(replays):
+            values = [value for summary in summaries if (value := summary.get(key)) is not None]
+            interval = known_interval(values, FIGURES[key].positive)
+            means[name][key] = {
+                "mean": sum(values) / len(values) if values else None,
+                "interval": [interval.low, interval.high] if interval and math.isfinite(interval.low) else None,
+                "logs": len(values),
+            }
     return means
-
-
-def _mean_of(summaries: Sequence[Figures], key: str) -> dict[str, SummaryValue]:
-    values = [value for summary in summaries if (value := summary.get(key)) is not None]
-    interval = known_interval(values, FIGURES[key].positive)
-    return {
-        "mean": sum(values) / len(values) if values else None,
-        "interval": [interval.low, interval.high] if interval and math.isfinite(interval.low) else None,
-        "logs": len(values),
-    }
 
 
 def _keys(replays: Sequence[ReplayResult]) -> list[str]:
     return [key for key in FIGURES if any(key in f for r in replays for f in r.summaries.values())]
 
 
-def _tables(replays: Sequence[ReplayResult]) -> list[Table]:
-    """Tabulate each log and, of several, the means."""
-    tables = []
-    for replayed in replays:
-        rows: list[Row] = [{"observer": name, **figures} for name, figures in _figures_by_row(replayed).items()]
-        tables.append(Table(_headings([replayed]), rows, replayed.log.title, _entry))
+def _tables(replays: Sequence[ReplayResult]) -> list[tuple[Table, list[str]]]:
+    """Tabulate each log, with its remarks, and of several the means."""
+    tables = [(_table(replayed.log.title, _rows(replayed), [replayed]), remarks(replayed)) for replayed in replays]
     if len(replays) > 1:
-        rows = [{"observer": name, **mean} for name, mean in _means(replays).items()]
-        title = f"Means over {len(replays)} logs, with 95 % intervals"
-        tables.append(Table(_headings(replays), rows, title, _mean_entry))
+        tables.append((_table(f"Means over {len(replays)} logs, with 95 % intervals", _means(replays), replays), []))
     return tables
 
 
-def _headings(replays: Sequence[ReplayResult]) -> dict[str, str]:
-    headings = {key: "lag [ms]" if key == "lag_s" else FIGURES[key].heading for key in _keys(replays)}
-    return {"observer": "observer", **headings}
+def _table(title: str, figures: Mapping[str, Row], replays: Sequence[ReplayResult]) -> Table:
+    headings = {key: FIGURES[key].heading for key in _keys(replays)}
+    rows = [{"observer": name, **row} for name, row in figures.items()]
+    return Table({"observer": "observer", **headings}, rows, title, _entry)
 
 
 def _entry(row: Row, key: str) -> str:
-    value = row.get(key)
-    return str(value) if isinstance(value, str) else figure_text(key, value)
+    match row.get(key):
+        case str() as name:
+            return name
+        case {"mean": float() as mean, "interval": [float() as low, float() as high]}:
+            interval = Interval(*(_in_unit(key, value) for value in (mean, low, high)))
+            return "\n".join([figure_text(key, mean), *format_interval(FIGURES[key].pattern, interval)])
+        case {"mean": value} | value:
+            return figure_text(key, value)
 
 
 def figure_text(key: str, value: SummaryValue) -> str:
     """Format a figure for a table; a dash for None."""
-    if not isinstance(value, float):
-        return "-"
-    return f"{value * 1e3:.2f}" if key == "lag_s" else FIGURES[key].pattern.format(value)
+    return FIGURES[key].pattern.format(_in_unit(key, value)) if isinstance(value, float) else "-"
 
 
-def _mean_entry(row: Row, key: str) -> str:
-    figure = row[key]
-    if not isinstance(figure, Mapping):
-        return str(figure)
-    scale, pattern = (1e3, "{:.2f}") if key == "lag_s" else (1.0, FIGURES[key].pattern)
-    text = figure_text(key, figure["mean"])
-    match figure:
-        case {"mean": float() as mean, "interval": [float() as low, float() as high]}:
-            return "\n".join([text, *format_interval(pattern, Interval(scale * mean, scale * low, scale * high))])
-    return text
+def _in_unit(key: str, value: float) -> float:
+    return 1e3 * value if key == "lag_s" else value
 
 
 def replay_tables(replays: Sequence[ReplayResult]) -> Group:
     """Return the tables that `cmg-mj replay` prints: one for each log, and one of the means."""
-    tables = _tables(replays)
     parts = []
-    for table, replayed in zip(tables, replays, strict=False):
-        parts += [table.rich(), *(Text(line, overflow="fold") for line in remarks(replayed)), Text("")]
-    means = [table.rich() for table in tables[len(replays) :]]
-    return Group(*parts, *means, Text(table_note(replays), overflow="fold"))
+    for table, lines in _tables(replays):
+        parts += [table.rich(), *(Text(line, overflow="fold") for line in lines), *([Text("")] if lines else [])]
+    return Group(*parts, Text(table_note(replays), overflow="fold"))
 
 
 def replay_markdown(replays: Sequence[ReplayResult]) -> str:
     """Return the tables as Markdown."""
-    tables = _tables(replays)
-    parts = []
-    for table, replayed in zip(tables, replays, strict=False):
-        parts += [f"{table.title}:", table.markdown(), *remarks(replayed)]
-    for table in tables[len(replays) :]:
-        parts += [f"{table.title}:", table.markdown()]
+    parts = [part for table, lines in _tables(replays) for part in (f"{table.title}:", table.markdown(), *lines)]
     return "\n\n".join([*parts, table_note(replays)])
 
 
 def remarks(replayed: ReplayResult) -> list[str]:
     """Return the remarks on a log and its reference, and the observers left out."""
     lines = remarks_on(replayed.log, replayed.alignment) + noise_remarks(replayed.log, replayed.noise)
-    if replayed.zero_phase is not None:
-        lines.append(replayed.zero_phase.remark)
+    if (smoother := replayed.zero_phase) is not None:
+        best = "-" if smoother.best_rms_error_rad_s is None else f"{smoother.best_rms_error_rad_s:.4f}"
+        lines.append(
+            f"{ZERO_PHASE} is no observer: it sees the future. It smooths the tilt to both sides of each sample, below "
+            f"{smoother.cutoff_hz:.3g} Hz, chosen by the tilt alone; with {smoother.best_cutoff_hz:.3g} Hz, the best "
+            f"for the reference, its error is {best} rad/s."
+        )
     if doubt := model_remark(replayed.misfit):
         lines.append(doubt)
     reasons: dict[str, list[str]] = {}

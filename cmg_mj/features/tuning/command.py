@@ -171,7 +171,7 @@ def tune_log(
     parameters count as better by more than 1 % and beyond chance. Sixteen short worlds compare both in a closed loop.
     Logs are read as in replay. Writes a folder with tuned.json.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.features.replay.inputs import model_of
+    from cmg_mj.features.replay.log_replay import model_of
     from cmg_mj.features.replay.noise import noise_numbers
     from cmg_mj.features.replay.reading import check_distinct_logs, read_log
     from cmg_mj.features.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs

@@ -13,9 +13,8 @@ import numpy as np
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
-from cmg_mj.features.replay.inputs import ObserverInputs, observer_inputs
 from cmg_mj.features.replay.log import REFERENCE, Log
-from cmg_mj.features.replay.log_replay import NO_MODEL, misfit_of, replay_log
+from cmg_mj.features.replay.log_replay import NO_MODEL, ObserverInputs, misfit_of, observer_inputs, replay_log
 from cmg_mj.features.replay.noise import noise_figures, noise_remarks
 from cmg_mj.features.replay.reference import Alignment, alignment_of, model_remark, remarks_on
 from cmg_mj.features.tuning.closed_loop import LoopComparison, compare_in_loop, judged

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.view.recording.replay_recording import MAIN
 from tests.command import ROOT, CommandOutcome, cmg_mj
 from tests.features.replay.motion import COLUMNS, sine, write_csv
 
 LOG = ROOT / "examples" / "data" / "stepper_encoder_gyro.csv"
 REAL = "time=time_s,tilt=encoder_rad,rate=gyr_y_rad_s"
 PLAIN = ",".join(f"{role}={name}" for role, name in COLUMNS.items())
-FILES = ["plot.png", "recording.rrd", "replay.toml", "signals.parquet", "summary.json"]
 
 
 @pytest.fixture(autouse=True)
@@ -53,14 +50,16 @@ def test_the_real_log() -> None:
 
 @pytest.mark.slow
 def test_what_it_writes() -> None:
-    outcome = replay("sine.csv", "--columns", PLAIN, "--out", "it")
+    outcome = replay("sine.csv", "--columns", PLAIN, "--window", "2:4", "--out", "it")
     assert outcome.status == 0
     assert "Open the recording: rerun it/recording.rrd" in outcome.err
-    assert files("it") == FILES
+    assert files("it") == ["plot.png", "recording.rrd", "replay.toml", "signals.parquet", "summary.json"]
     assert (Path("it") / "plot.png").read_bytes()[:4] == b"\x89PNG"
-    summary = json.loads((Path("it") / "summary.json").read_text())
+    observers = json.loads((Path("it") / "summary.json").read_text())["logs"][0]["observers"]
+    linear = observers["linear"]
+    assert linear["velocity_rms_error_push_rad_s"] == pytest.approx(linear["velocity_rms_error_rad_s"], rel=1e-2)
     signals = Trajectory.load(Path("it") / "signals.parquet")
-    assert signals.observers == tuple(name for name in summary["logs"][0]["observers"] if name != "zero")
+    assert signals.observers == tuple(name for name in observers if name != "zero")
     np.testing.assert_array_equal(signals["reference_rad_s"], sine()["gyro_rad_s"])
     assert "estimate/linear/x2_rad_s" in signals.columns
 
@@ -72,92 +71,51 @@ def test_its_recording() -> None:
     replay("sine.csv", "--columns", PLAIN, "--out", "it", "--observers", "linear")
     entities = {str(chunk.entity_path) for chunk in RrdReader("it/recording.rrd").stream()}
     assert {"/sine/tilt/measured", "/sine/rate/true", "/sine/rate_estimate/linear", "/summary", "/settings"} <= entities
-    assert len(MAIN) == 3
-
-
-@pytest.mark.slow
-def test_the_same_replay_goes_to_the_same_folder() -> None:
-    for folder in ("runs/replay-sine", "runs/replay-sine", "runs/replay-sine-2"):
-        settle = ("--settle-s", "0.5") if folder.endswith("2") else ()
-        assert re.search(rf"Written to {folder}[.;] ", replay("sine.csv", "--columns", PLAIN, *settle).err)
 
 
 @pytest.mark.slow
 def test_several_logs() -> None:
-    half = {name: values[:2000] for name, values in sine().items()}
     os.mkdir("other")
-    write_csv("other/sine.csv", half)
-    outcome = replay("sine.csv", "other/sine.csv", "--columns", PLAIN, "--out", "it", "--json", "--observers", "linear")
-    result = json.loads(outcome.out)
+    write_csv("other/sine.csv", {name: values[:2000] for name, values in sine().items()})
+    arguments = ("sine.csv", "other/sine.csv", "--columns", PLAIN, "--observers", "linear,finite_difference")
+    result = json.loads(replay(*arguments, "--out", "it", "--json").out)
     assert [log["samples"] for log in result["logs"]] == [4000, 2000]
     errors = [log["observers"]["linear"]["velocity_rms_error_rad_s"] for log in result["logs"]]
     mean = result["mean"]["linear"]["velocity_rms_error_rad_s"]
     assert mean["mean"] == pytest.approx(np.mean(errors))
     assert mean["interval"] is None  # of fewer than four positive numbers
-    assert files("it") == [
-        "plot-sine-2.png",
-        "plot-sine.png",
-        "recording.rrd",
-        "replay.toml",
-        "signals-sine-2.parquet",
-        "signals-sine.parquet",
-        "summary.json",
-    ]
-    assert "Means over 2 logs" in replay("sine.csv", "other/sine.csv", "--columns", PLAIN).out
-
-
-@pytest.mark.slow
-def test_markdown_and_table_say_the_same() -> None:
-    arguments = ("sine.csv", "--columns", PLAIN, "--observers", "linear,finite_difference")
+    single = {"recording.rrd", "replay.toml", "summary.json"}
+    assert set(files("it")) - single == {
+        f"{name}.{ending}"
+        for log in ("sine", "sine-2")
+        for name, ending in ((f"plot-{log}", "png"), (f"signals-{log}", "parquet"))
+    }
     table, markdown = replay(*arguments).out, replay(*arguments, "--markdown").out
     assert "| `finite_difference` |" in markdown
     for text in (table, markdown):
+        assert "Means over 2 logs" in text
         assert "2.50" in text  # the lag [ms]
-        assert "Fit: 1 - RMS error" in text
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "say which columns are what"),
-        (("--columns", "tilt=tilt_rad"), "no time"),
+        ((), "--columns"),
         (("--columns", PLAIN, "--rate", "0"), "--rate"),
         (("--columns", PLAIN, "--max-gap", "-1"), "--max-gap"),
-        (("--columns", PLAIN, "--delay", "nan"), "--delay nan: must be from -1e+06 to 1e+06 s"),
         (("--columns", PLAIN, "--scale", "rate=x"), "--scale rate=x: "),
-        (("--columns", PLAIN, "--radii", "1"), "write INNER,OUTER"),
-        (("--columns", PLAIN, "--time-range", "5:1"), "must end after its start"),
-        (("--columns", PLAIN, "--window", "a"), "--window 'a': write START:END"),
+        (("--columns", PLAIN, "--radii", "1"), "--radii '1'"),
+        (("--columns", PLAIN, "--time-range", "5:1"), "--time-range 5:1"),
+        (("--columns", PLAIN, "--window", "a"), "--window 'a'"),
         (("--columns", PLAIN, "--observers", "liner"), "did you mean 'linear'?"),
-        (
-            ("--columns", PLAIN, "--observers", "linear", "--set", "ltv.Q=1"),
-            "--set ltv: is not among --observers linear",
-        ),
-        (("--columns", PLAIN, "--set", "ltv.nope=3"), "observer.nope: no such field of"),
+        (("--columns", PLAIN, "--observers", "linear", "--set", "ltv.Q=1"), "--set ltv: "),
         (("--columns", PLAIN, "--set", "linear.tau=-1"), "tau = -1: "),
         (("--columns", PLAIN, "--settle-s", "nan"), "--settle-s nan"),
-        (("--columns", PLAIN, "--noise", "accelerometer=3"), "the tilt is not that of two accelerometers"),
-        (("--columns", PLAIN, "--noise", "tilt=0.05,tilt=0.1"), "--noise tilt: given twice"),
-        (("--columns", "time=t_s,tilt=tilt_rad", "--window", "2:4"), "--window: there is no reference"),
-        (
-            ("--columns", PLAIN, "--window", "30:40"),
-            "--window 30:40: sine.csv has no sample there; it goes from 0 to 19.995 s",
-        ),
+        (("--columns", PLAIN, "--noise", "tilt=0.05,tilt=0.1"), "--noise tilt: "),
         (("--columns", PLAIN, "--model", "x.xml"), "no such file, nor a bundled one"),
-        (("--columns", PLAIN, "--out", ""), "name a folder"),
+        (("./sine.csv", "--columns", PLAIN), "sine.csv: this log is given twice"),
     ],
 )
 def test_wrong_arguments(arguments: tuple, message: str) -> None:
     assert message in replay("sine.csv", *arguments).complaint
     assert not Path("runs").exists()
-
-
-@pytest.mark.slow
-def test_a_window_of_ones_own() -> None:
-    outcome = replay("sine.csv", "--columns", PLAIN, "--window", "2:4", "--json", "--observers", "linear")
-    figures = json.loads(outcome.out)["logs"][0]["observers"]["linear"]
-    assert figures["velocity_rms_error_push_rad_s"] == pytest.approx(figures["velocity_rms_error_rad_s"], rel=1e-2)
-
-
-def test_the_same_log_twice() -> None:
-    assert "sine.csv" in replay("sine.csv", "./sine.csv", "--columns", PLAIN).complaint

@@ -9,14 +9,10 @@ import numpy as np
 import pytest
 
 from cmg_mj.features.replay import replay
-from cmg_mj.features.replay.log import ReadOptions
 from cmg_mj.features.replay.log_replay import ReplayResult, replay_log
-from cmg_mj.features.replay.reading import read_log
-from cmg_mj.features.replay.reference import alignment
-from cmg_mj.features.replay.scores import lag
 from cmg_mj.observers import make_observer
 from cmg_mj.results.trajectory import Trajectory
-from tests.features.replay.motion import AMPLITUDE, COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
+from tests.features.replay.motion import AMPLITUDE, DT, OMEGA, read, sine
 from tests.observers.reference import PAPER
 
 PEAK = AMPLITUDE * OMEGA
@@ -26,8 +22,7 @@ GAIN = math.sin(OMEGA * DT / 2.0) / (OMEGA * DT / 2.0)
 
 @pytest.fixture(scope="module")
 def sine_replay(tmp_path_factory: pytest.TempPathFactory) -> ReplayResult:
-    path = write_csv(tmp_path_factory.mktemp("sine") / "sine.csv", sine())
-    return replay_log(read_log(path, ReadOptions(COLUMNS)), settle_s=1.0)
+    return replay_log(read(tmp_path_factory.mktemp("sine"), sine()), settle_s=1.0)
 
 
 def test_the_difference_of_a_sine(sine_replay: ReplayResult) -> None:
@@ -61,8 +56,7 @@ def test_zero_has_a_fit_of_zero_and_no_lag(sine_replay: ReplayResult) -> None:
 
 def test_without_a_reference(tmp_path: Path) -> None:
     """The difference's integral is the mean of two measured tilts: half a step behind."""
-    path = write_csv(tmp_path / "sine.csv", sine())
-    result = replay_log(read_log(path, ReadOptions({"time": "t_s", "tilt": "tilt_rad"}))).summaries
+    result = replay_log(read(tmp_path, sine(), {"time": "t_s", "tilt": "tilt_rad"})).summaries
     assert set(result["finite_difference"]) == {"reconstruction_rms_deg", "roughness_rad_s", "noise_gain_1_s"}
     step = 2.0 * AMPLITUDE * math.sin(OMEGA * DT / 2.0) / math.sqrt(2.0)
     assert result["finite_difference"]["reconstruction_rms_deg"] == pytest.approx(math.degrees(step / 2.0), rel=5e-3)
@@ -71,71 +65,3 @@ def test_without_a_reference(tmp_path: Path) -> None:
     whole_periods = math.degrees(AMPLITUDE / math.sqrt(2.0))
     assert result["zero"]["reconstruction_rms_deg"] == pytest.approx(whole_periods, rel=0.01)
     assert result["zero"]["roughness_rad_s"] == 0.0
-
-
-def test_roughness_of_white_noise_is_its_size(tmp_path: Path) -> None:
-    """A tilt that is summed white noise has white differences."""
-    steps = np.random.default_rng(1).standard_normal(N) * 0.01
-    columns = {"t_s": DT * np.arange(N), "tilt_rad": np.cumsum(steps) * DT}
-    path = write_csv(tmp_path / "walk.csv", columns)
-    result = replay_log(read_log(path, ReadOptions({"time": "t_s", "tilt": "tilt_rad"}))).summaries
-    assert result["finite_difference"]["roughness_rad_s"] == pytest.approx(0.01, rel=0.05)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("late", [0.012, -0.0031, 0.0])
-def test_a_late_reference_is_noticed_and_taken_back(tmp_path: Path, late: float) -> None:
-    t = DT * np.arange(N)
-    columns = {"t_s": t, "tilt_rad": tilt(t), "gyro_rad_s": rate(t - late) / 1.015 - 0.02}
-    path = write_csv(tmp_path / "late.csv", columns)
-    result = replay_log(read_log(path, ReadOptions(COLUMNS))).alignment
-    assert result is not None
-    assert result.lag_s == pytest.approx(late, abs=2e-5)
-    assert result.scale == pytest.approx(1.015, rel=1e-3)
-    assert result.offset_rad_s == pytest.approx(1.015 * 0.02, rel=1e-2)
-    log = read_log(path, ReadOptions(COLUMNS, delay_s=late, scale={"rate": 1.015}, offset={"rate": 1.015 * 0.02}))
-    expected = replay_log(read_log(write_csv(tmp_path / "sine.csv", sine()), ReadOptions(COLUMNS))).summaries
-    for name, figures in replay_log(log).summaries.items():
-        assert figures["velocity_rms_error_rad_s"] == pytest.approx(
-            expected[name]["velocity_rms_error_rad_s"], rel=1e-3
-        )
-
-
-def test_lags_are_finer_than_a_sample_of_noise_too() -> None:
-    """White noise low-passed at a quarter of the sampling rate, drawn ten times as finely."""
-    from scipy.signal import butter, sosfiltfilt
-
-    fine = sosfiltfilt(butter(6, 0.025, output="sos"), np.random.default_rng(0).standard_normal(60_000))
-    for tenths in (3, 5, -7, 13):
-        late = fine[1000 - tenths : -1000 - tenths : 10]
-        result = lag([late], [fine[1000:-1000:10]], DT)
-        assert result == pytest.approx(tenths * DT / 10.0, abs=DT / 1000.0)
-
-
-def test_a_lag_does_not_ask_for_size_or_offset() -> None:
-    t = DT * np.arange(N)
-    assert lag([7.0 * rate(t - 0.01) + 3.0], [rate(t)], DT) == pytest.approx(0.01, abs=DT / 2000.0)
-
-
-def test_there_is_no_lag_of_what_is_not_alike() -> None:
-    noise = np.random.default_rng(2).standard_normal((2, N))
-    assert lag([noise[0]], [noise[1]], DT) is None
-    assert lag([np.zeros(N)], [noise[1]], DT) is None
-
-
-def test_a_reference_that_counts_the_other_way() -> None:
-    t = DT * np.arange(N)
-    result = alignment([tilt(t)], [-rate(t)], DT)
-    assert result.correlation == pytest.approx(-1.0, abs=1e-6)
-
-
-@pytest.mark.parametrize(("share", "has_lag"), [(0.4, False), (0.6, True)])
-def test_a_faint_likeness_has_no_lag(share: float, has_lag: bool) -> None:
-    """An estimate that is the reference, 20 ms early, and another motion: they correlate by `share`."""
-    from scipy.signal import butter, sosfiltfilt
-
-    motion, disturbance = sosfiltfilt(butter(4, 0.1, output="sos"), np.random.default_rng(5).standard_normal((2, N)))
-    mixture = share * np.roll(motion, -4) + math.sqrt(1.0 - share**2) * disturbance * motion.std() / disturbance.std()
-    result = lag([mixture], [motion], DT)
-    assert (result is not None) == has_lag
-    assert result is None or result == pytest.approx(-0.02, abs=2e-3)

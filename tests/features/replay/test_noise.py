@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.core.tilt import RadialTilt
-from cmg_mj.features.replay.inputs import replay_prepared
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import Log, ReadOptions
-from cmg_mj.features.replay.log_replay import replay_log
+from cmg_mj.features.replay.log_replay import replay_log, replay_prepared
 from cmg_mj.features.replay.noise import noise_figures, noise_in, noise_of, noise_remarks
 from cmg_mj.features.replay.reading import read_log
-from cmg_mj.features.replay.table import ACCELEROMETERS
-from cmg_mj.scenario.schema import Scenario
-from tests.features.replay.motion import COLUMNS, DT, N, sine, write_csv
+from tests.features.replay.motion import DT, N, read, sine, two_accelerometers
 
-PLACES = RadialTilt(0.1, 0.3)
 RUN_COLUMNS = {
     "time": "time_s",
     "tilt": "y1_rad",
@@ -31,55 +28,33 @@ RUN_COLUMNS = {
 }
 
 
-def noisy_log(folder: Path, degrees: float, options: ReadOptions | None = None, n: int = N) -> Log:
-    columns = sine()
-    columns["tilt_rad"] = columns["tilt_rad"] + np.radians(degrees) * np.random.default_rng(0).standard_normal(N)
-    path = write_csv(folder / "noisy.csv", {name: values[:n] for name, values in columns.items()})
-    return read_log(path, options or ReadOptions(COLUMNS))
+def noisy_log(folder: Path, degrees: float) -> Log:
+    noise = np.radians(degrees) * np.random.default_rng(0).standard_normal(N)
+    return read(folder, {**sine(), "tilt_rad": sine()["tilt_rad"] + noise})
 
 
-def two_accelerometers(folder: Path, density: float) -> Log:
-    """Write a log of two accelerometers at 200 Hz that swing at 0.7 Hz."""
-    random, t = np.random.default_rng(1), DT * np.arange(N)
-    w, sigma = 1.4 * np.pi, density * 1e-6 * 9.80665 * math.sqrt(100.0)
-    y, rate = 0.1 * np.sin(w * t), 0.1 * w * np.cos(w * t)
-    columns = {"t_s": t}
-    for name, r in (("inner", PLACES.r_inner), ("outer", PLACES.r_outer)):
-        columns[f"{name}_x"] = -r * w**2 * y - 9.81 * np.sin(y) + sigma * random.standard_normal(N)
-        columns[f"{name}_z"] = 9.81 * np.cos(y) - r * rate**2 + sigma * random.standard_normal(N)
-    path = write_csv(folder / "two.csv", columns)
-    names = {name: name for name in ACCELEROMETERS}
-    options = ReadOptions({"time": "t_s", **names}, units=dict.fromkeys(names, "m_s2"), radii_m=(0.1, 0.3))
-    return read_log(path, options)
-
-
-def run_scenario(density: float, seed: int, duration_s: float) -> Scenario:
-    settings = ["observer.kind=gyro_free", f"sensors.accelerometer.noise_density_ug_rthz={density}", f"seed={seed}"]
-    return load_scenario("push_recovery", [*settings, f"duration_s={duration_s}"])
-
-
-def errors_of_a_run(folder: Path, density: float, seed: int, duration_s: float) -> list[tuple[float, ...]]:
-    """Return the errors of `gyro_free` and `kalman` on a run's log: noise told, and not told."""
-    experiment = prepare(run_scenario(density, seed, duration_s))
-    trajectory = experiment.run().trajectory
-    assert trajectory is not None
-    trajectory.save(folder / "run.parquet")
-    log = read_log(folder / "run.parquet", ReadOptions(RUN_COLUMNS))
-    _, model, truth = experiment.design.constructor_arguments
-    told = {"tilt": math.degrees(truth.tilt), "acceleration": truth.acceleration}
-    results = [replay_prepared(log, ["gyro_free", "kalman"], model=model, noises=noises) for noises in (told, {})]
-    return [
-        tuple(float(figures["velocity_rms_error_rad_s"] or 0.0) for figures in list(result.summaries.values())[:2])
-        for result in results
-    ]
+def accelerometers_of_800_ug(folder: Path) -> Log:
+    return two_accelerometers(folder, 0.1, noise=800e-6 * STANDARD_GRAVITY * math.sqrt(0.5 / DT))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("density", [400.0, 600.0, 1000.0, 1500.0])
 def test_a_run_replayed_without_being_told_its_noise(density: float, tmp_path: Path) -> None:
     """At 400 ug/rtHz the tilt's noise is 0.36 deg; the default of 0.1 deg gives 0.034 and 0.166 for 0.014 and 0.069."""
+    sensor = f"sensors.accelerometer.noise_density_ug_rthz={density}"
     for seed in range(2):
-        told, by_the_log = errors_of_a_run(tmp_path, density, seed, 15.0)
+        settings = ["observer.kind=gyro_free", sensor, f"seed={seed}", "duration_s=15.0"]
+        experiment = prepare(load_scenario("push_recovery", settings))
+        trajectory = experiment.run().trajectory
+        assert trajectory is not None
+        trajectory.save(tmp_path / "run.parquet")
+        log = read_log(tmp_path / "run.parquet", ReadOptions(RUN_COLUMNS))
+        _, model, truth = experiment.design.constructor_arguments
+        errors = []
+        for noises in ({"tilt": math.degrees(truth.tilt), "acceleration": truth.acceleration}, {}):
+            result = replay_prepared(log, ["gyro_free", "kalman"], model=model, noises=noises).summaries
+            errors.append([result[name]["velocity_rms_error_rad_s"] for name in ("gyro_free", "kalman")])
+        told, by_the_log = errors
         assert by_the_log == pytest.approx(told, rel=0.1)
 
 
@@ -93,7 +68,7 @@ def test_a_noise_is_told_or_else_the_logs(tmp_path: Path) -> None:
 
 def test_the_noise_of_two_accelerometers(tmp_path: Path) -> None:
     """Tilt and acceleration as the two make them, with the model's correlation."""
-    log = two_accelerometers(tmp_path, 800.0)
+    log = accelerometers_of_800_ug(tmp_path)
     noise, expected = noise_of(log), noise_of(log, {"accelerometer": 800.0})
     assert noise.tilt == pytest.approx(expected.tilt, rel=0.04)
     assert noise.acceleration == pytest.approx(expected.acceleration, rel=0.04)
@@ -112,8 +87,7 @@ def test_resampled_noise_has_the_density_that_observers_assume(rate: float, jitt
     random = np.random.default_rng(0)
     t = DT * (np.arange(N) + random.uniform(-jitter, jitter, N))
     tilt = 0.01 * random.standard_normal(N)
-    path = write_csv(tmp_path / "log.csv", {"t_s": t, "tilt_rad": tilt})
-    log = read_log(path, ReadOptions({"time": "t_s", "tilt": "tilt_rad"}, rate_hz=rate))
+    log = read(tmp_path, {"t_s": t, "tilt_rad": tilt}, {"time": "t_s", "tilt": "tilt_rad"}, rate_hz=rate)
     density = np.abs(np.fft.rfft(log["y1_rad"])) ** 2 / len(log)
     band = np.arange(len(density)) / (len(log) * log.dt) < 20.0
     noise = noise_in(log).tilt
@@ -123,9 +97,7 @@ def test_resampled_noise_has_the_density_that_observers_assume(rate: float, jitt
 
 def test_a_told_density_is_that_of_the_rows(tmp_path: Path) -> None:
     """A sample at a slower rate than the rows' has all of a row's noise, since nothing filters it."""
-    from dataclasses import replace
-
-    log = two_accelerometers(tmp_path, 800.0)
+    log = accelerometers_of_800_ug(tmp_path)
     told = {"accelerometer": 800.0}
     slow, quick = replace(log, dt=2.0 * log.dt), replace(log, dt=log.dt / 2.0)
     assert noise_of(slow, told) == noise_of(log, told)
@@ -134,18 +106,10 @@ def test_a_told_density_is_that_of_the_rows(tmp_path: Path) -> None:
         assert noise_of(log_at_rate).tilt == pytest.approx(noise_of(log_at_rate, told).tilt, rel=0.04)
 
 
-def keys(figures: object, path: Sequence[str]) -> object:
-    for name in path:
-        assert isinstance(figures, dict)
-        figures = figures[name]
-    return figures
-
-
 def test_json_has_the_logs_noise(tmp_path: Path) -> None:
-    log = noisy_log(tmp_path, 0.36)
-    figures = noise_figures(log, noise_of(log))
-    assert keys(figures, ("noise_by_the_log", "tilt_rad", "used")) is True
-    assert keys(noise_figures(log, noise_of(log, {"tilt": 0.1})), ("noise_by_the_log", "tilt_rad", "used")) is False
-    fine = noisy_log(tmp_path, 0.0)
-    tilt = keys(noise_figures(fine, noise_of(fine)), ("noise_by_the_log", "tilt_rad"))
-    assert tilt == {"sigma": None, "reason": "there is hardly any", "used": False}
+    log, fine = noisy_log(tmp_path, 0.36), noisy_log(tmp_path, 0.0)
+    for noises, used in ({}, True), ({"tilt": 0.1}, False):
+        figures: Any = noise_figures(log, noise_of(log, noises))
+        assert figures["noise_by_the_log"]["tilt_rad"]["used"] is used
+    figures = noise_figures(fine, noise_of(fine))
+    assert figures["noise_by_the_log"]["tilt_rad"] == {"sigma": None, "reason": "there is hardly any", "used": False}

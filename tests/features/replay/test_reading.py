@@ -13,32 +13,33 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.replay.log import Log, ReadOptions
+from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.features.replay.log import ACCELEROMETERS, Log, ReadOptions, assignments, unit_of_name
 from cmg_mj.features.replay.reading import read_log
-from cmg_mj.features.replay.table import ACCELEROMETERS, assignments, unit_of_name
-from tests.features.replay.motion import COLUMNS, DT, OMEGA, N, rate, sine, tilt, write_csv
+from tests.features.replay.motion import COLUMNS, DT, OMEGA, N, rate, read, sine, tilt, two_accelerometers, write_csv
 
-SIGNALS = ("time_s", "y1_rad", "reference_rad_s")
-
-
-@pytest.fixture
-def plain(tmp_path: Path) -> Log:
-    return read_log(write_csv(tmp_path / "plain.csv", sine()), ReadOptions(COLUMNS))
+T = DT * np.arange(N)
+ONE = {"time": "t_s", "tilt": "tilt_rad"}
 
 
-def assert_same(log: Log, plain: Log, tolerance: float = 1e-9) -> None:
-    assert log.dt == pytest.approx(plain.dt, rel=1e-9)
-    for name in SIGNALS:
-        np.testing.assert_allclose(log[name], plain[name], atol=tolerance)
+def assert_plain(log: Log, tolerance: float = 1e-9) -> None:
+    """It is the sine at its own rate."""
+    assert log.dt == pytest.approx(DT, rel=1e-9)
+    for name, expected in zip(("time_s", "y1_rad", "reference_rad_s"), sine().values(), strict=True):
+        np.testing.assert_allclose(log[name], expected, atol=tolerance)
 
 
-def test_the_plain_one(plain: Log) -> None:
-    assert plain.dt == DT
-    assert list(plain.parts) == [slice(0, N)]
-    assert plain.notes == ()
-    assert plain.has == {"reference"}
-    np.testing.assert_array_equal(plain["y1_rad"], sine()["tilt_rad"])
-    np.testing.assert_array_equal(plain["reference_rad_s"], sine()["gyro_rad_s"])
+def assert_sine(log: Log, tolerance: float) -> None:
+    """Tilt and reference are the sine's at the log's times, where the reference is known."""
+    np.testing.assert_allclose(log["y1_rad"], tilt(log["time_s"]), atol=tolerance)
+    known = np.isfinite(log["reference_rad_s"])
+    np.testing.assert_allclose(log["reference_rad_s"][known], rate(log["time_s"])[known], atol=10.0 * tolerance)
+
+
+def test_the_plain_one(tmp_path: Path) -> None:
+    plain = read(tmp_path, sine())
+    assert (plain.dt, list(plain.parts), plain.notes, plain.has) == (DT, [slice(0, N)], (), {"reference"})
+    assert_plain(plain, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -47,144 +48,125 @@ def test_the_plain_one(plain: Log) -> None:
         (("t_ms", "pitch_deg", "gyro_dps"), (1e3, 180 / math.pi, 180 / math.pi)),
         (("Time [us]", "Pitch (°)", "Gyro [deg/s]"), (1e6, 180 / math.pi, 180 / math.pi)),
         (("timeMs", "tiltMrad", "gyro rad/s"), (1e3, 1e3, 1.0)),
-        (("stamp_ns", "pitch_rev", "gyro_rpm"), (1e9, 0.5 / math.pi, 30.0 / math.pi)),
     ],
 )
-def test_units_by_their_names(heads: tuple, sizes: tuple, plain: Log, tmp_path: Path) -> None:
+def test_units_by_their_names(heads: tuple, sizes: tuple, tmp_path: Path) -> None:
     columns = {h: v * s for h, v, s in zip(heads, sine().values(), sizes, strict=True)}
-    path = write_csv(tmp_path / "other.csv", columns)
-    assert_same(read_log(path, ReadOptions(dict(zip(COLUMNS, heads, strict=True)))), plain)
+    assert_plain(read(tmp_path, columns, dict(zip(COLUMNS, heads, strict=True))))
 
 
-def test_units_as_options(plain: Log, tmp_path: Path) -> None:
+def test_units_as_options(tmp_path: Path) -> None:
     t, y, w = sine().values()
-    path = write_csv(tmp_path / "told.csv", {"a": t * 1e3, "b": np.degrees(y), "c": -np.degrees(w)})
-    log = read_log(
-        path,
-        ReadOptions(
-            {"time": "a", "tilt": "b", "rate": "c"},
-            units={"time": "ms", "tilt": "degrees", "rate": "deg/s"},
-            scale={"rate": -1.0},
-        ),
-    )
-    assert_same(log, plain)
+    columns = {"a": t * 1e3, "b": np.degrees(y), "c": -np.degrees(w)}
+    units = {"time": "ms", "tilt": "degrees", "rate": "deg/s"}
+    assert_plain(read(tmp_path, columns, {"time": "a", "tilt": "b", "rate": "c"}, units=units, scale={"rate": -1.0}))
 
 
 @pytest.mark.parametrize(
     ("quantity", "name", "unit"),
     [
-        ("rate", "gyr_y_rad_s", "rad_s"),
         ("rate", "alpha_rad_s2", None),
         ("angle", "gyro_deg_s", None),
         ("acceleration", "acc_x (m/s^2)", "m_s2"),
-        ("acceleration", "ax_mg", "mg"),
         ("acceleration", "accX", None),
         ("time", "timestamp", None),
-        ("angle", "tilt", None),
     ],
 )
 def test_what_a_name_ends_in(quantity: str, name: str, unit: str | None) -> None:
     assert unit_of_name(quantity, name) == unit  # type: ignore[arg-type]
 
 
-def parquet(path: Path, columns: dict) -> Path:
-    pq.write_table(pa.table(columns), path)
-    return path
+def test_parquet_with_dates(tmp_path: Path) -> None:
+    """Whole nanoseconds are subtracted before they are floats: in 2026 a double has a quarter of a microsecond.
 
-
-def test_parquet_with_dates(plain: Log, tmp_path: Path) -> None:
-    """Whole nanoseconds are subtracted before they are floats: in 2026 a double has a quarter of a microsecond."""
+    Nested columns and truth values beside are not numbers; spaces around a heading do not count.
+    """
     t, y, w = sine().values()
     stamps = pa.array(1_790_000_000_000_000_000 + np.rint(t * 1e9).astype(int), pa.timestamp("ns", "UTC"))
-    path = parquet(tmp_path / "log.parquet", {"t_s": stamps, "tilt_rad": y.astype("float32"), "gyro_rad_s": w})
-    assert_same(read_log(path, ReadOptions(COLUMNS)), plain, 1e-7)
+    columns = {" t_s": stamps, "tilt_rad ": y.astype("float32"), "gyro_rad_s": w, "imu.tilt_rad": 2.0 * y}
+    columns |= {"imu": pa.array([{"tilt_rad": one} for one in y]), "up_rad": y > 0.0}
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table(columns), path)
+    assert_plain(read_log(path, ReadOptions(COLUMNS)), 1e-7)
+    np.testing.assert_array_equal(read_log(path, ReadOptions({**ONE, "tilt": "imu.tilt_rad"}))["y1_rad"], 2.0 * y)
+    for name in ("imu", "up_rad"):
+        with pytest.raises(InputError, match=f"column '{name}' holds"):
+            read_log(path, ReadOptions({**ONE, "tilt": name}, units={"tilt": "rad"}))
 
 
-def test_dates_in_a_csv(plain: Log, tmp_path: Path) -> None:
-    t, y, w = sine().values()
-    stamps = [f"2026-11-22T06:{int(s // 60):02}:{s % 60:06.3f}" for s in t]
-    path = write_csv(tmp_path / "dates.csv", {"when": stamps, "tilt_rad": y, "gyro_rad_s": w})
-    log = read_log(path, ReadOptions({**COLUMNS, "time": "when"}))
-    assert_same(log, plain)
+def test_dates_in_a_csv(tmp_path: Path) -> None:
+    stamps = [f"2026-11-22T06:{int(s // 60):02}:{s % 60:06.3f}" for s in T]
+    assert_plain(read(tmp_path, {**sine(), "t_s": stamps}))
 
 
-def test_a_csv_is_read_as_told(plain: Log, tmp_path: Path) -> None:
+def test_a_csv_is_read_as_told(tmp_path: Path) -> None:
     """Semicolons with decimal commas in Latin-1, as a German Excel writes them, with Windows' line ends."""
-    heads = {"t_s": "t_s", "tilt_rad": "Neigung (°)", "gyro_rad_s": "gyro_rad_s"}
-    columns = {heads[name]: values for name, values in sine().items()}
-    columns["Neigung (°)"] = np.degrees(columns["Neigung (°)"])
-    path = write_csv(tmp_path / "eu.csv", columns, delimiter=";")
+    t, y, w = sine().values()
+    path = write_csv(tmp_path / "eu.csv", {"t_s": t, "Neigung (°)": np.degrees(y), "gyro_rad_s": w}, delimiter=";")
     path.write_bytes(path.read_text("utf-8").replace(".", ",").replace("\n", "\r\n").encode("latin-1"))
     told = ReadOptions({**COLUMNS, "tilt": "Neigung (°)"}, delimiter=";", encoding="latin-1", decimal=",")
-    assert_same(read_log(path, told), plain)
+    assert_plain(read_log(path, told))
     for wrong in ({"delimiter": ","}, {"encoding": "utf-8"}, {"decimal": "."}, {"delimiter": ";;"}):
         with pytest.raises(InputError, match="eu"):
             read_log(path, dataclasses.replace(told, **wrong))
 
 
-def test_a_rate_instead_of_times(plain: Log, tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "rate.csv", sine())
-    assert_same(read_log(path, ReadOptions({"tilt": "tilt_rad", "rate": "gyro_rad_s"}, rate_hz=1.0 / DT)), plain)
+def test_a_rate_instead_of_times(tmp_path: Path) -> None:
+    assert_plain(read(tmp_path, sine(), {"tilt": "tilt_rad", "rate": "gyro_rad_s"}, rate_hz=1.0 / DT))
 
 
-def test_some_stamps_twice(plain: Log, tmp_path: Path) -> None:
+def test_a_time_range(tmp_path: Path) -> None:
+    log = read(tmp_path, sine(), time_range_s=(2.0, 5.0))
+    np.testing.assert_allclose(log["time_s"], T[400:1001])
+
+
+def test_some_stamps_twice(tmp_path: Path) -> None:
     twice = np.sort(np.concatenate([np.arange(N), [100, 2000]]))
-    log = read_log(write_csv(tmp_path / "twice.csv", {k: v[twice] for k, v in sine().items()}), ReadOptions(COLUMNS))
-    assert_same(log, plain)
+    log = read(tmp_path, {name: values[twice] for name, values in sine().items()})
+    assert_plain(log)
     assert log.notes == ("2 rows with the time of the row before discarded, first at 0.5 s",)
 
 
 def test_stamps_rounded_to_milliseconds_are_even(tmp_path: Path) -> None:
     t = np.arange(3000) * 0.0025
-    path = write_csv(tmp_path / "ms.csv", {**sine(t), "t_s": np.round(t, 3)})
-    log = read_log(path, ReadOptions(COLUMNS))
+    log = read(tmp_path, {**sine(t), "t_s": np.round(t, 3)})
     assert log.dt == pytest.approx(0.0025, rel=1e-4)
     np.testing.assert_array_equal(log["y1_rad"], tilt(t))
-    np.testing.assert_allclose(log["reference_rad_s"], rate(t), atol=1e-12)
     assert "taken as even sampling" in log.notes[0]
 
 
-def test_uneven_times_are_resampled(tmp_path: Path) -> None:
-    rng = np.random.default_rng(3)
-    t = np.arange(N) * DT + rng.uniform(-0.2, 0.2, N) * DT
-    log = read_log(write_csv(tmp_path / "uneven.csv", sine(t)), ReadOptions(COLUMNS))
-    assert log.notes[0].startswith("uneven steps")
+@pytest.mark.parametrize(("jitter", "rate_hz"), [(0.2, None), (0.0, 130.0)])
+def test_resampled(jitter: float, rate_hz: float | None, tmp_path: Path) -> None:
+    t = T + np.random.default_rng(3).uniform(-jitter, jitter, N) * DT
+    log = read(tmp_path, sine(t), rate_hz=rate_hz)
+    assert "resampled" in log.notes[0]
+    assert log.dt == pytest.approx(1.0 / (rate_hz or 200.0), rel=1e-4)
     np.testing.assert_allclose(np.diff(log["time_s"]), log.dt, rtol=1e-6)
-    np.testing.assert_allclose(log["y1_rad"], tilt(log["time_s"]), atol=1e-7)
-    np.testing.assert_allclose(log["reference_rad_s"], rate(log["time_s"]), atol=1e-6)
-
-
-def test_to_another_rate(tmp_path: Path) -> None:
-    log = read_log(write_csv(tmp_path / "s.csv", sine()), ReadOptions(COLUMNS, rate_hz=130.0))
-    assert log.dt == 1.0 / 130.0
-    np.testing.assert_allclose(log["y1_rad"], tilt(log["time_s"]), atol=1e-7)
+    assert_sine(log, 1e-7)
 
 
 def test_a_short_gap_is_bridged_and_a_long_one_parts(tmp_path: Path) -> None:
     mask = np.ones(N, dtype=bool)
-    mask[1000:1003] = False
-    mask[2000:2200] = False
-    log = read_log(write_csv(tmp_path / "gaps.csv", {k: v[mask] for k, v in sine().items()}), ReadOptions(COLUMNS))
+    mask[1000:1003] = mask[2000:2200] = False
+    columns = {name: values[mask] for name, values in sine().items()}
+    log = read(tmp_path, columns)
     assert [(p.start, p.stop) for p in log.parts] == [(0, 2000), (2000, 3800)]
     short_gap_note, long_gap_note = log.notes
     assert "1 gap bridged by straight lines; the longest is 20 ms at 4.995 s" in short_gap_note
     assert "1 gap not bridged" in long_gap_note
-    assert "1005 ms at 9.995 s" in long_gap_note
     measured_rows = np.isin(np.arange(3800), np.arange(1000, 1003), invert=True)
     np.testing.assert_allclose(log["y1_rad"][measured_rows], tilt(log["time_s"])[measured_rows], atol=1e-12)
-    np.testing.assert_allclose(log["y1_rad"], tilt(log["time_s"]), atol=3e-4)
+    assert_sine(log, 3e-4)
     assert np.isnan(log["reference_rad_s"][1001])
     assert log.duration_s == pytest.approx((1999 + 1799) * DT)
-    longer = read_log(tmp_path / "gaps.csv", ReadOptions(COLUMNS, max_gap_s=2.0))
-    assert len(longer.parts) == 1
+    assert len(read(tmp_path, columns, max_gap_s=2.0).parts) == 1
 
 
 def test_missing_numbers_are_gaps(tmp_path: Path) -> None:
     columns = {name: list(values) for name, values in sine().items()}
-    columns["tilt_rad"][100] = None
-    columns["tilt_rad"][101] = float("nan")
+    columns["tilt_rad"][100:102] = None, float("nan")
     columns["gyro_rad_s"][500] = None
-    log = read_log(write_csv(tmp_path / "nan.csv", columns), ReadOptions(COLUMNS))
+    log = read(tmp_path, columns)
     assert "2 rows of 4,000 without a number discarded, first row 101" in log.notes[0]
     assert len(log) == N
     assert np.isfinite(log["y1_rad"]).all()
@@ -195,133 +177,88 @@ def test_a_reference_at_times_of_its_own(tmp_path: Path) -> None:
     """Tilt and gyro in rows of their own, as a merged log has them."""
     t = np.arange(2 * N) * DT / 2.0
     tilts, rates = list(tilt(t)), list(rate(t))
-    for k in range(2 * N):
-        (rates if k % 2 == 0 else tilts)[k] = None  # type: ignore[call-overload]
-    log = read_log(
-        write_csv(tmp_path / "merged.csv", {"t_s": t, "tilt_rad": tilts, "gyro_rad_s": rates}), ReadOptions(COLUMNS)
-    )
+    tilts[1::2] = rates[::2] = [None] * N
+    log = read(tmp_path, {"t_s": t, "tilt_rad": tilts, "gyro_rad_s": rates})
     assert log.dt == pytest.approx(DT)
-    measured_rows = np.isfinite(log["reference_rad_s"])
-    assert measured_rows.sum() >= N - 2
-    np.testing.assert_allclose(log["reference_rad_s"][measured_rows], rate(log["time_s"])[measured_rows], atol=1e-6)
+    assert np.isfinite(log["reference_rad_s"]).sum() >= N - 2
+    assert_sine(log, 1e-7)
 
 
-def test_a_tilt_that_starts_again_after_a_turn(tmp_path: Path) -> None:
-    t = np.arange(N) * DT
-    wrapped_tilt = (2.0 * t + math.pi) % (2.0 * math.pi) - math.pi
-    log = read_log(
-        write_csv(tmp_path / "turns.csv", {"t_s": t, "tilt_rad": wrapped_tilt}),
-        ReadOptions({"time": "t_s", "tilt": "tilt_rad"}),
-    )
-    np.testing.assert_allclose(np.diff(log["y1_rad"]), 2.0 * DT, atol=1e-9)
+@pytest.mark.parametrize(("speed", "flicker"), [(2.0, 0.0), (0.4, 0.003)])
+def test_a_tilt_that_starts_again_after_a_turn_runs_on(speed: float, flicker: float, tmp_path: Path) -> None:
+    truth = speed * T + flicker * np.random.default_rng(1).standard_normal(N)
+    log = read(tmp_path, {"t_s": T, "tilt_rad": (truth + math.pi) % (2.0 * math.pi) - math.pi}, ONE)
+    assert np.ptp(log["y1_rad"] - truth) < 1e-9
     assert "jumps by a turn" in log.notes[0]
-
-
-def test_two_accelerometers_give_tilt_and_acceleration(tmp_path: Path) -> None:
-    """a = r alpha tangentially, -r w^2 radially, less gravity, in g and for any motion."""
-    t = np.arange(N) * DT
-    y, w, alpha = tilt(t), rate(t), -(OMEGA**2) * tilt(t)
-    columns: dict[str, np.ndarray] = {"t_ms": t * 1e3}
-    for place, r in (("in", 0.05), ("out", 0.15)):
-        columns[f"{place}_x_g"] = (r * alpha - 9.80665 * np.sin(y)) / 9.80665
-        columns[f"{place}_z_mg"] = (-r * w**2 + 9.80665 * np.cos(y)) / 9.80665e-3
-    path = write_csv(tmp_path / "imu.csv", columns)
-    roles = {"time": "t_ms", "inner_x": "in_x_g", "inner_z": "in_z_mg", "outer_x": "out_x_g", "outer_z": "out_z_mg"}
-    log = read_log(path, ReadOptions(roles, radii_m=(0.05, 0.15)))
-    np.testing.assert_allclose(log["y1_rad"], y, atol=1e-9)
-    np.testing.assert_allclose(log["acceleration_rad_s2"], alpha, atol=1e-9)
-    assert log.has == {"acceleration"}
 
 
 def test_gimbals_and_command(tmp_path: Path) -> None:
     """Half the difference of two encoders; a command is held, not drawn out, when it is resampled."""
-    t = np.arange(N) * DT
-    columns = {**sine(), "g1_deg": np.degrees(0.1 * t), "g2_deg": np.degrees(-0.1 * t), "u_rad_s": (t // 1.0) % 2.0}
-    path = write_csv(tmp_path / "g.csv", columns)
+    columns = {**sine(), "g1_deg": np.degrees(0.1 * T), "g2_deg": np.degrees(-0.1 * T), "u_rad_s": (T // 1.0) % 2.0}
     roles = {**COLUMNS, "gimbal1": "g1_deg", "gimbal2": "g2_deg", "command": "u_rad_s"}
-    log = read_log(path, ReadOptions(roles))
+    log = read(tmp_path, columns, roles)
     assert log.has == {"reference", "gimbals"}
-    np.testing.assert_allclose(log["y2_rad"], 0.1 * t, atol=1e-12)
-    assert set(read_log(path, ReadOptions(roles, rate_hz=333.0))["u_rad_s"]) == {0.0, 1.0}
+    np.testing.assert_allclose(log["y2_rad"], 0.1 * T, atol=1e-12)
+    assert set(read(tmp_path, columns, roles, rate_hz=333.0)["u_rad_s"]) == {0.0, 1.0}
     del roles["command"]
-    half = read_log(path, ReadOptions(roles))
+    half = read(tmp_path, columns, roles)
     assert half.has == {"reference"}
     assert "need both" in half.notes[-1]
-
-
-def test_between(tmp_path: Path) -> None:
-    log = read_log(write_csv(tmp_path / "s.csv", sine()), ReadOptions(COLUMNS, time_range_s=(2.0, 5.0)))
-    assert (log["time_s"][0], len(log)) == (pytest.approx(2.0), 601)
-
-
-def rows_without(c: dict) -> dict:
-    times = [None if i % 2 else t for i, t in enumerate(c["t_s"])]
-    return {"t_s": times, "tilt_rad": [y if i % 2 else None for i, y in enumerate(c["tilt_rad"])]}
 
 
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        (lambda c: {"tilt_rad": ["x", *[0.1] * (N - 1)]}, "invalid value 'x'"),
-        (lambda c: {"t_s": [*c["t_s"][:-1], "now"]}, "column 't_s' holds string"),
+        (lambda c: {"tilt_rad": ["x", *[0.1] * (N - 1)]}, "column 'tilt_rad' holds string"),
         (lambda c: {"tilt_rad": np.full(N, 0.3)}, "nothing moves"),
         (lambda c: {"gyro_rad_s": np.full(N, 0.3)}, "the reference is 0.3 rad/s in every row"),
-        (lambda c: {"tilt_rad": [None] * N}, "0 rows"),
         (lambda c: {"gyro_rad_s": [None] * N}, "the reference has no number"),
-        (rows_without, "0 rows"),
+        (lambda c: {"tilt_rad": [None] * N}, "0 rows"),
         (lambda c: {"t_s": np.zeros(N)}, "3,999 of 4,000 rows have the same time"),
         (lambda c: {"t_s": c["t_s"] * 1e4}, "rows are 50 s apart"),
         (lambda c: {"t_s": np.roll(c["t_s"], 500)}, "time goes back"),
-        (lambda c: {k: v[:7] for k, v in c.items()}, "7 rows with all that is needed; at least 20"),
+        (lambda c: {k: v[:7] for k, v in c.items()}, "7 rows"),
         (lambda c: {k: v[:0] for k, v in c.items()}, "has no row"),
     ],
 )
 def test_a_log_that_cannot_be_is_refused_in_a_line(changed: Callable, message: str, tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "wrong.csv", {**sine(), **changed(sine())})
-    with pytest.raises(InputError) as info:
-        read_log(path, ReadOptions(COLUMNS))
-    assert str(path) in str(info.value)
-    assert message in str(info.value)
+    with pytest.raises(InputError, match=message) as info:
+        read(tmp_path, {**sine(), **changed(sine())})
+    assert "log.csv: " in str(info.value)
     assert "\n" not in str(info.value)
 
 
-ONE = {"time": "t_s", "tilt": "tilt_rad"}
-PAIR = {"columns": dict.fromkeys(ACCELEROMETERS, "tilt_rad"), "units": dict.fromkeys(ACCELEROMETERS, "g")}
+PAIR, PAIR_SI = dict.fromkeys(ACCELEROMETERS, "tilt_rad"), dict.fromkeys(ACCELEROMETERS, "m_s2")
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("columns", "options", "message"),
     [
-        ({"columns": {"tild": "a"}}, "--columns tild: no such role; did you mean 'tilt'"),
-        ({"columns": {"rate": "a_dps"}}, "name the tilt, or ax and az"),
-        ({"columns": {"tilt": "pitch"}}, "say --units tilt=UNIT"),
-        ({"columns": {"tilt": "a"}, "units": {"tilt": "m"}}, "--units tilt=m"),
-        ({"columns": {"tilt": "a_deg"}, "units": {"rate": "dps"}}, "--units rate: there is no such column"),
-        ({"columns": {"tilt": "a_deg"}, "scale": {"tilt": 0.0}}, "--scale tilt=0"),
-        ({"columns": {"tilt": "a_deg", "inner_x": "b_g"}}, "name the tilt, or"),
-        ({"columns": {"tilt": "a_deg", "ax": "b_g", "az": "c_g"}}, "name the tilt, or"),
-        ({"columns": {"inner_x": "b_g"}}, "inner_x, inner_z, outer_x and outer_z"),
-        ({"columns": {"ax": "b_g"}}, "ax and az"),
-        ({"columns": {"tilt": "a_deg", "gimbal1": "b_deg"}}, "gimbal1 and gimbal2"),
-        ({"columns": {"time": "t_s", "tilt": "no_deg"}}, "has no column 'no_deg'"),
-        ({"columns": {"tilt": "tilt_rad"}}, "no time"),
-        ({"columns": ONE, "delay_s": 0.1}, "--delay"),
-        ({"columns": ONE, "windows_s": [(1.0, 2.0)]}, "--window"),
-        ({"columns": COLUMNS, "windows_s": [(30.0, 40.0)]}, "--window 30:40"),
-        ({"columns": COLUMNS, "radii_m": (0.1, 0.2)}, "--radii"),
-        ({"columns": COLUMNS, "time_range_s": (100.0, 200.0)}, "--time-range 100:200"),
-        ({"columns": COLUMNS, "rate_hz": 1e6}, "at most 5,000,000"),
-        ({"columns": COLUMNS, "rate_hz": 0.5}, "no part of 20 samples"),
-        (PAIR, "--radii"),
-        ({**PAIR, "radii_m": (67.0, 201.5)}, "--radii 67,201.5"),
-        ({}, "say which columns are what"),
+        ({"tild": "a"}, {}, "--columns tild: .*'tilt'"),
+        ({"rate": "a_dps"}, {}, "--columns: "),
+        ({"ax": "b_g"}, {}, "--columns: "),
+        ({"tilt": "a_deg", "gimbal1": "b_deg"}, {}, "--columns: "),
+        ({"tilt": "pitch"}, {}, "--columns tilt=pitch: "),
+        ({"tilt": "a"}, {"units": {"tilt": "m"}}, "--units tilt=m: "),
+        ({"tilt": "a_deg"}, {"units": {"rate": "dps"}}, "--units rate: "),
+        ({"tilt": "a_deg"}, {"scale": {"tilt": 0.0}}, "--scale tilt=0: "),
+        ({**ONE, "tilt": "no_deg"}, {}, "has no column 'no_deg'"),
+        ({"tilt": "tilt_rad"}, {}, "no time"),
+        (ONE, {"delay_s": 0.1}, "--delay"),
+        (COLUMNS, {"delay_s": math.nan}, "--delay nan: "),
+        (ONE, {"windows_s": [(1.0, 2.0)]}, "--window: "),
+        (COLUMNS, {"windows_s": [(30.0, 40.0)]}, "--window 30:40: "),
+        (COLUMNS, {"time_range_s": (100.0, 200.0)}, "--time-range 100:200: "),
+        (COLUMNS, {"rate_hz": 1e6}, "at most 5,000,000"),
+        (COLUMNS, {"rate_hz": 0.5}, "no part of 20 samples"),
+        (PAIR, {"units": PAIR_SI}, "--radii INNER,OUTER"),
+        (PAIR, {"units": PAIR_SI, "radii_m": (67.0, 201.5)}, "--radii 67,201.5: "),
+        ({}, {}, "--columns"),
     ],
 )
-def test_arguments_that_cannot_be(arguments: dict, message: str, tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "s.csv", sine())
-    with pytest.raises(InputError) as info:
-        read_log(path, ReadOptions(**arguments))
-    assert message in str(info.value)
+def test_arguments_that_cannot_be(columns: dict, options: dict, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        read(tmp_path, sine(), columns, **options)
 
 
 @pytest.mark.parametrize("content", [b"", b"\n \n", b"\x7fELF\0\0\0", b"PAR1 and no more"])
@@ -333,100 +270,62 @@ def test_files_that_are_none(content: bytes, tmp_path: Path) -> None:
             read_log(file, ReadOptions(COLUMNS))
 
 
-def test_parquet_with_nested_columns_and_truth_values(tmp_path: Path) -> None:
-    t, y = sine()["t_s"], sine()["tilt_rad"]
-    nested = pa.array([{"tilt_rad": one} for one in y])
-    columns = {" t_s": t, "tilt_rad ": y, "imu.tilt_rad": 2.0 * y, "imu": nested, "up_rad": y > 0.0}
-    path = parquet(tmp_path / "log.parquet", columns)
-    np.testing.assert_array_equal(read_log(path, ReadOptions(ONE))["y1_rad"], y)
-    np.testing.assert_array_equal(read_log(path, ReadOptions({**ONE, "tilt": "imu.tilt_rad"}))["y1_rad"], 2.0 * y)
-    for name in ("imu", "up_rad"):
-        with pytest.raises(InputError, match=f"column '{name}' holds"):
-            read_log(path, ReadOptions({**ONE, "tilt": name}, units={"tilt": "rad"}))
-
-
 def test_milliseconds_are_not_taken_as_seconds(tmp_path: Path) -> None:
-    columns = {"clock": sine()["t_s"] * 1e3, "tilt_rad": sine()["tilt_rad"]}
-    names = {"time": "clock", "tilt": "tilt_rad"}
-    path = write_csv(tmp_path / "ms.csv", columns)
+    columns, roles = {"clock": T * 1e3, "tilt_rad": tilt(T)}, {**ONE, "time": "clock"}
     with pytest.raises(InputError, match="--units time=ms"):
-        read_log(path, ReadOptions(names))
-    assert read_log(path, ReadOptions(names, units={"time": "ms"})).dt == pytest.approx(DT)
-    assert read_log(path, ReadOptions(names, units={"time": "s"})).dt == pytest.approx(1e3 * DT)
-
-
-def test_a_tilt_that_flickers_at_the_end_of_its_turn_runs_on(tmp_path: Path) -> None:
-    t = np.arange(N) * DT
-    truth = 0.4 * t + 0.003 * np.random.default_rng(1).standard_normal(N)
-    columns = {"t_s": t, "tilt_rad": (truth + math.pi) % (2.0 * math.pi) - math.pi}
-    log = read_log(write_csv(tmp_path / "turns.csv", columns), ReadOptions(ONE))
-    assert np.ptp(log["y1_rad"] - truth) < 1e-9
-    assert "jumps by a turn" in log.notes[0]
+        read(tmp_path, columns, roles)
+    for unit, size in (("ms", 1.0), ("s", 1e3)):
+        assert read(tmp_path, columns, roles, units={"time": unit}).dt == pytest.approx(size * DT)
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("tilt=Packet number,Roll | Phi | X (degrees)", {"tilt": "Packet number,Roll | Phi | X (degrees)"}),
         ('tilt="a,rate=b (deg)",rate=c', {"tilt": "a,rate=b (deg)", "rate": "c"}),
         ('time = t , tilt = "5"" tube" ,rate=w', {"time": "t", "tilt": '5" tube', "rate": "w"}),
         ('tilt=the "raw" one,rate=w', {"tilt": 'the "raw" one', "rate": "w"}),
         ('tilt="a,b', None),
-        ('tilt="a" b', None),
         ("tilt=", None),
-        ("tilt=Roll,x9=1 (deg)", None),
         ("tilt=a,tilt=b", None),
     ],
 )
 def test_headings_with_commas_go_into_quotes(text: str, expected: dict[str, str] | None) -> None:
     if expected is None:
         with pytest.raises(InputError, match="--columns"):
-            assignments(text, "--columns")
+            assignments([text], "--columns")
     else:
-        assert assignments(text, "--columns") == expected
+        assert assignments([text], "--columns") == expected
 
 
 def one_accelerometer(folder: Path, turn: float = 1.0, **options) -> Log:
     """Specific force at the pivot."""
-    t = np.arange(N) * DT
-    columns = {"t_s": t, "ax_g": -turn * np.sin(tilt(t)), "az": turn * 9.80665 * np.cos(tilt(t))}
-    roles = {"time": "t_s", "ax": "ax_g", "az": "az"}
-    return read_log(write_csv(folder / "imu.csv", columns), ReadOptions(roles, **{"units": {"az": "m/s2"}, **options}))
+    columns = {"t_s": T, "ax_g": -turn * np.sin(tilt(T)), "az": turn * 9.80665 * np.cos(tilt(T))}
+    return read(folder, columns, {"time": "t_s", "ax": "ax_g", "az": "az"}, units={"az": "m/s2"}, **options)
 
 
 def test_one_accelerometer(tmp_path: Path) -> None:
-    log = one_accelerometer(tmp_path)
-    np.testing.assert_allclose(log["y1_rad"], tilt(np.arange(N) * DT), atol=1e-12)
-    assert (log.has, log.tilt, len(log.notes)) == (frozenset(), None, 1)
     downward = one_accelerometer(tmp_path, -1.0)
     assert "--scale ax=-1,az=-1 if the sensor shows gravity itself, --scale az=-1 if" in downward.notes[-2]
-    turned = one_accelerometer(tmp_path, -1.0, scale={"ax": -1.0, "az": -1.0})
-    np.testing.assert_allclose(turned["y1_rad"], tilt(np.arange(N) * DT), atol=1e-12)
-    assert len(turned.notes) == 1
+    for log in (one_accelerometer(tmp_path), one_accelerometer(tmp_path, -1.0, scale={"ax": -1.0, "az": -1.0})):
+        np.testing.assert_allclose(log["y1_rad"], tilt(T), atol=1e-12)
+        assert (log.has, log.tilt, len(log.notes)) == (frozenset(), None, 1)
 
 
-def accelerometers(folder: Path, swing: float, units: dict[str, str], factor: float = 1.0) -> list[str]:
-    """Notes on two accelerometers in m/s^2, read in other units."""
-    t = DT * np.arange(2000)
-    y, w, alpha = (swing / 0.2 * values for values in (tilt(t), rate(t), -(OMEGA**2) * tilt(t)))
-    columns = {"t_s": t}
-    for place, r in (("inner", 0.1), ("outer", 0.3)):
-        columns[f"{place}_x"] = factor * (r * alpha - 9.81 * np.sin(y))
-        columns[f"{place}_z"] = factor * (9.81 * np.cos(y) - r * w**2)
-    path = write_csv(folder / "log.csv", columns)
-    names = {name: name for name in ACCELEROMETERS}
-    units = {**dict.fromkeys(ACCELEROMETERS, "m_s2"), **units}
-    return list(read_log(path, ReadOptions({"time": "t_s", **names}, units=units, radii_m=(0.1, 0.3))).notes)
+def test_two_accelerometers_give_tilt_and_acceleration(tmp_path: Path) -> None:
+    """For any motion, and in any unit."""
+    for unit, factor in (("m_s2", 1.0), ("mg", 1e3 / STANDARD_GRAVITY)):
+        log = two_accelerometers(tmp_path, 0.2, factor, **dict.fromkeys(ACCELEROMETERS, unit))
+        np.testing.assert_allclose(log["y1_rad"], tilt(T), atol=1e-9)
+        np.testing.assert_allclose(log["acceleration_rad_s2"], -(OMEGA**2) * tilt(T), atol=1e-9)
+        assert (log.has, log.notes) == ({"acceleration"}, ())
 
 
-@pytest.mark.parametrize("swing", [1e-5, 0.02, 0.2])
+@pytest.mark.parametrize("swing", [1e-5, 0.2])
 def test_accelerometers_in_a_wrong_unit(swing: float, tmp_path: Path) -> None:
-    """The cure that is named is one, and of the right unit nothing is said."""
-    assert accelerometers(tmp_path, swing, {}) == []
-    inner, outer = accelerometers(tmp_path, swing, dict.fromkeys(ACCELEROMETERS, "g"))
+    """The cure that is named is one."""
+    inner, outer = two_accelerometers(tmp_path, swing, **dict.fromkeys(ACCELEROMETERS, "g")).notes
     assert inner.endswith(": --units inner_x=m_s2,inner_z=m_s2")
     assert outer.endswith(": --units outer_x=m_s2,outer_z=m_s2")
-    (wrong,) = accelerometers(tmp_path, swing, {"outer_x": "mm_s2", "outer_z": "mm_s2"})
+    (wrong,) = two_accelerometers(tmp_path, swing, outer_x="mm_s2", outer_z="mm_s2").notes
     assert wrong.endswith(": --units outer_x=m_s2,outer_z=m_s2")
-    counts = accelerometers(tmp_path, swing, {}, 16384.0 / 9.80665)
-    assert "--scale inner_x=0.00059" in counts[0]
+    assert "--scale inner_x=0.00059" in two_accelerometers(tmp_path, swing, 16384.0 / STANDARD_GRAVITY).notes[0]

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +15,15 @@ import pytest
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
 from cmg_mj.core.tilt import RadialTilt, TiltNoise
 from cmg_mj.core.types import needs
-from cmg_mj.features.replay.inputs import model_of, observer_inputs, replay_prepared
 from cmg_mj.features.replay.log import Log, ReadOptions
-from cmg_mj.features.replay.log_replay import NO_MODEL, replay_log
+from cmg_mj.features.replay.log_replay import NO_MODEL, model_of, observer_inputs, replay_log, replay_prepared
 from cmg_mj.features.replay.noise import noise_numbers, noise_of
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
 from cmg_mj.observers.parameter_options import parameters_of
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.save import report_run, save_run
-from tests.features.replay.motion import COLUMNS, DT, N, sine, write_csv
+from tests.features.replay.motion import COLUMNS, DT, N, read, sine
 from tests.observers.reference import PAPER
 
 KEYS = ("velocity_rms_error_rad_s", "velocity_fit", "velocity_rms_error_push_rad_s", "velocity_fit_push")
@@ -42,31 +42,22 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def log(tmp_path: Path, **more: np.ndarray) -> Log:
-    columns = dict(COLUMNS, **{name.partition("_")[0]: name for name in more})
-    return read_log(write_csv(tmp_path / "log.csv", {**sine(), **more}), ReadOptions(columns))
+    return read(tmp_path, {**sine(), **more}, {**COLUMNS, **{name.partition("_")[0]: name for name in more}})
 
 
 def test_a_run_replays_to_its_figures(run: Path) -> None:
     """Estimates bit for bit, of the loop's observer (whose k1 is not the default) and of every open-loop observer."""
     result = replay_prepared(read_log(run))
     summary = json.loads((run / "summary.json").read_text())
+    expected = {"homogeneous": summary, **summary["open_loop_observers"], **summary["references"]}
     trajectory = Trajectory.load(run / "trajectory.parquet")
     assert result.left_out == {}
     assert set(result.estimates) == set(OBSERVERS)
     for name, figures in result.summaries.items():
-        expected = (
-            summary if name == "homogeneous" else {**summary["open_loop_observers"], **summary["references"]}[name]
-        )
         for key in KEYS:
-            assert figures[key] == pytest.approx(expected[key], rel=1e-12, abs=1e-13), (name, key)
+            assert figures[key] == pytest.approx(expected[name][key], rel=1e-12, abs=1e-13), (name, key)
         for signal, values in result.estimates.get(name, {}).items():
             np.testing.assert_array_equal(values, trajectory[f"estimate/{name}/{signal}"])
-
-
-def test_a_runs_file_is_the_same_as_its_folder(run: Path) -> None:
-    folder, file = read_log(run), read_log(run / "trajectory.parquet")
-    np.testing.assert_array_equal(folder["y1_rad"], file["y1_rad"])
-    assert folder.name == file.name == "a-run"
 
 
 def test_a_runs_parameters_model_and_noise_can_be_changed(run: Path) -> None:
@@ -76,15 +67,6 @@ def test_a_runs_parameters_model_and_noise_can_be_changed(run: Path) -> None:
     changed = replay_prepared(run_log, ["homogeneous", "gyro_free"], parameters=parameters, noises={"tilt": 1.0})
     for name in ("homogeneous", "gyro_free"):
         assert np.abs(changed.estimates[name]["x2_rad_s"] - original.estimates[name]["x2_rad_s"]).max() > 1e-3
-
-
-def test_a_runs_recording_as_any_parquet(run: Path) -> None:
-    """With --columns it is a log like others: the same estimates of those that need no more."""
-    path = run / "trajectory.parquet"
-    plain = read_log(path, ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
-    result = replay_log(plain, ["linear"], settle_s=0.0)
-    trajectory = Trajectory.load(path)["estimate/linear/x2_rad_s"]
-    np.testing.assert_allclose(result.estimates["linear"]["x2_rad_s"], trajectory, atol=1e-9)
 
 
 @pytest.mark.slow
@@ -126,31 +108,20 @@ def test_observers_that_need_no_model_do_not_look_at_it() -> None:
 
 
 def test_parts_are_replayed_each_from_its_start(tmp_path: Path) -> None:
-    mask = np.ones(N, dtype=bool)
-    mask[2000:2300] = False
-    log_of_parts = read_log(
-        write_csv(tmp_path / "p.csv", {k: v[mask] for k, v in sine().items()}), ReadOptions(COLUMNS)
-    )
-    second = read_log(write_csv(tmp_path / "s.csv", {k: v[2300:] for k, v in sine().items()}), ReadOptions(COLUMNS))
-    parts_result, second_result = (
-        replay_log(log_of_parts, ["linear"], settle_s=0.5),
-        replay_log(second, ["linear"], settle_s=0.5),
-    )
-    np.testing.assert_array_equal(
-        parts_result.estimates["linear"]["x2_rad_s"][2000:], second_result.estimates["linear"]["x2_rad_s"]
-    )
-    assert log_of_parts.scored(0.5).sum() == 1900 + 1600
+    rows = np.r_[0:2000, 2300:N]
+    whole = read(tmp_path, {name: values[rows] for name, values in sine().items()})
+    second = read(tmp_path, {name: values[2300:] for name, values in sine().items()})
+    of_parts, of_second = (replay_log(one, ["linear"], settle_s=0.5).estimates["linear"] for one in (whole, second))
+    np.testing.assert_array_equal(of_parts["x2_rad_s"][2000:], of_second["x2_rad_s"])
+    assert whole.scored(0.5).sum() == 1900 + 1600
 
 
 def test_one_that_is_lost_is_said_and_the_others_go_on(tmp_path: Path) -> None:
-    result = replay_log(
-        log(tmp_path),
-        ["linear", "tests.features.replay.test_replayed:Loses", "tests.features.replay.test_replayed:Raises"],
-    )
+    loses, raises = (f"tests.features.replay.test_replayed:{name}" for name in ("Loses", "Raises"))
+    result = replay_log(log(tmp_path), ["linear", loses, raises])
     assert set(result.estimates) == {"linear"}
-    assert "x2_rad_s is not finite from 0.05 s on" in result.left_out["tests.features.replay.test_replayed:Loses"]
-    reason = result.left_out["tests.features.replay.test_replayed:Raises"]
-    assert re.fullmatch(r"raised ZeroDivisionError: .* \(test_replayed\.py, line \d+\).*", reason)
+    assert "x2_rad_s is not finite from 0.05 s on" in result.left_out[loses]
+    assert re.fullmatch(r"raised ZeroDivisionError: .* \(test_replayed\.py, line \d+\).*", result.left_out[raises])
 
 
 class Loses:
@@ -187,10 +158,8 @@ def test_noise_of_two_accelerometers_follows_from_theirs(tmp_path: Path) -> None
 
 def test_the_noise_of_a_runs_accelerometers_can_be_set(run: Path) -> None:
     """All else of its sensors stays: told what it had, it is the run's; of its resolution the rest."""
-    run_log, run_noise = (
-        read_log(run),
-        prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2],
-    )
+    run_log = read_log(run)
+    run_noise = prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]
     assert observer_inputs(run_log, noises={"accelerometer": 300.0}).noise == run_noise
     more = observer_inputs(run_log, noises={"accelerometer": 600.0}).noise
     assert more.tilt == pytest.approx(2.0 * run_noise.tilt, rel=1e-4)
@@ -205,19 +174,17 @@ def test_the_noise_of_a_runs_accelerometers_can_be_set(run: Path) -> None:
         (lambda: model_of("inertia=0.06"), "--model: gravity_torque"),
         (lambda: model_of("inertia=-1,gravity_torque=3"), "must be greater than 0"),
         (lambda: model_of("inertia=a,gravity_torque=3"), "--model inertia=a: "),
-        (lambda: model_of("mass=2"), "--model mass: no such number; allowed: gimbal_inertia"),
-        (lambda: model_of("nothing.xml"), "no such file, nor a bundled one"),
-        (lambda: noise_numbers("tild=3"), "--noise tild: no such number; did you mean 'tilt'?"),
-        (lambda: noise_numbers("tilt=0"), "must be greater than 0"),
-        (lambda: parameters_of(["k1=3"]), "write OBSERVER.PARAMETER=VALUE"),
+        (lambda: model_of("mass=2"), "--model mass: "),
+        (lambda: noise_numbers("tild=3"), "--noise tild: "),
+        (lambda: noise_numbers("tilt=0"), "--noise tilt=0: "),
+        (lambda: parameters_of(["k1=3"]), "--set 'k1=3': "),
         (lambda: parameters_of(["homogenous.k1=3"]), "did you mean 'homogeneous'?"),
         (lambda: parameters_of(["homogeneous.k1=x"]), "'x' is no number"),
     ],
 )
-def test_what_cannot_be(action, message: str) -> None:
-    with pytest.raises(InputError) as info:
+def test_what_cannot_be(action: Callable[[], object], message: str) -> None:
+    with pytest.raises(InputError, match=re.escape(message)):
         action()
-    assert message in str(info.value)
 
 
 def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
@@ -230,16 +197,18 @@ def test_wrong_parameters_and_nothing_to_judge(tmp_path: Path) -> None:
         replay_log(one, ["ltv"])
 
 
-@pytest.mark.parametrize("option", [{"units": {"tilt": "rad"}}, {"delay_s": 0.1}, {"delimiter": ";"}])
-def test_options_that_change_a_runs_recording_are_refused(run: Path, option: dict) -> None:
-    with pytest.raises(InputError, match=next(iter(option))):
-        read_log(run, ReadOptions(**option))
-
-
-def test_a_runs_recording_has_windows(run: Path) -> None:
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ({"units": {"tilt": "rad"}}, "units"),
+        ({"delay_s": 0.1}, "delay_s"),
+        ({"windows_s": [(5.0, 6.0)]}, "--window 5:6"),
+    ],
+)
+def test_options_that_change_a_runs_recording_are_refused(run: Path, option: dict, message: str) -> None:
     assert read_log(run, ReadOptions(windows_s=[(0.4, 0.6)])).windows == ((0.4, 0.6),)
-    with pytest.raises(InputError, match="--window 5:6"):
-        read_log(run, ReadOptions(windows_s=[(5.0, 6.0)]))
+    with pytest.raises(InputError, match=message):
+        read_log(run, ReadOptions(**option))
 
 
 def test_a_replay_has_its_columns_and_a_frame(tmp_path: Path) -> None:

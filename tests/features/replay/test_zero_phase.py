@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.features.replay.log import REFERENCE, Log, ReadOptions
+from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.log_replay import replay_log
-from cmg_mj.features.replay.reading import read_log
 from cmg_mj.features.replay.report import log_figures, remarks, replay_markdown
 from cmg_mj.features.replay.scores import ZeroPhase, noise_gain_of, smoothed_rate, zero_phase
-from tests.features.replay.motion import COLUMNS, DT, write_csv
+from tests.features.replay.motion import DT, read
 
 CUTOFF = 4.0
 
@@ -29,7 +28,7 @@ def noisy_log(folder: Path, seed: int = 0, n: int = 4000, sigma: float = 0.01) -
         y += 0.03 * np.sin(omega * t + phase)
         w += 0.03 * omega * np.cos(omega * t + phase)
     columns = {"t_s": t, "tilt_rad": y + sigma * random.standard_normal(n), "gyro_rad_s": w}
-    return read_log(write_csv(folder / "noisy.csv", columns), ReadOptions(COLUMNS))
+    return read(folder, columns)
 
 
 def scored_smoother(log: Log) -> ZeroPhase:
@@ -51,32 +50,13 @@ def test_a_straight_line_has_its_slope_everywhere() -> None:
     np.testing.assert_allclose(smoothed_rate(0.3 - 2.0 * DT * np.arange(300), DT, CUTOFF), -2.0, rtol=1e-9)
 
 
-@pytest.mark.slow
-def test_it_is_what_scipy_filters_to_and_fro() -> None:
-    """Butterworth of third order, twice as the response squared says; its bilinear form at a far higher rate."""
-    from scipy.signal import butter, sosfiltfilt
-
-    t = 1e-3 * np.arange(8000)
-    y = np.cumsum(np.random.default_rng(0).standard_normal(8000)) * 1e-3 + np.sin(5.0 * t)
-    expected = np.gradient(sosfiltfilt(butter(3, CUTOFF, fs=1e3, output="sos"), y), 1e-3)
-    np.testing.assert_allclose(smoothed_rate(y, 1e-3, CUTOFF)[1000:-1000], expected[1000:-1000], atol=5e-4)
-
-
 def test_what_white_noise_becomes() -> None:
     noise = np.random.default_rng(0).standard_normal(50_000)
     assert np.std(smoothed_rate(noise, DT, CUTOFF)) == pytest.approx(noise_gain_of(CUTOFF, DT), rel=0.02)
 
 
-def test_its_width_does_not_know_the_reference(tmp_path: Path) -> None:
-    log = noisy_log(tmp_path)
-    other = dataclasses.replace(log, columns={**log.columns, REFERENCE: np.sin(np.arange(len(log)))})
-    results = scored_smoother(log), scored_smoother(other)
-    assert results[0].cutoff_hz == results[1].cutoff_hz
-    assert results[0].best_cutoff_hz != results[1].best_cutoff_hz
-
-
 @pytest.mark.parametrize("seed", range(3))
-def test_the_width_is_nearly_the_best(seed: int, tmp_path: Path) -> None:
+def test_the_width_is_nearly_the_best_and_does_not_know_the_reference(seed: int, tmp_path: Path) -> None:
     log = noisy_log(tmp_path, seed)
     result = scored_smoother(log)
     error, best = result.figures["velocity_rms_error_rad_s"], result.best_rms_error_rad_s
@@ -84,6 +64,9 @@ def test_the_width_is_nearly_the_best(seed: int, tmp_path: Path) -> None:
     assert best is not None
     assert best <= error < 1.2 * best
     assert 2.0 < result.cutoff_hz < 8.0
+    other = scored_smoother(dataclasses.replace(log, columns={**log.columns, REFERENCE: np.sin(np.arange(len(log)))}))
+    assert result.cutoff_hz == other.cutoff_hz
+    assert result.best_cutoff_hz != other.best_cutoff_hz
 
 
 def test_the_row_is_said_to_be_no_observer(tmp_path: Path) -> None:
@@ -92,12 +75,6 @@ def test_the_row_is_said_to_be_no_observer(tmp_path: Path) -> None:
     figures = log_figures(replayed)
     assert set(figures["observers"]) == {"linear", "zero"}  # type: ignore[arg-type]
     assert json.dumps(figures["zero_phase"])
-    assert replayed.zero_phase is not None
-    error = replayed.zero_phase.figures["velocity_rms_error_rad_s"]
-    linear = replayed.summaries["linear"]["velocity_rms_error_rad_s"]
-    assert error is not None
-    assert linear is not None
-    assert error < linear / 2.0
     assert any(line.startswith("zero_phase is no observer: it sees the future.") for line in remarks(replayed))
     assert replay_markdown([replayed, replayed]).count("`zero_phase`") == 3
     unreferred = dataclasses.replace(log, has=frozenset())

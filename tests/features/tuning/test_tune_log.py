@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, load_scenario, prepare
-from cmg_mj.features.replay.inputs import replay_prepared
 from cmg_mj.features.replay.log import ReadOptions
+from cmg_mj.features.replay.log_replay import replay_prepared
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.features.tuning import tune_on_logs
