@@ -35,7 +35,9 @@ class LqgState(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class Lqg:
-    """u = -K [x1 + torque/(n M), x2, x3, x_e], all estimated by the law's own filter; x_e' = -x3.
+    """Linear-quadratic-Gaussian control: a steady-state Kalman filter and a state feedback, both optimal for (6).
+
+    u = -K [x1 + torque/(n M), x2, x3, x_e], all estimated by the law's own filter; x_e' = -x3.
 
     The model is the linearisation (6) with a torque on the rig beside it, sampled exactly with u held:
 

@@ -39,7 +39,9 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class Adaptive:
-    """dao2023 (7) to (9) for the reduced model, with what is unknown about it as r.
+    """The adaptive disturbance observer of dao2023 on the scissored pair.
+
+    dao2023 (7) to (9) for the reduced model, with what is unknown about it as r.
 
     The state is (x1 - e, x2), whose first entry y1 measures: as with the other observers, the estimate of x1 is one of
     y1 without its noise, not of the tilt from the true equilibrium. With D = J1 + J2 sin^2 y2,

@@ -14,7 +14,9 @@ from cmg_mj.inputs.types import STRICT, Positive
 
 @dataclass(frozen=True, config=STRICT)
 class FiniteDifference:
-    """x2 = (y1_k - y1_{k-1})/dt: no parameter, no model, no filter.
+    """The first-order difference, as used in reference [11] of aranovskiy2020 (Spong, Corke, Lozano 2001).
+
+    x2 = (y1_k - y1_{k-1})/dt: no parameter, no model, no filter.
 
     Attributes:
         dt: Sample period [s].

@@ -17,7 +17,9 @@ from cmg_mj.observers.model_copy import LARGEST_RATE, CopyState, follow, stages
 
 @dataclass(frozen=True, config=STRICT)
 class Homogeneous:
-    """x1' = x2 - k1 [e]^alpha, x2' = f2(y, x2, u) - k2 [e]^(2 alpha - 1), e = x1 - y1, [e]^a = |e|^a sign e.
+    """The homogeneous finite-time differentiator, aranovskiy2020 (11).
+
+    x1' = x2 - k1 [e]^alpha, x2' = f2(y, x2, u) - k2 [e]^(2 alpha - 1), e = x1 - y1, [e]^a = |e|^a sign e.
 
     One step of `model_copy.follow` a sample. The right-hand side is steep at e = 0 only below 1e-9 rad, far under any
     sensor's noise, so nothing chatters.

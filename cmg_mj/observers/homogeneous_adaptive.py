@@ -36,7 +36,9 @@ class BiasedEstimate(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class HomogeneousAdaptive:
-    """aranovskiy2020 (11) with sin(y1 + e), e estimated by dao2023's observer beside it.
+    """The homogeneous differentiator, which takes the equilibrium bias from the adaptive observer.
+
+    aranovskiy2020 (11) with sin(y1 + e), e estimated by dao2023's observer beside it.
 
     In (11) gravity is taken at y1, where it pulls at y1 + e: that error k1 (M e/J1/k2)^(alpha/(2 alpha - 1)) of the
     rate is what the estimate of e removes. Nothing flows back: the adaptive observer does not see (11).

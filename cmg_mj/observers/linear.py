@@ -17,7 +17,9 @@ from cmg_mj.inputs.types import STRICT, Positive
 
 @dataclass(frozen=True, config=STRICT)
 class LinearDifferentiator:
-    """G(s) = s/(tau s + 1)^2: model-free, aranovskiy2020 (9), sokolov2019 (8).
+    """The linear differentiator, aranovskiy2020 (9).
+
+    G(s) = s/(tau s + 1)^2: model-free, aranovskiy2020 (9), sokolov2019 (8).
 
     Discretised exactly for a measurement that runs straight between samples: on a ramp the estimate converges to the
     slope itself.

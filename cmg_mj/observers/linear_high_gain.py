@@ -21,7 +21,9 @@ from cmg_mj.inputs.types import STRICT, Positive
 
 @dataclass(frozen=True, config=STRICT)
 class LinearHighGain:
-    """x1' = x2 + (a1/eps)(y1 - x1), x2' = (a2/eps^2)(y1 - x1): model-free.
+    """The linear high-gain differentiator of Vasiljevic and Khalil, reference [13] of aranovskiy2020.
+
+    x1' = x2 + (a1/eps)(y1 - x1), x2' = (a2/eps^2)(y1 - x1): model-free.
 
     Its estimate of the rate is s/((eps^2/a2) s^2 + (a1 eps/a2) s + 1) y1, which with a1 = 2, a2 = 1 is (9) with
     tau = eps.

@@ -34,7 +34,9 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class LinearTimeVarying:
-    """x' = A'(y, u) x + b(y, u) - H C^T (C x - y), H' = H A'^T + A' H - H C^T C H + Q.
+    """The linear time-varying observer with a Riccati gain, aranovskiy2020 (10).
+
+    x' = A'(y, u) x + b(y, u) - H C^T (C x - y), H' = H A'^T + A' H - H C^T C H + Q.
 
     With diagonal Q and H_0 the third state decouples: H13 and H23 stay zero. What is left is the 2x2 block of
     (x1, x2) and the scalar H33.

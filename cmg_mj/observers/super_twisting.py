@@ -24,7 +24,9 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class SuperTwisting:
-    """z0' = z1 - l0 sqrt(L) |s|^(1/2) sign s, z1' = -l1 L sign s, s = z0 - y1: model-free.
+    """Levant's robust exact differentiator, reference [12] of aranovskiy2020.
+
+    z0' = z1 - l0 sqrt(L) |s|^(1/2) sign s, z1' = -l1 L sign s, s = z0 - y1: model-free.
 
     Discretised implicitly, because an explicit step chatters with an amplitude of order L dt: with h = dt and
     b = z0 + h z1 - y1, the sliding variable after the step solves
