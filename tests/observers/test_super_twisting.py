@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.observers import Measurement
-from cmg_mj.observers.super_twisting import State
+from cmg_mj.observers.linear import State
 from tests.observers.reference import BOUND, DT, observer, run
 
 L, L0, L1 = 10.0, 1.5, 1.1

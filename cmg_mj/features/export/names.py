@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 
 from cmg_mj.core.errors import InputError, shown
 from cmg_mj.core.types import Observer
-from cmg_mj.observers.registry import OBSERVERS
+from cmg_mj.observers import OBSERVERS
 
 RESERVED = frozenset(
     """
