@@ -70,7 +70,7 @@ MUTATIONS = [
     ),
     Mutation("homogeneous: k1", OBSERVERS + "homogeneous.py", r"k1: Positive = " + NUMBER),
     Mutation("homogeneous: k2", OBSERVERS + "homogeneous.py", r"k2: Positive = " + NUMBER),
-    Mutation("homogeneous: alpha", OBSERVERS + "homogeneous.py", r"alpha: Annotated\[.*?\] = " + NUMBER),
+    Mutation("homogeneous: alpha", OBSERVERS + "homogeneous.py", r"alpha: Exponent = " + NUMBER),
     *(
         Mutation(f"luenberger: L[{row}][{column}]", OBSERVERS + "luenberger.py", pattern)
         for row, column, pattern in (

@@ -17,6 +17,9 @@ from cmg_mj.observers.adaptive import State as AdaptiveState
 from cmg_mj.observers.model_copy import LARGEST_RATE, CopyState, follow, stages
 
 
+Exponent = Annotated[float, Field(gt=0.5, le=1.0)]
+
+
 @dataclass(frozen=True, config=STRICT)
 class Homogeneous:
     """The homogeneous finite-time differentiator, aranovskiy2020 (11).
@@ -46,7 +49,7 @@ class Homogeneous:
     model: ReducedModel
     k1: Positive = 20.0
     k2: Positive = 150.0
-    alpha: Annotated[float, Field(gt=0.5, le=1.0)] = 0.85
+    alpha: Exponent = 0.85
     friction_n_m: NonNegative = 0.0
     damping_n_m_s: NonNegative = 0.0
     friction_width_rad_s: Positive = 0.05
@@ -135,9 +138,9 @@ class HomogeneousAdaptive:
 
     dt: Positive
     model: ReducedModel
-    k1: Positive = 20.0
-    k2: Positive = 150.0
-    alpha: Annotated[float, Field(gt=0.5, le=1.0)] = 0.85
+    k1: Positive = Homogeneous.k1
+    k2: Positive = Homogeneous.k2
+    alpha: Exponent = Homogeneous.alpha
     L: tuple[float, float] = Adaptive.L
     Gamma: Positive = Adaptive.Gamma[0]
     Sigma: Positive = Adaptive.Sigma
