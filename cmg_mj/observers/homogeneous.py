@@ -16,7 +16,6 @@ from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.observers.adaptive import State as AdaptiveState
 from cmg_mj.observers.model_copy import LARGEST_RATE, CopyState, follow, stages
 
-
 Exponent = Annotated[float, Field(gt=0.5, le=1.0)]
 
 

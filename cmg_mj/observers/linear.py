@@ -21,7 +21,38 @@ from cmg_mj.inputs.types import STRICT, Positive
 
 
 @dataclass(frozen=True, config=STRICT)
-class LinearDifferentiator:
+class _ModelFree:
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    dt: Positive
+    model: ReducedModel
+
+
+class _LinearFilter(_ModelFree):
+    """A linear filter of second order, discretised exactly for a measurement that runs straight between samples."""
+
+    @property
+    def equations(self) -> tuple[list[list[float]], list[list[float]]]:
+        """A, B of z' = A z + B y1; z1 is the tilt and z2 its rate."""
+        raise NotImplementedError
+
+    @cached_property
+    def _rows(self) -> Coefficients:
+        A, B = self.equations
+        return second_order_rows(np.array(A), np.array(B), self.dt)
+
+    def init(self, y: Measurement) -> FilterState:
+        """Start at rest at the measured tilt."""
+        return FilterState(y.y1, 0.0 * y.y1, y.y1)
+
+    def step(self, state: FilterState, y: Measurement, u: Scalar) -> tuple[FilterState, Estimate]:
+        """Advance by one sample period."""
+        state = second_order_step(self._rows, state, y[0])
+        return state, Estimate(state[0], state[1], y[1])
+
+
+@dataclass(frozen=True, config=STRICT)
+class LinearDifferentiator(_LinearFilter):
     """The linear differentiator, aranovskiy2020 (9).
 
     G(s) = s/(tau s + 1)^2: model-free, aranovskiy2020 (9), sokolov2019 (8).
@@ -35,30 +66,17 @@ class LinearDifferentiator:
         tau: Time constant of the filter [s]. Default: Table 2.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ()
-
-    dt: Positive
-    model: ReducedModel
     tau: Positive = 0.02
 
-    @cached_property
-    def _rows(self) -> Coefficients:
+    @property
+    def equations(self) -> tuple[list[list[float]], list[list[float]]]:
+        """A, B of z' = A z + B y1."""
         tau = self.tau
-        A = np.array([[0.0, 1.0], [-1.0 / tau**2, -2.0 / tau]])
-        return second_order_rows(A, np.array([[0.0], [1.0 / tau**2]]), self.dt)
-
-    def init(self, y: Measurement) -> FilterState:
-        """Start at rest at the measured tilt."""
-        return FilterState(y.y1, 0.0 * y.y1, y.y1)
-
-    def step(self, state: FilterState, y: Measurement, u: Scalar) -> tuple[FilterState, Estimate]:
-        """Advance by one sample period."""
-        state = second_order_step(self._rows, state, y[0])
-        return state, Estimate(state[0], state[1], y[1])
+        return [[0.0, 1.0], [-1.0 / tau**2, -2.0 / tau]], [[0.0], [1.0 / tau**2]]
 
 
 @dataclass(frozen=True, config=STRICT)
-class LinearHighGain:
+class LinearHighGain(_LinearFilter):
     """The linear high-gain differentiator of Vasiljevic and Khalil, reference [13] of aranovskiy2020.
 
     x1' = x2 + (a1/eps)(y1 - x1), x2' = (a2/eps^2)(y1 - x1): model-free.
@@ -75,31 +93,19 @@ class LinearHighGain:
         a2: Coefficient a2 of the polynomial s^2 + a1 s + a2.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ()
-
-    dt: Positive
-    model: ReducedModel
     epsilon: Positive = 0.0287
     a1: Positive = 1.4142135623730951
     a2: Positive = 1.0
 
-    @cached_property
-    def _rows(self) -> Coefficients:
+    @property
+    def equations(self) -> tuple[list[list[float]], list[list[float]]]:
+        """A, B of z' = A z + B y1."""
         g1, g2 = self.a1 / self.epsilon, self.a2 / self.epsilon**2
-        return second_order_rows(np.array([[-g1, 1.0], [-g2, 0.0]]), np.array([[g1], [g2]]), self.dt)
-
-    def init(self, y: Measurement) -> FilterState:
-        """Start at rest at the measured tilt."""
-        return FilterState(y.y1, 0.0 * y.y1, y.y1)
-
-    def step(self, state: FilterState, y: Measurement, u: Scalar) -> tuple[FilterState, Estimate]:
-        """Advance by one sample period."""
-        state = second_order_step(self._rows, state, y[0])
-        return state, Estimate(state[0], state[1], y[1])
+        return [[-g1, 1.0], [-g2, 0.0]], [[g1], [g2]]
 
 
 @dataclass(frozen=True, config=STRICT)
-class FiniteDifference:
+class FiniteDifference(_ModelFree):
     """The first-order difference, as used in reference [11] of aranovskiy2020 (Spong, Corke, Lozano 2001).
 
     x2 = (y1_k - y1_{k-1})/dt: no parameter, no model, no filter.
@@ -108,11 +114,6 @@ class FiniteDifference:
         dt: Sample period [s].
         model: The reduced model (not used: this observer is model-free).
     """
-
-    needs: ClassVar[tuple[str, ...]] = ()
-
-    dt: Positive
-    model: ReducedModel
 
     def init(self, y: Measurement) -> Scalar:
         """Remember the measured tilt."""
@@ -132,7 +133,7 @@ class TwistingState(NamedTuple):
 
 
 @dataclass(frozen=True, config=STRICT)
-class SuperTwisting:
+class SuperTwisting(_ModelFree):
     """Levant's robust exact differentiator, reference [12] of aranovskiy2020.
 
     z0' = z1 - l0 sqrt(L) |s|^(1/2) sign s, z1' = -l1 L sign s, s = z0 - y1: model-free.
@@ -150,10 +151,6 @@ class SuperTwisting:
         l1: Gain of the rate's correction. Default: Levant's 1.1.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ()
-
-    dt: Positive
-    model: ReducedModel
     L: Positive = 10.4
     l0: Positive = 1.5
     l1: Positive = 1.1
