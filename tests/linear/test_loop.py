@@ -366,12 +366,12 @@ def test_states_of_all_kinds_are_taken() -> None:
 @pytest.mark.parametrize(
     ("fault", "message"),
     [
-        ("set", "keeps a set in its state"),
+        ("set", "its state holds a set"),
         ("raises", "fails near rest: KeyError: 'gone'"),
         ("drifts", "does not come to rest while nothing moves"),
     ],
 )
 def test_an_observer_that_cannot_be_linear_says_why(monkeypatch: pytest.MonkeyPatch, fault: str, message: str) -> None:
-    monkeypatch.setattr("cmg_mj.linear.slopes.MOST_SAMPLES", 1000)
+    monkeypatch.setattr("cmg_mj.linear.slopes.MAX_SAMPLES", 1000)
     with pytest.raises(InputError, match=message):
         observer_slopes(_Odd(fault))

@@ -3,7 +3,7 @@
 NumPy hands its operators and functions over to a class with `__array_ufunc__` (NEP 13) and `__array_function__`
 (NEP 18). Code written for arrays, such as the second branch of `elementwise`, therefore takes symbols unchanged. Code
 that no formula can express, such as `if y1 > 0.1:` or `math.sin(y1)`, asks the symbol for its value. The symbol then
-raises `NotExportable` with the line of the user's file.
+raises `InputError` with the line of the user's file.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from cmg_mj.core.arrays import Symbolic
 from cmg_mj.core.errors import InputError, raised
-from cmg_mj.features.export.pytree import NotExportable
 
 Operand: TypeAlias = "Symbol | float | np.generic | np.ndarray"
 
@@ -95,7 +94,7 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Operand, **kwargs: Operand) -> Operand:
         if method != "__call__" or kwargs:
-            raise NotExportable(f"numpy.{ufunc.__name__} with {', '.join(kwargs) or method} {here()}")
+            raise InputError(f"numpy.{ufunc.__name__} with {', '.join(kwargs) or method} {here()}")
         if any(isinstance(x, np.ndarray) and x.ndim for x in inputs):
             return np.frompyfunc(partial(_apply, ufunc), ufunc.nin, 1)(*map(_boxed, inputs))
         return _apply(ufunc, *inputs)
@@ -111,16 +110,16 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
             return _where(*args)
         if function is np.clip and len(args) == 3 and not kwargs:
             return np.minimum(np.maximum(args[0], args[1]), args[2])
-        raise NotExportable(f"numpy.{function.__name__} {here()}: it is not among the functions that can be exported")
+        raise InputError(f"numpy.{function.__name__} {here()}: it is not among the functions that can be exported")
 
     def __bool__(self) -> bool:
-        raise NotExportable(
+        raise InputError(
             f"a branch on a value {here()}: the exported C takes the same way always; use cmg_mj.core.arrays "
             "(where, clip, sign), or numpy.where"
         )
 
     def _number(self, *_: int | None) -> NoReturn:
-        raise NotExportable(
+        raise InputError(
             f"a plain number is asked for {here()}, as by float(), int(), round() or a function of math; use "
             "cmg_mj.core.arrays, or numpy's functions"
         )
@@ -149,7 +148,7 @@ def expression(x: Operand | Symbolic) -> casadi.SX:
     """Convert a symbol or a plain number to CasADi's expression.
 
     Raises:
-        NotExportable: The operand is neither.
+        InputError: The operand is neither.
     """
     if isinstance(x, np.ndarray) and x.ndim == 0:
         x = x[()]
@@ -157,7 +156,7 @@ def expression(x: Operand | Symbolic) -> casadi.SX:
         return x.sx
     if isinstance(x, (bool, int, float, np.bool_, np.integer, np.floating)):
         return casadi.SX(float(x))
-    raise NotExportable(f"{type(x).__name__} where a real number belongs {here()}")
+    raise InputError(f"{type(x).__name__} where a real number belongs {here()}")
 
 
 def _boxed(x: Operand) -> Operand:
@@ -178,7 +177,7 @@ def _apply(ufunc: np.ufunc, *inputs: Operand) -> Symbol:
         return Symbol(expression(inputs[0]))
     operation = OPERATIONS.get(ufunc)
     if operation is None:
-        raise NotExportable(f"numpy.{ufunc.__name__} {here()}: it is not among the functions that can be exported")
+        raise InputError(f"numpy.{ufunc.__name__} {here()}: it is not among the functions that can be exported")
     if ufunc in (np.maximum, np.minimum) and not isinstance(inputs[0], Symbol):
         inputs = inputs[::-1]  # the operand that may be NaN comes first: see `c_code`
     make = casadi.SX.unary if len(inputs) == 1 else casadi.SX.binary
@@ -199,7 +198,7 @@ Result = TypeVar("Result")
 MEASURED = ("y1", "y2", "acceleration")
 """Names of an observer's measurements."""
 
-MOST_NUMBERS = 1000
+MAX_NUMBERS = 1000
 """Largest state: 4 kB on a board in single precision. More is not meant for a board, and takes CasADi minutes."""
 
 
@@ -239,12 +238,12 @@ def function_of(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX
     """Make a function of symbols.
 
     Raises:
-        NotExportable: The outputs depend on other symbols.
+        InputError: The outputs depend on other symbols.
     """
     arguments = [symbol.sx for symbol in inputs]
     function = casadi.Function(name, arguments, casadi.cse(list(outputs)) if outputs else [], {"allow_free": True})
     if function.has_free():
-        raise NotExportable(
+        raise InputError(
             "it remembers something outside of its state, in self or elsewhere, which C would not have: make it a part "
             "of the state that step returns"
         )
@@ -255,12 +254,12 @@ def call_traced(name: str, function: Callable[[], Result]) -> Result:
     """Call a user's code with symbols."""
     try:
         return function()
-    except NotExportable:
+    except InputError:
         raise
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        raise NotExportable(f"{name} raised {raised(error)} {raised_at(error.__traceback__)}") from error
+        raise InputError(f"{name} raised {raised(error)} {raised_at(error.__traceback__)}") from error
 
 
 _LIBRARY_PATHS = (

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import casadi
 
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import Law, Measurement, Observer, extra_signals, feedback_state
 from cmg_mj.features.export.constants import Constants
 from cmg_mj.features.export.names import identifiers
-from cmg_mj.features.export.pytree import form, numbers, rebuild
 from cmg_mj.features.export.symbol import (
+    MAX_NUMBERS,
     MEASURED,
-    MOST_NUMBERS,
     LawNotExportable,
-    NotExportable,
     Symbol,
     as_written,
     call_traced,
@@ -26,6 +25,7 @@ from cmg_mj.features.export.symbol import (
     symbols_named,
 )
 from cmg_mj.laws.state_feedback import StateFeedback
+from cmg_mj.linear.slopes import Leaf, form, numbers, rebuild
 
 
 class Traced(NamedTuple):
@@ -58,7 +58,7 @@ def trace(observer: Observer, law: Law, constants: Constants) -> Traced:
         The formulas.
 
     Raises:
-        NotExportable: A formula cannot express what the observer does.
+        InputError: A formula cannot express what the observer does.
         LawNotExportable: A formula cannot express what the law does.
     """
     with as_written():
@@ -66,27 +66,54 @@ def trace(observer: Observer, law: Law, constants: Constants) -> Traced:
         return Traced(*observer_formulas, trace_law(law, constants, len(extra_signals(observer))))
 
 
+class _Recording(NamedTuple):
+    """The init and a step of an observer or a law, run once with symbols.
+
+    Attributes:
+        first: The measurement that init took.
+        state: Its state.
+        leaves: The numbers in that state.
+        symbols: A symbol for each of them, which the step took.
+        after: The numbers in the state that the step returned.
+        outputs: What it returned beside the state.
+    """
+
+    first: list[Symbol]
+    state: Any
+    leaves: list[Leaf]
+    symbols: list[Symbol]
+    after: list[casadi.SX]
+    outputs: list[casadi.SX]
+
+
+def _record(part: Observer | Law, label: str, step: Callable[[Any], tuple[Any, Sequence[Any]]]) -> _Recording:
+    """Run a part's init and, with symbols in the place of its state's numbers, a step."""
+    first = symbols_named(MEASURED)
+    state = call_traced("init(y)", lambda: part.init(Measurement(*first)))
+    leaves = list(numbers(state))
+    if len(leaves) > MAX_NUMBERS:
+        raise InputError(f"its state holds {len(leaves)} numbers; at most {MAX_NUMBERS} can be exported")
+    symbols = symbols_named([f"state {i}" for i in range(len(leaves))])
+    before = rebuild(state, iter(symbols))
+    after, outputs = call_traced(label, lambda: step(before))
+    recording = _Recording(first, state, leaves, symbols, [expression(leaf.value) for leaf in numbers(after)], [])
+    if form(after) != form(state):
+        raise InputError("its step returns a state that is made otherwise than the one of init")
+    return recording._replace(outputs=[expression(output) for output in outputs])
+
+
 def _trace_observer(
     observer: Observer, measure: casadi.Function
 ) -> tuple[tuple[str, ...], casadi.Function, casadi.Function, casadi.Function]:
     """Return the first four parts of `Traced`."""
-    first = symbols_named(MEASURED)
-    state = call_traced("init(y)", lambda: observer.init(Measurement(*first)))
-    leaves = list(numbers(state))
-    if len(leaves) > MOST_NUMBERS:
-        raise NotExportable(f"its state holds {len(leaves)} numbers; at most {MOST_NUMBERS} can be exported")
-    symbols = symbols_named([f"state {i}" for i in range(len(leaves))])
-    before, y, (u,) = rebuild(state, iter(symbols)), symbols_named(MEASURED), symbols_named(["u"])
-    after, estimate = call_traced("step(state, y, u)", lambda: observer.step(before, Measurement(*y), u))
-    next_state = [expression(leaf.value) for leaf in numbers(after)]
-    if form(after) != form(state):
-        raise NotExportable("its step returns a state that is made otherwise than the one of init")
-    outputs = [expression(part) for part in estimate]
-
-    needed = needed_numbers(symbols, next_state, outputs)
+    y, (u,) = symbols_named(MEASURED), symbols_named(["u"])
+    first, _, leaves, symbols, after, outputs = _record(
+        observer, "step(state, y, u)", lambda before: observer.step(before, Measurement(*y), u)
+    )
+    needed = needed_numbers(symbols, after, outputs)
     names = identifiers([leaves[i].path for i in needed])
     init = function_of("init", first, [expression(leaves[i].value) for i in needed])
-    step = function_of("step", [*(symbols[i] for i in needed), *y, u], [*(next_state[i] for i in needed), *outputs])
+    step = function_of("step", [*(symbols[i] for i in needed), *y, u], [*(after[i] for i in needed), *outputs])
     return tuple(names), measure, init, step
 
 
@@ -180,7 +207,7 @@ def trace_law(law: Law, constants: Constants, extra_signals: int) -> TracedLaw:
         return _trace_state_feedback(constants)
     try:
         return _trace(law, extra_signals)
-    except NotExportable as error:
+    except InputError as error:
         raise LawNotExportable(str(error)) from error
 
 
@@ -195,24 +222,18 @@ def _trace_state_feedback(constants: Constants) -> TracedLaw:
 
 
 def _trace(law: Law, extra_signals: int) -> TracedLaw:
-    first = symbols_named(MEASURED)
-    state = call_traced("init(y)", lambda: law.init(Measurement(*first)))
-    leaves = list(numbers(state))
-    if len(leaves) > MOST_NUMBERS:
-        raise NotExportable(f"its state holds {len(leaves)} numbers; at most {MOST_NUMBERS} can be exported")
-    symbols = symbols_named([f"state {i}" for i in range(len(leaves))])
     names = law_arguments(extra_signals)
     arguments = symbols_named(names)
     y, (x1, x2, x3, *extra), held = Measurement(*arguments[:3]), arguments[3:-1], arguments[-1]
-    before, x = rebuild(state, iter(symbols)), feedback_state(x1, x2, x3, tuple(extra))
-    after, u = call_traced("step(state, y, x, u)", lambda: law.step(before, y, x, held))
-    command, next_state = expression(u), [expression(leaf.value) for leaf in numbers(after)]
-    if form(after) != form(state):
-        raise NotExportable("its step returns a state that is made otherwise than the one of init")
 
+    def step(before: Any) -> tuple[Any, Sequence[Any]]:
+        after, u = law.step(before, y, feedback_state(x1, x2, x3, tuple(extra)), held)
+        return after, (u,)
+
+    first, state, leaves, symbols, next_state, (command,) = _record(law, "step(state, y, x, u)", step)
     integrator = [i for i, leaf in enumerate(leaves) if leaf.path == INTEGRATOR and hasattr(state, "x_e")]
     if hasattr(state, "x_e") and not integrator:
-        raise NotExportable("its integrator x_e is no number in its state, where C would have it")
+        raise InputError("its integrator x_e is no number in its state, where C would have it")
     needed = needed_numbers(symbols, next_state, [command, *(symbols[i].sx for i in integrator)])
     kept = [i for i in needed if i not in integrator] + integrator
     begin, outputs = [expression(leaves[i].value) for i in kept], [command, *(next_state[i] for i in kept)]
