@@ -22,7 +22,7 @@ OK, INPUT, RESULT = range(3)
 NOT_FINITE = (math.nan, math.inf, -math.inf)
 BROKEN_AT = (0, 1, 30)
 TICKS = 60
-OWN = "tests.features.export.own:"
+OWN, OWN_LAW = "tests.features.export.own:", "controller.kind=tests.features.export.own_laws:"
 
 
 @pytest.fixture(autouse=True)
@@ -145,6 +145,45 @@ def test_a_number_of_the_controller_that_is_not_finite_stops_it(kind: str, tmp_p
             seen += 1
     assert seen >= 1  # the integrator
     assert not compiled.statuses(readings)[0].any()
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize("member", ["parts_pi_1", "parts_abs", "x_e"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_state_of_the_law_that_is_not_finite_stops_it(member: str, value: float, tmp_path: Path) -> None:
+    """Also the number that the law divides by, which leaves the command finite."""
+    compiled = Compiled("linear", "double", tmp_path, f"{OWN_LAW}Elaborate")
+    samples = check.signals(controller("linear"), 0, "double")[:20]
+    fresh = compiled.run(samples)
+    members = [name for struct in ("state", "law_state") for name in members_of(compiled, struct)] + ["x_e"]
+    compiled.run(samples[:5])
+    compiled.numbers(len(members))[members.index(member)] = value
+    statuses, results = compiled.go_on(samples[5:])
+    assert set(statuses) == {RESULT}
+    assert not results.any()
+    np.testing.assert_array_equal(compiled.run(samples), fresh)
+
+
+def members_of(compiled: Compiled, struct: str) -> list[str]:
+    """Names of the numbers in a struct of the header."""
+    text = compiled.header.read_text().partition(f"}} linear_{struct};")[0].rpartition("typedef struct {")[2]
+    return re.findall(r"linear_real (\w+);", text)
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_an_infinite_command_stops_it_as_python(tmp_path: Path) -> None:
+    """It is not taken for one beyond the limit."""
+    law = f"{OWN_LAW}Overflows"
+    compiled, loop = Compiled("linear", "double", tmp_path, law), controller("linear", law)
+    upright, overturned = [0.0, 9.81, 0.0, 9.81, 0.0, 0.0], [-1.0, -9.81, -1.0, -9.81, 0.0, 0.0]
+    statuses, results = compiled.statuses(np.array([upright, overturned]))
+    assert statuses.tolist() == [0, RESULT]
+    assert np.all(np.isfinite(results))
+    loop.decide(0, upright[:4], upright[4:], 0.0, 0.0)
+    with pytest.raises(RunStopped, match="law Overflows returned -inf for u"):
+        loop.decide(loop.period, overturned[:4], overturned[4:], 0.0, 0.0)
 
 
 @needs_compiler
