@@ -122,19 +122,6 @@ def test_a_model_with_its_scenario_beside_it_is_not_judged_by_other_gains(half: 
     assert "run it      cmg-mj run push_recovery --set plant.model=half.xml" in cmg_mj("check", "half.xml").out
 
 
-def test_half_the_flywheel_is_solved_for(half: str) -> None:
-    """With gains made for it, it stands."""
-    solved = ["--set", "controller.lqr.state_cost=[1, 1, 1, 1]", "--set", "duration_s=4"]
-    outcome = cmg_mj("run", "push_recovery", "--set", half, *solved, "--out", "it", "--json")
-    assert (outcome.err, '"outcome": "done"' in outcome.out) == ("", True)
-
-
-@pytest.mark.slow
-def test_compare_says_it_once(half: str) -> None:
-    options = ["--observers", "linear,ltv", "--worlds", 2, "--set", half, "--set", "duration_s=2.2", "--json"]
-    assert cmg_mj("compare", "push_recovery", *options).err.count("hint") == 1
-
-
 def test_a_notch_is_in_the_rigid_loop() -> None:
     """The loop, sample after sample, obeys the polynomial of its poles."""
     plain, notched = loop(), loop("controller.notch_hz=8")

@@ -16,7 +16,6 @@ import pytest
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.features.plugin.build import FLAGS
-from cmg_mj.features.plugin.driver import set_world
 from cmg_mj.features.plugin.make import Plugin, plugin
 from cmg_mj.features.plugin.model import plugin_mjcf
 from cmg_mj.plant.tilt_line import apply_torques
@@ -146,9 +145,10 @@ def columns(trajectory: Trajectory, names: Sequence[str]) -> np.ndarray:
 
 
 def pairs(
-    made: Made, rows: dict[str, np.ndarray], trajectory: Trajectory, observer: str
+    made: Made, rows: dict[str, np.ndarray], trajectory: Trajectory
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     """What the plugin's program and the runner have of every quantity at every control tick."""
+    observer = made.experiment.scenario.observer.kind
     yield "qpos", rows["qpos"], columns(trajectory, trajectory.layout.positions())
     yield "qvel", rows["qvel"], columns(trajectory, trajectory.layout.rates())
     for axis in made.experiment.plant.axis_names:
@@ -170,43 +170,11 @@ def bits(numbers: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(numbers, dtype=float).view(np.uint64)
 
 
-def check_against_runner(made: Made, rows: dict[str, np.ndarray], trajectory: Trajectory, observer: str) -> None:
-    """Every number at every control tick is the runner's, bit for bit."""
-    for name, plugin_numbers, runner_numbers in pairs(made, rows, trajectory, observer):
+def check_against_runner(made: Made) -> None:
+    """Every number at every control tick of a run is the runner's, bit for bit."""
+    trajectory = made.experiment.run().trajectory
+    assert trajectory is not None
+    rows = run(made, made.start(), len(trajectory))
+    for name, plugin_numbers, runner_numbers in pairs(made, rows, trajectory):
         np.testing.assert_array_equal(plugin_numbers, runner_numbers, err_msg=name)
         np.testing.assert_array_equal(bits(plugin_numbers), bits(runner_numbers), err_msg=f"{name}, bits")
-
-
-class Comparison(NamedTuple):
-    """Numbers of a run beside the runner's.
-
-    Attributes:
-        differing: How many differ in any bit.
-        numbers: How many there are.
-        seconds: Until when the run went [s].
-    """
-
-    differing: int
-    numbers: int
-    seconds: float
-
-
-def compare(made: Made, seed: int | None = None, world: int = 0) -> Comparison:
-    """Compare every number with the runner's.
-
-    Args:
-        made: The plugin.
-        seed: Seed of the noise; None: the scenario's.
-        world: World whose noise it is.
-    """
-    experiment, data = made.experiment, made.start()
-    if seed is not None:
-        experiment = experiment.with_settings({"seed": seed})
-    set_world(made.model, data, experiment.scenario.seed, world)
-    trajectory = experiment.run(world=world).trajectory
-    assert trajectory is not None
-    rows = run(made, data, len(trajectory))
-    both = list(pairs(made, rows, trajectory, experiment.scenario.observer.kind))
-    differing = sum(int((bits(a) != bits(b)).sum()) for _, a, b in both)
-    period = experiment.controller().period * experiment.plant.timestep
-    return Comparison(differing, sum(b.size for _, _, b in both), len(trajectory) * period)

@@ -36,17 +36,6 @@ def test_every_column_is_the_native_ones(scenario: str, settings: tuple[str, ...
     assert (native.driver, plugin.driver) == ("native", "plugin")
 
 
-def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["run", "push_recovery", "--set", "duration_s=3", "--json", "--out"]
-    summaries = []
-    for driver in ("native", "plugin"):
-        main([*arguments, str(tmp_path / driver), "--driver", driver])
-        summaries.append(json.loads(capsys.readouterr().out))
-    assert {**summaries[1], "driver": "native"} == {**summaries[0], "driver": "native"}
-    names = [sorted(path.name for path in (tmp_path / driver).glob("*.*")) for driver in ("native", "plugin")]
-    assert names[0] == names[1]
-
-
 def test_command_that_makes_a_plugin(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """And its examples, in Python and in C, show the rig that nobody pushes as a run does."""
     folder = tmp_path / "balance"

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import cmg_mj.features.plugin as package
-from cmg_mj.core.noise import NoiseStream, normals
 from tests.features.export.compiled import COMPILER, STRICT, needs_compiler
 
 pytestmark = needs_compiler
@@ -58,14 +57,6 @@ def test_normals_are_numpys(noise: Noise, seed: int, world: int, stream: int) ->
     np.testing.assert_array_equal(words, np.floor(words))
     assert words.min() >= 0
     assert words.max() < 2**32
-
-
-def test_the_sensors_streams(noise: Noise) -> None:
-    """A sample after the other, as the sensors draw them."""
-    stream = NoiseStream.FLICKER.on_axis(1)
-    words, samples = noise.start(7, 3, stream), normals(7, 3, stream, 16)
-    for _ in range(40):
-        np.testing.assert_array_equal(noise.draw(words, 16), next(samples))
 
 
 @pytest.mark.slow
