@@ -15,7 +15,7 @@ from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
 from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
-from cmg_mj.stages.low_pass import INSIDE_HZ
+from cmg_mj.stages.low_pass import INSIDE_HZ, coefficients
 from cmg_mj.stages.notch import Notch
 
 if TYPE_CHECKING:
@@ -255,10 +255,8 @@ class ClosedLoop:
 
     def _filter(self, name: str, value: np.ndarray) -> np.ndarray:
         """Advance a part's low-pass by a sample."""
-        from scipy.signal import butter
-
         bandwidth = self._design.scenario.sensors.accelerometer.bandwidth_hz
-        numerator, denominator = np.array(butter(2, bandwidth, fs=INSIDE_HZ))
+        numerator, denominator = coefficients(bandwidth, INSIDE_HZ)
         return self._second_order(f"{name}_filter", numerator, denominator, value)
 
     def _second_order(self, name: str, numerator: Sequence, denominator: Sequence, value: np.ndarray) -> np.ndarray:

@@ -380,7 +380,7 @@ def _rows(table: Table, precision: Precision) -> str:
     return "".join(f"    {_row(row, precision)},\n" for row in table)
 
 
-WIDEST = 110
+MAX_WIDTH = 110
 """Longest line [characters]."""
 
 PrintBody = Callable[[casadi.Function, Sequence[str], Sequence[str]], str]
@@ -390,7 +390,7 @@ PrintBody = Callable[[casadi.Function, Sequence[str], Sequence[str]], str]
 def function_head(head: str, parameters: Sequence[str]) -> str:
     """Print a function's name and parameters, on as many lines as they need."""
     text = f"{head}({', '.join(parameters)})"
-    return text if len(text) <= WIDEST else f"{head}(\n    {(',' + chr(10) + '    ').join(parameters)})"
+    return text if len(text) <= MAX_WIDTH else f"{head}(\n    {(',' + chr(10) + '    ').join(parameters)})"
 
 
 class LawPrinter(NamedTuple):

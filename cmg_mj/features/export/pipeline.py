@@ -14,6 +14,7 @@ from cmg_mj.core.types import Observer
 from cmg_mj.features.export import check
 from cmg_mj.features.export.c_code import Precision, operations
 from cmg_mj.features.export.c_files import CodePrinter, LawPrinter, format_example, format_test_vector
+from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.features.export.constants import class_path, constants_of
 from cmg_mj.features.export.names import export_files, name_of
 from cmg_mj.features.export.symbol import LawNotExportable
@@ -107,7 +108,7 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
         format_test_vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist()),
     )
     files = dict(zip(export_files(name), (printer.header(), printer.source(), *other_files), strict=True))
-    compiler = check.find_compiler()
+    compiler = find_compiler()
     figures: Figures = {
         "observer": name,
         "precision": precision,
@@ -125,13 +126,9 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
     }
     if compiler is not None:
         with tempfile.TemporaryDirectory() as temporary:
-            folder = Path(temporary)
-            try:
-                for file, text in files.items():
-                    write_text(folder / file, text)
-            except OSError as error:
-                raise InputError(f"temporary folder {folder}: cannot be written: {error.strerror}") from error
-            off_by = figures["c_off_by"] = check.check_c(folder, name, compiler)
+            for file, text in files.items():
+                write_text(Path(temporary, file), text)
+            off_by = figures["c_off_by"] = check.check_c(Path(temporary), name, compiler)
         bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
     return Code(files, figures, printer.law)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import casadi
@@ -166,27 +166,6 @@ class TracedLaw(NamedTuple):
     def numbers(self) -> int:
         """Numbers in its state, the integrator included, which is the last."""
         return len(self.state) + self.has_integrator
-
-    def first(self, y: Sequence[float]) -> list[float]:
-        """Compute the state before the first decision, the integrator last."""
-        return [0.0] if self.init is None else [float(value) for value in self.init.call(list(y))]
-
-    def decide(
-        self, values: Mapping[str, float], memory: Sequence[float], constants: Sequence[float]
-    ) -> tuple[float, list[float]]:
-        """Compute u and the next state.
-
-        Args:
-            values: Name of an argument -> its value.
-            memory: The state, the integrator last.
-            constants: Values of the law's constants.
-
-        Returns:
-            u, and the next state.
-        """
-        arguments = [values[name] for name in self.arguments]
-        u, *after = (float(value) for value in self.step.call([*arguments, *memory, *constants]))
-        return u, after
 
 
 def trace_law(law: Law, constants: Constants, extra_signals: int) -> TracedLaw:

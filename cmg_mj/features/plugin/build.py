@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import platform
 import shlex
-import subprocess
 from collections.abc import Collection, Sequence
 from importlib.metadata import version
 from importlib.resources import files
@@ -13,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.features.export.compiler import build
 
 COMMON_SOURCES = ("noise.c", "sensors.c", "gyros.c", "controller.c", "state.c", "setup.c", "plugin.c")
 COMMON_HEADERS = ("ziggurat.h", "noise.h", "sensors.h", "gyros.h", "controller.h", "rig.h", "state.h", "setup.h")
@@ -59,16 +59,7 @@ def compile_plugin(folder: Path, compiler: Sequence[str], sources: Sequence[str]
     mujoco = find_mujoco()
     link = [f"-L{mujoco.parent}", f"-l:{mujoco.name}", f"-Wl,-rpath,{mujoco.parent}", "-lm"]
     command = [*compiler, *FLAGS, "-isystem", str(mujoco.parent / "include"), *sources, "-o", library, *link]
-    try:
-        process = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=300, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise InputError(f"plugin: the C compiler {shlex.join(compiler)} cannot be run: {error}") from error
-    if process.returncode:
-        lines = [line for line in process.stderr.splitlines() if "error" in line]
-        reason = lines[0] if lines else f"status {process.returncode}"
-        raise InputError(f"plugin: the C does not compile with {compiler[0]}: {reason}")
+    build(command, f"plugin: the C compiler {shlex.join(compiler)}", folder)
 
 
 def library_name(name: str) -> str:

@@ -15,6 +15,7 @@ import mujoco
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.export import check_installed
+from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.features.export.names import name_of
 from cmg_mj.features.plugin.build import check_platform, compile_plugin, library_name
 from cmg_mj.features.plugin.driver import PluginLoop
@@ -89,14 +90,8 @@ def require_tools() -> None:
     """
     check_platform()
     check_installed()
-    if _find_compiler() is None:
+    if find_compiler() is None:
         raise InputError("plugin: there is no C compiler: install gcc or clang, or name one in CC")
-
-
-def _find_compiler() -> list[str] | None:
-    from cmg_mj.features.export.check import find_compiler  # imports CasADi
-
-    return find_compiler()
 
 
 def require_stable_periods(experiment: Experiment) -> None:
@@ -159,7 +154,7 @@ def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
     Raises:
         InputError: The C does not compile, or there is no compiler: then all but the library is written.
     """
-    name, library, compiler = made.name, library_name(made.name), _find_compiler()
+    name, library, compiler = made.name, library_name(made.name), find_compiler()
     writers: dict[str, Callable[[Path], None]] = {
         file: partial(write_text, text=text) for file, text in made.files.items()
     }

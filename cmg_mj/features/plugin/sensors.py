@@ -17,13 +17,13 @@ from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.encoder import Encoder
 from cmg_mj.sensors.fog import Fog
 from cmg_mj.sensors.mems_gyro import PIECE, MemsGyro
-from cmg_mj.stages.low_pass import INSIDE_HZ
+from cmg_mj.stages.low_pass import INSIDE_HZ, coefficients
 from cmg_mj.stages.turning import YawCoupling
 
-MOST_AXES = 4
-MOST_GIMBALS = 8
-MOST_ESTIMATES = 64
-LARGEST_SEED = 2**53
+MAX_AXES = 4
+MAX_GIMBALS = 8
+MAX_ESTIMATES = 64
+MAX_SEED = 2**53
 """Seeds and worlds lie in the plugin's state, whose numbers are doubles."""
 
 Value = int | float | str | Sequence["Value"] | Mapping[str, "Value"]
@@ -72,9 +72,9 @@ def refuse_unsupported(rig: PluginRig) -> None:
     Raises:
         InputError: It does not have something that is in use.
     """
-    counts = [(len(rig.axes), "axes", MOST_AXES)]
-    counts += [(len(axis.modules), "modules on an axis", MOST_GIMBALS) for axis in rig.axes]
-    counts += [(3 + len(axis.controller.extra_signals[0]), "estimates", MOST_ESTIMATES) for axis in rig.axes]
+    counts = [(len(rig.axes), "axes", MAX_AXES)]
+    counts += [(len(axis.modules), "modules on an axis", MAX_GIMBALS) for axis in rig.axes]
+    counts += [(3 + len(axis.controller.extra_signals[0]), "estimates", MAX_ESTIMATES) for axis in rig.axes]
     for count, what, most in counts:
         if count > most:
             raise InputError(f"{count} {what}: a plugin takes at most {most}")
@@ -88,7 +88,7 @@ def check_noise(seed: float, world: float) -> None:
         InputError: It is out of range, or no whole number.
     """
     for name, number in (("seed", seed), ("world", world)):
-        if not 0 <= number <= LARGEST_SEED or number != int(number):
+        if not 0 <= number <= MAX_SEED or number != int(number):
             raise InputError(f"{name} = {number}: a plugin takes {name}s from 0 to 2^53, as whole numbers")
 
 
@@ -144,9 +144,9 @@ def describe_pair(sensor: Accelerometer, axis: int, clock: Clock) -> Struct:
     period, skew = clock.count(1.0 / sensor.rate_hz), clock.count(sensor.skew_s)
     raw = clock.count(1.0 / INSIDE_HZ) if sensor.bandwidth_hz else period
     uneven = bool(sensor.skew_s or sensor.bandwidth_hz)
-    same, other = _weights(sensor)
+    same, other = sensor.mounting_weights()
     inner, outer = sensor.bias
-    b, a = _low_pass(sensor)
+    b, a = coefficients(sensor.bandwidth_hz, INSIDE_HZ) if sensor.bandwidth_hz else [[0.0] * 3] * 2
     return {
         "noise_stream": NoiseStream.ACCELEROMETER.on_axis(axis),
         "flicker_stream": NoiseStream.FLICKER.on_axis(axis),
@@ -168,26 +168,6 @@ def describe_pair(sensor: Accelerometer, axis: int, clock: Clock) -> Struct:
         **_flicker(sensor.flicker_floor, 1.0 / sensor.raw_rate_hz),
         "delivery": clock.delivery(4, sensor.rate_hz, sensor.latency_s),
     }
-
-
-def _weights(sensor: Accelerometer) -> tuple[list[float], list[float]]:
-    """Compute each channel's weights of its own and the other axis: see `constant_errors`."""
-    same, other = [], []
-    parts = zip(sensor.scale_error, sensor.misalignment_deg, sensor.cross_axis, strict=True)
-    for scale, misalignment, cross in parts:
-        c, s = math.cos(math.radians(misalignment)), math.sin(math.radians(misalignment))
-        same += [(1.0 + scale) * (c + cross * s), (1.0 + scale) * (c - cross * s)]
-        other += [(1.0 + scale) * (cross * c - s), (1.0 + scale) * (cross * c + s)]
-    return same, other
-
-
-def _low_pass(sensor: Accelerometer) -> list[list[float]]:
-    """Compute the coefficients b and a of the low-pass, as `low_pass` has them."""
-    if not sensor.bandwidth_hz:
-        return [[0.0] * 3] * 2
-    from scipy.signal import butter  # 1 s of import, which only a part with a low-pass needs
-
-    return np.array(butter(2, sensor.bandwidth_hz, fs=INSIDE_HZ)).tolist()
 
 
 def describe_encoders(sensor: Encoder, gimbals: int, clock: Clock) -> Struct:

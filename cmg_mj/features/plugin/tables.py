@@ -31,32 +31,10 @@ if TYPE_CHECKING:
     from cmg_mj.features.export.c_files import LawPrinter
 
 NAMES_IN_USE = frozenset(
-    {
-        "axis",
-        "controller",
-        "decision",
-        "delivery",
-        "encoder",
-        "fog",
-        "gyros",
-        "law",
-        "measure",
-        "module",
-        "noise",
-        "observer",
-        "pair",
-        "plugin",
-        "rig",
-        "sensor",
-        "sensors",
-        "setup",
-        "show",
-        "spin",
-        "state",
-        "turn_gyro",
-        "turning",
-        "ziggurat",
-    }
+    """
+    axis controller decision delivery encoder fog gyros law measure module noise observer pair plugin rig sensor sensors
+    setup show spin state turn_gyro turning ziggurat
+    """.split()  # noqa: SIM905
 )
 """Names that would clash with the C that all plugins have in common."""
 

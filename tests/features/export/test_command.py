@@ -127,7 +127,7 @@ def test_wrong_input_is_one_line(arguments: list[str], words: str) -> None:
     [
         ("'", "No closing quotation"),
         ("no-such-compiler", "the C compiler no-such-compiler cannot be run: No such file or directory"),
-        (f"{sys.executable} -c 'raise SystemExit(1)'", "it ended with status 1 and without a message"),
+        (f"{sys.executable} -c 'raise SystemExit(1)'", "it ended with status 1, silently"),
         (f"{sys.executable} -c 0", "the compiled example cannot be run"),
     ],
 )
