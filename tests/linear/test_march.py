@@ -108,16 +108,6 @@ def test_the_push_that_fells_it_is_the_simulations(torque: float, stands: bool) 
 
 
 @pytest.mark.slow
-def test_sensors_that_are_late_are_in_the_loop() -> None:
-    settings = ["plant.bend_frequency_hz=20", "observer.kind=gyro_free", "controller.notch_hz=20"]
-    assert decay_of(*settings) == ("decays", "decays")
-    assert decay_of(*settings, "sensors.accelerometer.bandwidth_hz=44").rigid == "decays"
-    assert decay_of(*settings, "sensors.accelerometer.latency_s=0.06").rigid == "swings"
-    late = experiment(*settings[1:], "sensors.accelerometer.latency_s=0.06", "duration_s=8").run_many(2)
-    assert late.fell.any() or (late.mean("command_rms_rad_s") or 0.0) > 1.0
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(("hz", "bending"), [(16.5, "swings"), (17.0, "swings"), (17.5, "decays")])
 def test_a_mode_that_grows_by_a_thirtieth_in_a_second_is_unstable(hz: float, bending: str) -> None:
     settings = ["observer.kind=kalman", "plant.bend_beyond=both", "plant.bend_share=0.5"]

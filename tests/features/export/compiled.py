@@ -85,13 +85,6 @@ class Compiled:
         """The controller's first numbers: the observer's state, x_e, u. Writing to them changes the controller."""
         return self._controller[:count]
 
-    def step(self, state: np.ndarray, *arguments: float) -> tuple[np.ndarray, np.ndarray]:
-        """One step of the observer alone: the state and the estimate."""
-        state, estimate = state.astype(self.type), np.full(self.width, np.nan, self.type)
-        number = ctypes.c_double if self.type is np.float64 else ctypes.c_float
-        self._call("step", state, *map(number, arguments), estimate)
-        return state.astype(float), estimate.astype(float)
-
     def _call(self, function: str, *arguments: Any) -> int:
         pointers = [x.ctypes.data_as(ctypes.c_void_p) if isinstance(x, np.ndarray) else x for x in arguments]
         return getattr(self._loaded, f"{self.name}_{function}")(*pointers)
