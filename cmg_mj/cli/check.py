@@ -10,8 +10,7 @@ from cmg_mj.core.types import law_needs
 from cmg_mj.features.bend.verdict import bend_hints, bend_rows, judge_bend
 from cmg_mj.features.pivot.pivot_track import read_track
 from cmg_mj.laws import LAWS, TABLE_2_GAINS, StateFeedback
-from cmg_mj.linear.omissions import omissions
-from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_gains, sliding_words
+from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_gains, omissions, sliding_words
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.description import assignments, lines, number
 from cmg_mj.runs.experiment import Experiment

@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import Controller, PlantInterface
+from cmg_mj.core.controller import PlantInterface
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.linear.plant import LinearPlant
 from cmg_mj.scenario.design import Design
-from cmg_mj.scenario.make_controller import make_controller
+from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.sampled import Sensors
 
 STARTS_RAD_S = (0.01, 0.05)
@@ -74,7 +74,9 @@ class _March:
     def __init__(self, design: Design, plant: LinearPlant) -> None:
         scenario, self._rig, self._plant = design.scenario, design.rig, plant
         worlds = len(STARTS_RAD_S) + 1
-        self._controller = _quiet_controller(design, worlds)
+        known = PlantInterface(design.rig.tilt, GimbalAngle((1.0,), (0.0,)), design.rig.timestep)
+        quiet = _quiet(design.scenario.sensors)
+        self._controller = design.controller(known, worlds=range(worlds), sensors=quiet, open_loop_observers={})
         self._interval = self._controller.steps_per_sample * design.rig.timestep
         self._F, self._G = plant.hold(self._interval)
         tilt, rate = (row / (row @ row) for row in plant.C[:2])
@@ -152,34 +154,17 @@ def _reading(
     return IdealReading(np.array(forces), [y2], gyro, rate)
 
 
-def _quiet_controller(design: Design, worlds: int) -> Controller:
-    """Make the controller of a run, in so many worlds, with sensors that show what is there."""
-    settings = design.scenario.controller
-    return make_controller(
-        design.observer(),
-        design.fresh_law(),
-        _quiet(design.scenario.sensors),
-        PlantInterface(design.rig.tilt, GimbalAngle((1.0,), (0.0,)), design.rig.timestep),
-        worlds=range(worlds),
-        feedback=settings.feedback,
-        angle_source=settings.angle_source,
-        notch_hz=settings.notch_hz,
-    )
-
-
 def _quiet(sensors: Sensors) -> Sensors:
     """Return the sensors with their rates, latencies, ranges and low-passes, and without errors."""
-    pair = replace(
-        sensors.accelerometer,
+    pair = sensors.accelerometer
+    pair = Accelerometer(
+        rate_hz=pair.rate_hz,
+        latency_s=pair.latency_s,
+        range_g=pair.range_g,
+        skew_s=pair.skew_s,
+        bandwidth_hz=pair.bandwidth_hz,
         noise_density_ug_rthz=0.0,
-        bias_mg=(0.0, 0.0),
         counts_per_g=0.0,
-        scale_error=(0.0, 0.0),
-        misalignment_deg=(0.0, 0.0),
-        cross_axis=(0.0, 0.0),
-        bias_instability_ug=0.0,
-        vibration_mg=0.0,
-        wheel_harmonics_mg=(),
     )
     encoder = replace(sensors.encoder, counts_per_revolution=0.0)
     fog = replace(sensors.fog, angle_random_walk_deg_rth=0.0, bias_deg_h=0.0)

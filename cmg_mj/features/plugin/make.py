@@ -23,8 +23,7 @@ from cmg_mj.features.plugin.model import plugin_mjcf
 from cmg_mj.features.plugin.sensors import PluginAxis, PluginRig
 from cmg_mj.features.plugin.tables import PluginCode, generate_plugin
 from cmg_mj.laws import StateFeedback
-from cmg_mj.linear.omissions import IN_THE_MODEL, omissions
-from cmg_mj.linear.verdict import require_stable_period
+from cmg_mj.linear.verdict import SIMULATED, omissions, require_stable_period
 from cmg_mj.plant.mujoco_state import set_control_callback
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.result import Result
@@ -136,7 +135,7 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
     axes = []
     for i, part in enumerate(experiment.parts):
         for field, clause in omissions(part.scenario).items():
-            if field not in IN_THE_MODEL:
+            if field not in SIMULATED:
                 raise InputError(f"{field}: {clause}: a plugin does not have it")
         axis = part.plant.axis
         modules = tuple((module.name, module.direction, module.speed, module.gimbal_zero) for module in axis.modules)
