@@ -17,7 +17,7 @@ from cmg_mj.core.zero_order_hold import hold_matrices
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.kalman import COLUMNS, Kalman
 
-LEAST_NOISE = 1e-6
+MIN_NOISE = 1e-6
 """Standard deviation that a measurement without noise counts with: the filter's gains need some [rad]."""
 
 Four = tuple[float, float, float, float]
@@ -121,7 +121,7 @@ class Lqg:
     @property
     def measurement_noise(self) -> np.ndarray:
         """R, covariance of v1, v2, (2, 2) [rad^2]."""
-        return np.diag([max(LEAST_NOISE, sigma) ** 2 for sigma in (self.noise.tilt, self.noise.gimbal)])
+        return np.diag([max(MIN_NOISE, sigma) ** 2 for sigma in (self.noise.tilt, self.noise.gimbal)])
 
     @cached_property
     def expected_covariance(self) -> np.ndarray:

@@ -14,7 +14,7 @@ from cmg_mj.core.types import BIAS, Estimate, Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.observers.adaptive import State as AdaptiveState
-from cmg_mj.observers.model_copy import LARGEST_RATE, CopyState, follow, stages
+from cmg_mj.observers.model_copy import MAX_RATE, CopyState, follow, stages
 
 Exponent = Annotated[float, Field(gt=0.5, le=1.0)]
 
@@ -55,10 +55,10 @@ class Homogeneous:
 
     def __post_init__(self) -> None:
         resistance = self.friction(0.0, 0.0)
-        if resistance * self.dt > LARGEST_RATE:
+        if resistance * self.dt > MAX_RATE:
             raise ValueError(
                 f"friction_n_m, damping_n_m_s: too much for the sample period: friction_n_m/friction_width_rad_s + "
-                f"damping_n_m_s must be below {LARGEST_RATE / self.dt / resistance:.3g} times its value"
+                f"damping_n_m_s must be below {MAX_RATE / self.dt / resistance:.3g} times its value"
             )
 
     @cached_property

@@ -18,9 +18,9 @@ from cmg_mj.core.arrays import Scalar, clip
 from cmg_mj.core.reduced_model import ReducedModel, Terms
 from cmg_mj.core.types import Estimate, Measurement
 from cmg_mj.inputs.types import STRICT, Positive
-from cmg_mj.observers.model_copy import LARGEST_RATE, follow, stages
+from cmg_mj.observers.model_copy import MAX_RATE, follow, stages
 
-MOST_PIECES = 1000
+MAX_PIECES = 1000
 
 
 class State(NamedTuple):
@@ -69,8 +69,8 @@ class LinearTimeVarying:
         return State(y.y1, zero, y.y2, h11 + zero, zero, h22 + zero, h33 + zero, y, self.model.terms(*y))
 
     def __post_init__(self) -> None:
-        if self._pieces > MOST_PIECES:
-            raise ValueError(f"Q: asks for an observer more than {MOST_PIECES} times as fast as the sample rate")
+        if self._pieces > MAX_PIECES:
+            raise ValueError(f"Q: asks for an observer more than {MAX_PIECES} times as fast as the sample rate")
 
     @cached_property
     def _pieces(self) -> int:
@@ -113,7 +113,7 @@ class LinearTimeVarying:
         n33 = (m33 + up) / (down * m33 + 1.0)
 
         # Only while a large H_0 fades can a gain at the beginning be too large for the step.
-        fit, fit3 = clip(LARGEST_RATE / (h * h11), 0.0, 1.0), clip(LARGEST_RATE / (h * h33), 0.0, 1.0)
+        fit, fit3 = clip(MAX_RATE / (h * h11), 0.0, 1.0), clip(MAX_RATE / (h * h33), 0.0, 1.0)
         gains = (fit * h11, fit * h12), (m11, m12), (n11, n12)
         x1, x2 = follow(self.correction, x1, x2, h, begin, middle, end, gains)
         x3 = _third_row(x3, h, u, before[1], y[1], (fit3 * h33, m33, n33))

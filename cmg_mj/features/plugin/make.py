@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Literal, NamedTuple, Unpack
+from typing import Any, Literal, NamedTuple, Unpack
 
 import mujoco
 
@@ -154,7 +154,7 @@ def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
         InputError: The C does not compile, or there is no compiler: then all but the library is written.
     """
     name, library, compiler = made.name, library_name(made.name), find_compiler()
-    writers: dict[str, Callable[[Path], None]] = {
+    writers: dict[str, Callable[[Path], Any]] = {
         file: partial(write_text, text=text) for file, text in made.files.items()
     }
     with tempfile.TemporaryDirectory() as temporary, claimed(out) as folder:
@@ -163,7 +163,7 @@ def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
             for file, text in made.files.items():
                 write_text(compiled.with_name(file), text)
             compile_plugin(compiled.parent, compiler, made.sources, library)
-            writers[library] = partial(_copy, compiled)
+            writers[library] = partial(shutil.copy, compiled)
         place = folder.write(writers, all_or_none=True)
     if compiler is None:
         raise InputError(
@@ -171,10 +171,6 @@ def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
             f"{place}: run `make` there where there is a compiler"
         )
     return Plugin(f"cmg_mj.{name}", place / library, place / f"{name}.xml", [place / file for file in writers])
-
-
-def _copy(source: Path, target: Path) -> None:
-    shutil.copy(source, target)
 
 
 _numbers = itertools.count()

@@ -11,16 +11,11 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.features.export import generate_code
 from cmg_mj.features.plugin.build import COMMON_SOURCES, c_text, common_files, extra_files
 from cmg_mj.features.plugin.sensors import (
-    Clock,
     PluginAxis,
     PluginRig,
-    Struct,
     Value,
     clock_of,
-    describe_encoders,
-    describe_fog,
-    describe_pair,
-    describe_settings,
+    describe_axis,
     describe_turn_gyro,
     refuse_unsupported,
 )
@@ -198,7 +193,7 @@ def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
     clock, first = clock_of(rig), rig.axes[0].controller
     declarations = "".join(f"extern const controller_type {name}_controller_type;\n" for name in names)
     axes = "".join(
-        f"static const axis_type axis_{i} = {{\n{_fields(_describe_axis(rig.axes[i], clock))}"
+        f"static const axis_type axis_{i} = {{\n{_fields(describe_axis(rig.axes[i], clock))}"
         f"    .controller = &{name}_controller_type,\n}};\n\n"
         for i, name in enumerate(names)
     )
@@ -228,26 +223,6 @@ const rig_type rig = {{
     .turning = {"&turning" if turning else "0"},
 }};
 """
-
-
-def _describe_axis(axis: PluginAxis, clock: Clock) -> Struct:
-    """Describe an axis but for its controller: `axis_type` in C."""
-    controller = axis.controller
-    pair, encoder, fog = controller.sensors.accelerometer, controller.sensors.encoder, controller.sensors.fog
-    has_fog = controller.feedback == "fog"
-    return {
-        "prefix": axis.prefix,
-        "gimbals": len(axis.modules),
-        "modules": axis.modules,
-        "pair": describe_pair(pair, controller.axis, clock),
-        "encoder": describe_encoders(encoder, len(axis.modules), clock),
-        "settings": describe_settings(pair, encoder),
-        **({"fog": describe_fog(fog, controller.axis, clock)} if has_fog else {}),
-        "raw_rate": pair.raw_rate_hz,
-        "joint": axis.joint,
-        "dofs": len(axis.shares),
-        "shares": axis.shares,
-    }
 
 
 def _fields(struct: Mapping[str, Value], indent: str = "    ") -> str:
