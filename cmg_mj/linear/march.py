@@ -61,88 +61,61 @@ def march(design: Design, plant: LinearPlant) -> Motion:
     Returns:
         The motion.
     """
-    motions = _March(design, plant)
-    motions.advance(DURATION_S)
-    if motions.is_undecided:
-        motions.advance(LONG_DURATION_S)
-    return motions.motion
+    scenario, rig = design.scenario, design.rig
+    worlds = len(STARTS_RAD_S) + 1  # one for each small start, and the scenario's own as the last
+    known = PlantInterface(rig.tilt, GimbalAngle((1.0,), (0.0,)), rig.timestep)
+    controller = design.controller(
+        known, worlds=range(worlds), sensors=_quiet(scenario.sensors), open_loop_observers={}
+    )
+    interval = controller.steps_per_sample * rig.timestep
+    F, G = plant.hold(interval)
+    tilt, rate = (row / (row @ row) for row in plant.C[:2])
+    x = np.transpose([*np.outer(STARTS_RAD_S, rate), math.radians(scenario.plant.initial_tilt_deg) * tilt])
+    bias, torque = np.zeros((2, worlds))
+    bias[-1] = math.radians(scenario.plant.equilibrium_bias_deg)
+    pushes = [(push.torque_n_m, push.duration_s) for push in scenario.push]
+    torque[-1], push_s = max(pushes, key=lambda push: abs(push[0] * push[1]), default=(0.0, interval))
+    u, y2, fell = np.zeros(worlds), np.zeros(worlds), np.zeros(worlds, bool)
+    fall_angle = math.radians(scenario.metrics.fall_angle_deg)
+    ticks = math.ceil(max(WINDOW_S, 4.0 * controller.law.dt) / interval)
+    step, sizes = 0, []
+    with np.errstate(all="ignore"):
+        for duration in (DURATION_S, LONG_DURATION_S):
+            while not fell.all() and step * rig.timestep < duration:
+                squares = np.zeros((2, worlds))
+                for _ in range(ticks):
+                    push = (PUSH_S <= step * rig.timestep < PUSH_S + push_s) * torque
+                    _, x2, _, y1, acceleration, gyro = plant.C @ x + np.outer(plant.D[:, 1], push)
+                    fell |= ~(np.abs(y1) < fall_angle)  # true where it is not a number
+                    squares += np.square([x2, y2])
+                    if controller.update(step, _reading(rig.tilt, rig.gravity, y1 - bias, acceleration, y2, x2, gyro)):
+                        u = np.array(controller.gimbal_rate)
+                    x = np.where(fell, 0.0, F @ x + G @ np.array([u * np.cos(y2), push]))
+                    y2 = np.where(fell, 0.0, y2 + interval * u)
+                    step += controller.steps_per_sample
+                sizes.append(np.sqrt(squares / ticks))
+            motion, is_decided = _judge(np.array(sizes), fell)
+            if is_decided:
+                break
+    return motion
 
 
-class _March:
-    """The closed loop: a world for each small start, and for the scenario's own as the last."""
+def _judge(sizes: np.ndarray, fell: np.ndarray) -> tuple[Motion, bool]:
+    """Judge the motions, and say whether the small ones have all decayed, or one has grown.
 
-    def __init__(self, design: Design, plant: LinearPlant) -> None:
-        scenario, self._rig, self._plant = design.scenario, design.rig, plant
-        worlds = len(STARTS_RAD_S) + 1
-        known = PlantInterface(design.rig.tilt, GimbalAngle((1.0,), (0.0,)), design.rig.timestep)
-        quiet = _quiet(design.scenario.sensors)
-        self._controller = design.controller(known, worlds=range(worlds), sensors=quiet, open_loop_observers={})
-        self._interval = self._controller.steps_per_sample * design.rig.timestep
-        self._F, self._G = plant.hold(self._interval)
-        tilt, rate = (row / (row @ row) for row in plant.C[:2])
-        starts = [*np.outer(STARTS_RAD_S, rate), math.radians(scenario.plant.initial_tilt_deg) * tilt]
-        self._x = np.transpose(starts)
-        self._bias = np.zeros(worlds)
-        self._bias[-1] = math.radians(scenario.plant.equilibrium_bias_deg)
-        pushes = [(push.torque_n_m, push.duration_s) for push in scenario.push]
-        torque, push_s = max(pushes, key=lambda push: abs(push[0] * push[1]), default=(0.0, self._interval))
-        self._push_ends = PUSH_S + push_s
-        self._push = np.zeros(worlds)
-        self._push[-1] = torque
-        self._u, self._y2, self._fell = np.zeros(worlds), np.zeros(worlds), np.zeros(worlds, bool)
-        self._step = 0
-        self._fall_angle = math.radians(scenario.metrics.fall_angle_deg)
-        self._sizes: list[np.ndarray] = []
-
-    def advance(self, until: float) -> None:
-        """March until a time [s], or until all have fallen."""
-        with np.errstate(all="ignore"):
-            while not self._fell.all() and self._step * self._rig.timestep < until:
-                self._sizes.append(self._window())
-
-    @property
-    def _decays(self) -> np.ndarray:
-        """True for each motion that has decayed, (n_starts,); of the scenario's own the tilt's rate alone counts."""
-        sizes = np.array(self._sizes)
-        largest, latest = sizes.max(axis=0), sizes[-GROWING_WINDOWS:]
-        grows = (sizes[-1] > TAIL * largest) & (np.diff(latest, axis=0) > 0.0).all(axis=0)
-        small = ((sizes[-1] <= DECAY * largest) | (sizes[-1] <= REST)) & (~grows | (len(sizes) < GROWING_WINDOWS))
-        small[1, -1] = True
-        return np.all(small, axis=0) & ~self._fell
-
-    @property
-    def is_undecided(self) -> bool:
-        """True if the small motions have neither all decayed nor grown."""
-        first, last = self._sizes[0], self._sizes[-1]
-        grown = np.any((last >= GROWTH * first) & (last > REST), axis=0) | self._fell
-        return not self._decays[:-1].all() and not grown[:-1].any()
-
-    @property
-    def motion(self) -> Motion:
-        """The motion from all starts."""
-        if self._decays[:-1].all():
-            return "decays" if self._decays[-1] else "decays if small"
-        return "falls" if self._fell[:-1].any() else "swings"
-
-    def _window(self) -> np.ndarray:
-        """March over a window, and return the RMS of the tilt's rate and of the gimbals' angle, (2, n_starts)."""
-        controller, plant = self._controller, self._plant
-        ticks = math.ceil(max(WINDOW_S, 4.0 * controller.law.dt) / self._interval)
-        squares = np.zeros((2, len(self._fell)))
-        for _ in range(ticks):
-            is_pushed = PUSH_S <= self._step * self._rig.timestep < self._push_ends
-            push = is_pushed * self._push
-            _, rate, _, y1, acceleration, gyro = plant.C @ self._x + np.outer(plant.D[:, 1], push)
-            self._fell |= ~(np.abs(y1) < self._fall_angle)  # true where it is not a number
-            squares += np.square([rate, self._y2])
-            reading = _reading(self._rig.tilt, self._rig.gravity, y1 - self._bias, acceleration, self._y2, rate, gyro)
-            if controller.update(self._step, reading):
-                self._u = np.array(controller.gimbal_rate)
-            x = self._F @ self._x + self._G @ np.array([self._u * np.cos(self._y2), push])
-            self._x = np.where(self._fell, 0.0, x)
-            self._y2 = np.where(self._fell, 0.0, self._y2 + self._interval * self._u)
-            self._step += controller.steps_per_sample
-        return np.sqrt(squares / ticks)
+    Args:
+        sizes: RMS of the tilt's rate and of the gimbals' angle in each window, (n_windows, 2, n_starts).
+        fell: Whether each motion fell, (n_starts,).
+    """
+    first, last, largest, latest = sizes[0], sizes[-1], sizes.max(axis=0), sizes[-GROWING_WINDOWS:]
+    grows = (last > TAIL * largest) & (np.diff(latest, axis=0) > 0.0).all(axis=0)
+    small = ((last <= DECAY * largest) | (last <= REST)) & (~grows | (len(sizes) < GROWING_WINDOWS))
+    small[1, -1] = True  # of the scenario's own motion the tilt's rate alone counts
+    decays = np.all(small, axis=0) & ~fell
+    grown = np.any((last >= GROWTH * first) & (last > REST), axis=0) | fell
+    if decays[:-1].all():
+        return ("decays" if decays[-1] else "decays if small"), True
+    return ("falls" if fell[:-1].any() else "swings"), bool(grown[:-1].any())
 
 
 def _reading(

@@ -53,17 +53,6 @@ def test_parameters_gains_and_units_are_in_comments() -> None:
     assert "/* largest gimbal rate [rad/s] */" in source
 
 
-def test_a_users_own_observer(tmp_path: Path) -> None:
-    Path("exported_by_a_user.py").write_text(
-        "class HTTPObserver2D:\n"
-        "    def __init__(self, dt, model): self.dt = dt\n"
-        "    def init(self, y): return y.y1\n"
-        "    def step(self, state, y, u): return y.y1, (y.y1, (y.y1 - state)/self.dt, y.y2)\n"
-    )
-    assert cmg_mj("export", "exported_by_a_user:HTTPObserver2D", "--out", "board").status == 0
-    assert "http_observer2_d.h" in files("board")
-
-
 @needs_compiler
 @pytest.mark.daily_cases("*-watcher")
 @pytest.mark.parametrize(
