@@ -87,7 +87,7 @@ def identifiers(paths: Sequence[tuple[str, ...]], reserved: Collection[str] = ()
 MACROS = ("H", "ENCODERS", "ESTIMATES", "TEST_VECTOR_H", "TICKS", "OK", "INPUT_NOT_FINITE", "RESULT_NOT_FINITE")
 """Words that follow NAME_ in macros, besides the parts of an estimate."""
 
-MAX_LENGTH = 40
+LONGEST = 40
 """Longest name [characters]: C99 distinguishes names by their first 63 characters, suffixes included."""
 
 
@@ -105,10 +105,10 @@ def name_of(observer: Observer, user_name: str | None = None) -> str:
         InputError: The user's name is no name in C, or the class has a name that cannot be spelled in C.
     """
     if user_name is not None:
-        if not re.fullmatch(rf"[A-Za-z][A-Za-z0-9_]{{0,{MAX_LENGTH - 1}}}", user_name, re.ASCII):
+        if not re.fullmatch(rf"[A-Za-z][A-Za-z0-9_]{{0,{LONGEST - 1}}}", user_name, re.ASCII):
             raise InputError(
                 f"--name {shown(user_name)}: must be a name in C: a letter, then letters without accents, digits and "
-                f"_, at most {MAX_LENGTH} in all"
+                f"_, at most {LONGEST} in all"
             )
         if {user_name, user_name.lower()} & RESERVED:
             raise InputError(
@@ -122,7 +122,7 @@ def name_of(observer: Observer, user_name: str | None = None) -> str:
     name = _class_in_c(cls.__name__)
     if name is None:
         raise InputError(
-            f"the class's name {shown(cls.__name__)} makes none in C of 1 to {MAX_LENGTH} letters, digits and _: "
+            f"the class's name {shown(cls.__name__)} makes none in C of 1 to {LONGEST} letters, digits and _: "
             "give one with --name"
         )
     return f"{name}_observer" if name in RESERVED else name
@@ -133,7 +133,7 @@ def _class_in_c(name: str) -> str | None:
     letters = spell_in_c(name)
     spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", letters or "")
     words = re.sub(r"[^a-z0-9]+", "_", spaced.lower()).strip("_")
-    return words if re.fullmatch(rf"[a-z].{{0,{MAX_LENGTH - 1}}}", words) else None
+    return words if re.fullmatch(rf"[a-z].{{0,{LONGEST - 1}}}", words) else None
 
 
 def export_files(name: str) -> list[str]:
