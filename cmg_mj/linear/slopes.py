@@ -29,8 +29,8 @@ MAX_SAMPLES = 40_000
 LOOK_EVERY = 100
 """Samples between two looks at it."""
 
-Step = Callable[[Any, Sequence[float]], tuple[Any, Sequence[float]]]
-"""A step as a function: state, inputs -> next state, outputs."""
+Step = Callable[..., tuple[Any, Sequence[float]]]
+"""A step as a function: state, *inputs -> next state, outputs."""
 
 
 class Slopes(NamedTuple):
@@ -63,12 +63,9 @@ def observer_slopes(observer: Observer) -> Slopes:
     Raises:
         InputError: The observer does not come to rest, has no slope there, or fails.
     """
-
-    def step(state: Any, inputs: Sequence[float]) -> tuple[Any, Sequence[float]]:
-        y1, y2, acceleration, u = inputs
-        return observer.step(state, Measurement(y1, y2, acceleration), u)
-
-    return _slopes(lambda: observer.init(Measurement(0.0, 0.0, 0.0)), step, 4)
+    return _slopes(
+        observer, lambda state, y1, y2, acceleration, u: observer.step(state, Measurement(y1, y2, acceleration), u), 4
+    )
 
 
 def law_slopes(law: Law, extra_signals: int = 0) -> Slopes:
@@ -85,12 +82,11 @@ def law_slopes(law: Law, extra_signals: int = 0) -> Slopes:
         InputError: The law does not come to rest, has no slope there, or fails.
     """
 
-    def step(state: Any, inputs: Sequence[float]) -> tuple[Any, Sequence[float]]:
-        y1, y2, acceleration, u, x1, x2, x3, *extra = inputs
-        state, command = law.step(state, Measurement(y1, y2, acceleration), feedback_state(x1, x2, x3, tuple(extra)), u)
+    def step(state: Any, y1: float, y2: float, acceleration: float, u: float, *x: float) -> tuple[Any, Sequence[float]]:
+        state, command = law.step(state, Measurement(y1, y2, acceleration), feedback_state(*x[:3], x[3:]), u)
         return state, (command,)
 
-    return _slopes(lambda: law.init(Measurement(0.0, 0.0, 0.0)), step, 7 + extra_signals)
+    return _slopes(law, step, 7 + extra_signals)
 
 
 def needed_states(A: np.ndarray, C: np.ndarray) -> np.ndarray:
@@ -109,11 +105,11 @@ def needed_states(A: np.ndarray, C: np.ndarray) -> np.ndarray:
     return needed
 
 
-def _slopes(init: Callable[[], Any], step: Step, inputs: int) -> Slopes:
+def _slopes(part: Observer | Law, step: Step, inputs: int) -> Slopes:
     """Find the slopes of a step at rest, without the states that no output depends on."""
     with np.errstate(all="ignore"):
         try:
-            rest = _rest(init(), step, inputs)
+            rest = _rest(part.init(Measurement(0.0, 0.0, 0.0)), step, inputs)
             names = ["_".join(filter(None, leaf.path)) for leaf in _floats(rest)]
             sides = [(_one_sided(rest, step, inputs, share), share_off) for share, share_off in STEPS.items()]
         except InputError:
@@ -141,7 +137,7 @@ def _rest(state: Any, step: Step, inputs: int) -> Any:
     largest: np.ndarray | float = 0.0
     for k in range(MAX_SAMPLES):
         before = state
-        state, _ = step(state, still)
+        state, _ = step(state, *still)
         if k % LOOK_EVERY == 0:
             earlier, now = (np.array([leaf.value for leaf in _floats(each)]) for each in (before, state))
             if now.shape != earlier.shape or not np.all(np.isfinite(now)):
@@ -159,7 +155,7 @@ def _one_sided(rest: Any, step: Step, inputs: int, share: float) -> tuple[np.nda
 
     def after(numbers: np.ndarray) -> np.ndarray:
         values = numbers.tolist()
-        state, outputs = step(rebuild(rest, iter(values[:n]), FLOATS), values[n:])
+        state, outputs = step(rebuild(rest, iter(values[:n]), FLOATS), *values[n:])
         return np.array([*(leaf.value for leaf in _floats(state)), *(float(output) for output in outputs)])
 
     middle, lengths = after(at), np.where(np.abs(at) > 1e-100, share * np.abs(at), share)
