@@ -82,8 +82,10 @@ def law_slopes(law: Law, extra_signals: int = 0) -> Slopes:
         InputError: The law does not come to rest, has no slope there, or fails.
     """
 
-    def step(state: Any, y1: float, y2: float, acceleration: float, u: float, *x: float) -> tuple[Any, Sequence[float]]:
-        state, command = law.step(state, Measurement(y1, y2, acceleration), feedback_state(*x[:3], x[3:]), u)
+    def step(state: Any, y1: float, y2: float, acceleration: float, u: float, *fed: float) -> tuple[Any, Any]:
+        x1, x2, x3, *extra = fed
+        x = feedback_state(x1, x2, x3, tuple(extra))
+        state, command = law.step(state, Measurement(y1, y2, acceleration), x, u)
         return state, (command,)
 
     return _slopes(law, step, 7 + extra_signals)
