@@ -112,18 +112,3 @@ def test_the_push_that_fells_it_is_the_simulations(torque: float, stands: bool) 
 def test_a_mode_that_grows_by_a_thirtieth_in_a_second_is_unstable(hz: float, bending: str) -> None:
     settings = ["observer.kind=kalman", "plant.bend_beyond=both", "plant.bend_share=0.5"]
     assert decay_of(f"plant.bend_frequency_hz={hz}", *settings) == (bending, "decays")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rate", [1, 5])
-def test_a_control_rate_that_is_far_too_low(rate: int) -> None:
-    assert decay_of("plant.bend_frequency_hz=10", f"controller.rate_hz={rate}") == ("falls", "falls")
-
-
-@pytest.mark.slow
-def test_a_swing_far_below_the_noise_is_rest() -> None:
-    """`homogeneous` ends in one of 0.004 rad/s there; noise causes 0.05 rad/s."""
-    settings = ["plant.bend_frequency_hz=20", "plant.bend_beyond=both", "plant.bend_share=0.5"]
-    subject = prepare(load_scenario("single_gimbal", settings))
-    assert decay_of(*settings, scenario="single_gimbal") == ("decays", "decays")
-    assert (subject.run_many(2).mean("command_rms_rad_s") or 0.0) < 0.5

@@ -15,12 +15,11 @@ from cmg_mj.features.bend.edit import STEP_SHARE
 from cmg_mj.features.bend.verdict import rk4_energy_loss
 from cmg_mj.plant.elements import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import section
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from tests.features.plugin.made import needs_compiler
+from tests.features.plugin.made import assert_same_run, needs_compiler
 
 SENSORS = ("accelerometer_inner", "accelerometer_outer", "fog")
 
@@ -141,19 +140,10 @@ def short(*settings: str) -> Experiment:
     return prepare(load_scenario("push_recovery", ["duration_s=0.5", "push=[]", "observer.kind=linear", *settings]))
 
 
-def trajectory_of(result: Result) -> Trajectory:
+def trajectory(experiment: Experiment) -> Trajectory:
+    result = experiment.run()
     assert result.trajectory is not None
     return result.trajectory
-
-
-def trajectory(experiment: Experiment, **options: Any) -> Trajectory:
-    return trajectory_of(experiment.run(**options))
-
-
-def assert_same(one: Trajectory, other: Trajectory) -> None:
-    assert list(one.columns) == list(other.columns)
-    for name in one.columns:
-        np.testing.assert_array_equal(one[name], np.squeeze(other[name]), name)
 
 
 def test_a_stiff_frame_moves_as_a_rigid_one() -> None:
@@ -164,14 +154,14 @@ def test_a_stiff_frame_moves_as_a_rigid_one() -> None:
 
 
 def test_without_a_frequency_the_other_fields_change_nothing() -> None:
-    assert_same(trajectory(short("plant.bend_share=0.5", "plant.bend_beyond=both")), trajectory(short()))
+    assert_same_run(short("plant.bend_share=0.5", "plant.bend_beyond=both").run(), short().run())
 
 
 def test_one_world_a_batch_and_the_callback_are_the_same_bits() -> None:
     experiment = short("plant.bend_frequency_hz=15", "controller.notch_hz=16", "observer.kind=homogeneous")
-    one = trajectory(experiment, world=1)
-    assert_same(one, trajectory(experiment, world=1, driver="callback"))
-    assert_same(one, trajectory_of(experiment.run_many([1])))
+    one = experiment.run(world=1)
+    assert_same_run(one, experiment.run(world=1, driver="callback"))
+    assert_same_run(one, experiment.run_many([1]))
     assert BEND_JOINT in experiment.plant.joint_names
 
 
@@ -180,7 +170,7 @@ def test_one_world_a_batch_and_the_callback_are_the_same_bits() -> None:
 @pytest.mark.parametrize("beyond", ["sensors", "both"])
 def test_the_plugins_model_has_the_bend(beyond: str) -> None:
     experiment = short("plant.bend_frequency_hz=15", f"plant.bend_beyond={beyond}", "plant.bend_share=0.5")
-    assert_same(trajectory(experiment, driver="plugin"), trajectory(experiment))
+    assert_same_run(experiment.run(), experiment.run("plugin"))
 
 
 def test_floors_that_a_bend_would_belie_are_not_printed() -> None:

@@ -15,7 +15,6 @@ import pytest
 from cmg_mj import load_scenario, prepare
 from cmg_mj.core.controller import Controller
 from cmg_mj.features.export import export
-from cmg_mj.runs.simulate import simulate
 
 pytest.importorskip("casadi", reason="casadi is not installed: the extra [export]")
 
@@ -113,9 +112,7 @@ class Recording:
             return tick
 
         controller.decide = decide_and_record  # type: ignore[method-assign]
-        scenario = experiment.scenario
-        observers = list(dict.fromkeys([kind, *scenario.open_loop_observers]))
-        simulate(experiment.plant, controller, scenario.duration_s, observers=observers, pushes=scenario.push)
+        experiment.simulate(experiment.plant, controller)
         self.samples, self.results, self.rate = np.array(samples), np.array(results), np.array(rates)
 
 

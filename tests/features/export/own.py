@@ -67,27 +67,6 @@ class Elaborate(Plain):
         return result, (x1, x2 + 1e-3 * trace, y.y2, state.double, trace / (state.samples + 1), size)
 
 
-class Matrix(Plain):
-    """A state that is an array, and products of matrices."""
-
-    def init(self, y: Measurement) -> np.ndarray:
-        return np.array([y.y1, 0.0 * y.y1])
-
-    def step(self, state: np.ndarray, y: Measurement, u: float) -> tuple[np.ndarray, Any]:
-        A = np.array([[1.0 - self.dt * self.l1, self.dt], [-self.dt * self.l2, 1.0]])
-        state = A @ state + np.array([self.l1, self.l2]) * self.dt * y.y1
-        return state, (state[0], state[1], y.y2)
-
-
-class NumPys(Plain):
-    """NumPy's own functions."""
-
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        state, (x1, x2, x3) = super().step(state, y, u)
-        x2 = np.clip(np.where(x2 >= 0.0, x2, 0.9 * x2), -3.0, 3.0)
-        return state, (np.tanh(x1), np.hypot(x2, 1e-3) * np.copysign(1.0, x2), np.floor(100.0 * x3) / 100.0)
-
-
 class Tilts(Plain):
     """Estimates the tilt alone, somehow."""
 

@@ -83,11 +83,6 @@ def test_a_class_with_any_name(cls: str, arguments: list[str], name: str) -> Non
         assert not Path("other").exists()
 
 
-def test_a_rig_with_one_gimbal() -> None:
-    assert cmg_mj("export", "linear", "--scenario", "single_gimbal", "--out", "board").status == 0
-    assert "#define LINEAR_ENCODERS 1" in Path("board/linear.h").read_text()
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -97,12 +97,7 @@ def test_names_in_c() -> None:
         ("ﬁlter", "filter"),
         ("__Own__", "own"),
         ("Double", "double_observer"),
-        ("Int", "int_observer"),
         ("main", "main_observer"),
-        ("ABS", "abs_observer"),
-        ("Math", "math_observer"),
-        ("Complex", "complex_observer"),
-        ("Class", "class_observer"),
     ],
 )
 def test_a_class_is_called_by_its_name(name: str, c_name: str) -> None:

@@ -19,6 +19,7 @@ from cmg_mj.features.plugin.build import FLAGS
 from cmg_mj.features.plugin.make import Plugin, plugin
 from cmg_mj.features.plugin.model import plugin_mjcf
 from cmg_mj.plant.tilt_line import apply_torques
+from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
 from tests.features.export.compiled import COMPILER
@@ -163,6 +164,15 @@ def pairs(
         for quantity, column in QUANTITIES.items():
             yield prefix + quantity, rows[prefix + quantity][:, 0], own[column]
         yield f"{prefix}sample", rows[f"{prefix}sample"][:, 0], np.arange(float(len(trajectory)))
+
+
+def assert_same_run(one: Result, other: Result) -> None:
+    """Every column of both is the same, bit for bit; one may be of a batch of one world."""
+    assert one.trajectory is not None
+    assert other.trajectory is not None
+    assert list(one.trajectory.columns) == list(other.trajectory.columns)
+    for name, values in one.trajectory.columns.items():
+        np.testing.assert_array_equal(values, np.squeeze(other.trajectory[name]), err_msg=name)
 
 
 def bits(numbers: np.ndarray) -> np.ndarray:
