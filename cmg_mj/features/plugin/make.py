@@ -17,11 +17,10 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.features.export import check_installed
 from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.features.export.names import name_of
-from cmg_mj.features.plugin.build import check_platform, compile_plugin, library_name
 from cmg_mj.features.plugin.driver import PluginLoop
 from cmg_mj.features.plugin.model import plugin_mjcf
 from cmg_mj.features.plugin.sensors import PluginAxis, PluginRig
-from cmg_mj.features.plugin.tables import PluginCode, generate_plugin
+from cmg_mj.features.plugin.tables import PluginCode, check_platform, compile_plugin, generate_plugin, library_name
 from cmg_mj.laws import StateFeedback
 from cmg_mj.linear.verdict import SIMULATED, omissions, require_stable_period
 from cmg_mj.plant.mujoco_state import set_control_callback

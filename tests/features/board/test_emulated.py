@@ -97,9 +97,6 @@ def test_no_process_is_left_behind(tmp_path: Path) -> None:
     [
         pytest.param("for (;;) {}", "the board has not answered for 3 s", marks=pytest.mark.slow),
         ("__builtin_trap();", "the board is gone: its processor met a fault"),
-        pytest.param(
-            "*(volatile int *)0xf0000000 = 1;", "the board is gone: its processor met a fault", marks=pytest.mark.slow
-        ),
         (
             "volatile int room[1100]; for (int i = 1099; i >= 0; i--) room[i] = i; c->x_e = room[3];",
             "the board is gone: its stack is full",

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.features.plugin.build import FLAGS
 from cmg_mj.features.plugin.make import Plugin, plugin
 from cmg_mj.features.plugin.model import plugin_mjcf
+from cmg_mj.features.plugin.tables import FLAGS
 from cmg_mj.plant.tilt_line import apply_torques
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
@@ -92,7 +92,7 @@ def quick() -> Made:
     """Made as fast as can be: the export compares on few signals, the compiler does not optimise."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("cmg_mj.features.export.check.TICKS", 40)
-        patch.setattr("cmg_mj.features.plugin.build.FLAGS", (*FLAGS, "-O0"))
+        patch.setattr("cmg_mj.features.plugin.tables.FLAGS", (*FLAGS, "-O0"))
         return make("gyro_free", *SHORT)
 
 

@@ -59,8 +59,3 @@ def test_ten_million_normals(noise: ctypes.CDLL) -> None:
         expected = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 0))).standard_normal(1_000_000)
         np.testing.assert_array_equal(drawn, expected)
         assert np.abs(drawn).max() > 3.6541528853610088
-
-
-@pytest.mark.parametrize("written", [np.nan, -1.0, 1e300, 0.5])
-def test_whatever_is_written_into_the_state(noise: ctypes.CDLL, written: float) -> None:
-    assert np.all(np.isfinite(draw(noise, np.full(WORDS, written), 100)))

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError
-from cmg_mj.features.plugin.build import common_files
 from cmg_mj.features.plugin.driver import FAILED, STATUS, instance_states, set_world
 from cmg_mj.features.plugin.make import describe_rig
-from cmg_mj.features.plugin.tables import NAMES_IN_USE, generate_plugin
+from cmg_mj.features.plugin.tables import NAMES_IN_USE, common_files, generate_plugin
 from cmg_mj.plant.mujoco_state import quiet
 from tests.features.plugin.made import check_against_runner, needs_compiler, quick, run
 

@@ -16,7 +16,7 @@ import pytest
 
 import cmg_mj
 from cmg_mj import load_scenario, prepare
-from cmg_mj.features.plugin.build import find_mujoco
+from cmg_mj.features.plugin.tables import find_mujoco
 from tests.features.export.compiled import COMPILER
 from tests.features.plugin.made import ALL_IMPERFECTIONS, Made, make, needs_compiler
 
