@@ -62,8 +62,22 @@ def trace(observer: Observer, law: Law, constants: Constants) -> Traced:
         LawNotExportable: A formula cannot express what the law does.
     """
     with as_written():
-        observer_formulas = _trace_observer(observer, _measure(constants))
-        return Traced(*observer_formulas, trace_law(law, constants, len(extra_signals(observer))))
+        y, (u,) = symbols_named(MEASURED), symbols_named(["u"])
+        first, _, leaves, symbols, after, outputs = _record(
+            observer, "step(state, y, u)", lambda before: observer.step(before, Measurement(*y), u)
+        )
+        needed = needed_numbers(symbols, after, outputs)
+        names = identifiers([leaves[i].path for i in needed])
+        init = function_of("init", first, [expression(leaves[i].value) for i in needed])
+        step = function_of("step", [*(symbols[i] for i in needed), *y, u], [*(after[i] for i in needed), *outputs])
+        if type(law) is StateFeedback:
+            law_formulas = _trace_state_feedback(constants)
+        else:
+            try:
+                law_formulas = _trace_law(law, len(extra_signals(observer)))
+            except InputError as error:
+                raise LawNotExportable(str(error)) from error
+        return Traced(tuple(names), _measure(constants), init, step, law_formulas)
 
 
 class _Recording(NamedTuple):
@@ -100,21 +114,6 @@ def _record(part: Observer | Law, label: str, step: Callable[[Any], tuple[Any, S
     if form(after) != form(state):
         raise InputError("its step returns a state that is made otherwise than the one of init")
     return recording._replace(outputs=[expression(output) for output in outputs])
-
-
-def _trace_observer(
-    observer: Observer, measure: casadi.Function
-) -> tuple[tuple[str, ...], casadi.Function, casadi.Function, casadi.Function]:
-    """Return the first four parts of `Traced`."""
-    y, (u,) = symbols_named(MEASURED), symbols_named(["u"])
-    first, _, leaves, symbols, after, outputs = _record(
-        observer, "step(state, y, u)", lambda before: observer.step(before, Measurement(*y), u)
-    )
-    needed = needed_numbers(symbols, after, outputs)
-    names = identifiers([leaves[i].path for i in needed])
-    init = function_of("init", first, [expression(leaves[i].value) for i in needed])
-    step = function_of("step", [*(symbols[i] for i in needed), *y, u], [*(after[i] for i in needed), *outputs])
-    return tuple(names), measure, init, step
 
 
 def _measure(constants: Constants) -> casadi.Function:
@@ -168,28 +167,6 @@ class TracedLaw(NamedTuple):
         return len(self.state) + self.has_integrator
 
 
-def trace_law(law: Law, constants: Constants, extra_signals: int) -> TracedLaw:
-    """Trace a law.
-
-    Args:
-        law: The law. Do not use it again: it may remember symbols.
-        constants: The constants of the law, which keep their names.
-        extra_signals: Number of signals that the observer estimates beyond x.
-
-    Returns:
-        The formulas.
-
-    Raises:
-        LawNotExportable: A formula cannot express what the law does.
-    """
-    if type(law) is StateFeedback:
-        return _trace_state_feedback(constants)
-    try:
-        return _trace(law, extra_signals)
-    except InputError as error:
-        raise LawNotExportable(str(error)) from error
-
-
 def _trace_state_feedback(constants: Constants) -> TracedLaw:
     """Trace (8) with symbols for its numbers."""
     parameters = symbols_named([constant.name for constant in constants.of_law])
@@ -200,7 +177,7 @@ def _trace_state_feedback(constants: Constants) -> TracedLaw:
     return TracedLaw(("x1", "x2", "x3"), (), (), True, None, step)
 
 
-def _trace(law: Law, extra_signals: int) -> TracedLaw:
+def _trace_law(law: Law, extra_signals: int) -> TracedLaw:
     names = law_arguments(extra_signals)
     arguments = symbols_named(names)
     y, (x1, x2, x3, *extra), held = Measurement(*arguments[:3]), arguments[3:-1], arguments[-1]
