@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -201,7 +202,7 @@ class ClosedLoop:
         }
         instants = {*self._tick_steps, *(step for _, step in taken)}
         instants |= {step for channel in self._channels for step in range(self._steps) if channel.is_filtered_at(step)}
-        holds = {}
+        hold = cache(lambda steps: plant.hold(steps * self._timestep))
         latched: dict[tuple[str, int], np.ndarray] = {}
         shown, commands = [], []
         for step, after in zip(sorted(instants), [*sorted(instants)[1:], self._steps], strict=True):
@@ -224,9 +225,7 @@ class ClosedLoop:
                 turned = u + rows[[INPUTS[-1], *self.inputs[len(INPUTS) :]][len(commands)]]
                 commands.append(u)
                 shown = shown or [*motion[:3], u, *estimate]
-            if after - step not in holds:
-                holds[after - step] = plant.hold((after - step) * self._timestep)
-            F, G = holds[after - step]
+            F, G = hold(after - step)
             x = F @ x + G @ np.array([turned, push])
         rows |= dict(zip(plant.names, x, strict=True))
         for (name, step, age), reading in self._late.items():

@@ -8,9 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.controller import PlantInterface
-from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.core.types import IdealReading
 from cmg_mj.linear.plant import LinearPlant
 from cmg_mj.scenario.design import Design
@@ -88,7 +87,10 @@ def march(design: Design, plant: LinearPlant) -> Motion:
                     _, x2, _, y1, acceleration, gyro = plant.C @ x + np.outer(plant.D[:, 1], push)
                     fell |= ~(np.abs(y1) < fall_angle)  # true where it is not a number
                     squares += np.square([x2, y2])
-                    if controller.update(step, _reading(rig.tilt, rig.gravity, y1 - bias, acceleration, y2, x2, gyro)):
+                    across, radial = -rig.gravity * np.sin(y1 - bias), rig.gravity * np.cos(y1 - bias)
+                    inner, outer = (across + radius * acceleration for radius in (rig.tilt.r_inner, rig.tilt.r_outer))
+                    forces = np.array([inner, radial, outer, radial])
+                    if controller.update(step, IdealReading(forces, [y2], gyro, x2)):
                         u = np.array(controller.gimbal_rate)
                     x = np.where(fell, 0.0, F @ x + G @ np.array([u * np.cos(y2), push]))
                     y2 = np.where(fell, 0.0, y2 + interval * u)
@@ -116,15 +118,6 @@ def _judge(sizes: np.ndarray, fell: np.ndarray) -> tuple[Motion, bool]:
     if decays[:-1].all():
         return ("decays" if decays[-1] else "decays if small"), True
     return ("falls" if fell[:-1].any() else "swings"), bool(grown[:-1].any())
-
-
-def _reading(
-    tilt: RadialTilt, gravity: float, y1: Scalar, acceleration: Scalar, y2: Scalar, rate: Scalar, gyro: Scalar
-) -> IdealReading:
-    """Return the readings of perfect sensors in a motion about the pivot."""
-    radial, across = gravity * np.cos(y1), -gravity * np.sin(y1)
-    forces = [across + tilt.r_inner * acceleration, radial, across + tilt.r_outer * acceleration, radial]
-    return IdealReading(np.array(forces), [y2], gyro, rate)
 
 
 def _quiet(sensors: Sensors) -> Sensors:
