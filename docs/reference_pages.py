@@ -666,8 +666,7 @@ def observers_page() -> str:
     ):
         for kind in classes.known:
             rows = [row for row in parameter_rows(classes, kind) if row.field not in ControllerSettings.model_fields]
-            module = inspect.getmodule(classes.find(kind))
-            about = _wrapped(_links((module.__doc__ or "").partition("\n")[0])) if module else ""
+            about = _wrapped(_links((classes.find(kind).__doc__ or "").partition("\n")[0]))
             parts += [f"## {title} `{kind}`", about]
             if rows:
                 example = option.format(kind=kind, example=examples[kind])

@@ -70,7 +70,7 @@ MUTATIONS = [
     ),
     Mutation("homogeneous: k1", OBSERVERS + "homogeneous.py", r"k1: Positive = " + NUMBER),
     Mutation("homogeneous: k2", OBSERVERS + "homogeneous.py", r"k2: Positive = " + NUMBER),
-    Mutation("homogeneous: alpha", OBSERVERS + "homogeneous.py", r"alpha: Annotated\[.*?\] = " + NUMBER),
+    Mutation("homogeneous: alpha", OBSERVERS + "homogeneous.py", r"alpha: Exponent = " + NUMBER),
     *(
         Mutation(f"luenberger: L[{row}][{column}]", OBSERVERS + "luenberger.py", pattern)
         for row, column, pattern in (
@@ -79,9 +79,9 @@ MUTATIONS = [
             (2, 1, r"tuple\[float, float\]\] = \(\s*\([^)]*\),\s*\([^)]*\),\s*\([^,]*,\s*" + NUMBER),
         )
     ),
-    Mutation("linear_high_gain: epsilon", OBSERVERS + "linear_high_gain.py", r"epsilon: Positive = " + NUMBER),
-    Mutation("linear_high_gain: a1", OBSERVERS + "linear_high_gain.py", r"a1: Positive = " + NUMBER),
-    Mutation("linear_high_gain: a2", OBSERVERS + "linear_high_gain.py", r"a2: Positive = " + NUMBER),
+    Mutation("linear_high_gain: epsilon", OBSERVERS + "linear.py", r"epsilon: Positive = " + NUMBER),
+    Mutation("linear_high_gain: a1", OBSERVERS + "linear.py", r"a1: Positive = " + NUMBER),
+    Mutation("linear_high_gain: a2", OBSERVERS + "linear.py", r"a2: Positive = " + NUMBER),
     Mutation(
         "homogeneous: friction_width", OBSERVERS + "homogeneous.py", r"friction_width_rad_s: Positive = " + NUMBER
     ),
@@ -115,9 +115,9 @@ MUTATIONS = [
             *("pivot_s", "learn_s", "surprise", "noise_s", "hurry", "doubt", "inflation"),
         )
     ),
-    Mutation("super_twisting: L", OBSERVERS + "super_twisting.py", r"    L: Positive = " + NUMBER),
-    Mutation("super_twisting: l0", OBSERVERS + "super_twisting.py", r"l0: Positive = " + NUMBER),
-    Mutation("super_twisting: l1", OBSERVERS + "super_twisting.py", r"l1: Positive = " + NUMBER),
+    Mutation("super_twisting: L", OBSERVERS + "linear.py", r"    L: Positive = " + NUMBER),
+    Mutation("super_twisting: l0", OBSERVERS + "linear.py", r"l0: Positive = " + NUMBER),
+    Mutation("super_twisting: l1", OBSERVERS + "linear.py", r"l1: Positive = " + NUMBER),
 ]
 REDUCED = ("J1", "J2", "J_d", "omega_d", "gravity_torque")
 

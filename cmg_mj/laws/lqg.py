@@ -16,7 +16,7 @@ from cmg_mj.core.types import FeedbackState, Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.kalman import COLUMNS, Kalman
 
-LEAST_NOISE = 1e-6
+MIN_NOISE = 1e-6
 """Standard deviation that a measurement without noise counts with: the filter's gains need some [rad]."""
 
 Four = tuple[float, float, float, float]
@@ -34,7 +34,9 @@ class LqgState(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class Lqg:
-    """u = -K [x1 + torque/(n M), x2, x3, x_e], all estimated by the law's own filter; x_e' = -x3.
+    """Linear-quadratic-Gaussian control: a steady-state Kalman filter and a state feedback, both optimal for (6).
+
+    u = -K [x1 + torque/(n M), x2, x3, x_e], all estimated by the law's own filter; x_e' = -x3.
 
     The model is the linearisation (6) with a torque on the rig beside it, sampled exactly with u held:
 
@@ -118,7 +120,7 @@ class Lqg:
     @property
     def measurement_noise(self) -> np.ndarray:
         """R, covariance of v1, v2, (2, 2) [rad^2]."""
-        return np.diag([max(LEAST_NOISE, sigma) ** 2 for sigma in (self.noise.tilt, self.noise.gimbal)])
+        return np.diag([max(MIN_NOISE, sigma) ** 2 for sigma in (self.noise.tilt, self.noise.gimbal)])
 
     @cached_property
     def expected_covariance(self) -> np.ndarray:

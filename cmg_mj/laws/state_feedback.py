@@ -84,7 +84,9 @@ _new = tuple.__new__
 
 @dataclass(frozen=True)
 class StateFeedback:
-    """u = -K_e [x1, x2, x3, x_e], x_e' = -x3 (aranovskiy2020 (8)), with the rate limit and anti-windup.
+    """State feedback with an integrator: (8) of aranovskiy2020, and where its gains come from.
+
+    u = -K_e [x1, x2, x3, x_e], x_e' = -x3 (aranovskiy2020 (8)), with the rate limit and anti-windup.
 
     While the command is limited, the integrator takes no step that would push it further into the limit.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
 from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
-from cmg_mj.stages.low_pass import INSIDE_HZ
+from cmg_mj.stages.low_pass import INSIDE_HZ, coefficients
 from cmg_mj.stages.notch import Notch
 
 if TYPE_CHECKING:
@@ -86,19 +87,14 @@ def linear_closed_loop(design: Design, plant: Plant, model: str = "rig") -> cont
     if model == "rig":
         linear = linearise_alone(plant)
     else:
-        _require_rigid(plant)
+        settings, cure = plant.settings, 'take linear_closed_loop(plant="rig")'
+        if plant.bends:
+            raise InputError(f"bend: the reduced model is rigid; {cure}, or set bend.frequency_hz=0")
+        if plant.reduced.pivot_arm:
+            raise InputError(f"plant.model = {settings.model!r}: its pivot slides; {cure}")
         linear = linear_reduced(plant.reduced)
     _require_covered(design)
     return ClosedLoop(design, linear).system()
-
-
-def _require_rigid(plant: Plant) -> None:
-    """Refuse a plant that the reduced model does not describe."""
-    settings, cure = plant.settings, 'linear_closed_loop(plant="rig")'
-    if plant.bends:
-        raise InputError(f"bend: the reduced model is rigid; take {cure}, or set bend.frequency_hz=0")
-    if plant.reduced.pivot_arm:
-        raise InputError(f"plant.model = {settings.model!r}: its pivot slides; take {cure}")
 
 
 def _require_covered(design: Design) -> None:
@@ -150,20 +146,20 @@ class ClosedLoop:
         self._steps = math.lcm(control_steps, *(channel.period for channel in self._channels))
         self._tick_steps = range(0, self._steps, control_steps)
         self.ticks, self.period = len(self._tick_steps), self._steps * self._timestep
-        # Readings on their way: sensor, step of a common period at which it is taken, periods ago.
-        self._on_the_way = {
-            channel.name: [
-                (taken % self._steps, age)
+        # The state of a reading on its way: sensor, step of a common period at which it is taken, periods ago.
+        self._late: dict[tuple[str, int, int], str] = {}
+        for channel in self._channels:
+            late = [
+                (channel.name, taken % self._steps, age)
                 for taken in sorted({channel.taken(tick) for tick in self._tick_steps if channel.taken(tick) < 0})
                 for age in range(1, -(taken // self._steps) + 1)
             ]
-            for channel in self._channels
-        }
+            self._late |= {reading: f"{channel.name}_{i}" for i, reading in enumerate(late, 1)}
         self._notch = Notch(controller.notch_hz, law.dt, math.inf) if controller.notch_hz else None
         self.states = [
             *plant.names,
             *(f"{channel.name}_filter_{i}" for channel in self._channels if channel.raw for i in (1, 2)),
-            *(f"{name}_{i + 1}" for name, waiting in self._on_the_way.items() for i in range(len(waiting))),
+            *self._late.values(),
             *_prefixed("observer", self._estimating),
             *_prefixed("law", self._deciding),
             *(["notch_1", "notch_2"] if self._notch else []),
@@ -173,6 +169,8 @@ class ClosedLoop:
         rows = np.eye(len(self.states) + len(self.inputs))
         self._rows = dict(zip((*self.states, *self.inputs), rows, strict=True))
         self._y1_slopes = _measured_slopes(design)
+        bandwidth = design.scenario.sensors.accelerometer.bandwidth_hz
+        self._low_pass = coefficients(bandwidth, INSIDE_HZ) if bandwidth else [[0.0] * 3] * 2
 
     def system(self) -> control.StateSpace:
         """Make the system for python-control."""
@@ -193,14 +191,6 @@ class ClosedLoop:
 
         With several ticks in a period their commands and gimbal rates are further signals.
         """
-        names = [*OUTPUTS, *(f"estimated_{name}" for name in (*OUTPUTS[:3], *self._extra))]
-        outputs = [*names[: None if not self._true_state else 4], *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
-        A, B, C, D = self._matrices()
-        kept = needed_states(A, C)
-        return A[kept][:, kept], B[kept], C[:, kept], D, kept, outputs
-
-    def _matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Compute A, B, C, D over a common period."""
         rows, plant = self._rows, self._plant
         start = dict(rows)
         x, turned, push = np.array([rows[name] for name in plant.names]), rows["u_before"], rows["push_n_m"]
@@ -209,7 +199,7 @@ class ClosedLoop:
         }
         instants = {*self._tick_steps, *(step for _, step in taken)}
         instants |= {step for channel in self._channels for step in range(self._steps) if channel.is_filtered_at(step)}
-        holds = {}
+        hold = cache(lambda steps: plant.hold(steps * self._timestep))
         latched: dict[tuple[str, int], np.ndarray] = {}
         shown, commands = [], []
         for step, after in zip(sorted(instants), [*sorted(instants)[1:], self._steps], strict=True):
@@ -218,26 +208,31 @@ class ClosedLoop:
             for channel in self._channels:
                 value = ideal[channel.name]
                 if channel.is_filtered_at(step):
-                    value = self._filter(channel.name, value)
+                    value = self._second_order(f"{channel.name}_filter", self._low_pass, value)
                 if (channel.name, step) in taken:
                     latched[channel.name, step] = value
             if step in self._tick_steps:
-                readings = {channel.name: self._read(channel, step, latched, start) for channel in self._channels}
+                readings = {
+                    channel.name: latched[channel.name, newest]
+                    if (newest := channel.taken(step)) >= 0
+                    else start[self._late[channel.name, newest % self._steps, -(newest // self._steps)]]
+                    for channel in self._channels
+                }
                 u, estimate = self._decide(motion, readings)
                 turned = u + rows[[INPUTS[-1], *self.inputs[len(INPUTS) :]][len(commands)]]
                 commands.append(u)
                 shown = shown or [*motion[:3], u, *estimate]
-            if after - step not in holds:
-                holds[after - step] = plant.hold((after - step) * self._timestep)
-            F, G = holds[after - step]
+            F, G = hold(after - step)
             x = F @ x + G @ np.array([turned, push])
         rows |= dict(zip(plant.names, x, strict=True))
-        for name, waiting in self._on_the_way.items():
-            for i, (step, age) in enumerate(waiting):
-                rows[f"{name}_{i + 1}"] = latched[name, step] if age == 1 else start[f"{name}_{i}"]
+        for (name, step, age), reading in self._late.items():
+            rows[reading] = latched[name, step] if age == 1 else start[self._late[name, step, age - 1]]
         n = len(self.states)
         ahead, out = np.array([rows[name] for name in self.states]), np.array([*shown, *commands[1:]])
-        return ahead[:, :n], ahead[:, n:], out[:, :n], out[:, n:]
+        names = [*OUTPUTS, *(f"estimated_{name}" for name in (*OUTPUTS[:3], *self._extra))]
+        outputs = [*names[: 4 if self._true_state else None], *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
+        kept = needed_states(ahead[:, :n], out[:, :n])
+        return ahead[kept][:, :n][:, kept], ahead[kept][:, n:], out[:, :n][:, kept], out[:, n:], kept, outputs
 
     def _ideal(self, motion: np.ndarray) -> dict[str, np.ndarray]:
         """Return what perfect sensors show of the plant's outputs, to first order: tangential forces, y2, the gyro."""
@@ -250,35 +245,13 @@ class ClosedLoop:
         forces = {name: radius * acceleration - known.gravity * y1 for name, radius in radii.items()}
         return forces | {"encoder": x3, "fog": gyro, "tilt": x1, "rate": x2}
 
-    def _filter(self, name: str, value: np.ndarray) -> np.ndarray:
-        """Advance a part's low-pass by a sample."""
-        from scipy.signal import butter
-
-        bandwidth = self._design.scenario.sensors.accelerometer.bandwidth_hz
-        numerator, denominator = np.array(butter(2, bandwidth, fs=INSIDE_HZ))
-        return self._second_order(f"{name}_filter", numerator, denominator, value)
-
-    def _second_order(self, name: str, numerator: Sequence, denominator: Sequence, value: np.ndarray) -> np.ndarray:
+    def _second_order(self, name: str, coefficients: Sequence[Sequence[float]], value: np.ndarray) -> np.ndarray:
         """Advance a filter of second order, whose states are a name's 1 and 2."""
-        (b0, b1, b2), (_, a1, a2), rows = numerator, denominator, self._rows
+        ((b0, b1, b2), (_, a1, a2)), rows = coefficients, self._rows
         passed = b0 * value + rows[f"{name}_1"]
         rows[f"{name}_1"] = b1 * value - a1 * passed + rows[f"{name}_2"]
         rows[f"{name}_2"] = b2 * value - a2 * passed
         return passed
-
-    def _read(
-        self,
-        channel: _Channel,
-        tick: int,
-        latched: dict[tuple[str, int], np.ndarray],
-        start: dict[str, np.ndarray],
-    ) -> np.ndarray:
-        """Return the reading that has been delivered by a tick."""
-        taken, name = channel.taken(tick), channel.name
-        if taken >= 0:
-            return latched[name, taken]
-        place = self._on_the_way[name].index((taken % self._steps, -(taken // self._steps)))
-        return start[f"{name}_{place + 1}"]
 
     def _decide(self, motion: np.ndarray, readings: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Return the command of a tick, and the estimate, as `Controller.decide` makes them."""
@@ -300,7 +273,7 @@ class ClosedLoop:
             x2 = readings["fog"] + rows["fog_noise_rad_s"]
         (u,) = self._advance("law", self._deciding, [*measured, x1, x2, x3, *estimate[3:]])
         if self._notch is not None:
-            u = self._second_order("notch", self._notch.numerator, self._notch.denominator, u)
+            u = self._second_order("notch", (self._notch.numerator, self._notch.denominator), u)
         rows["u_before"] = u
         return u, estimate
 

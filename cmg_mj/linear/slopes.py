@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.arrays import Symbolic
 from cmg_mj.core.errors import InputError, raised, shortened
 from cmg_mj.core.types import Law, Measurement, Observer, feedback_state
 
@@ -22,13 +24,13 @@ RESTED = 1e-9
 """A number rests that changes by less than this share in a sample."""
 GONE = 1e-15
 """Or by less than this share of the largest that it was: a trace of the start that fades for ever."""
-MOST_SAMPLES = 40_000
+MAX_SAMPLES = 40_000
 """Samples after which a state that has not come to rest is given up."""
 LOOK_EVERY = 100
 """Samples between two looks at it."""
 
-Step = Callable[[Any, Sequence[float]], tuple[Any, Sequence[float]]]
-"""A step as a function: state, inputs -> next state, outputs."""
+Step = Callable[..., tuple[Any, Sequence[float]]]
+"""A step as a function: state, *inputs -> next state, outputs."""
 
 
 class Slopes(NamedTuple):
@@ -61,12 +63,9 @@ def observer_slopes(observer: Observer) -> Slopes:
     Raises:
         InputError: The observer does not come to rest, has no slope there, or fails.
     """
-
-    def step(state: Any, inputs: Sequence[float]) -> tuple[Any, Sequence[float]]:
-        y1, y2, acceleration, u = inputs
-        return observer.step(state, Measurement(y1, y2, acceleration), u)
-
-    return _slopes(lambda: observer.init(Measurement(0.0, 0.0, 0.0)), step, 4)
+    return _slopes(
+        observer, lambda state, y1, y2, acceleration, u: observer.step(state, Measurement(y1, y2, acceleration), u), 4
+    )
 
 
 def law_slopes(law: Law, extra_signals: int = 0) -> Slopes:
@@ -83,12 +82,13 @@ def law_slopes(law: Law, extra_signals: int = 0) -> Slopes:
         InputError: The law does not come to rest, has no slope there, or fails.
     """
 
-    def step(state: Any, inputs: Sequence[float]) -> tuple[Any, Sequence[float]]:
-        y1, y2, acceleration, u, x1, x2, x3, *extra = inputs
-        state, command = law.step(state, Measurement(y1, y2, acceleration), feedback_state(x1, x2, x3, tuple(extra)), u)
+    def step(state: Any, y1: float, y2: float, acceleration: float, u: float, *fed: float) -> tuple[Any, Any]:
+        x1, x2, x3, *extra = fed
+        x = feedback_state(x1, x2, x3, tuple(extra))
+        state, command = law.step(state, Measurement(y1, y2, acceleration), x, u)
         return state, (command,)
 
-    return _slopes(lambda: law.init(Measurement(0.0, 0.0, 0.0)), step, 7 + extra_signals)
+    return _slopes(law, step, 7 + extra_signals)
 
 
 def needed_states(A: np.ndarray, C: np.ndarray) -> np.ndarray:
@@ -107,12 +107,12 @@ def needed_states(A: np.ndarray, C: np.ndarray) -> np.ndarray:
     return needed
 
 
-def _slopes(init: Callable[[], Any], step: Step, inputs: int) -> Slopes:
+def _slopes(part: Observer | Law, step: Step, inputs: int) -> Slopes:
     """Find the slopes of a step at rest, without the states that no output depends on."""
     with np.errstate(all="ignore"):
         try:
-            rest = _rest(init(), step, inputs)
-            names = tuple(_names(rest))
+            rest = _rest(part.init(Measurement(0.0, 0.0, 0.0)), step, inputs)
+            names = ["_".join(filter(None, leaf.path)) for leaf in _floats(rest)]
             sides = [(_one_sided(rest, step, inputs, share), share_off) for share, share_off in STEPS.items()]
         except InputError:
             raise
@@ -137,11 +137,11 @@ def _rest(state: Any, step: Step, inputs: int) -> Any:
     """Advance with inputs of zero until nothing changes."""
     still = (0.0,) * inputs
     largest: np.ndarray | float = 0.0
-    for k in range(MOST_SAMPLES):
+    for k in range(MAX_SAMPLES):
         before = state
-        state, _ = step(state, still)
+        state, _ = step(state, *still)
         if k % LOOK_EVERY == 0:
-            earlier, now = (np.array(list(_numbers(each))) for each in (before, state))
+            earlier, now = (np.array([leaf.value for leaf in _floats(each)]) for each in (before, state))
             if now.shape != earlier.shape or not np.all(np.isfinite(now)):
                 break
             largest = np.maximum(largest, np.abs(earlier))
@@ -152,13 +152,13 @@ def _rest(state: Any, step: Step, inputs: int) -> Any:
 
 def _one_sided(rest: Any, step: Step, inputs: int, share: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the slopes of next state and outputs to the upper and to the lower side, (n_rows, n_columns) each."""
-    at = np.array([*_numbers(rest), *[0.0] * inputs])
+    at = np.array([*(leaf.value for leaf in _floats(rest)), *[0.0] * inputs])
     n = len(at) - inputs
 
     def after(numbers: np.ndarray) -> np.ndarray:
         values = numbers.tolist()
-        state, outputs = step(_with_numbers(rest, iter(values[:n])), values[n:])
-        return np.array([*_numbers(state), *(float(output) for output in outputs)])
+        state, outputs = step(rebuild(rest, iter(values[:n]), FLOATS), *values[n:])
+        return np.array([*(leaf.value for leaf in _floats(state)), *(float(output) for output in outputs)])
 
     middle, lengths = after(at), np.where(np.abs(at) > 1e-100, share * np.abs(at), share)
     up = [(after(at + move) - middle) / length for move, length in zip(np.diag(lengths), lengths, strict=True)]
@@ -166,58 +166,90 @@ def _one_sided(rest: Any, step: Step, inputs: int, share: float) -> tuple[np.nda
     return np.transpose(up), np.transpose(down)
 
 
-def _parts(value: Any) -> list[tuple[str, Any]]:
-    """Return the parts of a state that may hold numbers, by name; none of a number or of what holds none."""
-    if isinstance(value, (tuple, list)):
-        names = getattr(value, "_fields", None) or (*map(str, range(len(value))),)
-        return [*zip(names, value, strict=True), *getattr(value, "__dict__", {}).items()]
-    if isinstance(value, dict):
-        return [(str(name), part) for name, part in value.items()]
-    if isinstance(value, np.ndarray) and value.ndim:
-        return [(str(i), part) for i, part in enumerate(value)]
-    if dataclasses.is_dataclass(value):
-        return [(field.name, getattr(value, field.name)) for field in dataclasses.fields(value)]
-    if value is None or isinstance(value, (bool, int, float, str, np.number, np.ndarray)):
-        return []
-    raise InputError(f"keeps a {shortened(type(value).__name__)} in its state, not numbers in tuples")
+def _floats(state: Any) -> list[Leaf]:
+    return [leaf for leaf in numbers(state) if isinstance(leaf.value, FLOATS)]
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (float, np.floating)) or (isinstance(value, np.ndarray) and not value.ndim)
+NUMBERS = (Symbolic, bool, int, float, np.bool_, np.integer, np.floating)
+FLOATS = (float, np.floating)
+"""Numbers of a linear system: whole numbers and flags are no part of it."""
+CONSTANTS = (type(None), str, type)
+"""Types of values that a state may hold besides numbers, if they stay the same."""
+MAX_DEPTH = 50
+"""Largest depth of a state; a state that holds itself has no end."""
 
 
-def _numbers(state: Any) -> Iterator[float]:
-    """The numbers of a state, in order; whole numbers and flags are no part of a linear system."""
-    if _is_number(state):
-        yield float(state)
-    for _, part in _parts(state):
-        yield from _numbers(part)
+class Leaf(NamedTuple):
+    """A number in a state, and its path."""
+
+    path: tuple[str, ...]
+    value: Any
 
 
-def _names(state: Any, name: str = "") -> Iterator[str]:
-    """Name the numbers of a state, parts joined by `_`."""
-    if _is_number(state):
-        yield name
-    for part_name, part in _parts(state):
-        yield from _names(part, f"{name}_{part_name}".removeprefix("_"))
+def numbers(tree: Any, path: tuple[str, ...] = ()) -> Iterator[Leaf]:
+    """Yield all numbers of a state, a tree of containers, in order.
+
+    Raises:
+        InputError: The state holds other values, or goes too deep.
+    """
+    if len(path) > MAX_DEPTH:
+        raise InputError(
+            f"its state goes deeper than {MAX_DEPTH} parts within parts, or holds itself: use a tuple of numbers"
+        )
+    parts = _parts(tree)
+    if parts is not None:
+        for name, part in parts:
+            yield from numbers(part, (*path, name))
+    elif isinstance(tree, NUMBERS):
+        yield Leaf(path, tree)
+    elif not isinstance(tree, CONSTANTS):
+        where = f" ({'.'.join(path)})" if path else ""
+        raise InputError(
+            f"its state holds a {shortened(type(tree).__name__)}{where}; use numbers, in tuples, lists, dicts, "
+            "dataclasses or arrays"
+        )
 
 
-def _with_numbers(state: Any, numbers: Iterator[float]) -> Any:
-    """Return a state of the same shape with other numbers, in the order of `_numbers`."""
-    if _is_number(state):
-        return next(numbers)
-    parts = {name: _with_numbers(part, numbers) for name, part in _parts(state)}
-    if isinstance(state, tuple):
-        attributes = getattr(state, "__dict__", {})
-        items = [part for name, part in parts.items() if name not in attributes]
-        made = tuple.__new__(type(state), items)
-        for name in attributes:
-            setattr(made, name, parts[name])
-        return made
-    if isinstance(state, list):
-        return list(parts.values())
-    if isinstance(state, dict):
-        return dict(zip(state, parts.values(), strict=True))
-    if isinstance(state, np.ndarray) and state.ndim:
-        return np.array(list(parts.values()), dtype=state.dtype)
-    return dataclasses.replace(state, **parts) if parts else state  # type: ignore[arg-type]
+def form(tree: Any) -> Any:
+    """Return the part of a state that a step must not change: its containers, and the values that are no numbers."""
+    parts = _parts(tree)
+    if parts is None:
+        return "number" if isinstance(tree, NUMBERS) else tree
+    return type(tree), [(name, form(part)) for name, part in parts]
+
+
+def rebuild(tree: Any, values: Iterator[Any], kinds: tuple[type, ...] = NUMBERS) -> Any:
+    """Rebuild a state with other numbers of these types, in the order of `numbers`."""
+    parts = _parts(tree)
+    if parts is None:
+        return next(values) if isinstance(tree, kinds) else tree
+    names, rebuilt = [name for name, _ in parts], [rebuild(part, values, kinds) for _, part in parts]
+    if isinstance(tree, np.ndarray):
+        kind = object if any(isinstance(part, Symbolic) for part in rebuilt) else tree.dtype
+        return np.array(rebuilt, kind).reshape(tree.shape) if tree.ndim else rebuilt[0]
+    if isinstance(tree, dict):
+        return dict(zip(tree, rebuilt, strict=True))
+    if dataclasses.is_dataclass(tree):
+        made, attributes = copy.copy(tree), 0
+    elif hasattr(tree, "_fields"):  # a Measurement has more than its fields
+        made, attributes = tuple.__new__(type(tree), rebuilt[: len(tree)]), len(tree)
+    else:
+        return type(tree)(rebuilt)
+    for name, part in list(zip(names, rebuilt, strict=True))[attributes:]:
+        object.__setattr__(made, name, part)
+    return made
+
+
+def _parts(tree: Any) -> list[tuple[str, Any]] | None:
+    """Return names and values of a container's parts; None for a value that is no container."""
+    if hasattr(tree, "_fields"):
+        return [*zip(tree._fields, tree, strict=True), *getattr(tree, "__dict__", {}).items()]
+    if isinstance(tree, (tuple, list)):
+        return [(str(i), part) for i, part in enumerate(tree)]
+    if isinstance(tree, dict):
+        return [(str(name), part) for name, part in tree.items()]
+    if isinstance(tree, np.ndarray):
+        return [("_".join(map(str, place)), tree[place]) for place in np.ndindex(*tree.shape)]
+    if dataclasses.is_dataclass(tree) and not isinstance(tree, type):
+        return [(field.name, getattr(tree, field.name)) for field in dataclasses.fields(tree)]
+    return None

@@ -9,6 +9,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, shown
 from cmg_mj.core.reduced_model import MARGIN, ReducedModel, hold_matrices, is_hurwitz
+from cmg_mj.inputs.features import entries
 from cmg_mj.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.linear.loop import ClosedLoop, sensors_used
 from cmg_mj.linear.plant import linear_reduced, linearise
@@ -275,10 +276,7 @@ def _sliding_pole(law: StateFeedback, plant: Plant, height: float) -> float:
     closed = np.eye(n + 1)
     closed[:n, :n], closed[:n, n] = F - np.outer(G[:, 0], k1 * y1 + k2 * rate + k3 * y2), -k4 * G[:, 0]
     closed[n, :n] = -law.dt * y2
-    if not np.all(np.isfinite(closed)):
-        return math.inf
-    z = np.linalg.eigvals(closed)
-    return math.log(float(np.abs(z[np.abs(z - 1.0) > STANDS_STILL]).max())) / law.dt
+    return _slowest(closed, law.dt, STANDS_STILL)
 
 
 def sliding_words(plant: Plant) -> str:
@@ -319,6 +317,41 @@ def _sliding_hint(scenario: Scenario, law: object, plant: Plant) -> str | None:
     )
 
 
+SIMULATED = (
+    "plant.accelerometer_inner_misplaced_mm",
+    "plant.accelerometer_outer_misplaced_mm",
+    *entries("edit"),
+)
+"""The properties that the plant's MuJoCo model itself has, whoever steps it."""
+
+
+def omissions(scenario: Scenario) -> dict[str, str]:
+    """Find what the reduced model, margins, the ceiling and the floor of y1 with its acceleration know nothing of.
+
+    Args:
+        scenario: The scenario of one axis.
+
+    Returns:
+        Field -> what it is, in words.
+    """
+    clauses = {
+        name: clause
+        for name, parts in scenario.feature_sections.items()
+        for part in parts
+        if (clause := part.unmodelled)
+    }
+    accelerometer = scenario.sensors.accelerometer
+    if accelerometer.vibration_mg:
+        clauses["sensors.accelerometer.vibration_mg"] = "the accelerometers' vibration"
+    if any(accelerometer.wheel_harmonics_mg):
+        clauses["sensors.accelerometer.wheel_harmonics_mg"] = "the flywheels' tones in the accelerometers"
+    for which in ("inner", "outer"):
+        field = f"accelerometer_{which}_misplaced_mm"
+        if getattr(scenario.plant, field):
+            clauses[f"plant.{field}"] = f"the {which} accelerometer's misplacement"
+    return clauses
+
+
 def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:
     """Refuse a control period so long that the loop is unstable, where a shorter one would do.
 
@@ -347,9 +380,18 @@ def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:
 
 
 def _sampled_pole(law: StateFeedback, model: ReducedModel, period: float) -> float:
-    """Return the slowest pole of the loop sampled so often, as a continuous one's [1/s]."""
+    """Return the slowest pole of the loop sampled so often [1/s]."""
     A, B = hold_matrices(model.A_e, model.B_e, period)[:2]
-    closed = A - B @ np.array([law.gains])
+    return _slowest(A - B @ np.array([law.gains]), period, 0.0)
+
+
+def _slowest(closed: np.ndarray, period: float, still: float) -> float:
+    """Return a sampled loop's slowest pole as of a continuous one, but for those so near 1 [1/s].
+
+    It is infinite where a sample's growth is beyond all numbers.
+    """
     if not np.all(np.isfinite(closed)):
         return math.inf
-    return math.log(max(float(np.abs(np.linalg.eigvals(closed)).max()), np.finfo(float).tiny)) / period
+    z = np.linalg.eigvals(closed)
+    size = np.abs(z[np.abs(z - 1.0) >= still]).max()
+    return math.log(max(float(size), np.finfo(float).tiny)) / period

@@ -21,7 +21,7 @@ from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 
 SINUSOID = "disturbance_n_m"
 
-FASTEST = 2.0
+MAX_RATE = 2.0
 """Limit of the observer's rates times the sample period."""
 
 
@@ -39,7 +39,9 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class Adaptive:
-    """dao2023 (7) to (9) for the reduced model, with what is unknown about it as r.
+    """The adaptive disturbance observer of dao2023 on the scissored pair.
+
+    dao2023 (7) to (9) for the reduced model, with what is unknown about it as r.
 
     The state is (x1 - e, x2), whose first entry y1 measures: as with the other observers, the estimate of x1 is one of
     y1 without its noise, not of the tilt from the true equilibrium. With D = J1 + J2 sin^2 y2,
@@ -96,16 +98,16 @@ class Adaptive:
             raise ValueError(
                 f"L: A + L C must be Hurwitz (both negative, left of -{MARGIN:g} 1/s), its eigenvalues are {listed}"
             )
-        fastest, limit = float(np.abs(poles).max()), FASTEST / self.dt
+        fastest, limit = float(np.abs(poles).max()), MAX_RATE / self.dt
         if fastest >= limit:
             raise ValueError(
                 f"L: too fast for the sample period: an eigenvalue of A + L C has the size {fastest:.3g} 1/s, "
-                f"which must be below {FASTEST:g}/dt = {limit:g} 1/s"
+                f"which must be below {MAX_RATE:g}/dt = {limit:g} 1/s"
             )
         if self.learning_rate >= limit:
             raise ValueError(
                 f"Sigma, Gamma: too large for the sample period: the unknown would be learnt at "
-                f"{self.learning_rate:.3g} 1/s, which must be below {FASTEST:g}/dt = {limit:g} 1/s"
+                f"{self.learning_rate:.3g} 1/s, which must be below {MAX_RATE:g}/dt = {limit:g} 1/s"
             )
 
     @property

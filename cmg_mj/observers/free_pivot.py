@@ -55,7 +55,9 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class FreePivot:
-    """x1' = x2, x2' = alpha; the sensors show y1 = x1 + w + v and a = alpha + b + n, at the samples.
+    """`gyro_free` for a pivot that moves: it learns how strongly, and trusts the measured tilt less.
+
+    x1' = x2, x2' = alpha; the sensors show y1 = x1 + w + v and a = alpha + b + n, at the samples.
 
     As in `gyro_free`, whose p, z, b, n, v and equations these are, but for w, minus the pivot's horizontal acceleration
     over g. It fades and is renewed: w+ = f w + white, f = exp(-2 pi pivot_hz dt), so that its variance S is stationary.

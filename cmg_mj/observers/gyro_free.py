@@ -35,7 +35,9 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class GyroFree:
-    """x1' = x2, x2' = alpha, and the sensors show y1 = x1 + v and a = alpha + b + n, at the samples.
+    """The tilt rate from tilt and angular acceleration alone, as in a gyro-free inertial measurement unit.
+
+    x1' = x2, x2' = alpha, and the sensors show y1 = x1 + v and a = alpha + b + n, at the samples.
 
     v and n are the noise of the same two accelerometers, so they are correlated; b is what is wrong with a for good:
     the offset between the accelerometers, or gravity seen by a misaligned one. Between samples alpha is taken to run

@@ -54,7 +54,9 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class HighGain:
-    """x1' = x2 - L^(1+b) q1(s), x2' = f2(y, x2, u) - L^(2+b) q2(l2 q1(s)), s = l1 (x1 - y1)/L^b, L' by (8).
+    """The high-gain observer with updated gain and homogeneous correction, andrieu2009 (7)-(10), on the scissored pair.
+
+    x1' = x2 - L^(1+b) q1(s), x2' = f2(y, x2, u) - L^(2+b) q2(l2 q1(s)), s = l1 (x1 - y1)/L^b, L' by (8).
 
     q1(w) = w + [w]^(1/(1-d_inf)), q2(w) = w + [w]^(1+d_inf); both w alone if d_inf = 0. Theorem 1's observer written
     out for n = 2 and f2 of the reduced model, one step a sample as there. L starts at phi2.

@@ -65,7 +65,9 @@ class TorqueEstimate(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class Kalman:
-    """x1' = x2, x2' = f2(x, u) + (torque + white)/(n D), x3' = u + g, torque' = walk; y1 = x1 + v1, y2 = x3 + v2.
+    """The extended Kalman filter of the reduced model with an unknown torque: an engineer's first choice.
+
+    x1' = x2, x2' = f2(x, u) + (torque + white)/(n D), x3' = u + g, torque' = walk; y1 = x1 + v1, y2 = x3 + v2.
 
     f2 is that of (4) with D = J1 + J2 sin^2 x3, and n is the number of gimbals among which the rig is shared. The
     torque on the rig is what the model lacks: a push, friction, and the equilibrium bias e, which makes the torque

@@ -26,7 +26,9 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, config=STRICT)
 class Luenberger:
-    """x' = A x + B u + L (y - C x) with the linearisation (6).
+    """The time-invariant full-order observer, sokolov2019 (9); the one aranovskiy2020 could not stabilise its rig with.
+
+    x' = A x + B u + L (y - C x) with the linearisation (6).
 
     Discretised exactly for an input held and a measurement that runs straight between samples.
 

@@ -18,7 +18,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel, Terms
 from cmg_mj.core.types import Measurement
 
-LARGEST_RATE = 2.5
+MAX_RATE = 2.5
 """Times the step: a rate at which the error fades that the Runge-Kutta step follows well. It is stable up to 2.78."""
 
 Correction = Callable[[Scalar, Any], tuple[Scalar, Scalar]]

@@ -17,7 +17,7 @@ from enum import Enum
 from typing import NamedTuple, TypeAlias
 
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.observers.registry import OBSERVER_CLASSES
+from cmg_mj.observers import OBSERVER_CLASSES
 
 PAPERS_GRAVITY = 3.4531 / 0.061841
 """g0 = (m g l/sqrt(2))/J1 of the rig that the papers' parameters were chosen for (aranovskiy2020 Table 1) [1/s^2]."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import textwrap
 from collections.abc import Mapping, Sequence
 
@@ -170,7 +169,7 @@ def class_list(kind: UserClassKind) -> str:
     lines = [f"{kind.what.capitalize()}s, and the defaults of their parameters (--set {kind.section}.NAME=VALUE)"]
     for name in kind.known:
         parameters = kind.takes(name)
-        title = (sys.modules[kind.find(name).__module__].__doc__ or "").partition("\n")[0]
+        title = (kind.find(name).__doc__ or "").partition("\n")[0]
         defaults = assignments({key: parameters[key].default for key in kind.own(name)}) or "no parameters"
         # A default is kept in one piece: its spaces are not those to break at.
         wrapped = textwrap.wrap(defaults.replace(", ", ",\0"), 98, initial_indent=indent, subsequent_indent=indent)

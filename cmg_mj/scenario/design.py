@@ -13,10 +13,8 @@ from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import RadialTilt, TiltNoise
 from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
-from cmg_mj.laws import LAWS, Law
-from cmg_mj.laws.registry import LAW_CLASSES
-from cmg_mj.observers import Observer, make_observer
-from cmg_mj.observers.registry import OBSERVER_CLASSES
+from cmg_mj.laws import LAW_CLASSES, LAWS, Law
+from cmg_mj.observers import OBSERVER_CLASSES, Observer, make_observer
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.stages.notch import notch

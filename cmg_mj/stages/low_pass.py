@@ -104,6 +104,13 @@ def noise_gain(bandwidth_hz: float, rate_hz: float) -> float:
     return (t**4 + (t - t**3) / math.sqrt(2.0)) / (1.0 + t**4)
 
 
+def coefficients(bandwidth_hz: float, rate_hz: float) -> list[list[float]]:
+    """Return b and a of the filter, the bandwidth and the rate of its samples in Hz."""
+    from scipy.signal import butter  # 1 s of import, which only a part with a low-pass needs
+
+    return np.array(butter(2, bandwidth_hz, fs=rate_hz)).tolist()
+
+
 def low_pass(bandwidth_hz: float, rate_hz: float, start: Scalar) -> Callable[[Scalar], Scalar]:
     """Return a filter at work, which has seen the same value for ever.
 
@@ -115,9 +122,7 @@ def low_pass(bandwidth_hz: float, rate_hz: float, start: Scalar) -> Callable[[Sc
     Returns:
         A function: the next sample -> what the filter shows.
     """
-    from scipy.signal import butter  # 1 s of import, which only a part with a low-pass needs
-
-    (b0, b1, b2), (_, a1, a2) = np.array(butter(2, bandwidth_hz, fs=rate_hz)).tolist()
+    (b0, b1, b2), (_, a1, a2) = coefficients(bandwidth_hz, rate_hz)
     first, second = (1.0 - b0) * start, (b2 - a2) * start
 
     def passed(x: Scalar) -> Scalar:

@@ -51,9 +51,9 @@ import numpy as np
 
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import Measurement, Observer
+from cmg_mj.observers import OBSERVERS, make_observer
 from cmg_mj.observers.free_pivot import FreePivot
 from cmg_mj.observers.gyro_free import GyroFree
-from cmg_mj.observers.registry import OBSERVERS, make_observer
 from cmg_mj.results.markdown import table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario

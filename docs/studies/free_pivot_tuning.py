@@ -17,7 +17,7 @@ from multiprocessing import get_context
 import numpy as np
 from free_pivot_grid import BASE, ERROR, OURS, Cell, experiment, grid, in_loop, replayed
 
-from cmg_mj.observers.registry import make_observer
+from cmg_mj.observers import make_observer
 from cmg_mj.results.markdown import table
 
 CELLS = {

@@ -16,12 +16,14 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from cmg_mj.features.plugin.driver import set_world
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.markdown import table
-from tests.features.plugin.made import SENSORS, Comparison, Made, compare, make, variant
+from tests.features.plugin.made import SENSORS, Made, bits, make, pairs, run, variant
 from tests.features.plugin.robots import ROBOTS, is_missing, write_robot
 
 PARTS = ("rig", "axes", "worlds", "robots")
@@ -29,6 +31,41 @@ INTEGRATORS = ("RK4", "implicitfast", "Euler")
 NOISES = ((0, 0), (0, 1), (0, 63), (1, 0), (12345678901, 7), (2**53, 2**53))
 """Seed and world."""
 WORLDS_OF = ("gyro_free", "adaptive")
+
+
+class Comparison(NamedTuple):
+    """Numbers of a run beside the runner's.
+
+    Attributes:
+        differing: How many differ in any bit.
+        numbers: How many there are.
+        seconds: Until when the run went [s].
+    """
+
+    differing: int
+    numbers: int
+    seconds: float
+
+
+def compare(made: Made, seed: int | None = None, world: int = 0) -> Comparison:
+    """Compare every number with the runner's.
+
+    Args:
+        made: The plugin.
+        seed: Seed of the noise; None: the scenario's.
+        world: World whose noise it is.
+    """
+    experiment, data = made.experiment, made.start()
+    if seed is not None:
+        experiment = experiment.with_settings({"seed": seed})
+    set_world(made.model, data, experiment.scenario.seed, world)
+    trajectory = experiment.run(world=world).trajectory
+    assert trajectory is not None
+    rows = run(made, data, len(trajectory))
+    both = list(pairs(made, rows, trajectory))
+    differing = sum(int((bits(a) != bits(b)).sum()) for _, a, b in both)
+    period = experiment.controller().period * experiment.plant.timestep
+    return Comparison(differing, sum(b.size for _, _, b in both), len(trajectory) * period)
 
 
 class Count:

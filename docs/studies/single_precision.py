@@ -23,7 +23,8 @@ import numpy as np
 from cmg_mj import load_scenario, prepare
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.export import export
-from cmg_mj.features.export.check import FLAGS, find_compiler
+from cmg_mj.features.export.check import FLAGS
+from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.observers import OBSERVERS, Measurement
 from cmg_mj.results.intervals import mean_interval
 from cmg_mj.results.markdown import table

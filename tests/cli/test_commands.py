@@ -193,7 +193,7 @@ def test_a_plot_and_a_title_that_looks_like_markup() -> None:
 @pytest.mark.slow
 def test_the_default_folder_tells_runs_apart(quick: str) -> None:
     Path("mine.py").write_text(
-        "from cmg_mj.observers.finite_difference import FiniteDifference\nclass Mine(FiniteDifference): pass\n"
+        "from cmg_mj.observers.linear import FiniteDifference\nclass Mine(FiniteDifference): pass\n"
     )
     for options in (["--seed", 3], ["--observer", "ltv"], ["--observer", "mine:Mine"]):
         assert cmg_mj("run", quick, *options).status == 0

@@ -60,18 +60,33 @@ def test_an_lqr_keeps_its_distance() -> None:
 @pytest.mark.parametrize("h", [5e-4, pytest.param(1e-4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("latency", [0.04, 0.06])
 def test_stable_is_what_the_loop_step_by_step_is(latency: float, h: float) -> None:
-    """The linearisation stepped finely, with the command held and the signals late."""
     outcome = loop(f"sensors.accelerometer.latency_s={latency}", f"sensors.encoder.latency_s={latency}")
+    is_stable = abs(tilts(h, 6.0, 0.005, latency)[-1]) < 0.01
+    assert (outcome.loop.words == "stable") == is_stable == (latency < 0.05)
+
+
+def tilts(h: float, seconds: float, period: float, latency: float = 0.0) -> np.ndarray:
+    """The linearisation stepped finely from a tilt, with the command held and the signals late."""
     model, K = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3])
-    steps, period, late = int(6.0 / h), round(0.005 / h), round(latency / h)
+    steps, late = round(seconds / h), round(latency / h)
     x = np.zeros((steps + 1, 4))
     x[0, 0], u = 0.01, 0.0
     for k in range(steps):
-        if k % period == 0:
+        if k % round(period / h) == 0:
             u = -K @ x[max(k - late, 0)]
         x[k + 1] = x[k] + h * (model.A_e @ x[k] + model.B_e[:, 0] * u)
-    is_stable = abs(x[-1, 0]) < 0.01
-    assert (outcome.loop.words == "stable") == is_stable == (latency < 0.05)
+    return x[:, 0]
+
+
+@pytest.mark.daily_cases("0.08-False", "0.1-True")
+@pytest.mark.parametrize(("period", "refused"), [(1.0, True), (0.1, True), (0.08, False)])
+def test_a_period_at_which_the_loop_is_unstable_is_not_exported(period: float, refused: bool) -> None:
+    grown = np.abs(tilts(5e-4, 40.0 * period, period)[:: round(period / 5e-4)])
+    assert bool(not grown[-1] <= grown[10]) is refused
+    outcome = cmg_mj("export", "linear", "--set", f"controller.rate_hz={1.0 / period}", "--out", "x")
+    assert outcome.status == (2 if refused else 0)
+    assert ("more than 10.2 Hz are needed" in outcome.err) is refused
+    assert Path("x").exists() is not refused
 
 
 @pytest.mark.parametrize(
@@ -120,19 +135,6 @@ def test_a_model_with_its_scenario_beside_it_is_not_judged_by_other_gains(half: 
         assert f"run it      cmg-mj run {scenario}" in out
     Path("half.toml").write_text('[plant]\nmodel = "other.xml"\n', encoding="utf-8")
     assert "run it      cmg-mj run push_recovery --set plant.model=half.xml" in cmg_mj("check", "half.xml").out
-
-
-def test_half_the_flywheel_is_solved_for(half: str) -> None:
-    """With gains made for it, it stands."""
-    solved = ["--set", "controller.lqr.state_cost=[1, 1, 1, 1]", "--set", "duration_s=4"]
-    outcome = cmg_mj("run", "push_recovery", "--set", half, *solved, "--out", "it", "--json")
-    assert (outcome.err, '"outcome": "done"' in outcome.out) == ("", True)
-
-
-@pytest.mark.slow
-def test_compare_says_it_once(half: str) -> None:
-    options = ["--observers", "linear,ltv", "--worlds", 2, "--set", half, "--set", "duration_s=2.2", "--json"]
-    assert cmg_mj("compare", "push_recovery", *options).err.count("hint") == 1
 
 
 def test_a_notch_is_in_the_rigid_loop() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.observers import Measurement
-from cmg_mj.observers.super_twisting import State
+from cmg_mj.observers.linear import TwistingState
 from tests.observers.reference import BOUND, DT, observer, run
 
 L, L0, L1 = 10.0, 1.5, 1.1
@@ -34,7 +34,7 @@ def test_each_step_solves_its_inclusion(parameters: dict, values: tuple[float, f
     for _ in range(200):
         z0, z1, y1 = rng.normal(0.0, 10.0 ** rng.uniform(-6.0, -1.0)), rng.normal(), 0.0
         z1 = z1 * 10.0 ** rng.uniform(-6.0, 0.0)
-        state, estimate = estimator.step(State(z0, z1), Measurement(y1, 0.1), 0.0)
+        state, estimate = estimator.step(TwistingState(z0, z1), Measurement(y1, 0.1), 0.0)
         s = state.z0 - y1
         xi = (z1 - state.z1) / (DT * l1 * bound)
         if s == 0.0:
@@ -84,7 +84,7 @@ def test_explicit_steps_would_chatter() -> None:
         s = z0
         z0, z1 = z0 + DT * (z1 - L0 * math.sqrt(L * abs(s)) * np.sign(s)), z1 - DT * L1 * L * np.sign(s)
         swings.append(z1)
-    estimator, state = observer("super_twisting", L=L), State(0.001, 0.0)
+    estimator, state = observer("super_twisting", L=L), TwistingState(0.001, 0.0)
     for _ in range(2000):
         state, _ = estimator.step(state, Measurement(0.0, 0.0), 0.0)
     print(f"explicit: rate swings by {np.ptp(swings[-200:]):.3f} rad/s; implicit: {abs(state.z1):.1e}")

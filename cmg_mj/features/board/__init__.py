@@ -16,7 +16,6 @@ from cmg_mj.core.errors import InputError, shown
 from cmg_mj.features.board.image import build, require
 from cmg_mj.features.board.qemu import Board, Cost
 from cmg_mj.features.export import export
-from cmg_mj.features.export.names import name_of
 
 __all__ = ["Board", "Cost", "on_a_board", "temporary_export"]
 
@@ -29,7 +28,7 @@ def temporary_export(controller: Controller) -> Iterator[tuple[str, Path]]:
         controller: The controller.
 
     Yields:
-        The observer's name in C, and the folder of the files, which is deleted at the end.
+        The controller's name in C, and the folder of the files, which is deleted at the end.
 
     Raises:
         InputError: The controller cannot be exported.
@@ -39,13 +38,9 @@ def temporary_export(controller: Controller) -> Iterator[tuple[str, Path]]:
             f"controller.feedback = {shown(controller.feedback)}: a board has no such sensor; it closes the loop "
             "on its own estimate, 'observer'"
         )
-    try:
-        name = name_of(controller.observer)
-    except InputError:  # a class that C cannot spell: no user sees this C
-        name = "own"
     with TemporaryDirectory(prefix="cmg_mj-board-") as folder:
-        export(controller, Path(folder), precision="single", name=name)
-        yield name, Path(folder)
+        export(controller, Path(folder), precision="single", name="on_board")
+        yield "on_board", Path(folder)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.features.export import compiler
 
 COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
 PACKAGES = {
@@ -105,8 +106,10 @@ def build(observer: str, folder: Path, controller: Path | None = None) -> Image:
     firmware = [FIRMWARE / name for name in ("startup.c", "mps2.c", "board.c")]
     sizes = [f"-D{size}={observer.upper()}_{size}" for size in ("ESTIMATES", "ENCODERS")]
     command: list[str | Path] = [COMPILER, *FLAGS, f"-DOBSERVER={observer}", *sizes, "-I", folder, "-I", FIRMWARE]
-    _run([*command, "-T", FIRMWARE / "mps2.ld", *firmware, source, "-lm", "-o", path], observer)
-    text, data, *_ = _run([SIZE, path], observer).splitlines()[1].split()
+    compiler.build(
+        [*command, "-T", FIRMWARE / "mps2.ld", *firmware, source, "-lm", "-o", path], f"{observer}: {COMPILER}"
+    )
+    text, data, *_ = compiler.build([SIZE, path], f"{observer}: {SIZE}").splitlines()[1].split()
     return Image(path, int(text) + int(data))
 
 
@@ -121,16 +124,3 @@ def flash_of(observer: str, folder: Path) -> int:
         The size [bytes].
     """
     return build(observer, folder).flash - build(observer, folder, EMPTY).flash
-
-
-def _run(command: list[str | Path], observer: str) -> str:
-    try:
-        process = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
-    except OSError as error:
-        raise InputError(f"{observer}: {command[0]} cannot be run: {error.strerror}") from error
-    if process.returncode:
-        lines = process.stderr.splitlines()
-        errors = [line for line in lines if "error" in line or "undefined" in line]
-        reason = (errors or lines or [f"status {process.returncode}"])[0]
-        raise InputError(f"{observer}: {command[0]} refuses it: {reason.strip()}")
-    return process.stdout

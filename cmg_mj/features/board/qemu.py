@@ -109,11 +109,6 @@ class Board:
     def __exit__(self, *exception: object) -> None:
         self.close()
 
-    @property
-    def process_id(self) -> int:
-        """Process id of the emulator."""
-        return self._process.pid
-
     def start(self) -> None:
         """Put the controller at its start."""
         self._ask("s", b"", "<")
@@ -150,26 +145,16 @@ class Board:
         counts, stack, *estimate = self._ask("o", self._packed(y1, y2, acceleration, u), layout)
         return tuple(estimate), self._cost("o", counts, stack)
 
-    def calibration_counts(self) -> list[int]:
-        """Count the instructions of code that has 0, 100 and 1000, to check the counter."""
-        nothing, _, hundred, _, thousand, _ = self._ask("c", b"", "<6I")
-        return [round((counts - nothing) / self._per_instruction) for counts in (nothing, hundred, thousand)]
-
     def _packed(self, *numbers: float) -> bytes:
         return struct.pack(f"<{len(numbers)}{self._reals}", *numbers)
 
-    def _calibrated(self) -> tuple[float, dict[str, tuple[int, int]]]:
-        """Calibrate: counts for an instruction; counts and stack of calls of empty functions, by kind of message."""
+    def _calibrated(self) -> tuple[float, dict[str, int]]:
+        """Calibrate: counts for an instruction; counts of calls of empty functions, by kind of message."""
         _, _, hundred, _, thousand, _ = self._ask("c", b"", "<6I")
-        costs = self._ask("e", b"", "<6I")
-        empty = {kind: (costs[2 * i], costs[2 * i + 1]) for i, kind in enumerate("uno")}
-        return (thousand - hundred) / 900.0, empty
+        return (thousand - hundred) / 900.0, dict(zip("uno", self._ask("e", b"", "<6I")[::2], strict=True))
 
     def _cost(self, kind: str, counts: int, stack: int) -> Cost:
-        if not self._empty:
-            return Cost(0, stack)
-        empty, _ = self._empty[kind]
-        return Cost(round((counts - empty) / self._per_instruction), stack)
+        return Cost(round((counts - self._empty[kind]) / self._per_instruction) if self._empty else 0, stack)
 
     def _ask(self, kind: str, payload: bytes, layout: str) -> tuple:
         """Send a message, as firmware/board.c describes it, and receive the numbers of its answer."""

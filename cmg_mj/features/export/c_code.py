@@ -18,7 +18,7 @@ from cmg_mj.core.errors import InputError
 
 Precision = Literal["double", "single"]
 
-WIDEST = 70
+MAX_WIDTH = 70
 """Longest expression [characters]; a longer one becomes a variable."""
 
 ATOM, UNARY, TIMES, PLUS, COMPARED, EQUAL, AND, OR, CHOICE = range(9)
@@ -37,32 +37,13 @@ INFIX = {
     casadi.OP_OR: ("||", OR),
 }
 
-CALLS = {
-    casadi.OP_POW: "pow",
-    casadi.OP_CONSTPOW: "pow",
-    casadi.OP_FABS: "fabs",
-    casadi.OP_SQRT: "sqrt",
-    casadi.OP_EXP: "exp",
-    casadi.OP_EXPM1: "expm1",
-    casadi.OP_LOG: "log",
-    casadi.OP_LOG1P: "log1p",
-    casadi.OP_SIN: "sin",
-    casadi.OP_COS: "cos",
-    casadi.OP_TAN: "tan",
-    casadi.OP_ASIN: "asin",
-    casadi.OP_ACOS: "acos",
-    casadi.OP_ATAN: "atan",
-    casadi.OP_ATAN2: "atan2",
-    casadi.OP_SINH: "sinh",
-    casadi.OP_COSH: "cosh",
-    casadi.OP_TANH: "tanh",
-    casadi.OP_HYPOT: "hypot",
-    casadi.OP_COPYSIGN: "copysign",
-    casadi.OP_FLOOR: "floor",
-    casadi.OP_CEIL: "ceil",
-    casadi.OP_FMOD: "fmod",
-}
-"""Functions of math.h."""
+MATH = (
+    *("fabs", "sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh"),
+    *("hypot", "copysign", "floor", "ceil", "fmod"),
+)
+"""Functions of math.h that CasADi and NumPy name alike."""
+CALLS = {getattr(casadi, f"OP_{name.upper()}"): name for name in (*MATH, "pow", "asin", "acos", "atan", "atan2")}
+CALLS[casadi.OP_CONSTPOW] = "pow"
 
 SELECT = -1
 """c ? a : b, which CasADi writes as the sum of (c ? a : 0) and (!c ? b : 0)."""
@@ -164,7 +145,7 @@ def body(
             arguments = [texts[j] if k < n else _number(nodes[j], texts[j], real) for k, j in enumerate(node.arguments)]
         text = _text(node, arguments, inputs, precision)
         is_variable = _is_operation(node) and (
-            len(uses[i]) > 1 or any(user in ARGUMENT_TWICE for user in uses[i]) or len(text.text) > WIDEST
+            len(uses[i]) > 1 or any(user in ARGUMENT_TWICE for user in uses[i]) or len(text.text) > MAX_WIDTH
         )
         if is_variable:
             name = f"t{len(lines) + 1}"

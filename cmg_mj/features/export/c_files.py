@@ -32,6 +32,15 @@ BITS = {"double": ("uint64_t", "UINT64_C(0x7ff0000000000000)"), "single": ("uint
 """Precision -> an integer as wide as a number, and the bits of the number's exponent."""
 
 
+LIMIT = """\
+        else if (controller->u < -rate_limit)
+            controller->u = -rate_limit;
+        else if (controller->u > rate_limit)
+            controller->u = rate_limit;
+"""
+"""Limits the command, behind the check that it is finite; (8) has done so."""
+
+
 @dataclass(frozen=True)
 class CodePrinter:
     """Prints the code of a controller.
@@ -69,6 +78,8 @@ class CodePrinter:
         places = "".join(f"    {N}_{place},\n" for place in self.places)
         count = "    long updates; /* so far, while the integrator is trimmed */\n" if self.constants.trimmed else ""
         wrong_format, complaint = REQUIRED_FORMATS[self.precision]
+        law = self.traced.law
+        integrator = "integrator [rad s]" if law.has_integrator else "NaN: the law has no integrator"
         return f"""{format_header_comment(n, self.controller, self.precision)}
 #ifndef {N}_H
 #define {N}_H
@@ -102,7 +113,7 @@ typedef struct {{
 {self.law.state_type}/* The whole controller's state. */
 typedef struct {{
     {n}_state observer;
-{self.law.member}    {real} x_e; /* {self.law.integrator_comment} */
+{f"    {n}_law_state law;" + chr(10) if law.state else ""}    {real} x_e; /* {integrator} */
     {real} u; /* last command [rad/s] */
     int started;
     {n}_status status; /* of the last update */
@@ -222,7 +233,7 @@ static int is_finite({real} x)
 {trim if constants.trimmed else ""}        {law_call}
         if (!({_are_finite(results)}))
             controller->status = {N}_RESULT_NOT_FINITE;
-{self.law.limit("        ")}    }}
+{"" if traced.law.is_state_feedback else LIMIT}    }}
     if (controller->status != {N}_OK) {{
         for (i = 0; i < {N}_ESTIMATES; ++i) estimate[i] = 0;
         controller->u = 0;
@@ -380,7 +391,7 @@ def _rows(table: Table, precision: Precision) -> str:
     return "".join(f"    {_row(row, precision)},\n" for row in table)
 
 
-WIDEST = 110
+MAX_WIDTH = 110
 """Longest line [characters]."""
 
 PrintBody = Callable[[casadi.Function, Sequence[str], Sequence[str]], str]
@@ -390,7 +401,7 @@ PrintBody = Callable[[casadi.Function, Sequence[str], Sequence[str]], str]
 def function_head(head: str, parameters: Sequence[str]) -> str:
     """Print a function's name and parameters, on as many lines as they need."""
     text = f"{head}({', '.join(parameters)})"
-    return text if len(text) <= WIDEST else f"{head}(\n    {(',' + chr(10) + '    ').join(parameters)})"
+    return text if len(text) <= MAX_WIDTH else f"{head}(\n    {(',' + chr(10) + '    ').join(parameters)})"
 
 
 class LawPrinter(NamedTuple):
@@ -418,19 +429,9 @@ class LawPrinter(NamedTuple):
         return f"/* The law's state{beside}. */\ntypedef struct {{\n{members}}} {self.name}_law_state;\n\n"
 
     @property
-    def member(self) -> str:
-        """The state's line in the controller's struct."""
-        return f"    {self.name}_law_state law;\n" if self.law.state else ""
-
-    @property
-    def integrator_comment(self) -> str:
-        """The meaning of the controller's `x_e`."""
-        return "integrator [rad s]" if self.law.has_integrator else "NaN: the law has no integrator"
-
-    @property
     def finite_members(self) -> list[str]:
         """Members of the controller that must be finite after a decision, besides u."""
-        return [*(f"law.{member}" for member in self.law.state), *(["x_e"] if self.law.has_integrator else [])]
+        return self._memory("law.", "x_e")
 
     def functions(self, print_body: PrintBody) -> str:
         """Print `law`, and `init_law` if it has one."""
@@ -443,7 +444,9 @@ class LawPrinter(NamedTuple):
         step = f"/* {self.described}: u, not yet limited, and the next state. */\n{step}"
         if law.init is None or not memory:
             return step
-        init = function_head("static void init_law", [*self._reals(law.measured), *self._pointers()])
+        init = function_head(
+            "static void init_law", [*(f"{self.name}_real {name}" for name in law.measured), *self._pointers()]
+        )
         start = f"{init}\n{{\n{print_body(law.init, MEASURED, memory)}}}\n"
         return f"/* {self.described}: the state before the first decision. */\n{start}\n{step}"
 
@@ -470,18 +473,6 @@ class LawPrinter(NamedTuple):
         """
         return f"law({', '.join([*(values[name] for name in self._parameters()), *self._passed(state, x_e), u])});"
 
-    def limit(self, indent: str) -> str:
-        """Print the lines that limit the command, behind the check that it is finite; (8) has done so."""
-        if self.law.is_state_feedback:
-            return ""
-        lines = [
-            "else if (controller->u < -rate_limit)",
-            "    controller->u = -rate_limit;",
-            "else if (controller->u > rate_limit)",
-            "    controller->u = rate_limit;",
-        ]
-        return "".join(f"{indent}{line}\n" for line in lines)
-
     def _step_head(self) -> str:
         real, estimates = f"{self.name}_real", f"{self.name.upper()}_ESTIMATES"
         texts = {"estimate": f"const {real} estimate[{estimates}]"}
@@ -491,9 +482,6 @@ class LawPrinter(NamedTuple):
     def _parameters(self) -> list[str]:
         """Name the parameters of `law` before its pointers; extra signals come as the whole estimate."""
         return list(dict.fromkeys(name.partition("[")[0] for name in self.law.arguments))
-
-    def _reals(self, names: Sequence[str]) -> list[str]:
-        return [f"{self.name}_real {name}" for name in names]
 
     def _memory(self, member: str, x_e: str) -> list[str]:
         """Place the numbers of the state, the integrator last."""

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import copy
 import math
-import os
 import re
 import shlex
-import shutil
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,6 +16,7 @@ from cmg_mj.core.arrays import clip
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.features.export.c_code import Precision
+from cmg_mj.features.export.compiler import build, run
 from cmg_mj.features.export.constants import Constants
 from cmg_mj.features.export.symbol import LawNotExportable
 from cmg_mj.features.export.trace import Traced, law_arguments
@@ -91,41 +89,31 @@ def in_casadi(controller: Controller, traced: Traced, constants: Constants, samp
     def values(function: casadi.Function, *arguments: float) -> list[float]:
         return [float(value) for value in function.call(arguments)]
 
-    measure_constants = [constant.value for constant in constants.of_measure]
-    law, limit = traced.law, constants.of_law[-1].value
-    law_constants = [constant.value for constant in constants.of_law] if law.is_state_feedback else []
-    arguments, law_state = law_arguments(len(controller.extra_signals[0])), [*law.state, "x_e"][: law.numbers]
-    width = 3 + len(controller.extra_signals[0])
-    state: list[float] | None = None
-    memory: list[float] = []
-    u = 0.0
-    rows = []
+    of_measure, of_law = ([part.value for part in parts] for parts in (constants.of_measure, constants.of_law))
+    law, limit, extra, n = traced.law, of_law[-1], len(controller.extra_signals[0]), len(traced.state)
+    law_state, law_constants = [*law.state, "x_e"][: law.numbers], of_law if law.is_state_feedback else []
+    state, memory, rows, u = [0.0], [0.0], [], 0.0
     for k, row in enumerate(samples.tolist()):
-        y = values(traced.measure, *row, *measure_constants)
-        if state is None:
-            state, memory = values(traced.init, *y), law.first(y)
-            estimate = [y[0], 0.0, y[1], *[0.0] * (width - 3)]
+        y = values(traced.measure, *row, *of_measure)
+        if k == 0:
+            state, estimate = values(traced.init, *y), [y[0], 0.0, y[1], *[0.0] * extra]
+            memory = memory if law.init is None else values(law.init, *y)
         else:
             result = values(traced.step, *state, *y, u)
-            state, estimate = result[: len(state)], result[len(state) :]
-        for place, value in zip(traced.state, state, strict=True):
-            if not math.isfinite(value):  # and the estimate is: Python has gone on
-                raise InputError(_not_finite(place, value, k))
+            state, estimate = result[:n], result[n:]
         if k < constants.trimmed:
             memory[-1] = constants.trim_gain.value * estimate[constants.trim_part]
         x1, x3 = (y[0], y[1]) if controller.angle_source == "measured" else (estimate[0], estimate[2])
-        inputs = dict(zip(arguments, [*y, x1, estimate[1], x3, *estimate[3:], u], strict=True))
-        u, memory = law.decide(inputs, memory, law_constants)
+        known = dict(zip(law_arguments(extra), [*y, x1, estimate[1], x3, *estimate[3:], u], strict=True))
+        u, *memory = values(law.step, *(known[name] for name in law.arguments), *memory, *law_constants)
         u = clip(u, -limit, limit)
-        for place, value in zip(law_state, memory, strict=True):
-            if not math.isfinite(value):
-                raise LawNotExportable(_not_finite(place, value, k))
+        for refusal, names, numbers in ((InputError, traced.state, state), (LawNotExportable, law_state, memory)):
+            for name, value in zip(names, numbers, strict=True):
+                if not math.isfinite(value):  # and the estimate is: Python has gone on
+                    where = f"({name}) at sample {k}, where the C stops"
+                    raise refusal(f"its state holds {value} {where}: hold numbers that are finite")
         rows.append([*estimate, u])
     return np.array(rows)
-
-
-def _not_finite(place: str, value: float, sample: int) -> str:
-    return f"its state holds {value} ({place}) at sample {sample}, where the C stops: hold numbers that are finite"
 
 
 def columns(controller: Controller) -> list[str]:
@@ -192,17 +180,6 @@ def _refusal(controller: Controller, part: int) -> type[InputError]:
     return LawNotExportable if is_command and type(controller.law) is not StateFeedback else InputError
 
 
-def find_compiler() -> list[str] | None:
-    """Find a C compiler: CC, or else cc, gcc or clang."""
-    try:
-        command = shlex.split(os.environ.get("CC", ""))
-    except ValueError as error:
-        raise InputError(f"CC = {os.environ['CC']!r}: {error}") from error
-    if command:
-        return command
-    return next(([path] for path in map(shutil.which, ("cc", "gcc", "clang")) if path), None)
-
-
 def check_c(folder: Path, name: str, compiler: Sequence[str]) -> dict[str, float]:
     """Compile an export's example, which compares the C with the test vector, and run it.
 
@@ -219,26 +196,10 @@ def check_c(folder: Path, name: str, compiler: Sequence[str]) -> dict[str, float
     """
     program = folder / f"{name}_example"
     sources = [str(folder / f"{name}.c"), str(folder / f"{name}_example.c")]
-    process = _run([*compiler, *FLAGS, *sources, "-o", str(program), "-lm"], f"the C compiler {shlex.join(compiler)}")
-    if process.returncode:
-        hint = " (CC must name a compiler for this machine)" if os.environ.get("CC") else ""
-        raise InputError(f"the C does not compile with {shlex.join(compiler)}{hint}: {_first_line(process)}")
-    process = _run([str(program)], "the compiled example")
+    build([*compiler, *FLAGS, *sources, "-o", str(program), "-lm"], f"the C compiler {shlex.join(compiler)}")
+    process = run([str(program)], "the compiled example")
     program.unlink()
     if process.returncode:
         raise InputError(f"the C is not what Python runs: {'; '.join(process.stdout.splitlines())}")
     differences = re.findall(r"^(\w+): off by at most (\S+),", process.stdout, re.MULTILINE)
     return {part: float(off) for part, off in differences}
-
-
-def _run(command: Sequence[str], what: str) -> subprocess.CompletedProcess[str]:
-    try:
-        return subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=300, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise InputError(f"{what} cannot be run: {getattr(error, 'strerror', None) or error}") from error
-
-
-def _first_line(process: subprocess.CompletedProcess[str]) -> str:
-    lines = process.stderr.strip().splitlines()
-    status = f"it ended with status {process.returncode} and without a message"
-    return next((line for line in lines if "error" in line), lines[0] if lines else status)

@@ -77,7 +77,7 @@ def export(
             "no C compiler was found (CC, cc, gcc, clang): the traced formulas were compared with Python, the C was not"
         )
     for part in figures["beyond_rounding"]:
-        off = (figures["c_off_by"] or {})[part]
+        off = figures["c_off_by"][part]
         note(f"hint: {part} is off by {off:.2g} in {precision} precision: the observer amplifies last digits")
     at = files[0].parent
     compile_it = shell_command("cc", "-std=c99", at / f"{name}.c", at / f"{name}_example.c", "-lm")

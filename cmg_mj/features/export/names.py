@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 
 from cmg_mj.core.errors import InputError, shown
 from cmg_mj.core.types import Observer
-from cmg_mj.observers.registry import OBSERVERS
+from cmg_mj.observers import OBSERVERS
 
 RESERVED = frozenset(
     """
@@ -122,8 +122,8 @@ def name_of(observer: Observer, user_name: str | None = None) -> str:
     name = _class_in_c(cls.__name__)
     if name is None:
         raise InputError(
-            f"the class's name {shown(cls.__name__)} makes none in C of 1 to {LONGEST} letters, digits and _: give one "
-            "with --name"
+            f"the class's name {shown(cls.__name__)} makes none in C of 1 to {LONGEST} letters, digits and _: "
+            "give one with --name"
         )
     return f"{name}_observer" if name in RESERVED else name
 

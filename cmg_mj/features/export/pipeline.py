@@ -5,8 +5,9 @@ from __future__ import annotations
 import copy
 import shlex
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple, TypedDict, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, raised, shown
@@ -14,6 +15,7 @@ from cmg_mj.core.types import Observer
 from cmg_mj.features.export import check
 from cmg_mj.features.export.c_code import Precision, operations
 from cmg_mj.features.export.c_files import CodePrinter, LawPrinter, format_example, format_test_vector
+from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.features.export.constants import class_path, constants_of
 from cmg_mj.features.export.names import export_files, name_of
 from cmg_mj.features.export.symbol import LawNotExportable
@@ -26,31 +28,17 @@ from cmg_mj.stages.trim import Trim
 Part = TypeVar("Part", Observer, Law)
 
 
-class Figures(TypedDict):
-    """The sizes of an export and its differences from Python, as `--json` prints them."""
-
-    observer: str
-    precision: Precision
-    files: list[str]
-    numbers_in_state: int
-    operations: dict[str, int]
-    trace_off_by: float
-    compiler: str | None
-    c_off_by: dict[str, float] | None
-    beyond_rounding: list[str]
-
-
 class Code(NamedTuple):
     """A controller as C, compared with Python.
 
     Attributes:
         files: Name -> text.
-        figures: The figures of the export.
+        figures: Its sizes and differences from Python, as `--json` prints them.
         law: The printer of the law's part, for C that is joined to it.
     """
 
     files: dict[str, str]
-    figures: Figures
+    figures: dict[str, Any]
     law: LawPrinter
 
 
@@ -107,8 +95,8 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
         format_test_vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist()),
     )
     files = dict(zip(export_files(name), (printer.header(), printer.source(), *other_files), strict=True))
-    compiler = check.find_compiler()
-    figures: Figures = {
+    compiler = find_compiler()
+    figures: dict[str, Any] = {
         "observer": name,
         "precision": precision,
         "files": list(files),
@@ -125,19 +113,15 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
     }
     if compiler is not None:
         with tempfile.TemporaryDirectory() as temporary:
-            folder = Path(temporary)
-            try:
-                for file, text in files.items():
-                    write_text(folder / file, text)
-            except OSError as error:
-                raise InputError(f"temporary folder {folder}: cannot be written: {error.strerror}") from error
-            off_by = figures["c_off_by"] = check.check_c(folder, name, compiler)
+            for file, text in files.items():
+                write_text(Path(temporary, file), text)
+            off_by = figures["c_off_by"] = check.check_c(Path(temporary), name, compiler)
         bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
     return Code(files, figures, printer.law)
 
 
-def export_table(figures: Figures) -> str:
+def export_table(figures: Mapping[str, Any]) -> str:
     """Print the figures of an export as text."""
     operations = figures["operations"]
     lines = [

@@ -3,7 +3,7 @@
 NumPy hands its operators and functions over to a class with `__array_ufunc__` (NEP 13) and `__array_function__`
 (NEP 18). Code written for arrays, such as the second branch of `elementwise`, therefore takes symbols unchanged. Code
 that no formula can express, such as `if y1 > 0.1:` or `math.sin(y1)`, asks the symbol for its value. The symbol then
-raises `NotExportable` with the line of the user's file.
+raises `InputError` with the line of the user's file.
 """
 
 from __future__ import annotations
@@ -11,11 +11,12 @@ from __future__ import annotations
 import linecache
 import os
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+import traceback
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, NoReturn, TypeAlias, TypeVar
 
 import casadi
@@ -24,53 +25,22 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from cmg_mj.core.arrays import Symbolic
 from cmg_mj.core.errors import InputError, raised
-from cmg_mj.features.export.pytree import NotExportable
+from cmg_mj.features.export.c_code import MATH
+from cmg_mj.linear.slopes import needed_states
 
 Operand: TypeAlias = "Symbol | float | np.generic | np.ndarray"
 
 OPERATIONS: dict[np.ufunc, int] = {
-    np.add: casadi.OP_ADD,
-    np.subtract: casadi.OP_SUB,
-    np.multiply: casadi.OP_MUL,
-    np.divide: casadi.OP_DIV,
-    np.power: casadi.OP_POW,
-    np.float_power: casadi.OP_POW,
-    np.negative: casadi.OP_NEG,
-    np.absolute: casadi.OP_FABS,
-    np.fabs: casadi.OP_FABS,
-    np.sign: casadi.OP_SIGN,
-    np.sqrt: casadi.OP_SQRT,
-    np.exp: casadi.OP_EXP,
-    np.expm1: casadi.OP_EXPM1,
-    np.log: casadi.OP_LOG,
-    np.log1p: casadi.OP_LOG1P,
-    np.sin: casadi.OP_SIN,
-    np.cos: casadi.OP_COS,
-    np.tan: casadi.OP_TAN,
-    np.arcsin: casadi.OP_ASIN,
-    np.arccos: casadi.OP_ACOS,
-    np.arctan: casadi.OP_ATAN,
-    np.arctan2: casadi.OP_ATAN2,
-    np.sinh: casadi.OP_SINH,
-    np.cosh: casadi.OP_COSH,
-    np.tanh: casadi.OP_TANH,
-    np.hypot: casadi.OP_HYPOT,
-    np.copysign: casadi.OP_COPYSIGN,
-    np.maximum: casadi.OP_FMAX,
-    np.minimum: casadi.OP_FMIN,
-    np.floor: casadi.OP_FLOOR,
-    np.ceil: casadi.OP_CEIL,
-    np.fmod: casadi.OP_FMOD,
-    np.less: casadi.OP_LT,
-    np.less_equal: casadi.OP_LE,
-    np.equal: casadi.OP_EQ,
-    np.not_equal: casadi.OP_NE,
-    np.logical_and: casadi.OP_AND,
-    np.bitwise_and: casadi.OP_AND,  # of comparisons
-    np.logical_or: casadi.OP_OR,
-    np.bitwise_or: casadi.OP_OR,
-    np.logical_not: casadi.OP_NOT,
-    np.invert: casadi.OP_NOT,
+    getattr(np, name): getattr(casadi, f"OP_{operation.upper()}")
+    for name, operation in {
+        **dict(zip(MATH, MATH, strict=True)),
+        **{"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "negative": "neg", "sign": "sign"},
+        **{"power": "pow", "float_power": "pow", "absolute": "fabs", "maximum": "fmax", "minimum": "fmin"},
+        **{"arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2"},
+        **{"less": "lt", "less_equal": "le", "equal": "eq", "not_equal": "ne"},
+        **{"logical_and": "and", "logical_or": "or", "logical_not": "not"},
+        **{"bitwise_and": "and", "bitwise_or": "or", "invert": "not"},  # of comparisons
+    }.items()
 }
 """NumPy's function -> CasADi's operation."""
 
@@ -95,7 +65,7 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Operand, **kwargs: Operand) -> Operand:
         if method != "__call__" or kwargs:
-            raise NotExportable(f"numpy.{ufunc.__name__} with {', '.join(kwargs) or method} {here()}")
+            raise InputError(f"numpy.{ufunc.__name__} with {', '.join(kwargs) or method} {here()}")
         if any(isinstance(x, np.ndarray) and x.ndim for x in inputs):
             return np.frompyfunc(partial(_apply, ufunc), ufunc.nin, 1)(*map(_boxed, inputs))
         return _apply(ufunc, *inputs)
@@ -111,16 +81,16 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
             return _where(*args)
         if function is np.clip and len(args) == 3 and not kwargs:
             return np.minimum(np.maximum(args[0], args[1]), args[2])
-        raise NotExportable(f"numpy.{function.__name__} {here()}: it is not among the functions that can be exported")
+        raise InputError(f"numpy.{function.__name__} {here()}: it is not among the functions that can be exported")
 
     def __bool__(self) -> bool:
-        raise NotExportable(
+        raise InputError(
             f"a branch on a value {here()}: the exported C takes the same way always; use cmg_mj.core.arrays "
             "(where, clip, sign), or numpy.where"
         )
 
     def _number(self, *_: int | None) -> NoReturn:
-        raise NotExportable(
+        raise InputError(
             f"a plain number is asked for {here()}, as by float(), int(), round() or a function of math; use "
             "cmg_mj.core.arrays, or numpy's functions"
         )
@@ -149,7 +119,7 @@ def expression(x: Operand | Symbolic) -> casadi.SX:
     """Convert a symbol or a plain number to CasADi's expression.
 
     Raises:
-        NotExportable: The operand is neither.
+        InputError: The operand is neither.
     """
     if isinstance(x, np.ndarray) and x.ndim == 0:
         x = x[()]
@@ -157,7 +127,7 @@ def expression(x: Operand | Symbolic) -> casadi.SX:
         return x.sx
     if isinstance(x, (bool, int, float, np.bool_, np.integer, np.floating)):
         return casadi.SX(float(x))
-    raise NotExportable(f"{type(x).__name__} where a real number belongs {here()}")
+    raise InputError(f"{type(x).__name__} where a real number belongs {here()}")
 
 
 def _boxed(x: Operand) -> Operand:
@@ -178,7 +148,7 @@ def _apply(ufunc: np.ufunc, *inputs: Operand) -> Symbol:
         return Symbol(expression(inputs[0]))
     operation = OPERATIONS.get(ufunc)
     if operation is None:
-        raise NotExportable(f"numpy.{ufunc.__name__} {here()}: it is not among the functions that can be exported")
+        raise InputError(f"numpy.{ufunc.__name__} {here()}: it is not among the functions that can be exported")
     if ufunc in (np.maximum, np.minimum) and not isinstance(inputs[0], Symbol):
         inputs = inputs[::-1]  # the operand that may be NaN comes first: see `c_code`
     make = casadi.SX.unary if len(inputs) == 1 else casadi.SX.binary
@@ -199,7 +169,7 @@ Result = TypeVar("Result")
 MEASURED = ("y1", "y2", "acceleration")
 """Names of an observer's measurements."""
 
-MOST_NUMBERS = 1000
+MAX_NUMBERS = 1000
 """Largest state: 4 kB on a board in single precision. More is not meant for a board, and takes CasADi minutes."""
 
 
@@ -218,16 +188,13 @@ def needed_numbers(
     symbols: Sequence[Symbol], next_state: Sequence[casadi.SX], outputs: Sequence[casadi.SX]
 ) -> list[int]:
     """Find the numbers of a state that an estimate depends on, now or later; a state may hold unused measurements."""
-    place = {symbol.sx.name(): i for i, symbol in enumerate(symbols)}
-    needed: set[int] = set()
-    waiting = list(outputs)
-    while waiting:
-        for symbol in casadi.symvar(waiting.pop()):
-            i = place.get(symbol.name())
-            if i is not None and i not in needed:
-                needed.add(i)
-                waiting.append(next_state[i])
-    return sorted(needed)
+    names = [symbol.sx.name() for symbol in symbols]
+
+    def depends(expressions: Sequence[casadi.SX]) -> np.ndarray:
+        used = [{symbol.name() for symbol in casadi.symvar(each)} for each in expressions]
+        return np.array([[name in its for name in names] for its in used]).reshape(len(used), len(names))
+
+    return np.flatnonzero(needed_states(depends(next_state), depends(outputs))).tolist()
 
 
 def symbols_named(names: Sequence[str]) -> list[Symbol]:
@@ -239,12 +206,12 @@ def function_of(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX
     """Make a function of symbols.
 
     Raises:
-        NotExportable: The outputs depend on other symbols.
+        InputError: The outputs depend on other symbols.
     """
     arguments = [symbol.sx for symbol in inputs]
     function = casadi.Function(name, arguments, casadi.cse(list(outputs)) if outputs else [], {"allow_free": True})
     if function.has_free():
-        raise NotExportable(
+        raise InputError(
             "it remembers something outside of its state, in self or elsewhere, which C would not have: make it a part "
             "of the state that step returns"
         )
@@ -255,12 +222,12 @@ def call_traced(name: str, function: Callable[[], Result]) -> Result:
     """Call a user's code with symbols."""
     try:
         return function()
-    except NotExportable:
+    except InputError:
         raise
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        raise NotExportable(f"{name} raised {raised(error)} {raised_at(error.__traceback__)}") from error
+        raise InputError(f"{name} raised {raised(error)} {raised_at(error)}") from error
 
 
 _LIBRARY_PATHS = (
@@ -276,25 +243,18 @@ class LawNotExportable(InputError):
 
 def here() -> str:
     """Locate the running line, the innermost one outside this package: `(own.py, line 12: if y1 > 0.1:)`."""
-    frame: FrameType | None = sys._getframe(1)
-    while frame is not None and frame.f_code.co_filename.startswith(_LIBRARY_PATHS):
-        frame = frame.f_back
-    return "" if frame is None else _format_line(frame.f_code.co_filename, frame.f_lineno)
+    return _locate(traceback.walk_stack(sys._getframe(1)))
 
 
-def raised_at(traceback: TracebackType | None) -> str:
+def raised_at(error: BaseException) -> str:
     """Locate the innermost line of the user's code that an exception came from."""
-    place = ""
-    while traceback is not None:
-        file = traceback.tb_frame.f_code.co_filename
+    return _locate(reversed(list(traceback.walk_tb(error.__traceback__))))
+
+
+def _locate(frames: Iterable[tuple[FrameType, int]]) -> str:
+    for frame, line in frames:
+        file = frame.f_code.co_filename
         if not file.startswith(_LIBRARY_PATHS):
-            place = _format_line(file, traceback.tb_lineno)
-        traceback = traceback.tb_next
-    return place
-
-
-def _format_line(file: str, line: int) -> str:
-    text = linecache.getline(file, line).strip()
-    near = os.path.relpath(file)
-    name = near if len(near) < len(file) else file
-    return f"({name}, line {line}{': ' if text else ''}{text})"
+            text = linecache.getline(file, line).strip()
+            return f"({min(os.path.relpath(file), file, key=len)}, line {line}{': ' if text else ''}{text})"
+    return ""

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import casadi
 
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import Law, Measurement, Observer, extra_signals, feedback_state
 from cmg_mj.features.export.constants import Constants
 from cmg_mj.features.export.names import identifiers
-from cmg_mj.features.export.pytree import form, numbers, rebuild
 from cmg_mj.features.export.symbol import (
+    MAX_NUMBERS,
     MEASURED,
-    MOST_NUMBERS,
     LawNotExportable,
-    NotExportable,
     Symbol,
     as_written,
     call_traced,
@@ -26,6 +25,7 @@ from cmg_mj.features.export.symbol import (
     symbols_named,
 )
 from cmg_mj.laws.state_feedback import StateFeedback
+from cmg_mj.linear.slopes import Leaf, form, numbers, rebuild
 
 
 class Traced(NamedTuple):
@@ -58,36 +58,62 @@ def trace(observer: Observer, law: Law, constants: Constants) -> Traced:
         The formulas.
 
     Raises:
-        NotExportable: A formula cannot express what the observer does.
+        InputError: A formula cannot express what the observer does.
         LawNotExportable: A formula cannot express what the law does.
     """
     with as_written():
-        observer_formulas = _trace_observer(observer, _measure(constants))
-        return Traced(*observer_formulas, trace_law(law, constants, len(extra_signals(observer))))
+        y, (u,) = symbols_named(MEASURED), symbols_named(["u"])
+        first, _, leaves, symbols, after, outputs = _record(
+            observer, "step(state, y, u)", lambda before: observer.step(before, Measurement(*y), u)
+        )
+        needed = needed_numbers(symbols, after, outputs)
+        names = identifiers([leaves[i].path for i in needed])
+        init = function_of("init", first, [expression(leaves[i].value) for i in needed])
+        step = function_of("step", [*(symbols[i] for i in needed), *y, u], [*(after[i] for i in needed), *outputs])
+        if type(law) is StateFeedback:
+            law_formulas = _trace_state_feedback(constants)
+        else:
+            try:
+                law_formulas = _trace_law(law, len(extra_signals(observer)))
+            except InputError as error:
+                raise LawNotExportable(str(error)) from error
+        return Traced(tuple(names), _measure(constants), init, step, law_formulas)
 
 
-def _trace_observer(
-    observer: Observer, measure: casadi.Function
-) -> tuple[tuple[str, ...], casadi.Function, casadi.Function, casadi.Function]:
-    """Return the first four parts of `Traced`."""
+class _Recording(NamedTuple):
+    """The init and a step of an observer or a law, run once with symbols.
+
+    Attributes:
+        first: The measurement that init took.
+        state: Its state.
+        leaves: The numbers in that state.
+        symbols: A symbol for each of them, which the step took.
+        after: The numbers in the state that the step returned.
+        outputs: What it returned beside the state.
+    """
+
+    first: list[Symbol]
+    state: Any
+    leaves: list[Leaf]
+    symbols: list[Symbol]
+    after: list[casadi.SX]
+    outputs: list[casadi.SX]
+
+
+def _record(part: Observer | Law, label: str, step: Callable[[Any], tuple[Any, Sequence[Any]]]) -> _Recording:
+    """Run a part's init and, with symbols in the place of its state's numbers, a step."""
     first = symbols_named(MEASURED)
-    state = call_traced("init(y)", lambda: observer.init(Measurement(*first)))
+    state = call_traced("init(y)", lambda: part.init(Measurement(*first)))
     leaves = list(numbers(state))
-    if len(leaves) > MOST_NUMBERS:
-        raise NotExportable(f"its state holds {len(leaves)} numbers; at most {MOST_NUMBERS} can be exported")
+    if len(leaves) > MAX_NUMBERS:
+        raise InputError(f"its state holds {len(leaves)} numbers; at most {MAX_NUMBERS} can be exported")
     symbols = symbols_named([f"state {i}" for i in range(len(leaves))])
-    before, y, (u,) = rebuild(state, iter(symbols)), symbols_named(MEASURED), symbols_named(["u"])
-    after, estimate = call_traced("step(state, y, u)", lambda: observer.step(before, Measurement(*y), u))
-    next_state = [expression(leaf.value) for leaf in numbers(after)]
+    before = rebuild(state, iter(symbols))
+    after, outputs = call_traced(label, lambda: step(before))
+    recording = _Recording(first, state, leaves, symbols, [expression(leaf.value) for leaf in numbers(after)], [])
     if form(after) != form(state):
-        raise NotExportable("its step returns a state that is made otherwise than the one of init")
-    outputs = [expression(part) for part in estimate]
-
-    needed = needed_numbers(symbols, next_state, outputs)
-    names = identifiers([leaves[i].path for i in needed])
-    init = function_of("init", first, [expression(leaves[i].value) for i in needed])
-    step = function_of("step", [*(symbols[i] for i in needed), *y, u], [*(next_state[i] for i in needed), *outputs])
-    return tuple(names), measure, init, step
+        raise InputError("its step returns a state that is made otherwise than the one of init")
+    return recording._replace(outputs=[expression(output) for output in outputs])
 
 
 def _measure(constants: Constants) -> casadi.Function:
@@ -140,49 +166,6 @@ class TracedLaw(NamedTuple):
         """Numbers in its state, the integrator included, which is the last."""
         return len(self.state) + self.has_integrator
 
-    def first(self, y: Sequence[float]) -> list[float]:
-        """Compute the state before the first decision, the integrator last."""
-        return [0.0] if self.init is None else [float(value) for value in self.init.call(list(y))]
-
-    def decide(
-        self, values: Mapping[str, float], memory: Sequence[float], constants: Sequence[float]
-    ) -> tuple[float, list[float]]:
-        """Compute u and the next state.
-
-        Args:
-            values: Name of an argument -> its value.
-            memory: The state, the integrator last.
-            constants: Values of the law's constants.
-
-        Returns:
-            u, and the next state.
-        """
-        arguments = [values[name] for name in self.arguments]
-        u, *after = (float(value) for value in self.step.call([*arguments, *memory, *constants]))
-        return u, after
-
-
-def trace_law(law: Law, constants: Constants, extra_signals: int) -> TracedLaw:
-    """Trace a law.
-
-    Args:
-        law: The law. Do not use it again: it may remember symbols.
-        constants: The constants of the law, which keep their names.
-        extra_signals: Number of signals that the observer estimates beyond x.
-
-    Returns:
-        The formulas.
-
-    Raises:
-        LawNotExportable: A formula cannot express what the law does.
-    """
-    if type(law) is StateFeedback:
-        return _trace_state_feedback(constants)
-    try:
-        return _trace(law, extra_signals)
-    except NotExportable as error:
-        raise LawNotExportable(str(error)) from error
-
 
 def _trace_state_feedback(constants: Constants) -> TracedLaw:
     """Trace (8) with symbols for its numbers."""
@@ -194,25 +177,19 @@ def _trace_state_feedback(constants: Constants) -> TracedLaw:
     return TracedLaw(("x1", "x2", "x3"), (), (), True, None, step)
 
 
-def _trace(law: Law, extra_signals: int) -> TracedLaw:
-    first = symbols_named(MEASURED)
-    state = call_traced("init(y)", lambda: law.init(Measurement(*first)))
-    leaves = list(numbers(state))
-    if len(leaves) > MOST_NUMBERS:
-        raise NotExportable(f"its state holds {len(leaves)} numbers; at most {MOST_NUMBERS} can be exported")
-    symbols = symbols_named([f"state {i}" for i in range(len(leaves))])
+def _trace_law(law: Law, extra_signals: int) -> TracedLaw:
     names = law_arguments(extra_signals)
     arguments = symbols_named(names)
     y, (x1, x2, x3, *extra), held = Measurement(*arguments[:3]), arguments[3:-1], arguments[-1]
-    before, x = rebuild(state, iter(symbols)), feedback_state(x1, x2, x3, tuple(extra))
-    after, u = call_traced("step(state, y, x, u)", lambda: law.step(before, y, x, held))
-    command, next_state = expression(u), [expression(leaf.value) for leaf in numbers(after)]
-    if form(after) != form(state):
-        raise NotExportable("its step returns a state that is made otherwise than the one of init")
 
+    def step(before: Any) -> tuple[Any, Sequence[Any]]:
+        after, u = law.step(before, y, feedback_state(x1, x2, x3, tuple(extra)), held)
+        return after, (u,)
+
+    first, state, leaves, symbols, next_state, (command,) = _record(law, "step(state, y, x, u)", step)
     integrator = [i for i, leaf in enumerate(leaves) if leaf.path == INTEGRATOR and hasattr(state, "x_e")]
     if hasattr(state, "x_e") and not integrator:
-        raise NotExportable("its integrator x_e is no number in its state, where C would have it")
+        raise InputError("its integrator x_e is no number in its state, where C would have it")
     needed = needed_numbers(symbols, next_state, [command, *(symbols[i].sx for i in integrator)])
     kept = [i for i in needed if i not in integrator] + integrator
     begin, outputs = [expression(leaves[i].value) for i in kept], [command, *(next_state[i] for i in kept)]

@@ -9,21 +9,20 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Literal, NamedTuple, Unpack
+from typing import Any, Literal, NamedTuple, Unpack
 
 import mujoco
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.export import check_installed
+from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.features.export.names import name_of
-from cmg_mj.features.plugin.build import check_platform, compile_plugin, library_name
 from cmg_mj.features.plugin.driver import PluginLoop
 from cmg_mj.features.plugin.model import plugin_mjcf
 from cmg_mj.features.plugin.sensors import PluginAxis, PluginRig
-from cmg_mj.features.plugin.tables import PluginCode, generate_plugin
+from cmg_mj.features.plugin.tables import PluginCode, check_platform, compile_plugin, generate_plugin, library_name
 from cmg_mj.laws import StateFeedback
-from cmg_mj.linear.omissions import IN_THE_MODEL, omissions
-from cmg_mj.linear.verdict import require_stable_period
+from cmg_mj.linear.verdict import SIMULATED, omissions, require_stable_period
 from cmg_mj.plant.mjcf import set_control_callback
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.result import Result
@@ -89,14 +88,8 @@ def require_tools() -> None:
     """
     check_platform()
     check_installed()
-    if _find_compiler() is None:
+    if find_compiler() is None:
         raise InputError("plugin: there is no C compiler: install gcc or clang, or name one in CC")
-
-
-def _find_compiler() -> list[str] | None:
-    from cmg_mj.features.export.check import find_compiler  # imports CasADi
-
-    return find_compiler()
 
 
 def require_stable_periods(experiment: Experiment) -> None:
@@ -141,7 +134,7 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
     axes = []
     for i, part in enumerate(experiment.parts):
         for field, clause in omissions(part.scenario).items():
-            if field not in IN_THE_MODEL:
+            if field not in SIMULATED:
                 raise InputError(f"{field}: {clause}: a plugin does not have it")
         axis = part.plant.axis
         modules = tuple((module.name, module.direction, module.speed, module.gimbal_zero) for module in axis.modules)
@@ -159,8 +152,8 @@ def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
     Raises:
         InputError: The C does not compile, or there is no compiler: then all but the library is written.
     """
-    name, library, compiler = made.name, library_name(made.name), _find_compiler()
-    writers: dict[str, Callable[[Path], None]] = {
+    name, library, compiler = made.name, library_name(made.name), find_compiler()
+    writers: dict[str, Callable[[Path], Any]] = {
         file: partial(write_text, text=text) for file, text in made.files.items()
     }
     with tempfile.TemporaryDirectory() as temporary, claimed(out) as folder:
@@ -169,7 +162,7 @@ def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
             for file, text in made.files.items():
                 write_text(compiled.with_name(file), text)
             compile_plugin(compiled.parent, compiler, made.sources, library)
-            writers[library] = partial(_copy, compiled)
+            writers[library] = partial(shutil.copy, compiled)
         place = folder.write(writers, all_or_none=True)
     if compiler is None:
         raise InputError(
@@ -177,10 +170,6 @@ def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:
             f"{place}: run `make` there where there is a compiler"
         )
     return Plugin(f"cmg_mj.{name}", place / library, place / f"{name}.xml", [place / file for file in writers])
-
-
-def _copy(source: Path, target: Path) -> None:
-    shutil.copy(source, target)
 
 
 _numbers = itertools.count()

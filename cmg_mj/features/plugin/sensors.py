@@ -13,15 +13,15 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import CORNERS_HZ, NoiseStream, spread_of
 from cmg_mj.core.sensor import steps_until, whole_steps
 from cmg_mj.core.types import STANDARD_GRAVITY
-from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
+from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.gyros import PIECE, Fog, MemsGyro
-from cmg_mj.stages.low_pass import INSIDE_HZ
+from cmg_mj.stages.low_pass import INSIDE_HZ, coefficients
 from cmg_mj.stages.turning import YawCoupling
 
-MOST_AXES = 4
-MOST_GIMBALS = 8
-MOST_ESTIMATES = 64
-LARGEST_SEED = 2**53
+MAX_AXES = 4
+MAX_GIMBALS = 8
+MAX_ESTIMATES = 64
+MAX_SEED = 2**53
 """Seeds and worlds lie in the plugin's state, whose numbers are doubles."""
 
 Value = int | float | str | Sequence["Value"] | Mapping[str, "Value"]
@@ -70,9 +70,9 @@ def refuse_unsupported(rig: PluginRig) -> None:
     Raises:
         InputError: It does not have something that is in use.
     """
-    counts = [(len(rig.axes), "axes", MOST_AXES)]
-    counts += [(len(axis.modules), "modules on an axis", MOST_GIMBALS) for axis in rig.axes]
-    counts += [(3 + len(axis.controller.extra_signals[0]), "estimates", MOST_ESTIMATES) for axis in rig.axes]
+    counts = [(len(rig.axes), "axes", MAX_AXES)]
+    counts += [(len(axis.modules), "modules on an axis", MAX_GIMBALS) for axis in rig.axes]
+    counts += [(3 + len(axis.controller.extra_signals[0]), "estimates", MAX_ESTIMATES) for axis in rig.axes]
     for count, what, most in counts:
         if count > most:
             raise InputError(f"{count} {what}: a plugin takes at most {most}")
@@ -86,13 +86,8 @@ def check_noise(seed: float, world: float) -> None:
         InputError: It is out of range, or no whole number.
     """
     for name, number in (("seed", seed), ("world", world)):
-        if not 0 <= number <= LARGEST_SEED or number != int(number):
+        if not 0 <= number <= MAX_SEED or number != int(number):
             raise InputError(f"{name} = {number}: a plugin takes {name}s from 0 to 2^53, as whole numbers")
-
-
-def steps_of(duration: float, timestep: float) -> int:
-    """Count the physics steps of a time of a sensor."""
-    return whole_steps(duration, timestep, "a sensor's time", f"{duration:g} s")
 
 
 class Clock(NamedTuple):
@@ -111,7 +106,7 @@ class Clock(NamedTuple):
 
     def count(self, duration: float) -> int:
         """Count the instants of a duration that is a multiple of them [s]."""
-        return steps_of(duration, self.timestep) // self.steps
+        return whole_steps(duration, self.timestep, "a sensor's time", f"{duration:g} s") // self.steps
 
     def delivery(self, width: int, rate_hz: float, latency_s: float) -> Struct:
         """Describe how a sensor's samples of so many numbers are delivered: `delivery_type` in C."""
@@ -124,27 +119,53 @@ class Clock(NamedTuple):
 def clock_of(rig: PluginRig) -> Clock:
     """Return the clock of a plugin, at whose instants a sensor or the controller may be due."""
     first = rig.axes[0].controller
+    steps = Clock(first.timestep, 1, first.period)
     spacings = [first.period]
     for axis in rig.axes:
         sensors = axis.controller.sensors
         pair = sensors.accelerometer
         times = [1.0 / pair.rate_hz, 1.0 / sensors.encoder.rate_hz, pair.skew_s]
-        if pair.bandwidth_hz:
-            times.append(1.0 / INSIDE_HZ)
-        if axis.controller.feedback == "fog":
-            times.append(1.0 / sensors.fog.rate_hz)
-        spacings += [steps_of(time, axis.controller.timestep) for time in times]
-    return Clock(first.timestep, math.gcd(*spacings), first.period)
+        times += [1.0 / INSIDE_HZ] if pair.bandwidth_hz else []
+        times += [1.0 / sensors.fog.rate_hz] if axis.controller.feedback == "fog" else []
+        spacings += map(steps.count, times)
+    return steps._replace(steps=math.gcd(*spacings))
 
 
-def describe_pair(sensor: Accelerometer, axis: int, clock: Clock) -> Struct:
+def describe_axis(axis: PluginAxis, clock: Clock) -> Struct:
+    """Describe an axis but for its controller: `axis_type` in C."""
+    controller = axis.controller
+    pair, encoder, fog = controller.sensors.accelerometer, controller.sensors.encoder, controller.sensors.fog
+    counts, turn = pair.counts_per_g, encoder.counts_per_revolution
+    return {
+        "prefix": axis.prefix,
+        "gimbals": len(axis.modules),
+        "modules": axis.modules,
+        "pair": _describe_pair(pair, controller.axis, clock),
+        "encoder": {
+            "period": clock.count(1.0 / encoder.rate_hz),
+            "delivery": clock.delivery(len(axis.modules), encoder.rate_hz, encoder.latency_s),
+        },
+        "settings": {  # what a model's <config> may change
+            "force_sigma": pair.raw_sigma,
+            "force_step": STANDARD_GRAVITY / counts if counts else 0.0,
+            "angle_step": 2.0 * math.pi / turn if turn else 0.0,
+        },
+        **({"fog": _describe_fog(fog, controller.axis, clock)} if controller.feedback == "fog" else {}),
+        "raw_rate": pair.raw_rate_hz,
+        "joint": axis.joint,
+        "dofs": len(axis.shares),
+        "shares": axis.shares,
+    }
+
+
+def _describe_pair(sensor: Accelerometer, axis: int, clock: Clock) -> Struct:
     """Describe the accelerometers of an axis: `pair_type` in C."""
     period, skew = clock.count(1.0 / sensor.rate_hz), clock.count(sensor.skew_s)
     raw = clock.count(1.0 / INSIDE_HZ) if sensor.bandwidth_hz else period
     uneven = bool(sensor.skew_s or sensor.bandwidth_hz)
-    same, other = _weights(sensor)
+    same, other = sensor.mounting_weights()
     inner, outer = sensor.bias
-    b, a = _low_pass(sensor)
+    b, a = coefficients(sensor.bandwidth_hz, INSIDE_HZ) if sensor.bandwidth_hz else [[0.0] * 3] * 2
     return {
         "noise_stream": NoiseStream.ACCELEROMETER.on_axis(axis),
         "flicker_stream": NoiseStream.FLICKER.on_axis(axis),
@@ -168,43 +189,7 @@ def describe_pair(sensor: Accelerometer, axis: int, clock: Clock) -> Struct:
     }
 
 
-def _weights(sensor: Accelerometer) -> tuple[list[float], list[float]]:
-    """Compute each channel's weights of its own and the other axis: see `constant_errors`."""
-    same, other = [], []
-    parts = zip(sensor.scale_error, sensor.misalignment_deg, sensor.cross_axis, strict=True)
-    for scale, misalignment, cross in parts:
-        c, s = math.cos(math.radians(misalignment)), math.sin(math.radians(misalignment))
-        same += [(1.0 + scale) * (c + cross * s), (1.0 + scale) * (c - cross * s)]
-        other += [(1.0 + scale) * (cross * c - s), (1.0 + scale) * (cross * c + s)]
-    return same, other
-
-
-def _low_pass(sensor: Accelerometer) -> list[list[float]]:
-    """Compute the coefficients b and a of the low-pass, as `low_pass` has them."""
-    if not sensor.bandwidth_hz:
-        return [[0.0] * 3] * 2
-    from scipy.signal import butter  # 1 s of import, which only a part with a low-pass needs
-
-    return np.array(butter(2, sensor.bandwidth_hz, fs=INSIDE_HZ)).tolist()
-
-
-def describe_encoders(sensor: Encoder, gimbals: int, clock: Clock) -> Struct:
-    """Describe the encoders of an axis: `encoder_type` in C."""
-    delivery = clock.delivery(gimbals, sensor.rate_hz, sensor.latency_s)
-    return {"period": clock.count(1.0 / sensor.rate_hz), "delivery": delivery}
-
-
-def describe_settings(accelerometer: Accelerometer, encoder: Encoder) -> Struct:
-    """Describe what a model's <config> may change: `sensor_settings` in C."""
-    counts, turn = accelerometer.counts_per_g, encoder.counts_per_revolution
-    return {
-        "force_sigma": accelerometer.raw_sigma,
-        "force_step": STANDARD_GRAVITY / counts if counts else 0.0,
-        "angle_step": 2.0 * math.pi / turn if turn else 0.0,
-    }
-
-
-def describe_fog(sensor: Fog, axis: int, clock: Clock) -> Struct:
+def _describe_fog(sensor: Fog, axis: int, clock: Clock) -> Struct:
     """Describe the fibre-optic gyro of an axis: `fog_type` in C."""
     return {
         "stream": NoiseStream.FOG.on_axis(axis),

@@ -1,26 +1,31 @@
-"""Generates a plugin's C: exported controllers, what joins them to the plugin, the rig's numbers, the common files."""
+"""Generates a plugin's C: exported controllers, what joins them to the plugin, the rig's numbers, the common files.
+
+Compiles it, and prints what stands beside it.
+"""
 
 from __future__ import annotations
 
 import copy
 import hashlib
-from collections.abc import Mapping, Sequence
+import json
+import platform
+import shlex
+from collections.abc import Collection, Mapping, Sequence
+from importlib.metadata import version
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.features.export import compiler as c_compiler
 from cmg_mj.features.export import generate_code
-from cmg_mj.features.plugin.build import COMMON_SOURCES, c_text, common_files, extra_files
 from cmg_mj.features.plugin.sensors import (
-    Clock,
     PluginAxis,
     PluginRig,
-    Struct,
     Value,
     clock_of,
-    describe_encoders,
-    describe_fog,
-    describe_pair,
-    describe_settings,
+    describe_axis,
     describe_turn_gyro,
     refuse_unsupported,
 )
@@ -30,33 +35,104 @@ from cmg_mj.stages.trim import trim_of
 if TYPE_CHECKING:
     from cmg_mj.features.export.c_files import LawPrinter
 
-NAMES_IN_USE = frozenset(
-    {
-        "axis",
-        "controller",
-        "decision",
-        "delivery",
-        "encoder",
-        "fog",
-        "gyros",
-        "law",
-        "measure",
-        "module",
-        "noise",
-        "observer",
-        "pair",
-        "plugin",
-        "rig",
-        "sensor",
-        "sensors",
-        "setup",
-        "show",
-        "spin",
-        "state",
-        "turn_gyro",
-        "turning",
-        "ziggurat",
+
+COMMON_SOURCES = ("noise.c", "sensors.c", "gyros.c", "controller.c", "state.c", "setup.c", "plugin.c")
+COMMON_HEADERS = ("ziggurat.h", "noise.h", "sensors.h", "gyros.h", "controller.h", "rig.h", "state.h", "setup.h")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
+TESTED_PLATFORM = ("Linux", "glibc")
+FOLDER = files("cmg_mj.features.plugin")
+
+
+def find_mujoco() -> Path:
+    """Find the library of MuJoCo's Python package, which has the folder `include` beside it, without importing it.
+
+    Raises:
+        InputError: It is not where the wheel of this version has it.
+    """
+    spec, number = find_spec("mujoco"), version("mujoco")
+    library = Path((spec and spec.origin) or "").with_name(f"libmujoco.so.{number}")
+    if not library.is_file():
+        raise InputError(f"plugin: {library} is missing: a plugin is made for the MuJoCo of the wheel {number}")
+    return library
+
+
+def common_files() -> dict[str, str]:
+    """Read the C that all plugins have in common: name -> text."""
+    return {name: (FOLDER / "c" / name).read_text(encoding="utf-8") for name in (*COMMON_HEADERS, *COMMON_SOURCES)}
+
+
+def check_platform() -> None:
+    """Refuse platforms on which no plugin has been tested.
+
+    Raises:
+        InputError: No plugin has been tested on this platform.
+    """
+    here = platform.system(), platform.libc_ver()[0]
+    if here != TESTED_PLATFORM:
+        raise InputError(f"plugin: made and tested on Linux with glibc, not on {' with '.join(filter(None, here))}")
+
+
+def compile_plugin(folder: Path, compiler: Sequence[str], sources: Sequence[str], library: str) -> None:
+    """Compile a plugin in its folder.
+
+    Raises:
+        InputError: The compiler cannot be run, or refuses.
+    """
+    mujoco = find_mujoco()
+    link = [f"-L{mujoco.parent}", f"-l:{mujoco.name}", f"-Wl,-rpath,{mujoco.parent}", "-lm"]
+    command = [*compiler, *FLAGS, "-isystem", str(mujoco.parent / "include"), *sources, "-o", library, *link]
+    c_compiler.build(command, f"plugin: the C compiler {shlex.join(compiler)}", folder)
+
+
+def library_name(name: str) -> str:
+    """Name the library of a plugin."""
+    return f"libcmg_mj_{name}.so"
+
+
+def extra_files(name: str, code: Collection[str], sources: Sequence[str], prefix: str) -> dict[str, str]:
+    """Print the Makefile and the examples.
+
+    Args:
+        name: The plugin's name behind `cmg_mj.`.
+        code: The files of the C.
+        sources: Those of them that are compiled.
+        prefix: What the first axis' sensors are named with: empty, or `AXIS/`.
+
+    Returns:
+        Name -> text.
+    """
+    mujoco, tilt = find_mujoco(), f"balance/{prefix}tilt"
+    words = {
+        "NAME": name,
+        "LIBRARY": library_name(name),
+        "TILT_IN_C": c_text(tilt),
+        "TILT_IN_PYTHON": json.dumps(tilt, ensure_ascii=False),
+        "MUJOCO": str(mujoco.parent),
+        "LIBMUJOCO": mujoco.name,
+        "SOURCES": " ".join(sources),
+        "INCLUDED": " ".join(file for file in code if file not in sources),
+        "FLAGS": " ".join(FLAGS),
     }
+    result = {}
+    for file, template in (("example.c", "example.c"), ("example.py", "example.py.txt"), ("Makefile", "Makefile")):
+        text = (FOLDER / "templates" / template).read_text(encoding="utf-8")
+        for word, value in words.items():
+            text = text.replace(f"@{word}@", value)
+        result[file if file == "Makefile" else f"{name}_{file}"] = text
+    return result
+
+
+def c_text(text: str) -> str:
+    """Print a text as C reads it; in octal whatever is no plain letter, and ?, which begins trigraphs."""
+    letters = (chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode())
+    return f'"{"".join(letters)}"'
+
+
+NAMES_IN_USE = frozenset(
+    """
+    axis controller decision delivery encoder fog gyros law measure module noise observer pair plugin rig sensor sensors
+    setup show spin state turn_gyro turning ziggurat
+    """.split()  # noqa: SIM905
 )
 """Names that would clash with the C that all plugins have in common."""
 
@@ -220,7 +296,7 @@ def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
     clock, first = clock_of(rig), rig.axes[0].controller
     declarations = "".join(f"extern const controller_type {name}_controller_type;\n" for name in names)
     axes = "".join(
-        f"static const axis_type axis_{i} = {{\n{_fields(_describe_axis(rig.axes[i], clock))}"
+        f"static const axis_type axis_{i} = {{\n{_fields(describe_axis(rig.axes[i], clock))}"
         f"    .controller = &{name}_controller_type,\n}};\n\n"
         for i, name in enumerate(names)
     )
@@ -250,26 +326,6 @@ const rig_type rig = {{
     .turning = {"&turning" if turning else "0"},
 }};
 """
-
-
-def _describe_axis(axis: PluginAxis, clock: Clock) -> Struct:
-    """Describe an axis but for its controller: `axis_type` in C."""
-    controller = axis.controller
-    pair, encoder, fog = controller.sensors.accelerometer, controller.sensors.encoder, controller.sensors.fog
-    has_fog = controller.feedback == "fog"
-    return {
-        "prefix": axis.prefix,
-        "gimbals": len(axis.modules),
-        "modules": axis.modules,
-        "pair": describe_pair(pair, controller.axis, clock),
-        "encoder": describe_encoders(encoder, len(axis.modules), clock),
-        "settings": describe_settings(pair, encoder),
-        **({"fog": describe_fog(fog, controller.axis, clock)} if has_fog else {}),
-        "raw_rate": pair.raw_rate_hz,
-        "joint": axis.joint,
-        "dofs": len(axis.shares),
-        "shares": axis.shares,
-    }
 
 
 def _fields(struct: Mapping[str, Value], indent: str = "    ") -> str:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from cmg_mj.core.arrays import Scalar, signed_powers
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import Estimate, Measurement
-from cmg_mj.observers.riccati import exact_step, map_of_one
+from cmg_mj.observers.ltv import exact_step, map_of_one
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_2
 
 

@@ -16,12 +16,11 @@ from cmg_mj.features.bend.edit import STEP_SHARE
 from cmg_mj.features.bend.verdict import rk4_energy_loss
 from cmg_mj.plant.elements import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import section
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from tests.features.plugin.made import needs_compiler
+from tests.features.plugin.made import assert_same_run, needs_compiler
 
 SENSORS = ("accelerometer_inner", "accelerometer_outer", "fog")
 
@@ -142,19 +141,10 @@ def short(*settings: str) -> Experiment:
     return prepare(load_scenario("push_recovery", ["duration_s=0.5", "push=[]", "observer.kind=linear", *settings]))
 
 
-def trajectory_of(result: Result) -> Trajectory:
+def trajectory(experiment: Experiment) -> Trajectory:
+    result = experiment.run()
     assert result.trajectory is not None
     return result.trajectory
-
-
-def trajectory(experiment: Experiment, **options: Any) -> Trajectory:
-    return trajectory_of(experiment.run(**options))
-
-
-def assert_same(one: Trajectory, other: Trajectory) -> None:
-    assert list(one.columns) == list(other.columns)
-    for name in one.columns:
-        np.testing.assert_array_equal(one[name], np.squeeze(other[name]), name)
 
 
 def test_a_stiff_frame_moves_as_a_rigid_one() -> None:
@@ -165,14 +155,14 @@ def test_a_stiff_frame_moves_as_a_rigid_one() -> None:
 
 
 def test_without_a_frequency_the_other_fields_change_nothing() -> None:
-    assert_same(trajectory(short("bend.share=0.5", "bend.beyond=both")), trajectory(short()))
+    assert_same_run(short("bend.share=0.5", "bend.beyond=both").run(), short().run())
 
 
 def test_one_world_a_batch_and_the_callback_are_the_same_bits() -> None:
     experiment = short("bend.frequency_hz=15", "controller.notch_hz=16", "observer.kind=homogeneous")
-    one = trajectory(experiment, world=1)
-    assert_same(one, trajectory(experiment, world=1, driver="callback"))
-    assert_same(one, trajectory_of(experiment.run_many([1])))
+    one = experiment.run(world=1)
+    assert_same_run(one, experiment.run(world=1, driver="callback"))
+    assert_same_run(one, experiment.run_many([1]))
     assert BEND_JOINT in experiment.plant.joint_names
 
 
@@ -181,7 +171,7 @@ def test_one_world_a_batch_and_the_callback_are_the_same_bits() -> None:
 @pytest.mark.parametrize("beyond", ["sensors", "both"])
 def test_the_plugins_model_has_the_bend(beyond: BendBeyond) -> None:
     experiment = short("bend.frequency_hz=15", f"bend.beyond={beyond}", "bend.share=0.5")
-    assert_same(trajectory(experiment, driver="plugin"), trajectory(experiment))
+    assert_same_run(experiment.run(), experiment.run("plugin"))
 
 
 def test_floors_that_a_bend_would_belie_are_not_printed() -> None:
@@ -204,17 +194,7 @@ def test_floors_that_a_bend_would_belie_are_not_printed() -> None:
         ),
         (["bend.beyond=both"], "bend.share = 0.2: .* = 'both' set bend.share to at least 0.306"),
         (["bend.beyond=modules"], "bend.share = 0.2: .* = 'modules' set bend.share to at least 0.306"),
-        (
-            ["bend.beyond=modules", "bend.share=0.8", "plant.tilt_friction_n_m=0.1"],
-            "plant.tilt_friction_n_m = 0.1: ",
-        ),
-        (["bend.beyond=top"], "bend.beyond = 'top': "),
-        (["bend.frequency_hz=-1"], "bend.frequency_hz = -1: "),
-        (["bend.share=0"], "bend.share = 0: "),
-        (
-            ["bend.damping_ratio=1"],
-            "bend.damping_ratio = 1: ",
-        ),
+        (["bend.beyond=modules", "bend.share=0.8", "plant.tilt_friction_n_m=0.1"], "plant.tilt_friction_n_m = 0.1: "),
         (["plant.model=two_axes.xml"], "tilts about several axes, and a bend takes one; lock the others"),
     ],
 )

@@ -5,15 +5,12 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-from cmg_mj.features.board import Board, temporary_export
 from cmg_mj.features.board.image import available
 from cmg_mj.papers.aranovskiy2020 import on_the_board
 from tests.command import HANGS_AFTER_S, ROOT
-from tests.features.board.toy import short, toy
 
 SCRIPT = ROOT / "benchmarks" / "board.py"
 
@@ -40,16 +37,3 @@ def test_what_they_cost() -> None:
         assert row["step_instructions"] == pytest.approx(on_the_board.instructions()[row["observer"]], rel=0.1)
     # Of the observer tilt, rate and last sample; integrator, last command, whether it has started, status.
     assert linear["state_bytes"] == 7 * 4
-
-
-@pytest.mark.slow
-def test_most_of_11_is_powers(tmp_path: Path) -> None:
-    """Why (11) costs more than (10): four powers an update, which are more than half of it."""
-    with temporary_export(short("homogeneous").axis_controller()) as (name, folder):
-        powers = (folder / f"{name}.c").read_text().count("powf(")
-    steps = []
-    for more in ("", "extern float powf(float, float); y1 = powf(y1, y2);"):
-        with Board(toy(tmp_path, step=more), counting=True) as board:
-            steps.append(board.step(0.013, 0.85, 0.0, 0.0)[1].instructions)
-    assert powers == 4
-    assert powers * (steps[1] - steps[0]) > 0.5 * on_the_board.instructions()["homogeneous"]

@@ -41,11 +41,3 @@ def test_it_is_said_what_to_install(
     assert not available()
     assert cmg_mj("run", "push_recovery", "--driver", "board").complaint.endswith(f"apt install {packages}")
     assert not Path("runs").exists()
-
-
-@pytest.mark.skipif(bool(missing()), reason=f"not installed: {', '.join(missing())}")
-def test_without_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmg_mj.features.export.find_spec", lambda name: None)
-    outcome = cmg_mj("run", "push_recovery", "--driver", "board")
-    assert outcome.complaint == 'export: casadi is not installed: python -m pip install "cmg_mj[export]"'
-    assert not Path("runs").exists()

@@ -15,7 +15,6 @@ import pytest
 from cmg_mj import load_scenario, prepare
 from cmg_mj.core.controller import Controller
 from cmg_mj.features.export import export
-from cmg_mj.runs.simulate import simulate
 
 pytest.importorskip("casadi", reason="casadi is not installed: the extra [export]")
 
@@ -85,13 +84,6 @@ class Compiled:
         """The controller's first numbers: the observer's state, x_e, u. Writing to them changes the controller."""
         return self._controller[:count]
 
-    def step(self, state: np.ndarray, *arguments: float) -> tuple[np.ndarray, np.ndarray]:
-        """One step of the observer alone: the state and the estimate."""
-        state, estimate = state.astype(self.type), np.full(self.width, np.nan, self.type)
-        number = ctypes.c_double if self.type is np.float64 else ctypes.c_float
-        self._call("step", state, *map(number, arguments), estimate)
-        return state.astype(float), estimate.astype(float)
-
     def _call(self, function: str, *arguments: Any) -> int:
         pointers = [x.ctypes.data_as(ctypes.c_void_p) if isinstance(x, np.ndarray) else x for x in arguments]
         return getattr(self._loaded, f"{self.name}_{function}")(*pointers)
@@ -120,11 +112,7 @@ class Recording:
             return tick
 
         controller.decide = decide_and_record  # type: ignore[method-assign]
-        scenario = experiment.scenario
-        observers = list(dict.fromkeys([kind, *scenario.open_loop_observers]))
-        simulate(
-            experiment.plant, controller, scenario.duration_s, observers=observers, outside={"push": scenario.push}
-        )
+        experiment.simulate(experiment.plant, controller)
         self.samples, self.results, self.rate = np.array(samples), np.array(results), np.array(rates)
 
 

@@ -67,76 +67,55 @@ class Elaborate(Plain):
         return result, (x1, x2 + 1e-3 * trace, y.y2, state.double, trace / (state.samples + 1), size)
 
 
-class Matrix(Plain):
-    """A state that is an array, and products of matrices."""
-
-    def init(self, y: Measurement) -> np.ndarray:
-        return np.array([y.y1, 0.0 * y.y1])
-
-    def step(self, state: np.ndarray, y: Measurement, u: float) -> tuple[np.ndarray, Any]:
-        A = np.array([[1.0 - self.dt * self.l1, self.dt], [-self.dt * self.l2, 1.0]])
-        state = A @ state + np.array([self.l1, self.l2]) * self.dt * y.y1
-        return state, (state[0], state[1], y.y2)
-
-
-class NumPys(Plain):
-    """NumPy's own functions."""
+class Tilts(Plain):
+    """Estimates the tilt alone, somehow."""
 
     def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        state, (x1, x2, x3) = super().step(state, y, u)
-        x2 = np.clip(np.where(x2 >= 0.0, x2, 0.9 * x2), -3.0, 3.0)
-        return state, (np.tanh(x1), np.hypot(x2, 1e-3) * np.copysign(1.0, x2), np.floor(100.0 * x3) / 100.0)
+        return state, (self.tilt(y), 0.0, y.y2)
+
+    def tilt(self, y: Measurement) -> Any:
+        return y.y1
 
 
-class Branches(Plain):
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
+class Branches(Tilts):
+    def tilt(self, y: Measurement) -> Any:
         if y.y1 > 0.1:  # here
-            return state, (y.y1, 0.0, y.y2)
-        return super().step(state, y, u)
+            return 0.1
+        return y.y1
 
 
-class TakesTheLarger(Plain):
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        return super().step((max(state[0], -1.0), state[1]), y, u)  # here
+class TakesMath(Tilts):
+    def tilt(self, y: Measurement) -> Any:
+        return math.sin(y.y1)  # here
 
 
-class TakesMath(Plain):
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        return state, (math.sin(y.y1), 0.0, y.y2)  # here
+class TakesModulo(Tilts):
+    def tilt(self, y: Measurement) -> Any:
+        return y.y1 % 1.0  # here
 
 
-class Rounds(Plain):
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        return state, (round(y.y1, 3), 0.0, y.y2)  # here
+class TakesANorm(Tilts):
+    def tilt(self, y: Measurement) -> Any:
+        return np.linalg.norm(y.y1)  # here
 
 
-class Indexes(Plain):
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        return state, ([1.0, 2.0][int(y.y1)], 0.0, y.y2)  # here
-
-
-class TakesModulo(Plain):
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        return state, (y.y1 % 1.0, 0.0, y.y2)  # here
-
-
-class TakesANorm(Plain):
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        return state, (y.y1, np.linalg.norm(y.y1), y.y2)  # here
-
-
-class FillsAnArray(Plain):
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
+class FillsAnArray(Tilts):
+    def tilt(self, y: Measurement) -> Any:
         x = np.zeros(2)
         x[0] = y.y1  # here
-        return state, (x[0], x[1], y.y2)
+        return x[0]
 
 
-class Raises(Plain):
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
+class IsComplex(Tilts):
+    def tilt(self, y: Measurement) -> Any:
+        return abs(y.y1 + 1j * y.y2)  # here
+
+
+class Raises(Tilts):
+    def tilt(self, y: Measurement) -> Any:
         if type(y.y1) is not float:
             raise KeyError("floats only")  # here
-        return super().step(state, y, u)
+        return y.y1
 
 
 class Exits(Plain):
@@ -144,11 +123,6 @@ class Exits(Plain):
         if type(y.y1) is not float:
             raise SystemExit(3)  # here
         return super().init(y)
-
-
-class IsComplex(Plain):
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        return state, (abs(y.y1 + 1j * y.y2), 0.0, y.y2)  # here
 
 
 class LooksAtTypes(Plain):
@@ -190,30 +164,21 @@ class Grows(Plain):
         return [*state, y.y1], (y.y1, y.y1 - state[0], y.y2)
 
 
-class HoldsADeque(Plain):
+class HoldsADeque(Tilts):
     def init(self, y: Measurement) -> Any:
-        return deque([y.y1] * 3, maxlen=3)
-
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        return deque([*state, y.y1], maxlen=3), (y.y1, y.y1 - state[0], y.y2)
+        return deque([y.y1])
 
 
-class HoldsItself(Plain):
+class HoldsItself(Tilts):
     def init(self, y: Measurement) -> Any:
         state: list[Any] = [y.y1]
         state.append(state)
         return state
 
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        return state, (y.y1, 0.0, y.y2)
 
-
-class HoldsTooMuch(Plain):
+class HoldsTooMuch(Tilts):
     def init(self, y: Measurement) -> Any:
         return np.zeros((40, 40)) + y.y1
-
-    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
-        return state, (y.y1, state[0, 0], y.y2)
 
 
 class Blows(Plain):

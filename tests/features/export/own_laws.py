@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
-from collections import deque
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -81,44 +79,6 @@ class Branches(Memoryless):
         return super().step(state, y, x, u)
 
 
-class Raises(Memoryless):
-    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> tuple[Any, Any]:
-        if type(x.x1) is not float:
-            raise KeyError("floats only")  # here
-        return super().step(state, y, x, u)
-
-
-class HoldsADeque(Memoryless):
-    def init(self, y: Measurement) -> Any:
-        return deque([0.0])
-
-
-class HoldsTooMuch(Memoryless):
-    def init(self, y: Measurement) -> Any:
-        return [0.0] * 1001
-
-
-class Remembers(Memoryless):
-    def init(self, y: Measurement) -> Any:
-        object.__setattr__(self, "last", y.y1)
-
-    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> tuple[Any, Any]:
-        return state, -self.k1 * x.x1 - 0.1 * self.last  # type: ignore[attr-defined]
-
-
-class Grows(Memoryless):
-    def init(self, y: Measurement) -> Any:
-        return [y.y1]
-
-    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> tuple[Any, Any]:
-        return [*state, y.y1], -self.k1 * state[0]
-
-
-class DrawsLots(Memoryless):
-    def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> tuple[Any, Any]:
-        return state, super().step(state, y, x, u)[1] + random.random()
-
-
 class LooksAtTypes(Memoryless):
     def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> tuple[Any, Any]:
         return state, super().step(state, y, x, u)[1] * (1.0 if isinstance(x.x1, float) else 1.001)
@@ -138,11 +98,6 @@ class Blows(Memoryless):
 
     def step(self, state: Any, y: Measurement, x: FeedbackState, u: Any) -> tuple[Any, Any]:
         return 1e6 * state, 1e-300 * state * (1.0 + x.x1)
-
-
-class Uncopied(Memoryless):
-    def __deepcopy__(self, memo: Any) -> Any:
-        raise RuntimeError("there is only one of me")
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.export.pytree import form, numbers, rebuild
+from cmg_mj.linear.slopes import form, numbers, rebuild
 from cmg_mj.observers import Measurement
 from tests.features.export import own
 from tests.features.export.compiled import controller
@@ -97,12 +97,7 @@ def test_names_in_c() -> None:
         ("ﬁlter", "filter"),
         ("__Own__", "own"),
         ("Double", "double_observer"),
-        ("Int", "int_observer"),
         ("main", "main_observer"),
-        ("ABS", "abs_observer"),
-        ("Math", "math_observer"),
-        ("Complex", "complex_observer"),
-        ("Class", "class_observer"),
     ],
 )
 def test_a_class_is_called_by_its_name(name: str, c_name: str) -> None:

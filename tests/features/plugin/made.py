@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.features.plugin.build import FLAGS
-from cmg_mj.features.plugin.driver import set_world
 from cmg_mj.features.plugin.make import Plugin, plugin
 from cmg_mj.features.plugin.model import plugin_mjcf
+from cmg_mj.features.plugin.tables import FLAGS
 from cmg_mj.plant.tilt_line import apply_torques
+from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
 from tests.features.export.compiled import COMPILER
@@ -92,7 +92,7 @@ def quick() -> Made:
     """Made as fast as can be: the export compares on few signals, the compiler does not optimise."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("cmg_mj.features.export.check.TICKS", 40)
-        patch.setattr("cmg_mj.features.plugin.build.FLAGS", (*FLAGS, "-O0"))
+        patch.setattr("cmg_mj.features.plugin.tables.FLAGS", (*FLAGS, "-O0"))
         return make("gyro_free", *SHORT)
 
 
@@ -146,9 +146,10 @@ def columns(trajectory: Trajectory, names: Sequence[str]) -> np.ndarray:
 
 
 def pairs(
-    made: Made, rows: dict[str, np.ndarray], trajectory: Trajectory, observer: str
+    made: Made, rows: dict[str, np.ndarray], trajectory: Trajectory
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     """What the plugin's program and the runner have of every quantity at every control tick."""
+    observer = made.experiment.scenario.observer.kind
     yield "qpos", rows["qpos"], columns(trajectory, trajectory.layout.positions())
     yield "qvel", rows["qvel"], columns(trajectory, trajectory.layout.rates())
     for axis in made.experiment.plant.axis_names:
@@ -165,48 +166,25 @@ def pairs(
         yield f"{prefix}sample", rows[f"{prefix}sample"][:, 0], np.arange(float(len(trajectory)))
 
 
+def assert_same_run(one: Result, other: Result) -> None:
+    """Every column of both is the same, bit for bit; one may be of a batch of one world."""
+    assert one.trajectory is not None
+    assert other.trajectory is not None
+    assert list(one.trajectory.columns) == list(other.trajectory.columns)
+    for name, values in one.trajectory.columns.items():
+        np.testing.assert_array_equal(values, np.squeeze(other.trajectory[name]), err_msg=name)
+
+
 def bits(numbers: np.ndarray) -> np.ndarray:
     """Numbers as their 64 bits: -0 is not 0."""
     return np.ascontiguousarray(numbers, dtype=float).view(np.uint64)
 
 
-def check_against_runner(made: Made, rows: dict[str, np.ndarray], trajectory: Trajectory, observer: str) -> None:
-    """Every number at every control tick is the runner's, bit for bit."""
-    for name, plugin_numbers, runner_numbers in pairs(made, rows, trajectory, observer):
+def check_against_runner(made: Made) -> None:
+    """Every number at every control tick of a run is the runner's, bit for bit."""
+    trajectory = made.experiment.run().trajectory
+    assert trajectory is not None
+    rows = run(made, made.start(), len(trajectory))
+    for name, plugin_numbers, runner_numbers in pairs(made, rows, trajectory):
         np.testing.assert_array_equal(plugin_numbers, runner_numbers, err_msg=name)
         np.testing.assert_array_equal(bits(plugin_numbers), bits(runner_numbers), err_msg=f"{name}, bits")
-
-
-class Comparison(NamedTuple):
-    """Numbers of a run beside the runner's.
-
-    Attributes:
-        differing: How many differ in any bit.
-        numbers: How many there are.
-        seconds: Until when the run went [s].
-    """
-
-    differing: int
-    numbers: int
-    seconds: float
-
-
-def compare(made: Made, seed: int | None = None, world: int = 0) -> Comparison:
-    """Compare every number with the runner's.
-
-    Args:
-        made: The plugin.
-        seed: Seed of the noise; None: the scenario's.
-        world: World whose noise it is.
-    """
-    experiment, data = made.experiment, made.start()
-    if seed is not None:
-        experiment = experiment.with_settings({"seed": seed})
-    set_world(made.model, data, experiment.scenario.seed, world)
-    trajectory = experiment.run(world=world).trajectory
-    assert trajectory is not None
-    rows = run(made, data, len(trajectory))
-    both = list(pairs(made, rows, trajectory, experiment.scenario.observer.kind))
-    differing = sum(int((bits(a) != bits(b)).sum()) for _, a, b in both)
-    period = experiment.controller().period * experiment.plant.timestep
-    return Comparison(differing, sum(b.size for _, _, b in both), len(trajectory) * period)

@@ -7,12 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.cli import main
-from tests.features.plugin.made import needs_compiler
+from tests.features.plugin.made import assert_same_run, needs_compiler
 
 pytestmark = [needs_compiler, pytest.mark.slow]
 
@@ -27,24 +26,9 @@ pytestmark = [needs_compiler, pytest.mark.slow]
 def test_every_column_is_the_native_ones(scenario: str, settings: tuple[str, ...]) -> None:
     experiment = prepare(load_scenario(scenario, settings, "gyro_free"))
     native, plugin = experiment.run(world=3), experiment.run("plugin", world=3)
-    assert native.trajectory is not None
-    assert plugin.trajectory is not None
-    assert list(plugin.trajectory.columns) == list(native.trajectory.columns)
-    for name, values in native.trajectory.columns.items():
-        np.testing.assert_array_equal(plugin.trajectory[name], values, err_msg=name)
+    assert_same_run(native, plugin)
     assert plugin.summaries == native.summaries
     assert (native.driver, plugin.driver) == ("native", "plugin")
-
-
-def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["run", "push_recovery", "--set", "duration_s=3", "--json", "--out"]
-    summaries = []
-    for driver in ("native", "plugin"):
-        main([*arguments, str(tmp_path / driver), "--driver", driver])
-        summaries.append(json.loads(capsys.readouterr().out))
-    assert {**summaries[1], "driver": "native"} == {**summaries[0], "driver": "native"}
-    names = [sorted(path.name for path in (tmp_path / driver).glob("*.*")) for driver in ("native", "plugin")]
-    assert names[0] == names[1]
 
 
 def test_command_that_makes_a_plugin(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

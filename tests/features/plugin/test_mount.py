@@ -70,11 +70,11 @@ def test_nothing_is_begun_without_a_compiler(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "message"),
-    [(["--modules", "10"], "10 modules on an axis: a plugin takes at most 8"), ([], "the C does not compile")],
+    [(["--modules", "10"], "10 modules on an axis: a plugin takes at most 8"), ([], "refuses it")],
 )
 def test_all_is_written_or_nothing(options: list[str], message: str, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("robot.xml").write_text(PENDULUM, encoding="utf-8")
-    monkeypatch.setattr("cmg_mj.features.plugin.build.FLAGS", ("-std=c99", "-include", "missing.h"))
+    monkeypatch.setattr("cmg_mj.features.plugin.tables.FLAGS", ("-std=c99", "-include", "missing.h"))
     assert message in cmg_mj(*MOUNT, *options).complaint
     assert there() == ["robot.xml"]
 

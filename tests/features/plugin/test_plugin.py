@@ -10,13 +10,11 @@ from collections.abc import Callable, Iterator
 import mujoco
 import numpy as np
 import pytest
-from mujoco import rollout
 
-from cmg_mj import InputError, load_scenario, prepare
-from cmg_mj.features.plugin.build import common_files
-from cmg_mj.features.plugin.driver import FAILED, STATUS, initial_states, instance_states, set_world
+from cmg_mj import InputError
+from cmg_mj.features.plugin.driver import FAILED, STATUS, instance_states, set_world
 from cmg_mj.features.plugin.make import describe_rig
-from cmg_mj.features.plugin.tables import NAMES_IN_USE, generate_plugin
+from cmg_mj.features.plugin.tables import NAMES_IN_USE, common_files, generate_plugin
 from cmg_mj.plant.mjcf import quiet
 from tests.features.plugin.made import check_against_runner, needs_compiler, quick, run
 
@@ -41,10 +39,7 @@ def messages() -> Iterator[list[str]]:
 
 
 def test_half_a_second_is_bit_for_bit() -> None:
-    made = quick()
-    trajectory = made.experiment.run().trajectory
-    assert trajectory is not None
-    check_against_runner(made, run(made, made.start(), len(trajectory)), trajectory, "gyro_free")
+    check_against_runner(quick())
 
 
 def again(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
@@ -93,21 +88,6 @@ def test_passes_and_halves_of_steps_change_nothing() -> None:
         mujoco.mj_step2(model, halves)
     np.testing.assert_array_equal(halves.qpos, whole.qpos)
     np.testing.assert_array_equal(halves.plugin_state, whole.plugin_state)
-
-
-def test_worlds_by_rollout_are_those_of_run_many() -> None:
-    made = quick()
-    quiet_run = prepare(load_scenario("push_recovery", ("duration_s=0.5", "push=[]"), "gyro_free"))
-    trajectory = quiet_run.run_many([0, 3, 7]).trajectory
-    assert trajectory is not None
-    data, untouched = made.start(), made.start().plugin_state
-    states = initial_states(made.model, data, made.experiment.scenario.seed, [0, 3, 7])
-    np.testing.assert_array_equal(data.plugin_state, untouched)
-    ways = [mujoco.MjData(made.model) for _ in range(2)]
-    _, sensors = rollout.rollout(made.model, ways, states, nstep=100)
-    command = sensors[:, :, made.model.sensor("balance/command").adr[0]]
-    np.testing.assert_array_equal(command.T, trajectory["u_rad_s"])
-    assert len(set(command[:, -1])) == 3
 
 
 @pytest.mark.parametrize(("seed", "world"), [(2**53 + 1, 0), (0, -1), (1.5, 0)])
@@ -172,16 +152,13 @@ WRONG_MODELS = {
     "a name behind": ('(name|instance)="balance"', r'\1="balance/rig"', "must be named 'balance'"),
     "another plugin": ('plugin="cmg_mj[.]', 'plugin="cmg_mj.other_', "not found"),
     "a step that does not fit": (r'timestep="[^"]*"', 'timestep="0.003"', "a physics step of 0.003 s"),
-    "a step that is too long": (r'timestep="[^"]*"', 'timestep="0.01"', "a physics step of 0.01 s"),
     "a step that nearly fits": (r'timestep="[^"]*"', 'timestep="0.0025001"', "a physics step of 0.0025001 s"),
     "sensors off": ("<flag ", '<flag sensor="disable" ', "leaves the controller blind"),
     "no inner accelerometer": ('name="accelerometer_inner"/>', 'name="inner"/>', "no sensor 'accelerometer_inner'"),
-    "no outer accelerometer": ('name="accelerometer_outer"/>', 'name="outer"/>', "no sensor 'accelerometer_outer'"),
     "no encoder": ('name="cube2/gimbal_encoder"', 'name="encoder"', "no sensor 'cube2/gimbal_encoder'"),
     "no servo": ('name="cube1/gimbal_servo"', 'name="servo"', "no actuator 'cube1/gimbal_servo'"),
     "no motor": ('name="cube2/flywheel_motor"', 'name="motor"', "no actuator 'cube2/flywheel_motor'"),
     "another gimbal": ('"cube1/gimbal"', '"cube1/fork"', "no joint 'cube1/gimbal'"),
-    "another flywheel": ('"cube2/flywheel"', '"cube2/disc"', "no joint 'cube2/flywheel'"),
     "another encoder": ("<jointpos ", "<jointvel ", "sensor 'cube1/gimbal_encoder' is of another kind"),
     "another accelerometer": ("<accelerometer ", "<velocimeter ", "sensor 'accelerometer_inner' is of another kind"),
     "a late accelerometer": ("<accelerometer ", '<accelerometer delay="0.01" nsample="3" ', "has a delay or a history"),
@@ -189,7 +166,6 @@ WRONG_MODELS = {
     "actuation off": ("<flag ", '<flag actuation="disable" ', "holds its drives"),
     "drives switched off": ("<option ", '<option actuatorgroupdisable="0" ', "'cube1/gimbal_servo' is in a group"),
     "a servo elsewhere": ('servo" joint="cube1/gimbal"', 'servo" joint="yaw"', "must drive joint 'cube1/gimbal'"),
-    "a motor elsewhere": ('motor" joint="cube2/flywheel"', 'motor" joint="yaw"', "must drive joint 'cube2/flywheel'"),
     "a motor with a memory": ('biastype="affine" (gainprm="0.01")', r'dyntype="filter" \1', "must be a <velocity>"),
     "an encoder elsewhere": ('<jointpos joint="cube2/gimbal"', '<jointpos joint="yaw"', "of joint 'cube2/gimbal'"),
     "a gimbal that slides": ('name="cube1/gimbal" axis', r'type="slide" \g<0>', "joint 'cube1/gimbal' must be a hinge"),

@@ -28,16 +28,6 @@ UNSTABLE = "controller.rate_hz = 5: the closed loop is unstable on this rig's re
             f"cmg-mj: axis roll: {UNSTABLE}",
             marks=pytest.mark.slow,
         ),
-        pytest.param(
-            ["high_gain", "--set", "controller.rate_hz=20"],
-            "HighGain cannot be exported: it cannot be compared on random signals: observer HighGain returned inf",
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            ["linear", "--set", "controller.kind=tests.features.export.own_laws:Branches"],
-            "law Branches: cannot be exported: a branch on a value (",
-            marks=pytest.mark.slow,
-        ),
     ],
 )
 def test_one_line_and_nothing_written(arguments: list[str], words: str) -> None:

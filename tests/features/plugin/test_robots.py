@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.features.plugin.made import ALL_IMPERFECTIONS, check_against_runner, make, needs_compiler, run
+from tests.features.plugin.made import ALL_IMPERFECTIONS, check_against_runner, make, needs_compiler
 from tests.features.plugin.robots import ROBOTS, is_missing, write_robot
 
 pytestmark = [needs_compiler, pytest.mark.slow]
@@ -18,7 +18,4 @@ def test_a_mounted_robot(robot: str, imperfections: bool, tmp_path: Path) -> Non
     if is_missing(robot):
         pytest.skip("gymnasium is not installed")
     scenario = write_robot(robot, tmp_path, 15.0)
-    made = make("gyro_free", *(ALL_IMPERFECTIONS if imperfections else ()), scenario=scenario)
-    trajectory = made.experiment.run().trajectory
-    assert trajectory is not None
-    check_against_runner(made, run(made, made.start(), len(trajectory)), trajectory, "gyro_free")
+    check_against_runner(make("gyro_free", *(ALL_IMPERFECTIONS if imperfections else ()), scenario=scenario))

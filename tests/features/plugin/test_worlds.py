@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 import pytest
 from mujoco import rollout
-from mujoco.batch import Batch
 
 from cmg_mj.features.plugin.driver import initial_states
 from tests.features.plugin.made import ALL_IMPERFECTIONS, QUANTITIES, Made, make, needs_compiler
@@ -67,30 +66,3 @@ def test_rollout_goes_on_where_it_stopped() -> None:
     then, shown_then = rollout.rollout(made.model, data, first[order, -1], nstep=367)
     np.testing.assert_array_equal(then, whole[order, 333:])
     np.testing.assert_array_equal(shown_then, shown[order, 333:])
-
-
-@pytest.mark.parametrize("persistent", [False, True])
-def test_batch_is_rollout(persistent: bool) -> None:
-    made = make("gyro_free", "push=[]")
-    n, steps = 6, 400
-    states = initial_states(made.model, made.start(), 0, n)
-    command = made.model.sensor("balance/command").adr[0]
-    expected = by_rollout(made, states, steps)[:, :, command]
-    batch = Batch(made.model, n, THREADS, persistent=persistent)
-    for name, value in zip(("qpos", "qvel", "act", "plugin_state"), fields(made, states), strict=True):
-        batch.bind(name)[:] = value
-    shown = batch.bind("sensordata")
-    for step in range(steps):
-        batch.step()
-        np.testing.assert_array_equal(shown[:, command], expected[:, step])
-
-
-def fields(made: Made, states: np.ndarray) -> list[np.ndarray]:
-    """qpos, qvel, act and plugin_state of full physics states."""
-    data = mujoco.MjData(made.model)
-    rows: list[list[np.ndarray]] = [[], [], [], []]
-    for state in states:
-        mujoco.mj_setState(made.model, data, state, FULL)
-        for row, value in zip(rows, (data.qpos, data.qvel, data.act, data.plugin_state), strict=True):
-            row.append(value.copy())
-    return [np.array(row) for row in rows]
