@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from rich.console import Group
 
+from cmg_mj.core.errors import TomlValue
 from cmg_mj.inputs.files import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
-from cmg_mj.results.description import assignments
 from cmg_mj.results.floors import FLOOR_ACCELERATION, FLOORS, NO_ACCELERATION_FLOOR, NOISE_ALONE
 from cmg_mj.results.intervals import Interval, format_interval
 from cmg_mj.results.summary_keys import (
@@ -178,3 +178,22 @@ def class_list(kind: UserClassKind) -> str:
         lines += [line.replace("\0", " ") for line in wrapped]
         lines += textwrap.wrap(title, 98, initial_indent=indent, subsequent_indent=indent)
     return "\n".join(lines)
+
+
+def lines(title: str, rows: Iterable[tuple[str, str]]) -> str:
+    """Join a title, and rows of a label and a text."""
+    return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows)])
+
+
+def assignments(values: Mapping[str, TomlValue]) -> str:
+    """Parameters and their values, as `--set` takes them."""
+    return "  ".join(f"{name}={number(value)}" for name, value in values.items())
+
+
+def number(value: TomlValue) -> str:
+    """Return a value as TOML writes it, to six digits."""
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(number(item) for item in value)}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

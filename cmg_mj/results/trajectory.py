@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.results.files import METADATA_KEY, write_row_groups
+from cmg_mj.results.folder import METADATA_KEY, write_row_groups
 
 if TYPE_CHECKING:
     import pandas as pd

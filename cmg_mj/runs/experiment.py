@@ -26,7 +26,7 @@ from cmg_mj.linear.verdict import hints
 from cmg_mj.observers import Observer
 from cmg_mj.plant.build import check_scenario, plant_on_grid
 from cmg_mj.plant.plant import Plant
-from cmg_mj.results.files import whole_file
+from cmg_mj.results.folder import whole_file
 from cmg_mj.results.result import Result
 from cmg_mj.runs.batch import (
     AxisPart,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cmg_mj.results.files import whole_file
+from cmg_mj.results.folder import whole_file
 from cmg_mj.view.plots.map_plot import Map, Surface, draw_map, draw_surface, mappable
 from cmg_mj.view.plots.style import colours, hexadecimal
 

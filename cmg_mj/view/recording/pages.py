@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import rerun as rr
 
-from cmg_mj.results import markdown
 from cmg_mj.results.floors import NOISE_ALONE
 from cmg_mj.results.summary_keys import KEYS, OPEN_LOOP_COLUMNS, format_figure, heading
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.scenario.resolve import versions
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
@@ -76,7 +76,7 @@ def _estimates(branch: Branch) -> list[str]:
             (name, *(format_figure(key, summary.get(key)) for key in keys))
             for name, summary in zip(names, summaries, strict=True)
         ]
-        parts.append(markdown.table(("", *map(heading, keys)), rows))
+        parts.append(markdown_table(("", *map(heading, keys)), rows))
     return [*parts, NOISE_ALONE] if run.references else parts
 
 
@@ -89,7 +89,7 @@ def _by_column(branches: Sequence[Branch]) -> str:
         for key in KEYS
         if any(key in run.summary for run in runs)
     ]
-    return markdown.table(("", *(branch.label for branch in branches)), rows)
+    return markdown_table(("", *(branch.label for branch in branches)), rows)
 
 
 def _by_row(branches: Sequence[Branch]) -> list[str]:
@@ -101,7 +101,7 @@ def _by_row(branches: Sequence[Branch]) -> list[str]:
         columns = [[format_figure(key, run.summary.get(key)) for run in runs] for key in keys]
         text = first if i == 0 else first[:1]
         headings = (*("", "Outcome")[: len(text)], *map(heading, keys))
-        tables.append(markdown.table(headings, list(zip(*text, *columns, strict=True)), text_columns=len(text)))
+        tables.append(markdown_table(headings, list(zip(*text, *columns, strict=True)), text_columns=len(text)))
     return [*tables, BOLD]
 
 

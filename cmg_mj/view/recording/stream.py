@@ -18,7 +18,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.results.files import whole_file
+from cmg_mj.results.folder import whole_file
 from cmg_mj.view.recording.signals import Lines
 
 PIPES = Path("/dev/fd")

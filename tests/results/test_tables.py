@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cmg_mj.results.markdown import WIDTH, table, wrap
+from cmg_mj.results.tables import WIDTH, markdown_table, wrap
 
 WORDS = "a sentence of several words, " * 12
 
@@ -28,7 +28,7 @@ def test_the_items_of_a_list_stay_apart() -> None:
     [
         f"## {WORDS}",
         f"![{WORDS}](picture.png)",
-        table(("what", "how"), [("tilt", WORDS)], text_columns=2),
+        markdown_table(("what", "how"), [("tilt", WORDS)], text_columns=2),
         f"```sh\n{WORDS}\n```",
     ],
 )
