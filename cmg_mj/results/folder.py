@@ -284,6 +284,8 @@ def is_signed(path: Path) -> bool:
 
 METADATA_KEY = b"cmg_mj"
 """The key of what cmg_mj says of a table, as JSON, in the metadata of its Parquet file."""
+ROW_GROUP = 32768
+"""Number of rows that Arrow compresses together, and that a reader may skip."""
 
 
 def is_plain_file(path: Path) -> bool:
@@ -311,36 +313,17 @@ def whole_file(path: Path, ending: str = "") -> Iterator[Path]:
             temporary.unlink()
 
 
-def write_parquet(path: Path, table: pa.Table, metadata: Mapping[str, Any] | None = None) -> None:
-    """Write a table as Parquet.
+def write_parquet(path: Path, table: pa.Table, metadata: Mapping[str, Any]) -> None:
+    """Write a table as Parquet, whole or not at all.
 
     Args:
         path: The file.
         table: The table.
-        metadata: What the file says of the table beside it; by default nothing.
+        metadata: What the file says of the table beside it.
     """
-    write_row_groups(path, [table], metadata)
-
-
-def write_row_groups(path: Path, tables: Iterable[pa.Table], metadata: Mapping[str, Any] | None = None) -> None:
-    """Write tables with the same columns as one Parquet file, a row group each.
-
-    Args:
-        path: The file.
-        tables: The tables, at least one; each is written before the next is asked for.
-        metadata: What the file says of the table beside it; by default nothing.
-    """
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    stored = None if metadata is None else {METADATA_KEY: json.dumps(metadata).encode()}
     # Opened here: Arrow takes no path with bytes that are no UTF-8.
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        writer = None
-        for rows in tables:
-            table = rows if stored is None else rows.replace_schema_metadata(stored)
-            writer = writer or pq.ParquetWriter(file, table.schema)
-            writer.write_table(table)
-            pa.default_memory_pool().release_unused()  # of a long file, hundreds of row groups pile up
-        assert writer is not None
-        writer.close()
+        stored = {METADATA_KEY: json.dumps(metadata).encode()}
+        pq.write_table(table.replace_schema_metadata(stored), file, row_group_size=ROW_GROUP)
