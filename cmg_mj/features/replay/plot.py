@@ -16,7 +16,7 @@ from cmg_mj.view.plots.run_plot import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_
 from cmg_mj.view.plots.style import colours, hexadecimal, short_names, thinned
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from cmg_mj.view.plots.figure import Axes
 
 DETAIL_S = 2.0
 """Length of the detail [s]."""

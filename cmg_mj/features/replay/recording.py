@@ -12,8 +12,8 @@ from cmg_mj.features.replay.log import REFERENCE
 from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.report import replay_markdown, shown_first
 from cmg_mj.view.plots.style import BASELINE_COLOURS, Colour, colours, short_names
-from cmg_mj.view.recording.replay_recording import LogSeries, write_logs
 from cmg_mj.view.recording.run import numbered_parts
+from cmg_mj.view.recording.save import LogSeries, write_logs
 from cmg_mj.view.recording.signals import CONTROLLER, MODULES, Series
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.view.recording.replay_recording import MAIN
+from cmg_mj.view.recording.save import MAIN
 from tests.command import ROOT, CommandOutcome, cmg_mj
 from tests.features.replay.motion import COLUMNS, sine, write_csv
 

@@ -20,11 +20,10 @@ from cmg_mj.runs.save import report_run
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.stages.swing import Swing
 from cmg_mj.view.recording import RecordingHeader, Run, write_recording
-from cmg_mj.view.recording.pages import summary_page
+from cmg_mj.view.recording.layout import EYE, summary_page
 from cmg_mj.view.recording.run import legend, numbered_parts
-from cmg_mj.view.recording.shapes import FARTHEST, enclosing_ball
+from cmg_mj.view.recording.scene import FARTHEST, enclosing_ball
 from cmg_mj.view.recording.signals import make_branches
-from cmg_mj.view.recording.views import EYE
 
 SHORT = ("duration_s=0.6", "push.0.start_s=0.2")
 FIELD_OF_VIEW = math.radians(55.0)
