@@ -131,15 +131,17 @@ class RunFolder:
             return False
         return self._overwrite or all(_text(place / name) == _text(self.part / name) for name in REQUESTS)
 
-    def __enter__(self) -> RunFolder:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
+    def release(self, *_: object) -> None:
         """Remove what was made for nothing."""
         shutil.rmtree(self.part, ignore_errors=True)
         with suppress(OSError):  # what holds something stays
             for parent in self._made:
                 parent.rmdir()
+
+    def __enter__(self) -> RunFolder:
+        return self
+
+    __exit__ = release
 
 
 @contextmanager

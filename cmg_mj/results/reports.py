@@ -165,7 +165,7 @@ def estimates_table(
         keys: The figures to show.
         named: Whether the names are code in Markdown.
     """
-    rows = [{"observer": name, **values} for name, values in figures.items()]
+    rows = [{**values, "observer": name} for name, values in figures.items()]
     return Table(_headings(first, keys), rows, "", lambda row, key: format_figure(key, row.get(key)), named)
 
 

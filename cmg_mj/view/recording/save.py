@@ -1,4 +1,4 @@
-"""The file of a recording, of runs or of logs, and its view in a notebook's cell."""
+"""The file of a recording, of runs or of users' logs; and its view in a notebook's cell."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ import importlib
 import io
 import os
 import re
-import shutil
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,81 +18,159 @@ import rerun.blueprint as rrb
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.results.folder import whole_file
-from cmg_mj.view.recording.layout import (
-    Plot,
-    default_blueprint,
-    log_page,
-    log_pages,
-    page_tabs,
-    plot_view,
-    tabbed_blueprint,
-)
+from cmg_mj.scenario.resolve import versions
+from cmg_mj.view.recording.layout import Plot, default_blueprint, page_tabs, pages, plot_view, tabbed_blueprint
 from cmg_mj.view.recording.run import RecordingHeader, Run, numbered_parts
 from cmg_mj.view.recording.scene import log_poses, log_pushes, log_shapes
 from cmg_mj.view.recording.signals import Lines, Series, log_phases, log_styles, log_values, make_branches
 
-PIPES = Path("/dev/fd")
-"""Folder in which a process finds its pipes as files; Windows has none."""
 LONGEST_LIST = 120
 """Longest list of runs in an application's name [characters]."""
+LOG_TIMELINE = "time"
+"""Name of the timeline of a log, whose time is not simulated."""
+MAIN = (
+    Plot("Tilt [deg]", ("tilt/",), 1.7),
+    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 2.8),
+    Plot("Estimate less reference [rad/s]", ("rate_error/",), 2.8),
+)
+LOG_PLOTS = (
+    *MAIN,
+    Plot("Estimated equilibrium bias [deg]", ("bias/",)),
+    Plot("Angular acceleration, measured [rad/s^2]", ("acceleration/",)),
+    Plot("Command, gimbal rate [rad/s]", ("command/",)),
+    Plot("Gimbal angle from upright [deg]", ("gimbal/",)),
+)
 
 
-@contextlib.contextmanager
-def open_recording(path: Path, name: str, application: str, blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
-    """Open a recording to log to; write its file at the end.
+@dataclass(frozen=True)
+class LogSeries:
+    """The recorded series of one log.
+
+    Attributes:
+        name: Name of the log, unique in a recording.
+        series: The series, in the folders that `LOG_PLOTS` names: angles in degrees, rates in rad/s.
+        best: Names of the observers that are switched on at first.
+    """
+
+    name: str
+    series: Sequence[Series]
+    best: Sequence[str]
+
+
+def write_recording(path: Path, header: RecordingHeader, runs: Sequence[Run]) -> None:
+    """Write one run, or several runs to compare, as a rerun recording; whole or not at all.
 
     Args:
-        path: The file.
-        name: Name of the recording.
-        application: Result of `application_name`.
-        blueprint: Layout in which the recording opens.
+        path: The file, `recording.rrd`.
+        header: The experiment of all runs.
+        runs: The runs; each has a branch, named after the run.
 
-    Yields:
-        The recording.
+    Raises:
+        ValueError: There is no run, or two have the same name.
+        InputError: The environment turns rerun off.
+        OSError: The file cannot be written.
+    """
+    branches = make_branches(header, runs)
+    title = f"{header.title or 'Run'}: {', '.join(branch.label for branch in branches)}"
+    names, texts = [run.name for run in runs], pages(header, branches)
+    with _written(path, title, names, branches, default_blueprint(branches), texts) as rec:
+        for branch in branches:
+            log_shapes(rec, branch)
+            log_pushes(rec, branch)
+            log_poses(rec, branch)
+            log_phases(rec, header, branch, max(run.outcome.time_s for run in runs))
+        # By its properties a catalogue finds a recording.
+        package_versions = {name: versions()[name] for name in ("cmg_mj", "mujoco")}
+        rec.send_property("experiment", rr.AnyValues(True, **package_versions, title=header.title, runs=names))
+        for run in runs:
+            numbers = {key: value for key, value in run.summary.items() if isinstance(value, float)}
+            values = rr.AnyValues(True, **numbers, outcome=run.outcome.kind, time_s=run.outcome.time_s)
+            rec.send_property(rr.escape_entity_path_part(run.name), values)
+
+
+def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping[str, str]) -> None:
+    """Write logs as one recording; whole or not at all.
+
+    Args:
+        path: The file, `recording.rrd`.
+        title: The recording's name.
+        logs: The logs; each has a branch.
+        texts: Title -> Markdown of the pages; the first page is in front.
 
     Raises:
         InputError: The environment turns rerun off.
         OSError: The file cannot be written.
     """
-    with whole_file(path) as temporary, _strict(), rr.RecordingStream(application) as rec:
-        require_enabled(rec)
-        with _written(rec, temporary):
-            rec.send_blueprint(blueprint, make_active=False, make_default=True)
-            set_up(rec, name)
-            yield rec
+    names = [log.name for log in logs]
+    branches = [
+        Lines(path=f"/{part}", label=log.name, series={row.path: row for row in log.series}, timeline=LOG_TIMELINE)
+        for part, log in zip(numbered_parts(names), logs, strict=True)
+    ]
+    boards = [_log_board(branch, log, list(texts)) for branch, log in zip(branches, logs, strict=True)]
+    blueprint = tabbed_blueprint(boards, LOG_TIMELINE, "paused")
+    with _written(path, title, names, branches, blueprint, {name.lower(): text for name, text in texts.items()}):
+        pass
+
+
+def _log_board(branch: Lines, log: LogSeries, titles: Sequence[str]) -> rrb.Container:
+    """Lay out everything about one log."""
+    plots = [plot for plot in LOG_PLOTS if any(path.startswith(plot.entities) for path in branch.series)]
+    left, right = (
+        [plot_view(plot, branch, log.best) for plot in plots if (plot in MAIN) == is_left] for is_left in (True, False)
+    )
+    return rrb.Horizontal(
+        rrb.Vertical(*left, row_shares=[plot.height for plot in MAIN if plot in plots]),
+        rrb.Vertical(page_tabs(titles, titles[0]), *right, row_shares=[3.5, *[1.0] * len(right)]),
+        column_shares=[11, 9],
+        name=branch.label,
+    )
 
 
 @contextlib.contextmanager
-def _written(rec: rr.RecordingStream, path: Path) -> Iterator[None]:
-    """Write what is logged to a file, through a pipe: rerun by itself hides a full disk, or waits for ever."""
-    if not PIPES.exists():
-        rec.save(path)
-        yield
-        rec.disconnect()
-        return
-    read_end, write_end = os.pipe()
-    with ThreadPoolExecutor(1) as pool:
-        copied = pool.submit(_copy, read_end, path)
-        try:
-            try:
-                rec.save(PIPES / str(write_end))
-            finally:
-                os.close(write_end)  # rerun has opened one of its own
-            yield
-        finally:
-            rec.disconnect()
-        copied.result()
+def _written(
+    path: Path,
+    title: str,
+    names: Sequence[str],
+    branches: Sequence[Lines],
+    blueprint: rrb.Blueprint,
+    texts: Mapping[str, str],
+) -> Iterator[rr.RecordingStream]:
+    """Open a recording, with its layout, series and pages; write its file at the end.
 
+    Args:
+        path: The file.
+        title: Name of the recording.
+        names: The runs or logs.
+        branches: Their series.
+        blueprint: Layout in which the recording opens.
+        texts: Path of a page -> Markdown.
 
-def _copy(read_end: int, path: Path) -> None:
-    """Copy a pipe to a file; after a failure empty the pipe, because rerun waits for that."""
-    with open(read_end, "rb") as pipe:
-        try:
-            with path.open("wb") as file:
-                shutil.copyfileobj(pipe, file)
-        finally:
-            while pipe.read(1 << 20):
-                pass
+    Yields:
+        The recording, to log more to.
+
+    Raises:
+        InputError: The environment turns rerun off.
+        OSError: The file cannot be written.
+    """
+    strict = rr.strict_mode()
+    rr.set_strict_mode(True)  # rerun would only warn
+    try:
+        with rr.RecordingStream(_application_name(names, branches)) as rec:
+            require_enabled(rec)
+            memory = rec.memory_recording()  # of a file by itself rerun hides a full disk, or waits for ever
+            rec.send_blueprint(blueprint, make_active=False, make_default=True)
+            set_up(rec, title)
+            for branch in branches:
+                log_styles(rec, branch)
+                log_values(rec, branch)
+            for name, text in texts.items():
+                rec.log(name, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+            yield rec
+            recorded = memory.drain_as_bytes()
+    finally:
+        rr.set_strict_mode(strict)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(recorded)
 
 
 def require_enabled(rec: rr.RecordingStream) -> None:
@@ -114,7 +190,7 @@ def set_up(rec: rr.RecordingStream, name: str) -> None:
     rec.send_recording_name(name)
 
 
-def application_name(names: Sequence[str], branches: Sequence[Lines]) -> str:
+def _application_name(names: Sequence[str], branches: Sequence[Lines]) -> str:
     """Name the application of a recording.
 
     The viewer remembers a layout by application: recordings with other branches or lines must not share its name.
@@ -125,17 +201,6 @@ def application_name(names: Sequence[str], branches: Sequence[Lines]) -> str:
         run_names = f"{len(names)} runs"
     lines = " ".join(f"{branch.path}/{path}" for branch in branches for path in branch.series)
     return re.sub(r"[^\w -]", "-", f"cmg-mj {run_names} {zlib.crc32(lines.encode()):08x}", flags=re.ASCII)
-
-
-@contextlib.contextmanager
-def _strict() -> Iterator[None]:
-    """Make rerun raise where it would only warn."""
-    before = rr.strict_mode()
-    rr.set_strict_mode(True)
-    try:
-        yield
-    finally:
-        rr.set_strict_mode(before)
 
 
 def show_recording(path: Path | str, *, height: int = 600) -> Any:
@@ -170,104 +235,3 @@ def show_recording(path: Path | str, *, height: int = 600) -> Any:
         ) from error
     viewer.send_rrd(recording)
     return viewer
-
-
-def write_recording(path: Path, header: RecordingHeader, runs: Sequence[Run]) -> None:
-    """Write one run, or several runs to compare, as a rerun recording; whole or not at all.
-
-    Args:
-        path: The file, `recording.rrd`.
-        header: The experiment of all runs.
-        runs: The runs; each has a branch, named after the run.
-
-    Raises:
-        ValueError: There is no run, or two have the same name.
-        InputError: The environment turns rerun off.
-        OSError: The file cannot be written.
-    """
-    branches = make_branches(header, runs)
-    name = f"{header.title or 'Run'}: {', '.join(branch.label for branch in branches)}"
-    application = application_name([run.name for run in runs], branches)
-    with open_recording(path, name, application, default_blueprint(branches)) as rec:
-        end = max(run.outcome.time_s for run in runs)
-        for branch in branches:
-            log_shapes(rec, branch)
-            log_pushes(rec, branch)
-            log_styles(rec, branch)
-            log_values(rec, branch)
-            log_poses(rec, branch)
-            log_phases(rec, header, branch, end)
-        log_pages(rec, header, branches)
-
-
-TIMELINE = "time"
-"""Name of the timeline: a log's time is not simulated."""
-MAIN = (
-    Plot("Tilt [deg]", ("tilt/",), 1.7),
-    Plot("Tilt rate [rad/s]", ("rate/", "rate_estimate/"), 2.8),
-    Plot("Estimate less reference [rad/s]", ("rate_error/",), 2.8),
-)
-PLOTS = (
-    *MAIN,
-    Plot("Estimated equilibrium bias [deg]", ("bias/",)),
-    Plot("Angular acceleration, measured [rad/s^2]", ("acceleration/",)),
-    Plot("Command, gimbal rate [rad/s]", ("command/",)),
-    Plot("Gimbal angle from upright [deg]", ("gimbal/",)),
-)
-
-
-@dataclass(frozen=True)
-class LogSeries:
-    """The recorded series of one log.
-
-    Attributes:
-        name: Name of the log, unique in a recording.
-        series: The series, in the folders that `PLOTS` names: angles in degrees, rates in rad/s.
-        best: Names of the observers that are switched on at first.
-    """
-
-    name: str
-    series: Sequence[Series]
-    best: Sequence[str]
-
-
-def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping[str, str]) -> None:
-    """Write logs as one recording; whole or not at all.
-
-    Args:
-        path: The file, `recording.rrd`.
-        title: The recording's name.
-        logs: The logs; each has a branch.
-        texts: Title -> Markdown of the pages; the first page is in front.
-
-    Raises:
-        InputError: The environment turns rerun off.
-        OSError: The file cannot be written.
-    """
-    names = [log.name for log in logs]
-    branches = [
-        Lines(path=f"/{part}", label=log.name, series={row.path: row for row in log.series}, timeline=TIMELINE)
-        for part, log in zip(numbered_parts(names), logs, strict=True)
-    ]
-    boards = [_board(branch, log, list(texts)) for branch, log in zip(branches, logs, strict=True)]
-    blueprint = tabbed_blueprint(boards, TIMELINE, "paused")
-    with open_recording(path, title, application_name(names, branches), blueprint) as rec:
-        for branch in branches:
-            log_styles(rec, branch)
-            log_values(rec, branch)
-        for name, text in texts.items():
-            log_page(rec, name.lower(), text)
-
-
-def _board(branch: Lines, log: LogSeries, titles: Sequence[str]) -> rrb.Container:
-    """Lay out everything about one log. The legends have all observers, most of them switched off."""
-    plots = [plot for plot in PLOTS if any(path.startswith(plot.entities) for path in branch.series)]
-    views = {plot: plot_view(plot, branch, log.best, full_legend=True) for plot in plots}
-    left = [view for plot, view in views.items() if plot in MAIN]
-    right = [view for plot, view in views.items() if plot not in MAIN]
-    return rrb.Horizontal(
-        rrb.Vertical(*left, row_shares=[plot.height for plot in MAIN if plot in views]),
-        rrb.Vertical(page_tabs(titles, titles[0]), *right, row_shares=[3.5, *[1.0] * len(right)]),
-        column_shares=[11, 9],
-        name=branch.label,
-    )

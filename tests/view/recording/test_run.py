@@ -18,7 +18,7 @@ from rerun.chunk import RrdReader
 from cmg_mj.core.errors import InputError
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Outcome
-from cmg_mj.results.summary_keys import KEYS, format_figure, heading
+from cmg_mj.results.summary_keys import KEYS, capitalised, format_figure, heading
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs import live
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -26,9 +26,9 @@ from cmg_mj.runs.save import live_view
 from cmg_mj.scenario.loading import Scenario, load_scenario
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push
-from cmg_mj.view.recording import RecordingHeader, Run, save, write_recording
-from cmg_mj.view.recording.run import POSE_RATE_HZ, phases
-from cmg_mj.view.recording.scene import FLYWHEEL_SLOWDOWN
+from cmg_mj.view.recording import RecordingHeader, Run, write_recording
+from cmg_mj.view.recording.run import phases
+from cmg_mj.view.recording.scene import FLYWHEEL_SLOWDOWN, POSE_RATE_HZ
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1", 'open_loop_observers=["linear"]')
 NANOSECONDS = 1e9
@@ -165,8 +165,7 @@ def test_an_estimated_bias_is_drawn_beside_the_true_one(tmp_path: Path) -> None:
         np.testing.assert_allclose(estimate, np.degrees(run.trajectory[f"estimate/{name}/bias_rad"]), rtol=1e-12)
     _, true = scalars(path, "/adaptive/bias/true")
     np.testing.assert_allclose(true, setup.scenario.plant.equilibrium_bias_deg, rtol=1e-12)
-    (summary,) = static(path, "/summary", "TextDocument:text")
-    assert heading("bias_estimate_deg") in summary
+    assert heading("bias_estimate_deg")[1:] in static(path, "/summary", "TextDocument:text")[0]
 
 
 def matrix(xyzw: np.ndarray) -> np.ndarray:
@@ -258,10 +257,8 @@ def test_the_push_is_an_arrow_while_it_lasts(path: Path) -> None:
 
 def test_phases_are_recorded(path: Path, run: Run, experiment: Experiment) -> None:
     times, states = column(path, "/homogeneous/phase", "StateChange:state")
-    recorded_phases = [(time, state) for time, (state,) in zip(times, states, strict=True)]
     expected = phases(run, experiment.scenario.push, experiment.scenario.metrics)
-    assert recorded_phases == [(round(time, 9), name) for time, name in expected]
-    assert [state for _, state in recorded_phases][:3] == ["balancing", "push", "recovering"]
+    assert [*zip(times, states.ravel(), strict=True)] == [(round(time, 9), name) for time, name in expected]
 
 
 def make_run(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Run:
@@ -342,7 +339,8 @@ def test_two_observers_have_a_branch_each(run: Run, experiment: Experiment, tmp_
 
 def test_pages_name_and_layout(path: Path, run: Run) -> None:
     (summary,) = static(path, "/summary", "TextDocument:text")
-    assert [key for key in KEYS if heading(key) in summary] == [key for key in KEYS if key in run.summary]
+    rows = [line.split("|")[1].strip() for line in summary.splitlines() if line.startswith("| ")]
+    assert rows[2:] == [capitalised(heading(key)) for key in KEYS if key in run.summary]
     assert format_figure("tilt_rms_deg", run.summary["tilt_rms_deg"]) in summary
     (observers,) = static(path, "/observers", "TextDocument:text")
     assert all(name in observers for name in ("homogeneous", "linear", *REFERENCES))
@@ -360,7 +358,7 @@ def test_the_same_run_gives_the_same_recording(path: Path, experiment: Experimen
     assert rerun(tmp_path, "compare", "--unordered", path, other).returncode != 0
 
 
-def test_a_full_disk_or_ctrl_c_leaves_the_old_file(
+def test_a_full_disk_leaves_the_old_file(
     run: Run, experiment: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "recording.rrd"
@@ -372,14 +370,6 @@ def test_a_full_disk_or_ctrl_c_leaves_the_old_file(
             write(path, experiment, [run])
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(save, "log_phases", interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            write(path, experiment, [run])
     monkeypatch.setenv("RERUN", "off")
     with pytest.raises(InputError, match="RERUN"):
         write(path, experiment, [run])
