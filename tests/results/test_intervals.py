@@ -9,7 +9,6 @@ import pytest
 from scipy import stats
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.sweeps.cells import fell_interval
 from cmg_mj.results.intervals import (
     FEWEST,
     Interval,
@@ -49,34 +48,6 @@ def test_intervals_of_a_known_mean_cover_it(kind: str) -> None:
         "with falls": lambda: np.where(rng.random((TIMES, 120)) < 0.1, np.nan, rng.normal(1.0, 0.3, (TIMES, 120))),
     }[kind]()
     assert 0.925 <= share_that_holds(1.0, samples) <= 0.975
-
-
-def test_paired_differences_cover_and_are_narrower() -> None:
-    """Two observers with the same noise: errors correlated by 0.95, whose means are 0.02 apart."""
-    rng = np.random.default_rng(8)
-    common = rng.normal(0.0, 1.0, (TIMES, 100))
-    first, second = (
-        mean + 0.3 * (np.sqrt(0.95) * common + np.sqrt(0.05) * rng.normal(0.0, 1.0, common.shape))
-        for mean in (1.0, 1.02)
-    )
-    assert 0.925 <= share_that_holds(0.02, second - first) <= 0.975
-    paired, alone = known_interval(second[0] - first[0]), known_interval(first[0])
-    assert paired is not None
-    assert alone is not None
-    assert paired.half < 0.5 * alone.half
-
-
-@pytest.mark.parametrize("worlds", [100, 400])
-@pytest.mark.parametrize("share", [0.05, 0.2, 0.5])
-def test_the_share_of_falls_is_covered(share: float, worlds: int) -> None:
-    """Wilson's interval: exactly, by the probability of every count, and in 10,000 samples."""
-    low, high = np.array([fell_interval(n_fallen, worlds)[1:] for n_fallen in range(worlds + 1)]).T
-    is_covered = (low <= share) & (share <= high)
-    exactly = stats.binom.pmf(np.arange(worlds + 1), worlds, share)[is_covered].sum()
-    assert 0.925 <= exactly <= 0.975
-    n_fallen = np.random.default_rng(9).binomial(worlds, share, TIMES)
-    assert 0.925 <= is_covered[n_fallen].mean() <= 0.975
-    assert is_covered[n_fallen].mean() == pytest.approx(exactly, abs=0.01)
 
 
 SKEWED: dict[str, tuple[float, Callable[[np.random.Generator, tuple[int, int]], np.ndarray]]] = {

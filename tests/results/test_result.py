@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -66,14 +65,6 @@ def test_the_table_has_a_row_per_observer_and_world() -> None:
         assert set(summary) - set(row) == {"open_loop_observers", "references"}
     assert table[ERROR].to_pylist()[4:8] == [open_loop_figures(s)["linear"][ERROR] for s in result().summaries]
     assert set(table["tilt_rms_deg"].to_pylist()[4:]) == {None}  # the loop's alone
-
-
-def test_the_table_of_a_group_and_of_one_world() -> None:
-    _, fallen_worlds = result().split(2)
-    assert fallen_worlds.table()["world"].to_pylist()[:2] == [2, 3]
-    alone = experiment().run(world=5, keep_trajectory=False).table()
-    assert alone["world"].to_pylist() == [5] * ROWS
-    assert alone["seed"].to_pylist() == [0] * ROWS
 
 
 def test_references_have_values_too() -> None:
@@ -145,13 +136,6 @@ def test_wrong_keys_and_groups_are_refused() -> None:
     for count in (0, -1, 3):
         with pytest.raises(InputError, match=r"split\(-?\d+\): \d+ worlds do not make -?\d+ equal groups"):
             result().split(count)
-
-
-def test_one_world_is_one_group() -> None:
-    single = experiment().run()
-    (same,) = single.split(1)
-    assert same is single
-    assert math.isfinite(single.values(ERROR)[0])
 
 
 @pytest.mark.parametrize("metadata", [{"observers": ["homogeneous"]}, {"layout": 3}, [1]])

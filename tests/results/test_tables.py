@@ -44,10 +44,5 @@ def test_no_line_begins_with_markup(word: str) -> None:
         assert not [line for line in lines if line.split()[0] == word]
 
 
-def test_a_wrapped_text_stays_as_it_is() -> None:
-    text = wrap(f"# Title\n\n{WORDS}\n\n- one\n- {WORDS}")
-    assert wrap(text) == text
-
-
 def test_a_long_word_is_not_broken() -> None:
     assert wrap(f"short {'x' * 150} short") == f"short\n{'x' * 150}\nshort"

@@ -45,32 +45,16 @@ def test_pushes_add_up() -> None:
         ]
 
 
-@pytest.mark.slow
-def test_noise_and_bias() -> None:
-    with session("push=[]", "plant.initial_tilt_deg=0.0") as studio:
-        studio.run(3.0)
-        studio.send(ChangeSettings({NOISE: 0.0}))
-        studio.run(12.0)  # the integrator starts at zero
-        rows = studio.rows
-        noisy, quiet = (np.ptp(part[:, U]) for part in (rows[400:600], rows[-200:]))
-        assert quiet < 0.1 * noisy
-        studio.send(ChangeSettings({BIAS: 1.5}))
-        studio.run(24.0)
-        tilt = studio.data.qpos[studio.live.plant.tilt] - studio.live.plant.tilt_zero
-        assert np.degrees(tilt) == pytest.approx(-1.5, abs=0.1)
-
-
 def test_what_is_refused_changes_nothing_and_is_said() -> None:
     with session() as studio:
         studio.run(0.5)
-        for values, complaint in (
-            ({OBSERVER: "no_such"}, "no such observer"),
-            ({BIAS: 60.0}, "less than 45"),
+        for values, field in (
+            ({OBSERVER: "no_such"}, "observer"),
+            ({BIAS: 60.0}, "equilibrium_bias_deg"),
             ({NOISE: -1.0}, "noise_density_ug_rthz"),
-            ({OBSERVER: "tests.no_such_module:Observer"}, "cannot be imported"),
         ):
             studio.send(ChangeSettings(values))
-            assert complaint in studio.session_state().note
+            assert field in studio.session_state().note
         studio.run(1.0)
         same(studio.rows, runner_rows("duration_s=2.5"))
 

@@ -9,7 +9,6 @@ from cmg_mj.observers import OBSERVERS
 from cmg_mj.view.plots import style
 from cmg_mj.view.plots.style import (
     BASELINE_COLOURS,
-    BOUND_COLOURS,
     COLOURS,
     USER_COLOURS,
     Colour,
@@ -20,7 +19,6 @@ from cmg_mj.view.plots.style import (
     short_names,
     thinned,
 )
-from cmg_mj.view.recording.signals import CONTROLLER
 
 SIGHT = {
     "all three cones": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -85,12 +83,6 @@ def test_an_observer_keeps_its_colour_whatever_it_is_shown_with() -> None:
     assert list(colours(names)) == names
 
 
-@pytest.mark.parametrize("sight", SIGHT)
-def test_bounds_are_not_taken_for_what_they_bound(sight: str) -> None:
-    assert least_distance([BOUND_COLOURS["settle band"], BASELINE_COLOURS["true"]], sight) > 0.1
-    assert least_distance([BOUND_COLOURS["rate limit"], CONTROLLER], sight) > 0.1
-
-
 def summary(error: float | None, *, push: float | None = None, fell: bool = False) -> Summary:
     return {"velocity_rms_error_rad_s": error, "velocity_rms_error_push_rad_s": push, "fell": fell}
 
@@ -113,20 +105,9 @@ def test_names_are_shortened_where_they_stay_apart() -> None:
     assert list(short_names(["mine:linear", "linear"]).values()) == ["mine:linear", "linear"]
 
 
-@pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_signal_keeps_its_outline(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(style, "LONG", 1000)
     monkeypatch.setattr(style, "DRAWN", 200)
-
-
-def test_a_short_signal_stays_as_it_is(small: None) -> None:
-    time = np.arange(1000.0)
-    x, y = thinned(time, time**2)
-    assert x is time
-    assert len(y) == 1000
-
-
-def test_a_long_one_keeps_its_outline(small: None) -> None:
     time = np.arange(12345) / 100.0
     values = np.random.default_rng(0).normal(size=len(time))
     values[[0, 777, 5000]] = [9.0, np.nan, -30.0]
