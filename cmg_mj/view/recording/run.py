@@ -77,11 +77,6 @@ class Run:
         return figures_by_observer(self.trajectory.observers, self.summary)
 
     @property
-    def ranking(self) -> Summary:
-        """The numbers that rank the run: a run that did not reach its end ranks last."""
-        return {**self.summary, "fell": self.outcome.kind in ENDINGS}
-
-    @property
     def references(self) -> dict[str, Summary]:
         """The baselines, each with its numbers."""
         return {**section(self.summary, "references")}
@@ -172,10 +167,7 @@ def _recovery(trajectory: Trajectory, start: float, end: float, band: float) -> 
     window = (time >= start - 1e-9) & (time < end - 1e-9)
     if not window.any():
         return [(start, RECOVERING)]
-    times = time[window]
-    excursions = np.flatnonzero(np.abs(trajectory["x1_rad"][window]) > band)
-    settle_index = int(excursions[-1]) + 1 if excursions.size else 0
-    steps = [(start, RECOVERING)] if settle_index > 0 else []
-    if settle_index < len(times):
-        steps.append((max(start, float(times[settle_index])), SETTLED))
-    return steps
+    outside = np.flatnonzero(np.abs(trajectory["x1_rad"][window]) > band)
+    settled = time[window][outside[-1] + 1 if len(outside) else 0 :]
+    steps = [(start, RECOVERING)] if len(outside) else []
+    return [*steps, (max(start, float(settled[0])), SETTLED)] if len(settled) else steps
