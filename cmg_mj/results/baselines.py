@@ -22,7 +22,7 @@ REFERENCES = (*RATES, *FLOORS)
 
 RATE_START = 0.02
 """Standard deviation of the rate at the start, about zero: that of `gyro_free` [rad/s]."""
-LEAST_TILT_SIGMA = 1e-6
+MIN_TILT_SIGMA = 1e-6
 """A y1 without any noise counts with this one, as for the law `lqg` [rad]."""
 SETTLED = 1e-13
 """Gains that change by less from tick to tick, relative, are taken to be constant."""
@@ -57,7 +57,7 @@ class FusedGyro:
         bias: float | None = None,
     ) -> None:
         self._dt, self._bias = dt, bias
-        sigmas = np.maximum(tilt_sigmas, LEAST_TILT_SIGMA)
+        sigmas = np.maximum(tilt_sigmas, MIN_TILT_SIGMA)
         alike = bool((sigmas == sigmas[0]).all())
         self._R: Scalar = float(sigmas[0]) ** 2 if alike else sigmas * sigmas
         self._tilt_noise, self._walk = (gyro_sigma * dt) ** 2, bias_instability**2 * dt

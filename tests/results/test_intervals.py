@@ -10,7 +10,7 @@ from scipy import stats
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.results.intervals import (
-    FEWEST,
+    MIN_WORLDS,
     Interval,
     known_interval,
     mean_interval,
@@ -81,15 +81,15 @@ def test_intervals_of_what_is_positive_and_skewed_cover_better_than_students(
 
 @pytest.mark.parametrize("kind", SKEWED)
 def test_fewer_worlds_than_cover_have_no_interval(kind: str) -> None:
-    """From `FEWEST` on it holds the mean as often as of six; of two its upper end could be 330,000 times the mean."""
+    """From `MIN_WORLDS` on it holds the mean as often as of six; of two its upper end could be 330,000 times the mean."""
     mean, draw = SKEWED[kind]
-    samples = draw(np.random.default_rng(FEWEST), (4000, FEWEST))
+    samples = draw(np.random.default_rng(MIN_WORLDS), (4000, MIN_WORLDS))
     results = [known_interval(values, positive=True) for values in samples]
     intervals = [result for result in results if result is not None]
     assert len(intervals) == len(samples)
     assert covered(mean, intervals) > 0.87
     assert np.median([interval.high / interval.mean for interval in intervals if interval.mean]) < 10.0
-    for n_worlds in range(FEWEST):
+    for n_worlds in range(MIN_WORLDS):
         assert known_interval([0.1, 0.2, 0.3][:n_worlds], positive=True) is None
     with pytest.raises(InputError, match="needs four worlds or more, not 2"):
         positive_mean_interval([0.0, 1.0])
@@ -100,7 +100,7 @@ def test_narrow_intervals_are_students_and_zeros_have_none() -> None:
     assert positive_mean_interval(values) == pytest.approx(mean_interval(values), rel=5e-4)
     assert not positive_mean_interval(values).is_lopsided
     assert positive_mean_interval([0.0, 0.0, 0.0, 5.0]).is_lopsided
-    assert positive_mean_interval([0.0] * FEWEST) == (0.0, 0.0, 0.0)
+    assert positive_mean_interval([0.0] * MIN_WORLDS) == (0.0, 0.0, 0.0)
     assert positive_mean_interval([1.0, np.inf, 1.0, 2.0])[1:] == (-np.inf, np.inf)
     known = [1.0, 2.0, 3.0, 4.0]
     assert known_interval([np.nan, *known], positive=True) == positive_mean_interval(known)

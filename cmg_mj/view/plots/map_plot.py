@@ -147,9 +147,9 @@ def _draw_cells(
 
 def edges(centres: np.ndarray, *, log: bool) -> np.ndarray:
     """Return the edges of cells, half-way between their centres on the axis, (n + 1,)."""
-    on_axis = np.log(centres) if log else np.asarray(centres, dtype=float)
-    inner = (on_axis[:-1] + on_axis[1:]) / 2.0
-    result = np.concatenate([[2 * on_axis[0] - inner[0]], inner, [2 * on_axis[-1] - inner[-1]]])
+    at = np.log(centres) if log else np.asarray(centres, dtype=float)
+    beyond = np.concatenate([[2.0 * at[0] - at[1]], at, [2.0 * at[-1] - at[-2]]])
+    result = (beyond[:-1] + beyond[1:]) / 2.0
     return np.exp(result) if log else result
 
 

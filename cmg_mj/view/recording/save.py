@@ -24,7 +24,7 @@ from cmg_mj.view.recording.run import RecordingHeader, Run, numbered_parts
 from cmg_mj.view.recording.scene import log_poses, log_pushes, log_shapes
 from cmg_mj.view.recording.signals import Lines, Series, log_phases, log_styles, log_values, make_branches
 
-LONGEST_LIST = 120
+MAX_LIST = 120
 """Longest list of runs in an application's name [characters]."""
 LOG_TIMELINE = "time"
 """Name of the timeline of a log, whose time is not simulated."""
@@ -197,7 +197,7 @@ def _application_name(names: Sequence[str], branches: Sequence[Lines]) -> str:
     The name may have about 180 characters, few of them punctuation.
     """
     run_names = " ".join(names)
-    if len(run_names) > LONGEST_LIST:
+    if len(run_names) > MAX_LIST:
         run_names = f"{len(names)} runs"
     lines = " ".join(f"{branch.path}/{path}" for branch in branches for path in branch.series)
     return re.sub(r"[^\w -]", "-", f"cmg-mj {run_names} {zlib.crc32(lines.encode()):08x}", flags=re.ASCII)

@@ -35,7 +35,7 @@ MAX_TILES = 200
 TILE_COLORS = ((150, 156, 164), (132, 138, 147))
 POSES = 25
 """Number of poses of a run that the ball encloses."""
-FARTHEST = 2.0
+MAX_TRAVEL = 2.0
 """A rig that travels farther than so many radii is shown at its start."""
 CORNERS = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0
 
@@ -87,7 +87,7 @@ def enclosing_ball(plant: Plant, qpos: np.ndarray) -> Ball:
     poses = qpos[np.isfinite(qpos).all(axis=1)]
     whole = enclose(np.concatenate([start, poses[:: -(-len(poses) // POSES) or 1], poses[-1:]]))
     at_start = enclose(start)
-    return whole if whole.radius < FARTHEST * at_start.radius else at_start
+    return whole if whole.radius < MAX_TRAVEL * at_start.radius else at_start
 
 
 def _drawn(model: mujoco.MjModel, element_of: Any, count: int) -> Iterator[tuple[int, Any, np.ndarray]]:

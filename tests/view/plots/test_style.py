@@ -49,10 +49,6 @@ def least_distance(colours: list[Colour], sight: str) -> float:
     return float(distances[np.triu_indices(len(colours), 1)].min())
 
 
-def luminance(colours: list[Colour]) -> np.ndarray:
-    return linear(colours) @ [0.2126, 0.7152, 0.0722]
-
-
 @pytest.mark.parametrize(
     ("sight", "least"), [("all three cones", 0.13), ("protanopia", 0.1), ("deuteranopia", 0.1), ("tritanopia", 0.045)]
 )
@@ -63,14 +59,6 @@ def test_the_bundled_observers_can_be_distinguished(sight: str, least: float) ->
 @pytest.mark.parametrize("sight", SIGHT)
 def test_the_others_are_not_taken_for_them(sight: str) -> None:
     assert least_distance([*COLOURS.values(), *BASELINE_COLOURS.values(), *USER_COLOURS], sight) > 0.032
-
-
-def test_they_are_seen_on_white_and_on_the_viewers_ground() -> None:
-    """Contrast as WCAG counts it; 3 is what it asks of lines, which yellow and pink miss on white."""
-    light = luminance([*COLOURS.values(), *BASELINE_COLOURS.values(), *USER_COLOURS]) + 0.05
-    ground = float(luminance([(13, 16, 17)])[0]) + 0.05
-    assert (1.05 / light).min() > 1.85
-    assert (light / ground).min() > 2.7
 
 
 def test_every_bundled_observer_has_one() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 import re
 from collections.abc import Sequence
@@ -22,7 +21,7 @@ from cmg_mj.stages.swing import Swing
 from cmg_mj.view.recording import RecordingHeader, Run, write_recording
 from cmg_mj.view.recording.layout import EYE, pages
 from cmg_mj.view.recording.run import legend, numbered_parts
-from cmg_mj.view.recording.scene import FARTHEST, enclosing_ball
+from cmg_mj.view.recording.scene import MAX_TRAVEL, enclosing_ball
 from cmg_mj.view.recording.signals import make_branches
 
 SHORT = ("duration_s=0.6", "push.0.start_s=0.2")
@@ -122,14 +121,6 @@ def test_numbers_put_paths_into_the_order_given() -> None:
     assert numbered_parts([*"zyxwvutsrqp"])[0] == "01_z"
 
 
-def move(model: mujoco.MjModel, scale: float, shift: np.ndarray) -> mujoco.MjModel:
-    """The same rig, larger or smaller, elsewhere."""
-    for name in ("body_pos", "geom_pos", "geom_size", "geom_aabb", "site_pos", "jnt_pos", "body_ipos"):
-        getattr(model, name)[:] *= scale
-    model.body_pos[1] += shift
-    return model
-
-
 def corners(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
     """Return the corners of all boxes around geoms of moving bodies, (n, 3) [m]."""
     data = mujoco.MjData(model)
@@ -145,17 +136,12 @@ def corners(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
     return np.concatenate(boxes)
 
 
-@pytest.mark.parametrize("scenario", ["push_recovery", "single_gimbal"])
-@pytest.mark.parametrize(("scale", "shift"), [(1.0, (0, 0, 0)), (10.0, (0, 0, 0)), (0.1, (0, 0, 0)), (1.0, (5, -3, 1))])
-def test_a_rig_is_framed_whole(
-    monkeypatch: pytest.MonkeyPatch, scenario: str, scale: float, shift: tuple[float, float, float]
-) -> None:
+@pytest.mark.parametrize("scenario", ["push_recovery", "single_gimbal", "two_axes"])
+def test_a_rig_is_framed_whole(scenario: str) -> None:
     plant = prepare(load_scenario(scenario, ())).plant
-    model = move(copy.copy(plant.drawn_model), scale, np.array(shift, float))
-    monkeypatch.setitem(plant.__dict__, "drawn_model", model)
     qpos = plant.new_data().qpos[None]
     rig = enclosing_ball(plant, qpos)
-    points = corners(model, qpos[0])
+    points = corners(plant.drawn_model, qpos[0])
     eye = rig.centre + rig.radius * np.array(EYE)
     gaze = (rig.centre - eye) / np.linalg.norm(rig.centre - eye)
     to_points = points - eye
@@ -175,4 +161,4 @@ def test_a_rig_is_framed_where_it_goes() -> None:
         assert distance.max() <= ball.radius * (1.0 + 1e-9)
     at_start = enclosing_ball(plant, start[None]).radius
     assert enclosing_ball(plant, np.full((3, len(start)), math.nan)).radius == at_start
-    assert at_start < ball.radius < FARTHEST * at_start
+    assert at_start < ball.radius < MAX_TRAVEL * at_start
