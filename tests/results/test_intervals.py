@@ -81,7 +81,7 @@ def test_intervals_of_what_is_positive_and_skewed_cover_better_than_students(
 
 @pytest.mark.parametrize("kind", SKEWED)
 def test_fewer_worlds_than_cover_have_no_interval(kind: str) -> None:
-    """From `MIN_WORLDS` on it holds the mean as often as of six; of two its upper end could be 330,000 times the mean."""
+    """From `MIN_WORLDS` on it holds the mean as often as of six."""
     mean, draw = SKEWED[kind]
     samples = draw(np.random.default_rng(MIN_WORLDS), (4000, MIN_WORLDS))
     results = [known_interval(values, positive=True) for values in samples]
