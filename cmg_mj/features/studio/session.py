@@ -102,7 +102,7 @@ class PlottedTick(NamedTuple):
 
 
 class StudioSession:
-    """A scenario that the owner of its data steps. Without interference its trajectory is the runner's.
+    """A scenario that others step. Without interference its trajectory is the runner's.
 
     Args:
         experiment: The scenario.
@@ -111,6 +111,7 @@ class StudioSession:
         base: The scenario at the start.
         now: The scenario with the user's changes.
         plant: The plant, on a model that has visual geoms as well.
+        data: The plant's data, which others may move.
         stopped: The reason why the controller has stopped and the gimbals stand; empty while it runs.
         diverged: Whether the controller has stopped because the physics diverged.
         note: Result of the last change or jump, if the user should know.
@@ -128,33 +129,26 @@ class StudioSession:
         self._others = [Swings(scenario.swing, self.timestep, axes), MovingPivot(signals, self.timestep)]
         self._gravity = self.model.opt.gravity.copy()
         self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=PLOTTED_TICKS)
-        self._begin(0)
+        self.data = mujoco.MjData(self.model)
+        self.start()
 
     @property
     def model(self) -> mujoco.MjModel:
         """The model that is stepped and shown."""
         return self.plant.model
 
-    def new_data(self) -> mujoco.MjData:
-        """Make data at the scenario's initial state, and begin the run there."""
-        data = mujoco.MjData(self.model)
-        self.start(data)
-        return data
-
-    def start(self, data: mujoco.MjData) -> None:
+    def start(self) -> None:
         """Put the plant at the scenario's initial state, and begin the run; the user's changes stay."""
         initial = self.now.plant.new_data()
         everything = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-        mujoco.mj_copyState(self.now.plant.model, initial, data, everything)
+        mujoco.mj_copyState(self.now.plant.model, initial, self.data, everything)
         with set_control_callback(None):
-            mujoco.mj_forward(self.model, data)
-        self.begin(data)
+            mujoco.mj_forward(self.model, self.data)
+        self.begin()
 
-    def begin(self, data: mujoco.MjData) -> None:
+    def begin(self) -> None:
         """Begin a run at the present state, with a fresh controller."""
-        self._begin(round(data.time / self.timestep))
-
-    def _begin(self, step: int) -> None:
+        step = round(self.data.time / self.timestep)
         self._users_pushes = [push for push in self._users_pushes if push.start_s < (step - 0.5) * self.timestep]
         self.ticks.clear()
         self.diverged = False
@@ -200,76 +194,73 @@ class StudioSession:
     def _nothing(self) -> Outside:
         return Outside([0.0] * len(self._lines))
 
-    def sync_to_time(self, data: mujoco.MjData) -> int:
+    def sync_to_time(self) -> int:
         """Begin again at the state's time, if someone has moved the state; return the step."""
-        step = round(data.time / self.timestep)
+        step = round(self.data.time / self.timestep)
         if step != self._next:
-            self._begin(step)
-            self.note = f"the controller starts afresh at t = {data.time:g} s"
+            self.begin()
+            self.note = f"the controller starts afresh at t = {self.data.time:g} s"
         return step
 
-    def step(self, data: mujoco.MjData) -> bool:
+    def step(self) -> bool:
         """Advance one physics step, before which the controller takes due samples and decisions.
 
         No failure of an observer or of the physics raises from here.
 
-        Args:
-            data: The plant's data.
-
         Returns:
             Whether there was a control tick.
         """
-        step = self.sync_to_time(data)
+        data, step = self.data, self.sync_to_time()
         if step >= self._outside_until:
             start, self._outside_until = self._interval(step)
             self._set_outside(start)
         # Studio's mouse writes xfrc_applied: MuJoCo adds them up.
         apply_torques(data.qfrc_applied, self._lines, self._torques)
-        ticked = not self.stopped and self._control(data)
+        ticked = not self.stopped and self._control()
         mujoco.mj_step(self.model, data)
         self._next = step + 1
         if not np.isfinite(data.qpos).all():
             self.diverged = True
-            self._stop(data, f"the physics diverged at t = {data.time:g} s; reset")
+            self._stop(f"the physics diverged at t = {data.time:g} s; reset")
         return ticked
 
-    def _control(self, data: mujoco.MjData) -> bool:
+    def _control(self) -> bool:
+        data = self.data
         lean = self.plant.largest_tilt(data.qpos)
         if not abs(lean) <= math.radians(self.now.scenario.metrics.fall_angle_deg):
-            self._stop(data, f"the rig fell at t = {data.time:g} s; reset, or go back in time")
+            self._stop(f"the rig fell at t = {data.time:g} s; reset, or go back in time")
             return False
         try:
             ticked = control(self.plant, self.controller, data)
         except (InputError, RunStopped) as error:
-            self._stop(data, str(error))
+            self._stop(str(error))
             return False
         if ticked:
-            self.ticks.append(tuple(self._plotted_tick(data, *pair) for pair in enumerate(self._torques)))
+            self.ticks.append(tuple(self._plotted_tick(*pair) for pair in enumerate(self._torques)))
         return ticked
 
-    def _plotted_tick(self, data: mujoco.MjData, axis: int, torque: float) -> PlottedTick:
+    def _plotted_tick(self, axis: int, torque: float) -> PlottedTick:
         """Return the last tick of an axis."""
-        line, tick = self.plant.axes[axis].line, self.controller.parts[axis].tick
+        data, line, tick = self.data, self.plant.axes[axis].line, self.controller.parts[axis].tick
         assert tick is not None
         x1 = math.degrees(float(line.lean(data.qpos)) + self.now.plant.axes[axis].bias)
         return PlottedTick(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u, torque)
 
-    def _stop(self, data: mujoco.MjData, why: str) -> None:
+    def _stop(self, why: str) -> None:
         self.stopped = why
         for axis in self.plant.axes:
-            data.ctrl[axis.servos] = 0.0
+            self.data.ctrl[axis.servos] = 0.0
 
-    def choose(self, data: mujoco.MjData, values: FieldValues) -> None:
+    def choose(self, values: FieldValues) -> None:
         """Change settings of the scenario on all axes; `note` has the reason of a refusal.
 
         The controller starts afresh at the present state.
 
         Args:
-            data: The plant's data.
             values: Field, named as with `--set` -> value: the observer, the law, `controller.feedback`, the
                 accelerometers' noise, e.
         """
-        self.sync_to_time(data)
+        self.sync_to_time()
         try:
             fields = changed_fields(self.base, self.now, values)
             if self.now.scenario.plant.timestep_s is None:
@@ -281,16 +272,16 @@ class StudioSession:
         source = self.base.scenario.source  # which would grow with every change
         self.now = dataclasses.replace(new, scenario=new.scenario.with_source(source))
         copy_physics_numbers(self.model, new.plant.model)  # in place, because others hold the model too
-        self.restart_controller(data)
+        self.restart_controller()
         self.note = "; ".join(new.hints)
 
-    def restart_controller(self, data: mujoco.MjData) -> None:
+    def restart_controller(self) -> None:
         """Start the controller afresh at the present state, for instance after the failure of an observer."""
-        self._start_controller(self.sync_to_time(data))
+        self._start_controller(self.sync_to_time())
 
-    def push(self, data: mujoco.MjData, torque: float, duration_s: float, axis: int = 0) -> None:
+    def push(self, torque: float, duration_s: float, axis: int = 0) -> None:
         """Push from now on: torque about a tilt axis by its index [N m], duration [s]."""
-        step, dt = self.sync_to_time(data), self.timestep
+        step, dt = self.sync_to_time(), self.timestep
         duration_s = max(1, round(duration_s / dt)) * dt
         self._users_pushes.append(Push(step * dt, duration_s, torque, self.plant.axis_names[axis]))
         self._start_pushes(step)

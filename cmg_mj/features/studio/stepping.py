@@ -6,7 +6,6 @@ import logging
 import time
 from collections.abc import Callable
 
-import mujoco
 import numpy as np
 from mujoco.studio import (
     messages,
@@ -85,31 +84,30 @@ class Stepping(plugin.SimPlugin):
             return True
         self._complaint = ""
         self.live = live
-        data = live.new_data()
-        self.handle.set_model(live.model, data=data)
-        self._begin_pacing(data.time)
+        self.handle.set_model(live.model, data=live.data)
+        self._begin_pacing(live.data.time)
         return True
 
     @messages.handler(priority=AFTER_STUDIO)
     def on_reset(self, event: messages.ResetEvent) -> None:
         """Begin again at the scenario's initial state, or at the user's keyframe."""
-        session = self._session()
-        if session is None:
+        live = self.live
+        if live is None:
             return
-        live, data = session
         if event.key is None or not 0 <= event.key < live.model.nkey:
-            live.start(data)
+            live.start()
         else:
-            live.begin(data)
-        self._begin_pacing(data.time)
+            live.begin()
+        self._begin_pacing(live.data.time)
 
     @messages.handler
     def on_step(self, event: messages.StepEvent) -> bool:
         """Advance the physics steps that are due."""
-        live, data = self.live, event.data
+        live = self.live
         if live is None:
             self._sleep(REST_S)
             return True
+        data = live.data
         if event.model.opt.timestep != live.timestep:
             event.model.opt.timestep = live.timestep
             self._complain(f"the physics step stays {live.timestep:g} s: samples and ticks fall on whole steps")
@@ -119,7 +117,7 @@ class Stepping(plugin.SimPlugin):
             due, self._single_steps = self._single_steps, 0
             self._begin_pacing(data.time + due * live.timestep)
         for _ in range(due):
-            live.step(data)
+            live.step()
             if live.diverged:
                 self._pause = sim.PauseState.NORMAL_PAUSED  # there is nothing more to show
                 self.handle.send_to_viewer(self._state())
@@ -138,8 +136,8 @@ class Stepping(plugin.SimPlugin):
     def on_step_control(self, event: messages.StepControlSnapshot) -> bool:
         """Handle the user's pause, resumption, or speed."""
         self._pause, self._speed = event.pause_state, event.speed
-        if self.handle.data is not None:
-            self._begin_pacing(self.handle.data.time)
+        if self.live is not None:
+            self._begin_pacing(self.live.data.time)
         if event.noise_scale:
             self._complain("Studio's noise on the controls is not applied: set the accelerometers' noise here")
         return True
@@ -160,17 +158,15 @@ class Stepping(plugin.SimPlugin):
     @messages.handler
     def on_choose(self, event: ChangeSettings) -> None:
         """Change settings of the scenario."""
-        if session := self._session():
-            live, data = session
+        if self.live is not None:
             self._complaint = ""
-            live.choose(data, event.values)
+            self.live.choose(event.values)
 
     @messages.handler
     def on_push(self, event: PushRequest) -> None:
         """Push about the axis shown."""
-        if session := self._session():
-            live, data = session
-            live.push(data, event.torque_n_m, event.duration_s, self._axis_index(live))
+        if self.live is not None:
+            self.live.push(event.torque_n_m, event.duration_s, self._axis_index(self.live))
 
     @messages.handler
     def on_show_axis(self, event: ShowAxis) -> None:
@@ -185,14 +181,8 @@ class Stepping(plugin.SimPlugin):
     @messages.handler
     def on_start_again(self, _: RestartController) -> None:
         """Restart a controller that has stopped."""
-        if session := self._session():
-            live, data = session
-            live.restart_controller(data)
-
-    def _session(self) -> tuple[StudioSession, mujoco.MjData] | None:
-        """Return the session and its data, once a scenario is loaded."""
-        live, data = self.live, self.handle.data
-        return None if live is None or data is None else (live, data)
+        if self.live is not None:
+            self.live.restart_controller()
 
     def _complain(self, message: str) -> None:
         self._complaint = message
@@ -200,11 +190,10 @@ class Stepping(plugin.SimPlugin):
 
     def session_state(self) -> SessionState:
         """Describe the session for the panel."""
-        session = self._session()
-        if session is None:
+        live = self.live
+        if live is None:
             return SessionState(note=self._complaint)
-        live, data = session
-        now = live.now
+        now, data = live.now, live.data
         axis = self._axis_index(live)
         part = now.parts[axis]
         ticks = np.array([tick[axis] for tick in live.ticks if tick[axis].time_s < data.time - 1e-9]).reshape(-1, 6)
