@@ -120,13 +120,13 @@ def run_title(summary: Row) -> str:
 
 def summary_table(summary: Row) -> Group:
     """Make what `cmg-mj run` prints: the figures of each axis, and those of its open-loop observers."""
-    axes = section(summary, AXES) or {"figure": summary}
+    axes = section(summary, AXES) or {"": summary}
     end = outcome_in_words(str(summary["outcome"]), summary["end_time_s"])
     tables = [figures_table(axes, {next(iter(axes)): end}, run_title(summary))]
     floors: list[str] = []
     for name, axis in axes.items():
         if figures := open_loop_figures(axis):
-            tables.append(estimates_table(f"Open loop, {name}" if AXES in summary else "Open loop", figures))
+            tables.append(estimates_table(f"Open loop, {name}" if name else "Open loop", figures))
             floors += [floor for floor in FLOORS if floor in figures]
     return Group(*(table.rich() for table in tables), *([about_floors(floors)] if floors else []))
 
@@ -145,12 +145,12 @@ def figures_table(summaries: Mapping[str, Row], outcomes: Mapping[str, str], tit
         outcomes: Heading -> outcome in words.
         title: Above the table in the terminal.
     """
-    rows: list[Row] = [{"": "Outcome", **outcomes}]
+    rows: list[Row] = [{"figure": "Outcome", **outcomes}]
     for key in KEYS:
         if any(key in summary for summary in summaries.values()):
             figures = {name: format_figure(key, summary.get(key)) for name, summary in summaries.items()}
-            rows.append({"": capitalised(heading(key)), **figures})
-    columns = {"": "", **{name: name for name in summaries}}
+            rows.append({"figure": capitalised(heading(key)), **figures})
+    columns = {"figure": "", **{name: name for name in summaries}}
     return Table(columns, rows, title, lambda row, key: str(row.get(key, "")), named=False)
 
 
