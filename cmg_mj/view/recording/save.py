@@ -158,15 +158,17 @@ def _written(
         with rr.RecordingStream(_application_name(names, branches)) as rec:
             require_enabled(rec)
             memory = rec.memory_recording()  # of a file by itself rerun hides a full disk, or waits for ever
-            rec.send_blueprint(blueprint, make_active=False, make_default=True)
-            set_up(rec, title)
-            for branch in branches:
-                log_styles(rec, branch)
-                log_values(rec, branch)
-            for name, text in texts.items():
-                rec.log(name, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
-            yield rec
-            recorded = memory.drain_as_bytes()
+            try:
+                rec.send_blueprint(blueprint, make_active=False, make_default=True)
+                set_up(rec, title)
+                for branch in branches:
+                    log_styles(rec, branch)
+                    log_values(rec, branch)
+                for name, text in texts.items():
+                    rec.log(name, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+                yield rec
+            finally:
+                recorded = memory.drain_as_bytes()  # rerun complains of data that nobody takes
     finally:
         rr.set_strict_mode(strict)
     with whole_file(path) as temporary:
