@@ -163,17 +163,19 @@ def draw(path: Path, picture: Picture) -> None:
     all_axes: list[Axes] = []
     for i, panel in enumerate(panels):
         row, column = divmod(i - n_first, columns)
-        is_first = i < n_first
-        is_lowest = i == n_first - 1 if is_first else i + columns >= len(panels)
-        above = all_axes[i - columns] if i - columns >= n_first else all_axes[0] if 0 < i < n_first else None
-        place = grid[i, :] if is_first else grid[n_first + row, column]
-        axes = figure.add_subplot(place, sharex=above if picture.share_x else None)
+        if i < n_first:
+            place, is_lowest, above = grid[i, :], i == n_first - 1, i - 1
+        else:
+            place, is_lowest = grid[n_first + row, column], i + columns >= len(panels)
+            above = i - columns if row else -1
+        shared = all_axes[above] if picture.share_x and above >= 0 else None
+        axes = figure.add_subplot(place, sharex=shared)
         _draw_panel(axes, panel)
         all_axes.append(axes)
         if is_lowest or not picture.share_x:
             axes.set_xlabel(panel.x_label)
         axes.tick_params(labelbottom=is_lowest or not picture.share_x)
-        if n_first and not is_first:
+        if 0 < n_first <= i:
             axes.set_xlabel(axes.get_xlabel(), fontsize="small")
             axes.set_ylabel(panel.y_label.replace(" [", "\n[") if column == 0 else "", fontsize="x-small")
             axes.tick_params(labelleft=column == 0, labelsize="small")
