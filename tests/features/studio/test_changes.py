@@ -145,17 +145,9 @@ def test_a_model_dropped_on_the_viewer_takes_the_rigs_place(tmp_path: Path) -> N
     base = prepare(load_scenario("push_recovery"))
     studio = Session(lambda path: base.with_settings({"plant.model": path}) if path else base)
     with studio.handle:
-        studio.run(0.5)
-        studio.send(messages.LoadModelEvent(path=str(tmp_path / "none.xml")))
-        assert "no such file" in studio.session_state().note
-        studio.run(0.5)
-        assert studio.data.time > 1.0
-        studio.stepping.rows.clear()
         studio.send(messages.LoadModelEvent(path=str(other)))
         studio.run(3.0)
-        expected = runner_rows(f"plant.model={other}")
-        same(studio.rows, expected)
-        assert not np.array_equal(expected, runner_rows())
+        same(studio.rows, runner_rows(f"plant.model={other}"))
         other.write_text("<mujoco/>", encoding="utf-8")
         studio.send(messages.LoadModelEvent(path=str(other)))
         assert "joint" in studio.session_state().note
