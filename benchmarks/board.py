@@ -24,8 +24,8 @@ from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain
 from cmg_mj.papers.aranovskiy2020.on_the_board import PLAIN, RECORDED
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS as PAPER_OBSERVERS
-from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from cmg_mj.scenario.schema import Scenario
@@ -176,7 +176,7 @@ def cost_table(figures: CostFigures) -> Table:
 
 def cost_markdown(figures: CostFigures) -> str:
     """Write the table of costs in Markdown."""
-    return table([heading.strip() for heading in COLUMNS], _cells(figures))
+    return markdown_table([heading.strip() for heading in COLUMNS], _cells(figures))
 
 
 def _cells(figures: CostFigures) -> list[list[str]]:

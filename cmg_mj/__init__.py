@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from cmg_mj.sensors.sampled import Sensors as Sensors
     from cmg_mj.stages.push import Push as Push
     from cmg_mj.stages.swing import Swing as Swing
-    from cmg_mj.view.recording.stream import show_recording as show_recording
+    from cmg_mj.view.recording.save import show_recording as show_recording
 
 
 def _listed_names() -> dict[str, str]:

@@ -11,7 +11,7 @@ from cmg_mj.inputs.features import entries
 from cmg_mj.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_gains, omissions, sliding_words
 from cmg_mj.plant.plant import Plant
-from cmg_mj.results.description import assignments, lines, number
+from cmg_mj.results.reports import assignments, lines, number
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.resolve import resolved

@@ -70,7 +70,6 @@ FEATURES = {
                 "cmg_mj.features.studio.command:studio", "Open a scenario in MuJoCo Studio with its controller running."
             )
         },
-        needs=("pivot",),
     ),
     "sweeps": Feature(
         commands={

@@ -14,8 +14,8 @@ import numpy as np
 
 from cmg_mj.papers import PAPERS, Reproduction
 from cmg_mj.papers.claim import VERDICTS, Claim
-from cmg_mj.results import markdown
 from cmg_mj.results.folder import RunFolder, Writers, claimed, write_text
+from cmg_mj.results.tables import markdown_table, wrap
 from cmg_mj.view.plots.figure import draw
 
 
@@ -82,7 +82,7 @@ def found(claim: Claim) -> str:
 def verdict_table(entries: Sequence[Reproduction]) -> str:
     """Write every claim and its verdict as a Markdown table."""
     rows = [(entry.paper, _place(claim), claim.statement, claim.verdict) for entry in entries for claim in entry.claims]
-    return markdown.table(("paper", "place", "claim", "verdict"), rows, text_columns=4)
+    return markdown_table(("paper", "place", "claim", "verdict"), rows, text_columns=4)
 
 
 def report_text(entries: Sequence[Reproduction]) -> str:
@@ -105,8 +105,8 @@ def report_text(entries: Sequence[Reproduction]) -> str:
         if not entry.complete:
             parts.append("**Interrupted: not all of this paper's claims are here.**")
         headings = ("place", "claim", "found", "verdict", "conditions")
-        parts.append(markdown.table(headings, [_row(claim) for claim in entry.claims], text_columns=5))
-    return "\n\n".join(markdown.wrap(part) for part in parts) + "\n"
+        parts.append(markdown_table(headings, [_row(claim) for claim in entry.claims], text_columns=5))
+    return "\n\n".join(wrap(part) for part in parts) + "\n"
 
 
 def _place(claim: Claim) -> str:

@@ -22,7 +22,7 @@ REFERENCES = (*RATES, *FLOORS)
 
 RATE_START = 0.02
 """Standard deviation of the rate at the start, about zero: that of `gyro_free` [rad/s]."""
-LEAST_TILT_SIGMA = 1e-6
+MIN_TILT_SIGMA = 1e-6
 """A y1 without any noise counts with this one, as for the law `lqg` [rad]."""
 SETTLED = 1e-13
 """Gains that change by less from tick to tick, relative, are taken to be constant."""
@@ -57,7 +57,7 @@ class FusedGyro:
         bias: float | None = None,
     ) -> None:
         self._dt, self._bias = dt, bias
-        sigmas = np.maximum(tilt_sigmas, LEAST_TILT_SIGMA)
+        sigmas = np.maximum(tilt_sigmas, MIN_TILT_SIGMA)
         alike = bool((sigmas == sigmas[0]).all())
         self._R: Scalar = float(sigmas[0]) ** 2 if alike else sigmas * sigmas
         self._tilt_noise, self._walk = (gyro_sigma * dt) ** 2, bias_instability**2 * dt
@@ -67,7 +67,6 @@ class FusedGyro:
         self._gains: list[tuple[Scalar, Scalar]] = []
         self._is_settled = False
         self._turned = self._reading = self._x1 = self._turn = np.zeros(len(sigmas))
-        self._has_started = False
 
     def rates(self, reading: np.ndarray, y1: np.ndarray) -> np.ndarray:
         """Estimate the rate at the next ticks.
@@ -79,19 +78,17 @@ class FusedGyro:
         Returns:
             The rate, (n_rows, n_worlds) [rad/s].
         """
-        start = not self._has_started
+        start = not self._gains
         if start:
-            self._has_started, self._reading = True, reading[0]
+            self._reading = reading[0]
             self._turn = self._dt * (reading[0] if self._bias is None else np.full_like(reading[0], self._bias))
-        n = len(reading)
         before = np.vstack([self._reading[None], reading[:-1]])
         turns = 0.5 * self._dt * (before + reading)
         if start:
             turns[0] = 0.0
         turned = np.cumsum(np.vstack([self._turned[None], turns]), axis=0)[1:]
         self._reading, self._turned = reading[-1], turned[-1]
-        gains = self._next_gains(n - 1, first=True) if start else self._next_gains(n)
-        biases = self._filter(y1 - turned, gains)
+        biases = self._filter(y1 - turned, self._next_gains(len(reading)))
         return reading - biases / self._dt
 
     def _filter(self, seen: np.ndarray, gains: Sequence[tuple[Scalar, Scalar]]) -> np.ndarray:
@@ -99,30 +96,27 @@ class FusedGyro:
 
         `self._x1` is the estimate of what is seen, `self._turn` the bias times the sample period.
         """
-        single = seen.shape[1] == 1 and isinstance(self._R, float)
-        samples = seen[:, 0].tolist() if single else seen  # a float costs a twentieth of an array of one
-        x1, turn = (float(self._x1[0]), float(self._turn[0])) if single else (self._x1, self._turn)
-        turns = []
-        for sample, (k1, k2) in zip(samples, gains, strict=True):
+        x1, turn, turns = self._x1, self._turn, np.empty_like(seen)
+        for row, (sample, (k1, k2)) in enumerate(zip(seen, gains, strict=True)):
             x1 = x1 - turn
             e = sample - x1
             x1 = x1 + k1 * e
             turn = turn + k2 * e
-            turns.append(turn)
-        self._x1, self._turn = np.atleast_1d(x1), np.atleast_1d(turn)
-        return np.array(turns).reshape(seen.shape)
+            turns[row] = turn
+        self._x1, self._turn = x1, turn
+        return turns
 
-    def _next_gains(self, n: int, first: bool = False) -> Sequence[tuple[Scalar, Scalar]]:
+    def _next_gains(self, n: int) -> Sequence[tuple[Scalar, Scalar]]:
         """Compute the gains of the next n samples on x1 and on the bias times the sample period.
 
-        At the first one x1 is what is measured, and the bias stays.
+        At the very first one x1 is what is measured, and the bias stays.
         """
         if self._is_settled:
             return self._gains[-1:] * n
-        gains: list[tuple[Scalar, Scalar]] = [(1.0, 0.0)] if first else []
+        gains: list[tuple[Scalar, Scalar]] = [] if self._gains else [(1.0, 0.0)]
         dt, R, tilt_noise, walk = self._dt, self._R, self._tilt_noise, self._walk
         xx, xb, bb = self.covariance
-        for _ in range(n):
+        for _ in range(n - len(gains)):
             xx = xx + dt * (dt * bb - 2.0 * xb) + tilt_noise
             xb = xb - dt * bb
             bb = bb + walk

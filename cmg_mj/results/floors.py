@@ -157,14 +157,14 @@ class Floors:
     Args:
         noises: Noise of one sample of y1 and its acceleration, a world each.
         dt: Sample period [s].
-        has_acceleration: Which worlds have a floor of y1 with its acceleration, (n_worlds,); None: all. It is no floor
+        has_acceleration: Which worlds have a floor of y1 with its acceleration, (n_worlds,). It is no floor
             where a pivot moves, or where accelerometers vibrate or are off their radii.
     """
 
-    def __init__(self, noises: Sequence[TiltNoise], dt: float, has_acceleration: Sequence[bool] | None = None) -> None:
+    def __init__(self, noises: Sequence[TiltNoise], dt: float, has_acceleration: Sequence[bool]) -> None:
         self._y1 = TiltFloor(dt, len(noises))
         self._acceleration = [acceleration_floor(noise, dt) for noise in noises]
-        self._has_acceleration = has_acceleration or [True] * len(noises)
+        self._has_acceleration = has_acceleration
         self.add = self._y1.add
 
     def errors(self, world: int) -> dict[str, tuple[float | None, float | None]]:

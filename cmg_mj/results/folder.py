@@ -1,8 +1,9 @@
-"""The folder of a result: written to a hidden sibling and renamed into its place whole."""
+"""The folder of a result and its files: written to a hidden sibling and renamed into their place whole."""
 
 from __future__ import annotations
 
 import itertools
+import json
 import os
 import re
 import shutil
@@ -11,9 +12,12 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from cmg_mj.core.errors import InputError, raised
-from cmg_mj.results.files import is_plain_file
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 Writers = Mapping[str, Callable[[Path], object]]
 """Name of a file -> function that writes it to the path given."""
@@ -127,7 +131,7 @@ class RunFolder:
             return False
         return self._overwrite or all(_text(place / name) == _text(self.part / name) for name in REQUESTS)
 
-    def release(self) -> None:
+    def release(self, *_: object) -> None:
         """Remove what was made for nothing."""
         shutil.rmtree(self.part, ignore_errors=True)
         with suppress(OSError):  # what holds something stays
@@ -137,8 +141,7 @@ class RunFolder:
     def __enter__(self) -> RunFolder:
         return self
 
-    def __exit__(self, *exception: object) -> None:
-        self.release()
+    __exit__ = release
 
 
 @contextmanager
@@ -276,3 +279,50 @@ def is_signed(path: Path) -> bool:
     line = SIGNATURES[path.suffix].encode()
     with path.open("rb") as file:
         return file.read(len(line)) == line
+
+
+METADATA_KEY = b"cmg_mj"
+"""The key of what cmg_mj says of a table, as JSON, in the metadata of its Parquet file."""
+ROW_GROUP = 32768
+"""Number of rows that Arrow compresses together, and that a reader may skip."""
+
+
+def is_plain_file(path: Path) -> bool:
+    """Return whether this is a file, and neither a link to one nor a pipe or a device."""
+    return path.is_file() and not path.is_symlink()
+
+
+@contextmanager
+def whole_file(path: Path, ending: str = "") -> Iterator[Path]:
+    """Give a temporary name to write to; rename it to `path` at the end, or remove it if the writing failed.
+
+    Args:
+        path: The file.
+        ending: Ending of the temporary name, for readers that go by it.
+
+    Yields:
+        The temporary file.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial{ending}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        with suppress(FileNotFoundError):
+            temporary.unlink()
+
+
+def write_parquet(path: Path, table: pa.Table, metadata: Mapping[str, Any]) -> None:
+    """Write a table as Parquet, whole or not at all.
+
+    Args:
+        path: The file.
+        table: The table.
+        metadata: What the file says of the table beside it.
+    """
+    import pyarrow.parquet as pq
+
+    # Opened here: Arrow takes no path with bytes that are no UTF-8.
+    with whole_file(path) as temporary, temporary.open("wb") as file:
+        stored = {METADATA_KEY: json.dumps(metadata).encode()}
+        pq.write_table(table.replace_schema_metadata(stored), file, row_group_size=ROW_GROUP)

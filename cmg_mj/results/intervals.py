@@ -12,7 +12,7 @@ from cmg_mj.core.errors import InputError
 
 CONFIDENCE = 0.95
 LOPSIDED = 0.1
-FEWEST = 4
+MIN_WORLDS = 4
 """Fewer values than these have no interval of a mean that cannot be negative.
 
 From four on it holds the mean in 87 % or more of skewed samples, of three in 85 %, of two in 74 %. One of two can reach
@@ -70,7 +70,7 @@ def positive_mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
     and than a bootstrap of few worlds (`tests/results/test_intervals.py`); for narrow ones it is Student's.
 
     Args:
-        values: One a world, at least `FEWEST`, none below zero.
+        values: One a world, at least `MIN_WORLDS`, none below zero.
 
     Returns:
         The mean and its interval; infinite ends if a value is not finite.
@@ -78,7 +78,7 @@ def positive_mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
     Raises:
         InputError: There are fewer values.
     """
-    if len(values) < FEWEST:
+    if len(values) < MIN_WORLDS:
         raise InputError(f"an interval of a non-negative figure needs four worlds or more, not {len(values)}")
     mean, low, high = mean_interval(values)
     if not mean > 0.0:  # all are zero, or one is no number
@@ -90,14 +90,14 @@ def positive_mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
 def known_interval(values: Sequence[float] | np.ndarray, positive: bool = False) -> Interval | None:
     """Compute the interval of the mean over the finite values, as of the worlds that stood; None of too few.
 
-    Fewer than two are too few, and fewer than `FEWEST` of what cannot be negative.
+    Fewer than two are too few, and fewer than `MIN_WORLDS` of what cannot be negative.
 
     Args:
         values: One a world.
         positive: Whether the quantity cannot be negative (`positive_mean_interval`).
     """
     known = finite_values(values)
-    if len(known) < (FEWEST if positive else 2):
+    if len(known) < (MIN_WORLDS if positive else 2):
         return None
     return positive_mean_interval(known) if positive else mean_interval(known)
 

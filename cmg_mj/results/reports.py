@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 
 from rich.console import Group
 
+from cmg_mj.core.errors import TomlValue
 from cmg_mj.inputs.files import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
-from cmg_mj.results.description import assignments
 from cmg_mj.results.floors import FLOOR_ACCELERATION, FLOORS, NO_ACCELERATION_FLOOR, NOISE_ALONE
 from cmg_mj.results.intervals import Interval, format_interval
 from cmg_mj.results.summary_keys import (
@@ -68,7 +68,7 @@ def comparison_note(summaries: Sequence[Row]) -> str:
     loop = next((summary["in_loop_of"] for summary in summaries if "in_loop_of" in summary), None)
     if not loop:
         return ABOUT_COMPARISONS
-    floors = _about_floors(any(summary["observer"] == FLOOR_ACCELERATION for summary in summaries))
+    floors = about_floors([summary["observer"] for summary in summaries])
     return f"{ABOUT_COMPARISONS}\nOpen loop, on the motion of {loop}, the best:\n{ABOUT_BASELINES}\n{floors}"
 
 
@@ -84,21 +84,17 @@ def comparison_markdown(summaries: Sequence[Row]) -> str:
     return "\n\n".join([means.markdown(), *less, comparison_note(summaries)])
 
 
-def _headings(first: str, keys: Sequence[str]) -> dict[str, str]:
+def _headings(first: str, keys: Iterable[str]) -> dict[str, str]:
     return {"observer": first, **{key: heading(key) for key in keys}}
 
 
 def _mean_entry(summary: Row, key: str) -> str:
-    if key == "observer":
-        return str(summary[key])
     intervals = summary["intervals"]
     ends = intervals.get(key) if isinstance(intervals, Mapping) else None
     return _with_interval(format_figure(key, summary[key]), key, summary[key], ends)
 
 
 def _difference_entry(summary: Row, key: str) -> str:
-    if key == "observer":
-        return str(summary[key])
     less = section(summary, "minus_best").get(key)
     if less is None:
         return "best"
@@ -123,36 +119,58 @@ def run_title(summary: Row) -> str:
 
 def summary_table(summary: Row) -> Group:
     """Make what `cmg-mj run` prints: the figures of each axis, and those of its open-loop observers."""
-    ends = {"done": "stood to the end, {:g} s", "fell": "fell at {:.2f} s"}
-    outcome = str(summary["outcome"])
-    end = ends.get(outcome, outcome + " at {:g} s").format(summary["end_time_s"])
     axes = section(summary, AXES) or {"": summary}
-    rows: list[Row] = [{"": "Outcome", next(iter(axes)) or "figure": end}]
-    columns = {"": "", **{name or "figure": name for name in axes}}
+    end = outcome_in_words(str(summary["outcome"]), summary["end_time_s"])
+    tables = [figures_table(axes, {next(iter(axes)): end}, run_title(summary))]
+    floors: list[str] = []
+    for name, axis in axes.items():
+        if figures := open_loop_figures(axis):
+            tables.append(estimates_table(f"Open loop, {name}" if name else "Open loop", figures))
+            floors += [floor for floor in FLOORS if floor in figures]
+    return Group(*(table.rich() for table in tables), *([about_floors(floors)] if floors else []))
+
+
+def outcome_in_words(kind: str, time_s: SummaryValue) -> str:
+    """Say how a run ended, and when."""
+    ends = {"done": "stood to the end, {:g} s", "fell": "fell at {:.2f} s"}
+    return ends.get(kind, kind + " at {:g} s").format(time_s)
+
+
+def figures_table(summaries: Mapping[str, Row], outcomes: Mapping[str, str], title: str = "") -> Table:
+    """Tabulate summaries, a column each, with a row for each figure that any of them has.
+
+    Args:
+        summaries: Heading -> summary.
+        outcomes: Heading -> outcome in words.
+        title: Above the table in the terminal.
+    """
+    rows: list[Row] = [{"figure": "Outcome", **outcomes}]
     for key in KEYS:
-        if key in summary:
-            figures = {name or "figure": format_figure(key, axis.get(key)) for name, axis in axes.items()}
-            rows.append({"": capitalised(heading(key)), **figures})
-    open_loop = [_open_loop_table(name, axis) for name, axis in axes.items() if open_loop_figures(axis)]
-    floors = {name for axis in axes.values() for name in FLOORS if name in open_loop_figures(axis)}
-    about = [_about_floors(FLOOR_ACCELERATION in floors)] if floors else []
-    tables = [Table(columns, rows, run_title(summary), lambda row, key: str(row.get(key, ""))), *open_loop]
-    return Group(*(table.rich() for table in tables), *about)
+        if any(key in summary for summary in summaries.values()):
+            figures = {name: format_figure(key, summary.get(key)) for name, summary in summaries.items()}
+            rows.append({"figure": capitalised(heading(key)), **figures})
+    columns = {"figure": "", **{name: name for name in summaries}}
+    return Table(columns, rows, title, lambda row, key: str(row.get(key, "")), named=False)
 
 
-def _open_loop_table(axis: str, summary: Row) -> Table:
-    """Show how well the open-loop observers and the baselines estimate an axis' rate."""
-    rows = [{"observer": name, **figures} for name, figures in open_loop_figures(summary).items()]
-    columns = _headings(f"Open loop, {axis}" if axis else "Open loop", OPEN_LOOP_COLUMNS)
-    return Table(columns, rows, entry=_figure_entry)
+def estimates_table(
+    first: str, figures: Mapping[str, Row], keys: Sequence[str] = OPEN_LOOP_COLUMNS, *, named: bool = True
+) -> Table:
+    """Tabulate how well observers and baselines estimate the rate.
+
+    Args:
+        first: Heading of the names.
+        figures: Name -> figures.
+        keys: The figures to show.
+        named: Whether the names are code in Markdown.
+    """
+    rows = [{**values, "observer": name} for name, values in figures.items()]
+    return Table(_headings(first, keys), rows, "", lambda row, key: format_figure(key, row.get(key)), named)
 
 
-def _figure_entry(row: Row, key: str) -> str:
-    return str(row[key]) if key == "observer" else format_figure(key, row.get(key))
-
-
-def _about_floors(has_acceleration: bool) -> str:
-    return NOISE_ALONE if has_acceleration else NO_ACCELERATION_FLOOR
+def about_floors(names: Container[SummaryValue]) -> str:
+    """Explain the floors among some baselines."""
+    return NOISE_ALONE if FLOOR_ACCELERATION in names else NO_ACCELERATION_FLOOR
 
 
 def scenario_list() -> str:
@@ -177,3 +195,22 @@ def class_list(kind: UserClassKind) -> str:
         lines += [line.replace("\0", " ") for line in wrapped]
         lines += textwrap.wrap(title, 98, initial_indent=indent, subsequent_indent=indent)
     return "\n".join(lines)
+
+
+def lines(title: str, rows: Iterable[tuple[str, str]]) -> str:
+    """Join a title, and rows of a label and a text."""
+    return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows)])
+
+
+def assignments(values: Mapping[str, TomlValue]) -> str:
+    """Parameters and their values, as `--set` takes them."""
+    return "  ".join(f"{name}={number(value)}" for name, value in values.items())
+
+
+def number(value: TomlValue) -> str:
+    """Return a value as TOML writes it, to six digits."""
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(number(item) for item in value)}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-"""The caller of the controller, or the controller itself. `simulate` knows the first two; `board` is a processor."""
-
 
 @dataclass
 class Outcome:

@@ -13,14 +13,11 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.results.files import METADATA_KEY, write_row_groups
+from cmg_mj.results.folder import METADATA_KEY, write_parquet
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
-
-STRETCH = 32768
-"""Number of rows of a row group, and of what a recording takes at once."""
 
 SIGNALS = (
     "x1_rad",
@@ -108,28 +105,19 @@ class Layout:
         return [*SIGNALS, *estimates]
 
 
-def require_pandas() -> Any:
-    """Import pandas.
-
-    Raises:
-        InputError: pandas is not installed.
-    """
-    try:
-        return importlib.import_module("pandas")
-    except ImportError as error:
-        raise InputError(
-            "to_pandas: pandas is not installed. Install it with `python -m pip install pandas`, or use the columns "
-            "without it: dict(...) has them as NumPy arrays"
-        ) from error
-
-
 def frame_of(table: pa.Table) -> pd.DataFrame:
     """Convert a table to a pandas frame.
 
     Raises:
         InputError: pandas is not installed.
     """
-    require_pandas()
+    try:
+        importlib.import_module("pandas")
+    except ImportError as error:
+        raise InputError(
+            "to_pandas: pandas is not installed. Install it with `python -m pip install pandas`, or use the columns "
+            "without it: dict(...) has them as NumPy arrays"
+        ) from error
     return table.to_pandas()
 
 
@@ -237,32 +225,19 @@ class Trajectory(NamedColumns):
 
     def world(self, index: int) -> Trajectory:
         """Select one world of many, up to its end."""
-        columns = {name: values if name == "time_s" else values[:, index] for name, values in self.columns.items()}
-        running = np.isfinite(columns[self._first_signal])
-        return replace(self, columns={name: values[running] for name, values in columns.items()})
+        alone = self.of_worlds(index)
+        return alone._rows(np.isfinite(alone[self._first_signal]))
 
-    def of_worlds(self, worlds: np.ndarray | slice) -> Trajectory:
+    def of_worlds(self, worlds: np.ndarray | slice | int) -> Trajectory:
         """Select some of many worlds by their indices, a mask (n_worlds,) or a slice."""
         columns = {name: values if name == "time_s" else values[:, worlds] for name, values in self.columns.items()}
         return replace(self, columns=columns)
 
-    def from_tick(self, tick: int) -> Trajectory:
-        """Select the rows from a tick on."""
-        return self.rows(slice(tick, None))
-
-    def rows(self, rows: slice) -> Trajectory:
-        """Select successive rows."""
-        return replace(self, columns={name: values[rows] for name, values in self.columns.items()})
-
-    def stretches(self) -> Iterator[slice]:
-        """Divide the rows into stretches to be handled one after the other; there is at least one."""
-        n_rows = len(self)
-        for start in range(0, max(n_rows, 1), STRETCH):
-            yield slice(start, min(start + STRETCH, n_rows))
-
     def between(self, start_s: float, end_s: float) -> Trajectory:
         """Select the rows from one time to another, both included."""
-        rows = (self["time_s"] >= start_s - 1e-9) & (self["time_s"] <= end_s + 1e-9)
+        return self._rows((self["time_s"] >= start_s - 1e-9) & (self["time_s"] <= end_s + 1e-9))
+
+    def _rows(self, rows: np.ndarray) -> Trajectory:
         return replace(self, columns={name: values[rows] for name, values in self.columns.items()})
 
     def to_pandas(self) -> pd.DataFrame:
@@ -275,17 +250,15 @@ class Trajectory(NamedColumns):
         Raises:
             InputError: pandas is not installed.
         """
-        pandas = require_pandas()
+        import pyarrow as pa
+
         columns = dict(self.columns)
-        time = columns.pop("time_s")
-        worlds = next((values.shape[1] for values in columns.values() if values.ndim == 2), None)
-        if worlds is None:
-            return pandas.DataFrame({"time_s": time, **columns})
-        running = np.isfinite(columns[self._first_signal]).T  # (n_worlds, n_ticks)
-        world = np.broadcast_to(np.arange(worlds)[:, None], running.shape)
-        times = np.broadcast_to(time, running.shape)
-        rows = {name: values.T[running] for name, values in columns.items()}
-        return pandas.DataFrame({"world": world[running], "time_s": times[running], **rows})
+        of_many = [values for values in columns.values() if values.ndim == 2]
+        if of_many:
+            worlds = [self.world(index) for index in range(of_many[0].shape[1])]
+            number = np.repeat(np.arange(len(worlds)), [len(world) for world in worlds])
+            columns = {"world": number, **{name: np.concatenate([world[name] for world in worlds]) for name in self}}
+        return frame_of(pa.table(columns))
 
     @property
     def _first_signal(self) -> str:
@@ -293,11 +266,10 @@ class Trajectory(NamedColumns):
         return self.layout.columns()[0] if self.layout.axes else SIGNALS[0]
 
     def save(self, path: Path) -> None:
-        """Write one world's trajectory as Parquet, a row group a stretch, whole or not at all."""
+        """Write one world's trajectory as Parquet, whole or not at all."""
         import pyarrow as pa
 
-        tables = (pa.table(dict(self.rows(rows).columns)) for rows in self.stretches())
-        write_row_groups(path, tables, {"layout": asdict(self.layout), **self.metadata})
+        write_parquet(path, pa.table(dict(self.columns)), {"layout": asdict(self.layout), **self.metadata})
 
     @staticmethod
     def load(path: Path) -> Trajectory:

@@ -24,7 +24,7 @@ from cmg_mj.linear.loop import linear_closed_loop
 from cmg_mj.linear.verdict import hints
 from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant, check_axes, load_scenario_plant
-from cmg_mj.results.files import whole_file
+from cmg_mj.results.folder import whole_file
 from cmg_mj.results.result import Result
 from cmg_mj.runs.batch import (
     AxisPart,

@@ -12,11 +12,11 @@ import rerun as rr
 from cmg_mj.results.result import Outcome
 from cmg_mj.runs.recorder import MultiAxisRecorder, TickRecorder
 from cmg_mj.runs.simulate import SimulationOptions
+from cmg_mj.view.recording.layout import default_blueprint
 from cmg_mj.view.recording.run import RecordingHeader, Run
+from cmg_mj.view.recording.save import require_enabled, set_up
 from cmg_mj.view.recording.scene import log_poses, log_shapes
 from cmg_mj.view.recording.signals import Branch, log_styles, log_values, make_branches
-from cmg_mj.view.recording.stream import require_enabled, set_up
-from cmg_mj.view.recording.views import default_blueprint
 
 PIECES_HZ = 20.0
 """Largest rate at which ticks are sent; the eye takes it for motion."""

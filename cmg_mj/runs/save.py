@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmg_mj.plant.mjcf import quiet
-from cmg_mj.results.files import write_parquet
-from cmg_mj.results.folder import RunFolder, claimed, write_text
+from cmg_mj.results.folder import RunFolder, claimed, write_parquet, write_text
 from cmg_mj.results.reports import run_title
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from cmg_mj import OBSERVERS, load_scenario, prepare
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 
 HERE = Path(__file__).resolve().parents[2]
 
@@ -116,7 +116,7 @@ def main() -> None:
             gaps = [largest(before[f"{kind}/{part}"], after[f"{kind}/{part}"]) for part in ("one", "many")]
             rows.append((f"`{kind}`", *gaps, *times))
     headings = ("observer", "estimates, one world", "256 worlds", "us before", "after", "256 worlds: before", "after")
-    print(table(headings, rows, text_columns=3), "\n")
+    print(markdown_table(headings, rows, text_columns=3), "\n")
 
     keys = ("velocity_rms_error_rad_s", "tilt_rms_deg", "settle_time_s", "fell_fraction")
     means = {
@@ -127,7 +127,7 @@ def main() -> None:
         (f"`{old['observer']}`", *("-" if s[key] is None else f"{s[key]:.4f}" for key in keys for s in (old, new)))
         for old, new in zip(means["before"], means["after"], strict=True)
     ]
-    print(table(("observer", *(f"{key} {name}" for key in keys for name in ("before", "after"))), rows), "\n")
+    print(markdown_table(("observer", *(f"{key} {name}" for key in keys for name in ("before", "after"))), rows), "\n")
 
     rows = []
     for kind in ("linear", "homogeneous", "adaptive"):
@@ -141,7 +141,7 @@ def main() -> None:
         "after",
         f"ratio, median of {PAIRS} pairs",
     )
-    print(table(("observer", *costs), rows))
+    print(markdown_table(("observer", *costs), rows))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ import numpy as np
 
 from cmg_mj.results.baselines import MEMS_FUSED, MEMS_GYRO, RATE_START, FusedGyro, References
 from cmg_mj.results.floors import acceleration_floor
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 
@@ -69,7 +69,7 @@ def gyros(worlds: int) -> None:
         errors = [np.sqrt(squares[(time >= low) & (time < high)].mean()) for low, high in PARTS_S]
         rows.append([name, *(f"{error:.4f}" for error in errors)])
     print(f"RMS error [rad/s] over seconds of the run, {worlds} worlds\n")
-    print(table(["gyro", *(f"{low:g} to {high:g}" for low, high in PARTS_S)], rows))
+    print(markdown_table(["gyro", *(f"{low:g} to {high:g}" for low, high in PARTS_S)], rows))
 
 
 def places() -> None:
@@ -82,7 +82,7 @@ def places() -> None:
         rows.append([f"{inner:g}, {outer:g}", *figures, f"{acceleration_floor(noise, dt):.4f}"])
     headings = ["inner, outer [m]", "noise of y1 [deg]", "of the acceleration [rad/s^2]", "`floor_accel` [rad/s]"]
     print("\nThe floor by the accelerometers' places\n")
-    print(table(headings, rows))
+    print(markdown_table(headings, rows))
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.results import markdown
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
 
 SEED, WORLDS, LARGEST_DEG, CUTS, PARTS = 30_000, 5, 4.0, 2, 8
@@ -70,7 +70,7 @@ def main() -> None:
         (label, *(cell(values) for values in (*with_push, *without)))
         for label, with_push, without in zip(cases, pushed, quiet, strict=True)
     ]
-    print(markdown.table(("in the loop", "e < 0, push", "e > 0, push", "e < 0, no push", "e > 0, no push"), rows))
+    print(markdown_table(("in the loop", "e < 0, push", "e > 0, push", "e < 0, no push", "e > 0, no push"), rows))
 
 
 if __name__ == "__main__":

@@ -23,10 +23,10 @@ from rich.progress import track
 from cmg_mj import load_scenario, prepare
 from cmg_mj.core.errors import InputError
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, needs
-from cmg_mj.results import markdown
 from cmg_mj.results.baselines import GYROS, MEMS_FUSED, REFERENCES
 from cmg_mj.results.intervals import format_interval, in_line, known_interval
 from cmg_mj.results.result import Result
+from cmg_mj.results.tables import markdown_table
 
 ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
 WORDS = {"model": "model", "gimbals": "y2, u", "acceleration": "acceleration"}
@@ -91,7 +91,7 @@ def main() -> None:
     loop = results[LOOP_OF_BASELINES]
     rows += [[f"`{name}`", *errors(loop, name), "-", "-", "-", asked.get(name, "-")] for name in REFERENCES]
     print(f"{worlds} worlds; the last {len(REFERENCES)} rows are open loop, in the loop of {LOOP_OF_BASELINES}\n")
-    print(markdown.table(list(HEADINGS), rows))
+    print(markdown_table(list(HEADINGS), rows))
 
 
 if __name__ == "__main__":

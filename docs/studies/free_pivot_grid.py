@@ -54,7 +54,7 @@ from cmg_mj.core.types import Measurement, Observer
 from cmg_mj.observers import OBSERVERS, make_observer
 from cmg_mj.observers.free_pivot import FreePivot
 from cmg_mj.observers.gyro_free import GyroFree
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 
@@ -337,15 +337,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 "its start-up",
                 "bars",
             ]
-            print(table(headings, [row for row, _ in rows]))
+            print(markdown_table(headings, [row for row, _ in rows]))
             print("\nAll observers, the same worlds [1e-3 rad/s]:\n")
-            print(table(["cell", *(f"`{name}`" for name in OBSERVERS), "`zero`"], [row for _, row in rows]), flush=True)
+            print(
+                markdown_table(["cell", *(f"`{name}`" for name in OBSERVERS), "`zero`"], [row for _, row in rows]),
+                flush=True,
+            )
         if "loop" in options.parts:
             work = partial(read_or_compute, loop_rows, options.keep)
             rows = list(pool.map(work, chosen, seeds, counts))
             print(f"\nEach in its own loop, {options.worlds} worlds; errors of the worlds that stood [1e-3 rad/s]:\n")
             headings = ["cell", f"`{OURS}` fell", f"`{BASE}` fell", "fewest falls of another", "p", f"`{OURS}`"]
-            print(table([*headings, f"`{BASE}`", "bar"], [row for (row,) in rows]))
+            print(markdown_table([*headings, f"`{BASE}`", "bar"], [row for (row,) in rows]))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ import numpy as np
 from free_pivot_grid import BASE, ERROR, OURS, Cell, experiment, grid, in_loop, replayed
 
 from cmg_mj.observers import make_observer
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 
 CELLS = {
     "outer 1 deg off": "1 deg off",
@@ -90,7 +90,7 @@ def main() -> None:
             for row, count in zip(rows, counts, strict=True):
                 row.append(str(count))
             headings.append(f"falls of {options.falls}")
-    print(table(headings, rows))
+    print(markdown_table(headings, rows))
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from typing import NamedTuple
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj.cli import main as cmg_mj
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 from tests.features.mounting.robots import ROBOTS, Robot, gymnasium_asset
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "gymnasium_plugin.py"
@@ -97,7 +97,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         rows = [row(name, CASES[name], Path(folder)) for name in names]
     head = ["robot", "noise of a reset", "plugin, no action", "plugin, 1 % random", "no plugin, 1 % random"]
-    print(table([*head, "plugin, more random", "plugin, usual noise"], rows, text_columns=1))
+    print(markdown_table([*head, "plugin, more random", "plugin, usual noise"], rows, text_columns=1))
 
 
 if __name__ == "__main__":

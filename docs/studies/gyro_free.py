@@ -33,8 +33,8 @@ from beyond.floor import velocity_floor
 from cmg_mj.observers import OBSERVERS as BUNDLED
 from cmg_mj.results.floors import TiltFloor
 from cmg_mj.results.intervals import Interval, mean_interval
-from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.stages.push import inside, push_windows
@@ -120,10 +120,10 @@ def bars(noises: Sequence[float], biases: tuple[float, ...], worlds: int) -> Non
                 row.append(against(ratio(moved.values(ERROR), of.values(ERROR)), OFFSET_BAR) + fell)
             rows.append(row)
     print(f"\nVelocity RMS error, in the push window after the stroke [rad/s], {worlds} worlds:\n")
-    print(table(["ug/rtHz", "e [deg]", *(f"`{name}`" for name in OBSERVERS)], errors))
+    print(markdown_table(["ug/rtHz", "e [deg]", *(f"`{name}`" for name in OBSERVERS)], errors))
     print("\n`gyro_free`: its error by that of others, and whether the upper end is under the bar:\n")
     headings = ["ug/rtHz", "e [deg]", "stood", "best of ten", "by it", "in push window", "by it"]
-    print(table([*headings, "by the floor", "5 mg inner, by none", "5 mg outer, by none"], rows), flush=True)
+    print(markdown_table([*headings, "by the floor", "5 mg inner, by none", "5 mg outer, by none"], rows), flush=True)
 
 
 def _mean(result: Result) -> str:
@@ -158,7 +158,7 @@ def start(noises: Sequence[float], biases: tuple[float, ...], worlds: int) -> No
         rows.append([f"{noise:g}", "true feedback", "-", "-", "-", "-", "-", falls("linear", noise, TRUTH)])
     print(f"\n`gyro_free` by its `bias_start` at e = {biases[0]:g} deg, and the falls at e = {max(biases):g} deg:\n")
     headings = ["ug/rtHz", "bias_start", "error [rad/s]", "by the floor", "5 mg inner, by none", "5 mg outer, by none"]
-    print(table([*headings, "outer 1 deg off, by none", "fell, 5 mg inner"], rows), flush=True)
+    print(markdown_table([*headings, "outer 1 deg off, by none", "fell, 5 mg inner"], rows), flush=True)
 
 
 def _none_and(fields: Sequence[str]) -> list[tuple[str, ...]]:
@@ -195,7 +195,7 @@ def kalman(noises: Sequence[float], biases: tuple[float, ...], worlds: int) -> N
             print(f"\n`kalman`, {how}, {where}: its error, and less that of others")
             print("(in 1e-3 rad/s, with the interval's half):\n")
             headings = ["ug/rtHz", "e [deg]", "white, walk", "error [rad/s]", *(f"less `{name}`" for name in others)]
-            print(table(headings, rows), flush=True)
+            print(markdown_table(headings, rows), flush=True)
 
 
 def _less(of: Result, other: Result, key: str) -> str:
@@ -226,7 +226,7 @@ def limits(noises: Sequence[float]) -> None:
             found.append(f"{fell * STEP_DEG:.4f}" if fell < LARGEST else f"over {LARGEST * STEP_DEG:g}")
         rows.append([f"{noise:g}", label, *found])
     print("\nThe e at which half of 20 worlds fall [deg], to 1/16 degree:\n")
-    print(table(["ug/rtHz", "in the loop", "e < 0", "e > 0"], rows, text_columns=2), flush=True)
+    print(markdown_table(["ug/rtHz", "in the loop", "e < 0", "e > 0"], rows, text_columns=2), flush=True)
 
 
 def model(noises: Sequence[float]) -> None:
@@ -242,7 +242,7 @@ def model(noises: Sequence[float]) -> None:
         "\nThe floor of y1 and its acceleration for any motion, and the floor with model, command, push and e known, to"
     )
     print("to which the measured acceleration adds nothing [rad/s]: so much can a model take off at most.\n")
-    print(table(["ug/rtHz", "any motion", "all known", "less"], rows), flush=True)
+    print(markdown_table(["ug/rtHz", "any motion", "all known", "less"], rows), flush=True)
 
 
 def taps(worlds: int) -> None:
@@ -272,7 +272,7 @@ def taps(worlds: int) -> None:
     print("if all have one, and of one in worlds that it was not fitted in:\n")
     both = ("y1: whole run", "in push window")
     print(
-        table(["in the loop", "taps", *both, "y1 and acceleration: whole run", both[1]], rows, text_columns=2),
+        markdown_table(["in the loop", "taps", *both, "y1 and acceleration: whole run", both[1]], rows, text_columns=2),
         flush=True,
     )
 

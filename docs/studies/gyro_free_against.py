@@ -20,8 +20,8 @@ from rich.console import Console
 from rich.progress import track
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.side_by_side import run_of, run_side_by_side
 
 SEED = 160_000
@@ -114,7 +114,7 @@ def main() -> None:
         rows = [each.result() for each in track(waiting, "cases", console=Console(stderr=True))]
     heads = ["disturbance", *(f"`{name}`" for name in (*OBSERVERS, *BASELINES)), "fell with the true rate"]
     print(f"velocity RMS error [1e-3 rad/s], {options.worlds} worlds\n")
-    print(table(heads, rows))
+    print(markdown_table(heads, rows))
 
 
 if __name__ == "__main__":

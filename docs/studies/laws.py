@@ -14,9 +14,9 @@ import numpy as np
 from bias_limits import LARGEST_DEG, PARTS, SEED, WORLDS, Case, cell, limits
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.results import markdown
 from cmg_mj.results.intervals import format_interval, in_line, known_interval
 from cmg_mj.results.result import Result
+from cmg_mj.results.tables import markdown_table
 
 LQG = "`lqg`"
 LOOPS = {
@@ -56,13 +56,13 @@ def table(e: float, worlds: int) -> None:
         (name, f"{result.stood.sum()} of {worlds}", *(figure(result.values(key)) for key in FIGURES.values()))
         for name, result in results.items()
     ]
-    print(f"\ne = {e:g} degrees\n\n{markdown.table(('loop', 'stood', *FIGURES), rows)}")
+    print(f"\ne = {e:g} degrees\n\n{markdown_table(('loop', 'stood', *FIGURES), rows)}")
     less = [
         (name, *(figure(result.values(key) - results[LQG].values(key), "+") for key in FIGURES.values()))
         for name, result in results.items()
         if name != LQG
     ]
-    print(f"\nLess {LQG}, world by world\n\n{markdown.table(('loop', *FIGURES), less)}")
+    print(f"\nLess {LQG}, world by world\n\n{markdown_table(('loop', *FIGURES), less)}")
 
 
 def borne_pushes(case: Case) -> np.ndarray:
@@ -93,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ]
     step = f"{LARGEST_DEG / PARTS**2:g} degrees"
     print(f"\nBorne, biases in steps of {step} up to {LARGEST_DEG:g}, pushes of 0.1 s in steps of {PUSHES[0]:g} N m\n")
-    print(markdown.table(("loop", "-e [deg], push of 1 N m", "e [deg], the same", "push [N m], e = 0.5"), rows))
+    print(markdown_table(("loop", "-e [deg], push of 1 N m", "e [deg], the same", "push [N m], e = 0.5"), rows))
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ import mujoco
 from cmg_mj import mount
 from cmg_mj.features.mounting.mount_files import write_scenario
 from cmg_mj.features.mounting.prospects import Prospects, prospects
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from tests.features.mounting.push_robots import cart_pole
 
@@ -119,23 +119,30 @@ def main() -> None:
             cart = mounted(1.0, friction, damping)
             rows.append([f"{friction:g}", f"{damping:g}", *(standing(*cart, loop, worlds) for loop in RUBBED)])
             print(*rows[-1], sep=" | ", file=sys.stderr, flush=True)
-        print(table(["dry friction [N]", "damping [N s/m]", *names_of(RUBBED)], rows, text_columns=1))
+        print(markdown_table(["dry friction [N]", "damping [N s/m]", *names_of(RUBBED)], rows, text_columns=1))
         return
     if options.height:
         loops, rows, cart = RUBBED[:4], [], mounted(1.0)
         for off in HEIGHTS_M:
             rows.append([f"{off:g}", *(standing(*cart, loop, worlds, off) for loop in loops)])
-        print(table(["above the mass centre [m]", *names_of(loops)], rows, text_columns=1))
+        print(markdown_table(["above the mass centre [m]", *names_of(loops)], rows, text_columns=1))
         return
     carts = {mass: mounted(mass) for mass in masses}
     names = ["cart [kg]", "inertia left [kg m^2]", "pole: reduced, simulated [1/s]", "ceiling [N m s]", "c [m]"]
     names += ["y1 about the pivot", "loop's pole about the pivot [1/s]", "about the mass centre"]
-    print(table(names, [[f"{mass:g}", *figures(*cart)] for mass, cart in carts.items()], text_columns=1), flush=True)
+    print(
+        markdown_table(names, [[f"{mass:g}", *figures(*cart)] for mass, cart in carts.items()], text_columns=1),
+        flush=True,
+    )
     rows = []
     for name, loop in zip(names_of(LOOPS), LOOPS, strict=True):
         rows.append([name, *(standing(*cart, loop, worlds) for cart in carts.values())])
         print(*rows[-1], sep=" | ", file=sys.stderr, flush=True)
-    print(table([f"worlds of {worlds} that stand; cart [kg]", *(f"{mass:g}" for mass in masses)], rows, text_columns=1))
+    print(
+        markdown_table(
+            [f"worlds of {worlds} that stand; cart [kg]", *(f"{mass:g}" for mass in masses)], rows, text_columns=1
+        )
+    )
 
 
 main()

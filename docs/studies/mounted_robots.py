@@ -24,7 +24,7 @@ from cmg_mj.features.mounting.largest_push import PUSH_S
 from cmg_mj.features.mounting.mount_files import write_scenario
 from cmg_mj.features.mounting.prospects import prospects
 from cmg_mj.features.mounting.push import TimeLimit, simulated_push
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.schema import ObserverSettings
 from tests.features.mounting.robots import ROBOTS, Robot
@@ -116,7 +116,9 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             rows = [beside_homogeneous(name, ROBOTS[name], Path(folder)) for name in wanted]
         names = ["robot", "E of homogeneous [N m s]", "E of gyro_free [N m s]"]
-        print(table([*names, "homogeneous stands its E, 1.2 E", "gyro_free stands them"], rows, text_columns=1))
+        print(
+            markdown_table([*names, "homogeneous stands its E, 1.2 E", "gyro_free stands them"], rows, text_columns=1)
+        )
         return
     if sys.argv[1:] == ["--commands"]:
         print("\n".join(robot.command for robot in ROBOTS.values()))
@@ -126,7 +128,7 @@ def main() -> None:
     names = ["robot", "tilts about", "scale", "inertia [kg m^2]", "pole: reduced, simulated [1/s]", "ceiling [deg]"]
     names += ["ceiling [N m s]", "E [N m s] (of the ceiling)", "stands [N m s] (of E)"]
     names += ["another seed: alone; pushed so, and 1.8 times so"]
-    print(table(names, rows, text_columns=2))
+    print(markdown_table(names, rows, text_columns=2))
 
 
 main()

@@ -33,8 +33,8 @@ from cmg_mj.features.tuning.simulations import WARM_UP_S
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.observers.scaling import scaled_names, scaled_parameters, scales_of
 from cmg_mj.results.floors import FLOOR_Y1, TiltFloor, acceleration_floor
-from cmg_mj.results.markdown import table
 from cmg_mj.results.summary_keys import SummaryValue, section
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from tests.features.mounting.robots import ROBOTS
@@ -248,16 +248,16 @@ def main() -> None:
         body = [
             [kind, *(loop_cell(rows.get(f"{robot}/{kind}/loop", {}), key) for robot in wanted)] for kind in OBSERVERS
         ]
-        print(table([f"in its own loop, {key}", *short], body, text_columns=1), end="\n\n")
+        print(markdown_table([f"in its own loop, {key}", *short], body, text_columns=1), end="\n\n")
     head = [["tau", "tau", ".2f"], ["motion [rad/s]", "motion", ".4f"], *([name, name, ".2f"] for name in FLOORS)]
     body = [[label, *(cell(of[f"{robot}/{RIG}"], (key,), form) for robot in wanted)] for label, key, form in head]
     names = ("papers", "scaled", "tuned")
     body += [[kind, *(cell(of[f"{robot}/{kind}"], names, ".2f") for robot in wanted)] for kind in OBSERVERS]
-    print(table(["fit", *short], body, text_columns=1), end="\n\n")
+    print(markdown_table(["fit", *short], body, text_columns=1), end="\n\n")
     body = [
         [kind, *(cell(rows.get(f"{robot}/{kind}/E", {}), names, ".0%") for robot in wanted)] for kind in IN_THE_LOOP
     ]
-    print(table(["E of the ceiling", *short], body, text_columns=1))
+    print(markdown_table(["E of the ceiling", *short], body, text_columns=1))
 
 
 main()

@@ -21,7 +21,7 @@ from cmg_mj.features.board import Board, on_a_board
 from cmg_mj.features.board.processor import Decision, run_on
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.intervals import format_interval, in_line, known_interval
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 
@@ -95,7 +95,7 @@ def main() -> None:
     for name in of.observers.split(","):
         rows.append(row(prepare(load_scenario(of.scenario, [], name)), of.worlds))
         print(f"  {rows[-1]}", flush=True)
-    print(table(headings, rows))
+    print(markdown_table(headings, rows))
 
 
 if __name__ == "__main__":

@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj.features.plugin.driver import set_world
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.results.markdown import table
-from tests.features.plugin.made import SENSORS, Made, bits, make, pairs, run, variant
+from cmg_mj.results.tables import markdown_table
+from tests.features.plugin.made import SENSORS, Comparison, Made, bits, compare, make, pairs, run, variant
 from tests.features.plugin.robots import ROBOTS, is_missing, write_robot
 
 PARTS = ("rig", "axes", "worlds", "robots")
@@ -108,9 +108,9 @@ def tables(count: Count, rigs: Mapping[str, Callable[..., Made]], duration: floa
             if any("fell" in cell for cell in cells):
                 fallen.append([f"{name}, {sensors}", *count.cells(make_rig(*settings, TRUE_RATE), duration)])
         rows.append(row)
-    result = table(["", *(f"{name}, {sensors}" for sensors in SENSORS for name in INTEGRATORS)], rows)
+    result = markdown_table(["", *(f"{name}, {sensors}" for sensors in SENSORS for name in INTEGRATORS)], rows)
     if fallen:
-        result += f"\n\nWhat fell, on the true rate:\n\n{table(['', *INTEGRATORS], fallen)}"
+        result += f"\n\nWhat fell, on the true rate:\n\n{markdown_table(['', *INTEGRATORS], fallen)}"
     return result
 
 
@@ -129,7 +129,7 @@ def worlds(count: Count, duration: float) -> str:
                 made = make(observer, f"duration_s={duration}", *SENSORS[sensors], scenario=scenario)
                 cells = [count.cell(compare(made, seed, world), duration) for seed, world in NOISES]
                 rows.append([f"{scenario}, `{observer}`, {sensors}", *cells])
-    return table(["seed, world", *(f"{seed}, {world}" for seed, world in NOISES)], rows)
+    return markdown_table(["seed, world", *(f"{seed}, {world}" for seed, world in NOISES)], rows)
 
 
 def robots(count: Count, duration: float) -> str:

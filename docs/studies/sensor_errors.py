@@ -29,7 +29,7 @@ from scipy.optimize import brentq
 from cmg_mj import OBSERVERS, Accelerometer, load_plant, load_scenario, prepare
 from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.results.intervals import known_interval, ratio_interval
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 
 SEED = 90_000
 OURS = "gyro_free"
@@ -236,7 +236,7 @@ def main() -> None:
     own = ("error", "push window", "fell")
     headings = ("imperfection", "y1 off at rest [deg]", f"`{OURS}`", *own[1:], "best other", *own, "ratio of errors")
     print("Velocity RMS errors in 1e-3 rad/s, with 95 % intervals:\n")
-    print(table(headings, rows), "\n")
+    print(markdown_table(headings, rows), "\n")
     print("Every observer in its own loop, mean errors, in brackets the share of falls; the cheap gyro on the loop of")
     print(f"`{OURS}`; how often the rig falls if the law is told the true rate:\n")
     observers = names[:-1]
@@ -246,7 +246,7 @@ def main() -> None:
         told = share(of["true rate"]["fell"])
         rows.append((case.name, *(short(of[name]) for name in observers), mean(of[OURS]["mems"]), told))
     shown = (f"`{name}`" for name in observers)
-    print(table(("imperfection", *shown, "MEMS gyro", "falls with the true rate"), rows), "\n")
+    print(markdown_table(("imperfection", *shown, "MEMS gyro", "falls with the true rate"), rows), "\n")
     print(f"Where `{OURS}` loses:\n")
     print("\n".join(losses))
     known = [(name, gyro) for name, gyro, low in times if low > 1.0]

@@ -27,7 +27,7 @@ from cmg_mj.features.export.check import FLAGS
 from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.observers import OBSERVERS, Measurement
 from cmg_mj.results.intervals import mean_interval
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 
 SIGNALS = ("y1_rad", "y2_rad", "acceleration_rad_s2", "u_rad_s")
 HEADINGS = ["observer", "C, off by [rad/s]", "rounded once", "last digit", "error [rad/s]: Python", "C", "within"]
@@ -92,7 +92,7 @@ def main() -> None:
     assert result.trajectory is not None
     signals = np.array([result.trajectory[name] for name in SIGNALS])
     truth = result.trajectory["x2_rad_s"]
-    print(table(HEADINGS, [row(name, signals, truth) for name in of.observers.split(",")]))
+    print(markdown_table(HEADINGS, [row(name, signals, truth) for name in of.observers.split(",")]))
 
 
 if __name__ == "__main__":

@@ -17,9 +17,9 @@ import time
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.results.markdown import table
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import NESTED
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 
@@ -112,7 +112,7 @@ def main() -> None:
             "x3 [rad]",
         ]
         print(f"\n`{observer}`, {of.scenario}, {of.worlds} worlds:\n")
-        print(table([*headings, "CPU [ms/world-s]"], rows), flush=True)
+        print(markdown_table([*headings, "CPU [ms/world-s]"], rows), flush=True)
 
 
 if __name__ == "__main__":

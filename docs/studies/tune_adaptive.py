@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.results import markdown
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.scenario.schema import ObserverSettings
 
 SEED, WORLDS, LATE_S = 30_000, 6, 5.0
@@ -66,6 +66,6 @@ for w, damping, s in itertools.product((16.0, 20.0, 25.0, 30.0), (0.5, 0.7, 0.9)
     if not fell and bias <= LARGEST_BIAS_ERROR_DEG:
         scores[w, damping, s] = math.hypot(with_push, without)
 headings = ("w [rad/s]", "damping ratio", "s [1/s]", "velocity, push [rad/s]", "no push [rad/s]", "bias [deg]", "fell")
-print(markdown.table(headings, rows, text_columns=0))
+print(markdown_table(headings, rows, text_columns=0))
 best = min(scores, key=lambda point: scores[point])
 print(f"taken: w = {best[0]:g}, damping ratio {best[1]:g}, s = {best[2]:g}: {gains(*best)}")

@@ -18,8 +18,8 @@ from scipy.optimize import minimize
 from cmg_mj import load_scenario, make_observer, prepare
 from cmg_mj.features.replay import replay
 from cmg_mj.papers.andrieu2009.observer import largest_b
-from cmg_mj.results import markdown
 from cmg_mj.results.summary_keys import heading
+from cmg_mj.results.tables import markdown_table
 
 SEED, LOOP_SEED, WORLDS = 30_000, 31_000, 20
 ERROR = "velocity_rms_error_rad_s"
@@ -76,7 +76,7 @@ for d_inf in D_INF:
         found, given = tuned(d_inf, phi2)
         fits[found] = given
         rows.append((f"{d_inf:g}", f"{phi2:g}", f"{given['l1']:.4g}", f"{given['l2']:.4g}", f"{found:.5f}"))
-print(markdown.table(("d_inf", "phi2", "l1", "l2", heading(ERROR)), rows, text_columns=0))
+print(markdown_table(("d_inf", "phi2", "l1", "l2", heading(ERROR)), rows, text_columns=0))
 best, linear = fits[min(fits)], next(given for given in fits.values() if given["d_inf"] == 0.0)
 print("best:", {name: f"{value:.4g}" for name, value in best.items()})
 best_errors, linear_errors = loop("best", best), loop("best with d_inf = 0", linear)

@@ -20,7 +20,7 @@ import numpy as np
 
 from cmg_mj.inputs.files import folder
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.results.markdown import table
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 
@@ -84,7 +84,7 @@ def the_rig() -> str:
             cells = (f"{row[0]:.1f}", f"{row[1]:.4f}", f"{row[2]:.4f}", f"{row[3]:.3f}", f"{pole:.3f}")
             rows.append([name, axis.name, *cells, f"{own.J2:.2g}"])
     headings = ("model", "axis", "mass [kg]", "h [m]", "I [kg m^2]", "b [1/s]", "pole [1/s]", "J2 [kg m^2]")
-    return table(headings, rows, text_columns=2)
+    return markdown_table(headings, rows, text_columns=2)
 
 
 def turning() -> str:
@@ -107,7 +107,7 @@ def turning() -> str:
             ("the wrong sign", wrong),
         )
     ]
-    return table(("", "u roll [rad/s]", "u pitch [rad/s]", "on roll [N m]", "on pitch [N m]"), rows)
+    return markdown_table(("", "u roll [rad/s]", "u pitch [rad/s]", "on roll [N m]", "on pitch [N m]"), rows)
 
 
 def unlike() -> str:
@@ -146,7 +146,7 @@ def unlike() -> str:
         "on yaw, u 1 rad/s, x3 0.5 [N m]",
         "roll's b [1/s]",
     )
-    return table(headings, rows)
+    return markdown_table(headings, rows)
 
 
 def loop(worlds: int, observer: str) -> str:
@@ -175,7 +175,7 @@ def loop(worlds: int, observer: str) -> str:
         *("wheels", "yaw", "stood", "roll peak [deg]", "pitch peak without noise [deg]", "pitch peak [deg]"),
         *("yaw peak [deg]", "yaw at the end [deg]"),
     )
-    return table(headings, rows, text_columns=3)
+    return markdown_table(headings, rows, text_columns=3)
 
 
 def main() -> None:

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmg_mj.features.mounting.recoverable_states import ceiling
-from cmg_mj.results import markdown
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import section
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 
@@ -53,7 +53,7 @@ def each_on_the_other(worlds: int) -> str:
             rows.append(row)
     headings = ["observer", "turn [rad/s]", "stood"]
     headings += [f"{axis}{what}" for axis in AXES for what in (" [rad/s]", ", other locked", "")]
-    return markdown.table(headings, rows)
+    return markdown_table(headings, rows)
 
 
 def largest_tilt(worlds: int) -> str:
@@ -68,7 +68,7 @@ def largest_tilt(worlds: int) -> str:
             result = two_axes(*calm, f"plant.initial_tilt_deg={share * limit}").run_many(worlds, keep_trajectory=False)
             row.append(f"{int(result.stood.sum())} of {worlds}")
         rows.append(row)
-    return markdown.table(["model", "ceiling [deg]", *(f"stood at {share}" for share in (0.8, 0.9, 0.95, 1.0))], rows)
+    return markdown_table(["model", "ceiling [deg]", *(f"stood at {share}" for share in (0.8, 0.9, 0.95, 1.0))], rows)
 
 
 def fastest_turn(rates: Sequence[float] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0)) -> str:
@@ -87,7 +87,7 @@ def fastest_turn(rates: Sequence[float] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.
             outcome = experiment.run(keep_trajectory=False).outcomes[0]
             row.append(f"fell at {outcome.time_s:.1f} s" if outcome.fell else "stands")
         rows.append(row)
-    return markdown.table(["gimbals turned against it", *(f"{rate:g} rad/s" for rate in rates)], rows)
+    return markdown_table(["gimbals turned against it", *(f"{rate:g} rad/s" for rate in rates)], rows)
 
 
 def gait(worlds: int) -> str:
@@ -114,7 +114,7 @@ def gait(worlds: int) -> str:
                 + (figures if stood == worlds else ["-"] * 4)
             )
     headings = [f"{what} {axis} [{unit}]" for what, unit in (("error", "rad/s"), ("tilt RMS", "deg")) for axis in AXES]
-    return markdown.table(["torque", "observer", "stood", *headings], rows)
+    return markdown_table(["torque", "observer", "stood", *headings], rows)
 
 
 def main() -> None:

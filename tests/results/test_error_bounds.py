@@ -81,15 +81,6 @@ def test_the_matched_filter_reaches_the_floor_with_acceleration() -> None:
     assert abs(squares.mean() - floor) < 4.0 * standard_error(squares) < 0.04 * floor
 
 
-@pytest.mark.daily_cases("noise1")
-@pytest.mark.parametrize(
-    "noise", [TiltNoise(NOISE.tilt, NOISE.acceleration, 0.0), TiltNoise(NOISE.tilt, 2.0 * NOISE.acceleration, 0.89)]
-)
-def test_another_filter_does_not(noise: TiltNoise) -> None:
-    worse = squared_errors(noise) - squared_errors(NOISE)
-    assert worse.mean() > 4.0 * standard_error(worse)
-
-
 def inputs(y1: np.ndarray, edges: list[int]) -> np.ndarray:
     """Sum y1 over the shares of the past of each sample, one by one, (n_rows, n_worlds, n_taps)."""
     past = np.vstack([np.repeat(y1[:1], edges[-1], axis=0), y1])
@@ -153,20 +144,6 @@ def test_the_matched_filter_reaches_the_floor_of_y1() -> None:
     y1, rate, best = swing(40, seed=6)
     result = math.sqrt(np.mean(floors_of(y1, rate) ** 2))
     assert 0.98 * best < result < 1.01 * best < 0.6 * rate.std()
-
-
-def test_no_differentiator_is_below_the_floor_of_y1() -> None:
-    """In no world: linear ones cannot be, if their memory is no longer."""
-    y1, rate, _ = swing(10, seed=7)
-    least, zero = floors_of(y1, rate), 0.0 * y1[0]
-    for kind, name in (("linear", "tau"), ("linear_high_gain", "epsilon")):
-        for value in np.geomspace(0.01, 0.08, 4):
-            estimator = make_observer(kind, DT, PAPER, NOISE, **{name: float(value)})
-            state, squares = estimator.init(Measurement(y1[0], zero)), [rate[0] ** 2]
-            for k in range(1, len(y1)):
-                state, estimate = estimator.step(state, Measurement(y1[k], zero), zero)
-                squares.append((estimate.x2 - rate[k]) ** 2)
-            assert (np.sqrt(np.mean(squares, axis=0)) > least).all(), (kind, value)
 
 
 def test_too_few_samples_make_no_floor() -> None:

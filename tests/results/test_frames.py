@@ -58,15 +58,11 @@ def test_keys_iteration_and_look_up_agree(make: Callable[[], Any]) -> None:
         table["no such column"]
 
 
-def test_as_with_a_frame_the_length_counts_rows() -> None:
-    assert len(trajectory(one())) == len(trajectory(one())["time_s"]) == 80
-    assert len(many()) == len(many()["observer"]) == many().table().num_rows
-
-
 def test_the_columns_of_a_result() -> None:
     stood, error = many()["stood"], many()["velocity_rms_error_rad_s"]
     assert stood[:2].tolist() == [True, False]
     assert error[0] == many().summaries[0]["velocity_rms_error_rad_s"]
+    assert len(many()) == len(error) == many().table().num_rows
     assert many()["in_loop_of"][0] is None
 
 
@@ -90,13 +86,6 @@ def test_many_worlds_as_a_frame_have_a_row_a_world_and_tick() -> None:
         for name in alone:
             np.testing.assert_array_equal(rows[name], alone[name], name)
     assert len(worlds.world(1)) < len(worlds.world(0))  # it fell
-
-
-def test_two_axes_as_a_frame() -> None:
-    pytest.importorskip("pandas")
-    two = trajectory(cmg_mj.prepare(cmg_mj.load_scenario("two_axes", ["duration_s=0.05", "push=[]"])).run_many(2))
-    frame = two.to_pandas()
-    np.testing.assert_array_equal(frame[frame["world"] == 1]["pitch/x1_rad"], two["pitch/x1_rad"][:, 1])
 
 
 def test_results_as_frames() -> None:

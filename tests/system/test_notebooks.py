@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import cmg_mj
-from cmg_mj.view.recording import stream
+from cmg_mj.view.recording import save
 from tests.command import ROOT
 
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
@@ -68,10 +68,10 @@ class Widget:
 def test_a_recording_is_shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     path = tmp_path / "recording.rrd"
     path.write_bytes(b"RRF2")
-    real = stream.importlib.import_module
+    real = save.importlib.import_module
     module = type("module", (), {"Viewer": Widget})
     monkeypatch.setattr(
-        stream.importlib, "import_module", lambda name: module if name == "rerun_notebook" else real(name)
+        save.importlib, "import_module", lambda name: module if name == "rerun_notebook" else real(name)
     )
     monkeypatch.setenv("RERUN_NOTEBOOK_ASSET", "")
     monkeypatch.delenv("RERUN_NOTEBOOK_ASSET")

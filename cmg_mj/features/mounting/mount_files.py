@@ -40,8 +40,7 @@ from cmg_mj.inputs.files import expanded
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.observers.scaling import Number, scaled_names, scaled_parameters
 from cmg_mj.plant.plant import Plant
-from cmg_mj.results.files import whole_file
-from cmg_mj.results.folder import signed
+from cmg_mj.results.folder import signed, whole_file
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario

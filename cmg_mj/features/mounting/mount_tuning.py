@@ -16,8 +16,7 @@ from cmg_mj.features.mounting.mount_files import with_comment
 from cmg_mj.features.tuning import NoiseLevelResult, TuningResult, tune, tuned_scenario
 from cmg_mj.features.tuning.parameters import plain
 from cmg_mj.observers.parameter_options import ParameterValue
-from cmg_mj.results.files import whole_file
-from cmg_mj.results.folder import is_signed, signed
+from cmg_mj.results.folder import is_signed, signed, whole_file
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 

@@ -26,7 +26,7 @@ from cmg_mj.view.plots.run_plot import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_
 from cmg_mj.view.plots.style import BASELINE_COLOURS, Colour, colours, hexadecimal, short_names, thinned
 
 if TYPE_CHECKING:
-    from cmg_mj.view.plots.run_plot import Axes
+    from cmg_mj.view.plots.figure import Axes
     from cmg_mj.view.recording.signals import Series
 
 DETAIL_S = 2.0
@@ -125,7 +125,7 @@ def write_recording(path: Path, replays: Sequence[ReplayResult], names: Sequence
         InputError: The environment turns rerun off.
         OSError: The file cannot be written.
     """
-    from cmg_mj.view.recording.replay_recording import LogSeries, write_logs  # 0.4 s of import, needed only here
+    from cmg_mj.view.recording.save import LogSeries, write_logs  # 0.4 s of import, needed only here
 
     title = f"Replay: {', '.join(names)}"
     logs = [

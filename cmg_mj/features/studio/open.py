@@ -49,8 +49,7 @@ def open_in_studio(
         InputError: The graphics are not available, the port is in use, or the viewer fails.
     """
     check_graphics(viewer)
-    mode = "" if viewer == NATIVE else viewer
-    config = viewer_protocol.ViewerConfig(title=title, gfx=mode, http_port=port, open_browser=browser)
+    config = viewer_protocol.ViewerConfig(title=title, gfx=_mode(viewer), http_port=port, open_browser=browser)
     studio = app.App(app.Config(show_inspector=False))  # where the panel is; Shift+Tab shows it
     plugins = [studio, StudioPanel(), Stepping(load), sim_history.SimHistory(min_seconds=HISTORY_S)]
     with quiet():
@@ -94,14 +93,9 @@ def check_graphics(viewer: str) -> None:
             f"--viewer {viewer}: MuJoCo Studio's windows need Python 3.12 or newer, and this is "
             f"{sys.version_info.major}.{sys.version_info.minor}; take --viewer {WEB}"
         )
-    mode = "" if viewer == NATIVE else viewer
+    command = [sys.executable, "-m", __name__, _mode(viewer)]
     try:
-        process = subprocess.run(
-            [sys.executable, "-m", __name__, mode],
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE_S,
-        )
+        process = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
     except subprocess.TimeoutExpired:
         why = f"no frame in {PATIENCE_S:g} s"
     else:
@@ -110,6 +104,11 @@ def check_graphics(viewer: str) -> None:
         lines = [line.strip() for line in process.stderr.splitlines() if "rror" in line or "ailed" in line]
         why = lines[-1] if lines else f"a window ends the process, status {process.returncode}"
     raise InputError(f"--viewer {viewer}: MuJoCo Studio cannot draw with it here ({why}); take --viewer {WEB}")
+
+
+def _mode(viewer: str) -> str:
+    """Return Studio's name of the graphics: none for a window's default."""
+    return "" if viewer == NATIVE else viewer
 
 
 def launch(config: viewer_protocol.ViewerConfig, plugins: Sequence[plugin.Plugin]) -> viewer_handle.ViewerHandle:

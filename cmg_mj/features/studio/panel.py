@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -17,8 +16,6 @@ TITLE = "Gyroscopic balance"
 PLOTTED_S = 6.0
 PLOT_HEIGHT = 122.0
 FEEDBACKS = {"observer": "the observer's", "fog": "the gyro's", "truth": "the true one"}
-
-logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,6 @@ class StudioPanel(plugin.ViewerPlugin):
         self._torque, self._duration = 1.0, 0.1
         self._typed: dict[str, float] = {}
         self._shown = True
-        self._broken = False
 
     @messages.handler
     def on_state(self, event: SessionState) -> None:
@@ -102,37 +98,27 @@ class StudioPanel(plugin.ViewerPlugin):
         self.state = event
         recent = event.ticks[event.ticks[:, 0] > event.time_s - PLOTTED_S]
         recent = recent[:: max(1, len(recent) // 1200)]
-        names = ("time", "tilt", "rate", "estimate", "command", "push")
-        self._curves = {name: np.ascontiguousarray(recent[:, i]).tolist() for i, name in enumerate(names)}
+        names = ("time", "tilt", "rate", "estimate", "command")
+        self._curves = {name: recent[:, i].tolist() for i, name in enumerate(names) if len(recent)}
 
     @messages.handler
     def on_build_gui(self, _: messages.BuildGuiEvent) -> None:
-        """Draw the panel. A failure here ends the panel, not the viewer."""
-        if self._broken:
+        """Draw the panel, and its entry in the menu."""
+        if imgui.BeginMainMenuBar():
+            if imgui.BeginMenu("View"):
+                if imgui.MenuItem(TITLE, "", self._shown):
+                    self._shown = not self._shown
+                imgui.EndMenu()
+            imgui.EndMainMenuBar()
+        if not self._shown:
             return
-        try:
-            if imgui.BeginMainMenuBar():
-                if imgui.BeginMenu("View"):
-                    if imgui.MenuItem(TITLE, "", self._shown):
-                        self._shown = not self._shown
-                    imgui.EndMenu()
-                imgui.EndMainMenuBar()
-            if self._shown:
-                self._build_window()
-        except Exception:
-            self._broken = True
-            logger.exception("the panel has failed and is gone; the simulation runs on")
-
-    def _build_window(self) -> None:
         right = imgui.Vec2(imgui.GetIO().DisplaySize.x - 15.0, 45.0)
         imgui.SetNextWindowPos(right, int(imgui.Cond.FirstUseEver), imgui.Vec2(1.0, 0.0))
         imgui.SetNextWindowSize(imgui.Vec2(430.0, 770.0), int(imgui.Cond.FirstUseEver))
         expanded, self._shown = imgui.Begin(TITLE, self._shown)
-        try:
-            if expanded:
-                self._build()
-        finally:
-            imgui.End()
+        if expanded:
+            self._build()
+        imgui.End()
 
     def _build(self) -> None:
         now = self.state
@@ -145,17 +131,14 @@ class StudioPanel(plugin.ViewerPlugin):
         if now.note:
             imgui.TextWrapped(now.note)
         if now.settings is not None:
-            several = len(now.axes) > 1
-            if several and (axis := _new_choice("axis shown and pushed", now.axis, now.axes)):
-                self._send(ShowAxis(axis))
-            imgui.SeparatorText("Controller, on all axes" if several else "Controller")
             self._build_choices(now, now.settings)
-            imgui.SeparatorText("Disturbances")
-            self._build_disturbances(now, now.settings)
-            imgui.SeparatorText(f"The last {PLOTTED_S:g} s")
             self._build_plots(now)
 
     def _build_choices(self, now: SessionState, settings: Settings) -> None:
+        several = len(now.axes) > 1
+        if several and (axis := _new_choice("axis shown and pushed", now.axis, now.axes)):
+            self._send(ShowAxis(axis))
+        imgui.SeparatorText("Controller, on all axes" if several else "Controller")
         if observer := _new_choice("observer", settings.observer, now.observers):
             self._choose({OBSERVER: observer})
         if law := _new_choice("law", now.law, now.laws):
@@ -164,8 +147,7 @@ class StudioPanel(plugin.ViewerPlugin):
             imgui.TextUnformatted("K_e = " + ", ".join(f"{gain:.3g}" for gain in now.gains))
         if feedback := _new_choice("rate fed back", settings.feedback, FEEDBACKS, FEEDBACKS.values()):
             self._choose({FEEDBACK: feedback})
-
-    def _build_disturbances(self, now: SessionState, settings: Settings) -> None:
+        imgui.SeparatorText("Disturbances")
         _, self._torque = imgui.InputDouble("torque [N m]", self._torque, 0.1, 1.0, "%.2f")
         _, self._duration = imgui.InputDouble("duration [s]", self._duration, 0.05, 0.5, "%.3f")
         for label, sign in (("Push +", 1.0), ("Push -", -1.0)):
@@ -173,7 +155,7 @@ class StudioPanel(plugin.ViewerPlugin):
                 self._send(PushRequest(sign * self._torque, self._duration))
             imgui.SameLine()
         imgui.NewLine()
-        on_all = ", all axes" if len(now.axes) > 1 else ""
+        on_all = ", all axes" if several else ""
         self._build_number(f"e{on_all} [deg]", BIAS, settings.bias_deg, 0.1)
         self._build_number(f"noise{on_all} [ug/rtHz]", NOISE, settings.noise_ug_rthz, 100.0)
 
@@ -188,6 +170,7 @@ class StudioPanel(plugin.ViewerPlugin):
             self._typed.pop(name, None)
 
     def _build_plots(self, now: SessionState) -> None:
+        imgui.SeparatorText(f"The last {PLOTTED_S:g} s")
         for title, unit, curves in (
             ("Tilt", "deg", {"tilt": "tilt"}),
             ("Tilt rate", "rad/s", {"rate": "true", "estimate": "estimate"}),
@@ -199,9 +182,8 @@ class StudioPanel(plugin.ViewerPlugin):
                 start, always = now.time_s - PLOTTED_S, int(implot.Cond.Always)
                 implot.SetupAxisLimits(int(implot.Axis.X1), start, now.time_s, always)
                 implot.SetupLegend(int(implot.Location.NorthWest), int(implot.LegendFlags.Horizontal))
-                for name, label in curves.items():
-                    if self._curves.get("time"):
-                        implot.PlotLine(label, self._curves["time"], self._curves[name])
+                for name, label in curves.items() if self._curves else ():
+                    implot.PlotLine(label, self._curves["time"], self._curves[name])
                 implot.EndPlot()
 
     def _choose(self, values: FieldValues) -> None:

@@ -5,27 +5,22 @@ from __future__ import annotations
 import copy
 import dataclasses
 import math
-import sys
-from bisect import bisect_right
 from collections import deque
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, RunStopped
-from cmg_mj.core.sensor import whole_steps
-from cmg_mj.features.pivot.moving_pivot import pivot_directions
-from cmg_mj.features.pivot.pivot_signals import PivotSignals
+from cmg_mj.core.outside import Outside
 from cmg_mj.features.studio.settings import FieldValues, changed_fields
 from cmg_mj.plant.mjcf import set_control_callback
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.tilt_line import apply_torques
 from cmg_mj.runs.callback import control
+from cmg_mj.runs.disturbances import disturbances, outsides
 from cmg_mj.runs.experiment import Experiment
-from cmg_mj.scenario.schema import Scenario
-from cmg_mj.stages.swing import add_swing_torques
+from cmg_mj.stages.push import Push, Pushes
 
 PLOTTED_TICKS = 2400
 """Number of plotted ticks: 12 s at 200 Hz."""
@@ -93,67 +88,6 @@ def copy_physics_numbers(model: mujoco.MjModel, reference: mujoco.MjModel) -> No
         getattr(model, name)[:] = getattr(reference, name)
 
 
-class Pushes:
-    """The torques about the tilt axes at every physics step: the scenario's and the user's, which add up.
-
-    Args:
-        scenario: The scenario.
-        axes: Names of the axes.
-        timestep: Physics step [s].
-    """
-
-    def __init__(self, scenario: Scenario, axes: Sequence[str], timestep: float) -> None:
-        self._timestep, self._axes, self._swings = timestep, axes, scenario.swing
-        indices = {name: index for index, name in enumerate(axes)}
-        self._pushes = [  # first step, step after the last, torque, index of the axis; -1: the plant lacks the axis
-            (self._step(p.start_s), self._step(p.end_s), p.torque_n_m, indices.get(p.axis or axes[0], -1))
-            for p in scenario.push
-        ]
-        self._n_scenario = len(self._pushes)
-        self._add_up()
-
-    def _step(self, seconds: float) -> int:
-        return whole_steps(seconds, self._timestep, "push", f"{seconds:g} s")
-
-    def add(self, step: int, torque: float, duration_s: float, axis: int) -> None:
-        """Push from a physics step on for at least one step: torque about an axis by its index [N m], duration [s]."""
-        self._pushes.append((step, step + max(1, round(duration_s / self._timestep)), torque, axis))
-        self._add_up()
-
-    def forget(self, step: int) -> None:
-        """Discard the user's pushes from a step on: time has gone back to it."""
-        scenario, user = self._pushes[: self._n_scenario], self._pushes[self._n_scenario :]
-        self._pushes = [*scenario, *(push for push in user if push[0] < step)]
-        self._add_up()
-
-    def _add_up(self) -> None:
-        changes: dict[int, list[float]] = {}
-        for start, end, torque, axis in self._pushes:
-            for step, change in ((start, torque), (end, -torque)):
-                at_step = changes.setdefault(step, [0.0] * len(self._axes))
-                if axis >= 0:
-                    at_step[axis] += change
-        self._edges = sorted(changes)
-        sums = [0.0] * len(self._axes)
-        self._torques = [sums]
-        for step in self._edges:
-            sums = [torque + change for torque, change in zip(sums, changes[step], strict=True)]
-            self._torques.append([torque if abs(torque) > 1e-12 else 0.0 for torque in sums])  # no remainders
-
-    def at(self, step: int, steps_per_sample: int) -> Sequence[float]:
-        """Return the torque about each axis during a physics step [N m]; a swinging one is held between samples."""
-        start, end = self.interval(step, steps_per_sample)
-        middle = (start + 0.5 * (end - start)) * self._timestep
-        return add_swing_torques(self._torques[bisect_right(self._edges, step)], self._swings, self._axes, middle)
-
-    def interval(self, step: int, steps_per_sample: int) -> tuple[int, int]:
-        """Return the steps around a physics step between which the torques are constant: the first, and the next."""
-        index = bisect_right(self._edges, step)
-        start = step // steps_per_sample * steps_per_sample
-        end = start + steps_per_sample
-        return max([start, *self._edges[:index][-1:]]), min([end, *self._edges[index : index + 1]])
-
-
 class PlottedTick(NamedTuple):
     """A control tick of one axis in the plots: x1, the true and the estimated rate, u, the push."""
 
@@ -166,7 +100,7 @@ class PlottedTick(NamedTuple):
 
 
 class StudioSession:
-    """A scenario that the owner of its data steps. Without interference its trajectory is the runner's.
+    """A scenario that others step. Without interference its trajectory is the runner's.
 
     Args:
         experiment: The scenario.
@@ -175,7 +109,7 @@ class StudioSession:
         base: The scenario at the start.
         now: The scenario with the user's changes.
         plant: The plant, on a model that has visual geoms as well.
-        pushes: The torques from outside.
+        data: The plant's data, which others may move.
         stopped: The reason why the controller has stopped and the gimbals stand; empty while it runs.
         diverged: Whether the controller has stopped because the physics diverged.
         note: Result of the last change or jump, if the user should know.
@@ -187,127 +121,143 @@ class StudioSession:
         self.plant = drawn_plant(experiment.plant)
         self.timestep = self.plant.timestep
         self._lines = [axis.line for axis in self.plant.axes]
-        scenario = experiment.scenario
-        self.pushes = Pushes(scenario, self.plant.axis_names, self.timestep)
-        pivots = scenario.section("pivot")
-        self._pivot = PivotSignals(pivots, pivot_directions(self.plant, pivots), scenario.seed, 0)
-        self._still = self.model.opt.gravity.copy()
-        self._pivot_steps: tuple[int, int] | None = None if pivots else (0, sys.maxsize)
-        """The steps between which the present acceleration of the pivot is held; for ever if it is at rest."""
+        self._users_pushes: list[Push] = []
+        others = {name: parts for name, parts in outsides(experiment.scenario).items() if name != "push"}
+        self._others = disturbances(others, [self.plant], experiment.scenario.seed, 0)
+        self._gravity = self.model.opt.gravity.copy()
         self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=PLOTTED_TICKS)
-        self._begin(0)
+        self.data = mujoco.MjData(self.model)
+        self.start()
 
     @property
     def model(self) -> mujoco.MjModel:
         """The model that is stepped and shown."""
         return self.plant.model
 
-    def new_data(self) -> mujoco.MjData:
-        """Make data at the scenario's initial state, and begin the run there."""
-        data = mujoco.MjData(self.model)
-        self.start(data)
-        return data
-
-    def start(self, data: mujoco.MjData) -> None:
+    def start(self) -> None:
         """Put the plant at the scenario's initial state, and begin the run; the user's changes stay."""
         initial = self.now.plant.new_data()
         everything = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-        mujoco.mj_copyState(self.now.plant.model, initial, data, everything)
+        mujoco.mj_copyState(self.now.plant.model, initial, self.data, everything)
         with set_control_callback(None):
-            mujoco.mj_forward(self.model, data)
-        self.begin(data)
+            mujoco.mj_forward(self.model, self.data)
+        self.begin()
 
-    def begin(self, data: mujoco.MjData) -> None:
+    def begin(self) -> None:
         """Begin a run at the present state, with a fresh controller."""
-        self._begin(round(data.time / self.timestep))
-
-    def _begin(self, step: int) -> None:
-        self.pushes.forget(step)
+        step = round(self.data.time / self.timestep)
+        self._users_pushes = [push for push in self._users_pushes if push.start_s < (step - 0.5) * self.timestep]
         self.ticks.clear()
-        self.controller = self.now.controller()
-        self.note = self.stopped = ""
         self.diverged = False
         self._next = step
         """The next step, unless someone moves the state in time."""
+        self._start_controller(step)
 
-    def sync_to_time(self, data: mujoco.MjData) -> int:
+    def _start_controller(self, step: int) -> None:
+        self.controller = self.now.controller()
+        self.note = self.stopped = ""
+        self._start_pushes(step)
+
+    def _start_pushes(self, step: int) -> None:
+        """Bring the pushes, the scenario's and the user's, to a physics step."""
+        pushes = [*self.base.scenario.push, *self._users_pushes]
+        self._pushes = Pushes(pushes, self.timestep, self.plant.axis_names)
+        self._edges = sorted(self._pushes.edges)
+        start, self._outside_until = self._interval(step)
+        for edge in self._edges:
+            if edge < start:
+                self._pushes(edge, 1, self._nothing)
+        self._set_outside(start)
+
+    def _interval(self, step: int) -> tuple[int, int]:
+        """Return the steps around a physics step between which the torques are constant: the first, and the next."""
+        grid = self.controller.steps_per_sample
+        start, end = step // grid * grid, step // grid * grid + grid
+        return (
+            max([start, *(edge for edge in self._edges if edge <= step)]),
+            min([end, *(edge for edge in self._edges if edge > step)]),
+        )
+
+    def _set_outside(self, start: int) -> None:
+        """Set torques and the pivot's acceleration from a physics step on, until the interval's end."""
+        outside = self._nothing
+        for disturbance in (self._pushes, *self._others):
+            outside = disturbance(start, self._outside_until - start, outside)
+        self._torques = outside.torques
+        if outside.acceleration is not None:
+            self.model.opt.gravity[:] = self._gravity - outside.acceleration
+
+    @property
+    def _nothing(self) -> Outside:
+        return Outside([0.0] * len(self._lines))
+
+    def sync_to_time(self) -> int:
         """Begin again at the state's time, if someone has moved the state; return the step."""
-        step = round(data.time / self.timestep)
+        step = round(self.data.time / self.timestep)
         if step != self._next:
-            self._begin(step)
-            self.note = f"the controller starts afresh at t = {data.time:g} s"
+            self.begin()
+            self.note = f"the controller starts afresh at t = {self.data.time:g} s"
         return step
 
-    def step(self, data: mujoco.MjData) -> bool:
+    def step(self) -> bool:
         """Advance one physics step, before which the controller takes due samples and decisions.
 
         No failure of an observer or of the physics raises from here.
 
-        Args:
-            data: The plant's data.
-
         Returns:
             Whether there was a control tick.
         """
-        step = self.sync_to_time(data)
-        torques = self.pushes.at(step, self.controller.steps_per_sample)
+        data, step = self.data, self.sync_to_time()
+        if step >= self._outside_until:
+            start, self._outside_until = self._interval(step)
+            self._set_outside(start)
         # Studio's mouse writes xfrc_applied: MuJoCo adds them up.
-        apply_torques(data.qfrc_applied, self._lines, torques)
-        self._accelerate(step)
-        ticked = not self.stopped and self._control(data, step, torques)
+        apply_torques(data.qfrc_applied, self._lines, self._torques)
+        ticked = not self.stopped and self._control()
         mujoco.mj_step(self.model, data)
         self._next = step + 1
         if not np.isfinite(data.qpos).all():
             self.diverged = True
-            self._stop(data, f"the physics diverged at t = {data.time:g} s; reset")
+            self._stop(f"the physics diverged at t = {data.time:g} s; reset")
         return ticked
 
-    def _accelerate(self, step: int) -> None:
-        """Set the pivot's acceleration during a physics step, which is held as long as a swinging torque."""
-        if self._pivot_steps is not None and self._pivot_steps[0] <= step < self._pivot_steps[1]:
-            return
-        self._pivot_steps = self.pushes.interval(step, self.controller.steps_per_sample)
-        start, end = self._pivot_steps
-        self.model.opt.gravity[:] = self._still - self._pivot.mean(start * self.timestep, end * self.timestep)
-
-    def _control(self, data: mujoco.MjData, step: int, torques: Sequence[float]) -> bool:
+    def _control(self) -> bool:
+        data = self.data
         lean = self.plant.largest_tilt(data.qpos)
         if not abs(lean) <= math.radians(self.now.scenario.metrics.fall_angle_deg):
-            self._stop(data, f"the rig fell at t = {data.time:g} s; reset, or go back in time")
+            self._stop(f"the rig fell at t = {data.time:g} s; reset, or go back in time")
             return False
         try:
             ticked = control(self.plant, self.controller, data)
         except (InputError, RunStopped) as error:
-            self._stop(data, str(error))
+            self._stop(str(error))
             return False
         if ticked:
-            axes = range(len(torques))
-            self.ticks.append(tuple(self._plotted_tick(data, axis, torques[axis]) for axis in axes))
+            self.ticks.append(tuple(self._plotted_tick(*pair) for pair in enumerate(self._torques)))
         return ticked
 
-    def _plotted_tick(self, data: mujoco.MjData, axis: int, torque: float) -> PlottedTick:
+    def _plotted_tick(self, axis: int, torque: float) -> PlottedTick:
         """Return the last tick of an axis."""
-        line, tick = self.plant.axes[axis].line, self.controller.parts[axis].tick
+        data, line, tick = self.data, self.plant.axes[axis].line, self.controller.parts[axis].tick
         assert tick is not None
         x1 = math.degrees(float(line.lean(data.qpos)) + self.now.plant.axes[axis].bias)
         return PlottedTick(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u, torque)
 
-    def _stop(self, data: mujoco.MjData, why: str) -> None:
+    def _stop(self, why: str) -> None:
         self.stopped = why
         for axis in self.plant.axes:
-            data.ctrl[axis.servos] = 0.0
+            self.data.ctrl[axis.servos] = 0.0
 
-    def choose(self, data: mujoco.MjData, values: FieldValues) -> None:
+    def choose(self, values: FieldValues) -> None:
         """Change settings of the scenario on all axes; `note` has the reason of a refusal.
 
         The controller starts afresh at the present state.
 
         Args:
-            data: The plant's data.
             values: Field, named as with `--set` -> value: the observer, the law, `controller.feedback`, the
                 accelerometers' noise, e.
         """
-        self.sync_to_time(data)
+        self.sync_to_time()
         try:
             fields = changed_fields(self.base, self.now, values)
             if self.now.scenario.plant.timestep_s is None:
@@ -319,15 +269,16 @@ class StudioSession:
         source = self.base.scenario.source  # which would grow with every change
         self.now = dataclasses.replace(new, scenario=new.scenario.with_source(source))
         copy_physics_numbers(self.model, new.plant.model)  # in place, because others hold the model too
-        self.restart_controller(data)
+        self.restart_controller()
         self.note = "; ".join(new.hints)
 
-    def restart_controller(self, data: mujoco.MjData) -> None:
+    def restart_controller(self) -> None:
         """Start the controller afresh at the present state, for instance after the failure of an observer."""
-        self.sync_to_time(data)
-        self.stopped = self.note = ""
-        self.controller = self.now.controller()
+        self._start_controller(self.sync_to_time())
 
-    def push(self, data: mujoco.MjData, torque: float, duration_s: float, axis: int = 0) -> None:
+    def push(self, torque: float, duration_s: float, axis: int = 0) -> None:
         """Push from now on: torque about a tilt axis by its index [N m], duration [s]."""
-        self.pushes.add(self.sync_to_time(data), torque, duration_s, axis)
+        step, dt = self.sync_to_time(), self.timestep
+        duration_s = max(1, round(duration_s / dt)) * dt
+        self._users_pushes.append(Push(step * dt, duration_s, torque, self.plant.axis_names[axis]))
+        self._start_pushes(step)

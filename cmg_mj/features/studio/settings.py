@@ -47,43 +47,39 @@ def choosable_observers(base: Experiment) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*OBSERVERS, *(part.scenario.observer.kind for part in base.parts)]))
 
 
-def law_settings(scenario: Scenario) -> Fields:
-    """Return the section [controller] without the fields that stay whatever the law."""
-    return scenario.controller.model_dump(mode="json", exclude_none=True, exclude=set(LOOP_FIELDS))
-
-
 def choosable_laws(base: Experiment) -> dict[str, Fields]:
     """List the laws to choose from: name -> fields, on every axis."""
-    scenario = base.scenario
-    scenario_law = law_settings(scenario)
-    common = {name: scenario_law[name] for name in ("rate_hz", *STUDIO_LAW_FIELDS)}
+    fields = _laws(base.scenario)
+    law = _section(fields, LAW)
+    common = {name: law[name] for name in ("rate_hz", *STUDIO_LAW_FIELDS)}
+    of_axes: Fields = {
+        axis: {name: value for name, value in _section(fields, axis).items() if name in STUDIO_LAW_FIELDS}
+        for axis in fields
+        if axis != LAW
+    }
     bundled: dict[str, Fields] = {
         "Table 2": {**common, "kind": "state_feedback"},
-        "LQR": {**common, "kind": "state_feedback", "lqr": scenario_law.get("lqr", WEIGHTS)},
+        "LQR": {**common, "kind": "state_feedback", "lqr": law.get("lqr", WEIGHTS)},
         "LQG": {**common, "kind": "lqg"},
     }
-    axis_laws = _axis_laws(scenario)
-    common_of_axes = {
-        axis: {name: law[name] for name in STUDIO_LAW_FIELDS if name in law} for axis, law in axis_laws.items()
-    }
-    laws: dict[str, Fields] = {name: {LAW: law, **common_of_axes} for name, law in bundled.items()}
-    fields: Fields = {LAW: scenario_law, **axis_laws}
-    if fields not in laws.values():
-        laws["the scenario's"] = fields
-    return laws
+    laws: dict[str, Fields] = {name: {LAW: law, **of_axes} for name, law in bundled.items()}
+    return laws if fields in laws.values() else {**laws, "the scenario's": fields}
 
 
 def current_law(base: Experiment, now: Experiment) -> str:
     """Name the law in use; empty if it is none of the choosable laws."""
-    fields = {LAW: law_settings(now.scenario), **_axis_laws(now.scenario)}
+    fields = _laws(now.scenario)
     return next((name for name, law in choosable_laws(base).items() if law == fields), "")
 
 
-def _axis_laws(scenario: Scenario) -> dict[str, Fields]:
-    """Return the fields of the law that axes set themselves."""
+def _laws(scenario: Scenario) -> Fields:
+    """Return the section of the law, and those that axes have, without the fields that stay whatever the law."""
+    sections: Fields = {LAW: scenario.controller.model_dump(mode="json", exclude_none=True)}
+    for axis, settings in scenario.axes.items():
+        sections[f"axes.{axis}.{LAW}"] = _section(settings.as_fields(), LAW)
     return {
-        f"axes.{axis}.{LAW}": {name: value for name, value in section.items() if name not in LOOP_FIELDS}
-        for axis, section in ((axis, settings.as_fields().get(LAW, {})) for axis, settings in scenario.axes.items())
+        name: {field: value for field, value in _section(sections, name).items() if field not in LOOP_FIELDS}
+        for name in sections
     }
 
 

@@ -25,40 +25,10 @@ STATE_INTERVAL_S = 1.0 / 30.0
 """Interval between two states for the panel [s]."""
 REST_S = 0.002
 """Pause between two checks for due steps, without which the viewer's thread would starve [s]."""
-MOST_BEHIND_S = 0.1
+MAX_BEHIND_S = 0.1
 """Largest delay that the simulation catches up; it discards more [s]."""
 
 logger = logging.getLogger(__name__)
-
-
-class StepScheduler:
-    """Schedules physics steps by a clock.
-
-    Args:
-        clock: Returns the time [s].
-
-    Attributes:
-        speed: Speed of simulated time [% of real time].
-    """
-
-    def __init__(self, clock: Callable[[], float]) -> None:
-        self._clock = clock
-        self.speed = 100.0
-        self.begin(0.0)
-
-    def begin(self, time: float) -> None:
-        """Start pacing now, at a simulated time [s]."""
-        self._from = (self._clock(), time)
-
-    def steps_due(self, time: float, timestep: float) -> int:
-        """Return the number of physics steps due at a simulated time [s]."""
-        now = self._clock()
-        since, start = self._from
-        behind = start + (now - since) * self.speed / 100.0 - time
-        if behind > MOST_BEHIND_S:
-            self._from = (now, time + MOST_BEHIND_S)
-            behind = MOST_BEHIND_S
-        return max(0, int(behind / timestep + 1e-6))
 
 
 class Stepping(plugin.SimPlugin):
@@ -82,13 +52,27 @@ class Stepping(plugin.SimPlugin):
         self._load = load
         self._clock = clock
         self._sleep = sleep
-        self._pace = StepScheduler(clock)
+        self._speed = 100.0
         self._pause = sim.PauseState.UNPAUSED
         self._single_steps = 0
         self._state_sent_at = -1.0
         self._complaint = ""
         self._axis = ""
+        self._begin_pacing(0.0)
         self.live: StudioSession | None = None
+
+    def _begin_pacing(self, time: float) -> None:
+        """Go on in the clock's time from now, at a simulated time [s]."""
+        self._from = self._clock(), time
+
+    def _steps_due(self, time: float, timestep: float) -> int:
+        """Return the number of physics steps due at a simulated time [s]."""
+        now, (since, start) = self._clock(), self._from
+        behind = start + (now - since) * self._speed / 100.0 - time
+        if behind > MAX_BEHIND_S:
+            self._from = now, time + MAX_BEHIND_S
+            behind = MAX_BEHIND_S
+        return max(0, int(behind / timestep + 1e-6))
 
     @messages.handler
     def on_load_model(self, event: messages.LoadModelEvent) -> bool:
@@ -100,40 +84,40 @@ class Stepping(plugin.SimPlugin):
             return True
         self._complaint = ""
         self.live = live
-        data = live.new_data()
-        self.handle.set_model(live.model, data=data)
-        self._pace.begin(data.time)
+        self.handle.set_model(live.model, data=live.data)
+        self._begin_pacing(live.data.time)
         return True
 
     @messages.handler(priority=AFTER_STUDIO)
     def on_reset(self, event: messages.ResetEvent) -> None:
         """Begin again at the scenario's initial state, or at the user's keyframe."""
-        live, data = self.live, self.handle.data
-        if live is None or data is None:
+        live = self.live
+        if live is None:
             return
         if event.key is None or not 0 <= event.key < live.model.nkey:
-            live.start(data)
+            live.start()
         else:
-            live.begin(data)
-        self._pace.begin(data.time)
+            live.begin()
+        self._begin_pacing(live.data.time)
 
     @messages.handler
     def on_step(self, event: messages.StepEvent) -> bool:
         """Advance the physics steps that are due."""
-        live, data = self.live, event.data
+        live = self.live
         if live is None:
             self._sleep(REST_S)
             return True
+        data = live.data
         if event.model.opt.timestep != live.timestep:
             event.model.opt.timestep = live.timestep
             self._complain(f"the physics step stays {live.timestep:g} s: samples and ticks fall on whole steps")
         if self._pause == sim.PauseState.UNPAUSED:
-            due = self._pace.steps_due(data.time, live.timestep)
+            due = self._steps_due(data.time, live.timestep)
         else:
             due, self._single_steps = self._single_steps, 0
-            self._pace.begin(data.time + due * live.timestep)
+            self._begin_pacing(data.time + due * live.timestep)
         for _ in range(due):
-            live.step(data)
+            live.step()
             if live.diverged:
                 self._pause = sim.PauseState.NORMAL_PAUSED  # there is nothing more to show
                 self.handle.send_to_viewer(self._state())
@@ -146,14 +130,14 @@ class Stepping(plugin.SimPlugin):
         return True
 
     def _state(self) -> messages.StepControlSnapshot:
-        return messages.StepControlSnapshot(pause_state=self._pause, speed=self._pace.speed)
+        return messages.StepControlSnapshot(pause_state=self._pause, speed=self._speed)
 
     @messages.handler
     def on_step_control(self, event: messages.StepControlSnapshot) -> bool:
         """Handle the user's pause, resumption, or speed."""
-        self._pause, self._pace.speed = event.pause_state, event.speed
-        if self.handle.data is not None:
-            self._pace.begin(self.handle.data.time)
+        self._pause, self._speed = event.pause_state, event.speed
+        if self.live is not None:
+            self._begin_pacing(self.live.data.time)
         if event.noise_scale:
             self._complain("Studio's noise on the controls is not applied: set the accelerometers' noise here")
         return True
@@ -174,15 +158,15 @@ class Stepping(plugin.SimPlugin):
     @messages.handler
     def on_choose(self, event: ChangeSettings) -> None:
         """Change settings of the scenario."""
-        if self.live is not None and self.handle.data is not None:
+        if self.live is not None:
             self._complaint = ""
-            self.live.choose(self.handle.data, event.values)
+            self.live.choose(event.values)
 
     @messages.handler
     def on_push(self, event: PushRequest) -> None:
         """Push about the axis shown."""
-        if self.live is not None and self.handle.data is not None:
-            self.live.push(self.handle.data, event.torque_n_m, event.duration_s, self._axis_index(self.live))
+        if self.live is not None:
+            self.live.push(event.torque_n_m, event.duration_s, self._axis_index(self.live))
 
     @messages.handler
     def on_show_axis(self, event: ShowAxis) -> None:
@@ -197,8 +181,8 @@ class Stepping(plugin.SimPlugin):
     @messages.handler
     def on_start_again(self, _: RestartController) -> None:
         """Restart a controller that has stopped."""
-        if self.live is not None and self.handle.data is not None:
-            self.live.restart_controller(self.handle.data)
+        if self.live is not None:
+            self.live.restart_controller()
 
     def _complain(self, message: str) -> None:
         self._complaint = message
@@ -206,10 +190,10 @@ class Stepping(plugin.SimPlugin):
 
     def session_state(self) -> SessionState:
         """Describe the session for the panel."""
-        live, data = self.live, self.handle.data
-        if live is None or data is None:
+        live = self.live
+        if live is None:
             return SessionState(note=self._complaint)
-        now = live.now
+        now, data = live.now, live.data
         axis = self._axis_index(live)
         part = now.parts[axis]
         ticks = np.array([tick[axis] for tick in live.ticks if tick[axis].time_s < data.time - 1e-9]).reshape(-1, 6)

@@ -18,10 +18,9 @@ from cmg_mj.features.sweeps.pictures import ERRORS, fall_counts, pictures_of
 from cmg_mj.features.sweeps.sobol import FEWEST, LOST, IndexRow, index_table
 from cmg_mj.features.sweeps.store import CELLS, GOES_ON, INDICES, REPORT, TRIALS, Store
 from cmg_mj.features.sweeps.study import SweepStudy, VariedField, counted
-from cmg_mj.results import markdown
-from cmg_mj.results.files import whole_file
-from cmg_mj.results.folder import write_text
+from cmg_mj.results.folder import whole_file, write_text
 from cmg_mj.results.summary_keys import KEYS, Summary, SummaryValue, capitalised, format_figure, heading
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.view.plots.figure import Picture, draw
 
 MOST_ROWS = 60
@@ -155,7 +154,7 @@ def _table_of_cells(trials: Trials) -> str:
     for point in itertools.islice(study.points, MOST_ROWS):
         of_point = itertools.islice(every_cell, len(study.observers))
         rows.append([*(_format_value(point[field]) for field in fields), *map(_format_cell, of_point)])
-    table = markdown.table([*fields, *study.observers], rows, text_columns=0)
+    table = markdown_table([*fields, *study.observers], rows, text_columns=0)
     more = len(study.points) - MOST_ROWS
     return f"{table}\n\n{more} points more are in {CELLS}." if more > 0 else table
 
@@ -184,7 +183,7 @@ def _over_points(trials: Trials) -> str:
         [
             f"{capitalised(heading(ERROR))} of a point: the mean over its worlds that stood, so that "
             "where some fell it is that of the easier ones. Over the points at which any stood:",
-            markdown.table(["observer", "points", "mean", *shares, "worlds that fell"], table),
+            markdown_table(["observer", "points", "mean", *shares, "worlds that fell"], table),
             f"Every point is in {CELLS}.",
         ]
     )
@@ -234,7 +233,7 @@ def _leads(trials: Trials) -> list[str]:
         table.append([name, row.leads.words, *interval, row.surely.words, row.close.words])
     head = ["observer", "leads", *([] if is_grid else ["95 % interval"]), "surely", "close"]
     independent = " Of a design for indices, its independent points count." if study.design == "sobol" else ""
-    return ["## Who leads", ABOUT_LEADS + independent, markdown.table(head, table)]
+    return ["## Who leads", ABOUT_LEADS + independent, markdown_table(head, table)]
 
 
 def _indices(study: SweepStudy, rows: Sequence[IndexRow]) -> list[str]:
@@ -255,7 +254,7 @@ def _indices(study: SweepStudy, rows: Sequence[IndexRow]) -> list[str]:
             parts.append(f"### {capitalised(title)}")
         if table:
             headings = ["observer", "field", "first order", "total", "decisive"]
-            parts.append(markdown.table(headings, table, text_columns=2))
+            parts.append(markdown_table(headings, table, text_columns=2))
         if refused:
             parts.append("\n".join(["Refused:", "", *(f"- {name}: {why}" for name, why in refused.items())]))
     return parts
@@ -273,7 +272,7 @@ def _indices_in_short(rows: Sequence[IndexRow]) -> str:
     parts = []
     if table:
         headings = ["observer", "field", *(f"total index, {KEYS[key].label}" for key in columns)]
-        parts.append(markdown.table(headings, table, text_columns=2))
+        parts.append(markdown_table(headings, table, text_columns=2))
     if any(row.decisive for row in known.values()):
         parts.append("*: decisive, its interval is above all others'.")
     refused = dict.fromkeys((row.observer, row.figure, row.refused) for row in rows if row.refused)

@@ -20,8 +20,7 @@ from cmg_mj.features.sweeps.chunk import compute, part_of_progress, schema_of, t
 from cmg_mj.features.sweeps.study import FieldValue, SweepStudy
 from cmg_mj.features.sweeps.study_file import varied_tracks
 from cmg_mj.inputs.files import find, model_files
-from cmg_mj.results.files import whole_file
-from cmg_mj.results.folder import is_own, numbered, remove, write_marker
+from cmg_mj.results.folder import is_own, numbered, remove, whole_file, write_marker
 from cmg_mj.runs.experiment import prepare
 
 StudyFields: TypeAlias = "dict[str, dict[str, FieldValue]]"

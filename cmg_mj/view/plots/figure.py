@@ -6,18 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from cmg_mj.results.files import whole_file
+from cmg_mj.results.folder import whole_file
 from cmg_mj.view.plots.map_plot import Map, Surface, draw_map, draw_surface, mappable
 from cmg_mj.view.plots.style import colours, hexadecimal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+
+ROW_OF_LABELS = 110
+"""Characters of a legend that fit into a row."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,8 @@ class Line:
         y: Ordinates, (n,).
         label: Name in the legend; empty for none.
         style: Matplotlib's format: `-`, `--`, `.`, `o-`.
-        color: An observer, for its colour in every figure; the number of a colour of the cycle; None for the next one.
+        color: An observer, for its colour in every figure; a colour as matplotlib names it; the number of a colour of
+            the cycle; None for the next one.
         width: Line width [points].
         spread: Half height of a band around y, (n,), such as a confidence interval; or the heights below and above y,
             (2, n).
@@ -46,6 +49,24 @@ class Line:
     bars: bool = False
 
 
+class Span(NamedTuple):
+    """A shaded span of x, such as a push.
+
+    Attributes:
+        start: Its start.
+        end: Its end.
+        label: Name in the legend; empty for none.
+        color: Its colour.
+        height: Share of the panel's height that it takes, from the foot.
+    """
+
+    start: float
+    end: float
+    label: str = ""
+    color: str = "C3"
+    height: float = 1.0
+
+
 @dataclass(frozen=True)
 class Panel:
     """One set of axes.
@@ -58,7 +79,7 @@ class Panel:
         x_scale: Linear or logarithmic.
         y_scale: Linear or logarithmic.
         y_range: Limits of y; None to fit the data.
-        shaded: Spans of x to shade, such as pushes.
+        shaded: Spans of x to shade, `Span` or its start and end.
         x_ticks: Ticks on x; None for matplotlib's choice.
         y_ticks: Ticks on y; None for matplotlib's choice.
         map: A map to draw instead of lines.
@@ -72,7 +93,7 @@ class Panel:
     x_scale: Literal["linear", "log"] = "linear"
     y_scale: Literal["linear", "log"] = "linear"
     y_range: tuple[float, float] | None = None
-    shaded: Sequence[tuple[float, float]] = ()
+    shaded: Sequence[tuple[float, float]] | Sequence[Span] = ()
     x_ticks: Sequence[float] | None = None
     y_ticks: Sequence[float] | None = None
     map: Map | None = None
@@ -91,8 +112,9 @@ class Picture:
         columns: Number of panels beside each other.
         panel_height: Height of each panel [inch].
         panel_width: Width of each of several columns [inch].
-        first_height: Height of the first panel, which then has a row of its own; None for a panel like the others
-            [inch].
+        first_height: Height of the first panels, which have a row each; the others are small, in a grid below, and
+            surfaces share one scale. None if all panels are alike [inch].
+        n_first: Number of first panels, if they have a height.
     """
 
     name: str
@@ -103,6 +125,7 @@ class Picture:
     panel_height: float = 2.3
     panel_width: float = 5.5
     first_height: float | None = None
+    n_first: int = 1
 
 
 def pyplot() -> ModuleType:
@@ -130,67 +153,53 @@ def draw(path: Path, picture: Picture) -> None:
         path: The PNG to write.
         picture: The figure's data.
     """
-    if picture.first_height is not None:
-        figure = _with_large_first(picture, picture.first_height)
-        save_figure(path, figure, picture.title, dpi=100)
-        return
-    columns = picture.columns
-    rows = -(-len(picture.panels) // columns)
-    size = (9.0 if columns == 1 else picture.panel_width * columns, 0.8 + picture.panel_height * rows)
-    figure, grid = pyplot().subplots(
-        rows, columns, sharex="col" if picture.share_x else False, figsize=size, layout="constrained", squeeze=False
-    )
-    for i, axes in enumerate(grid.flat):
-        if i >= len(picture.panels):
-            axes.set_visible(False)
-            continue
-        panel = picture.panels[i]
+    columns, panels = picture.columns, picture.panels
+    n_first, first_height = (picture.n_first, picture.first_height) if picture.first_height else (0, 0.0)
+    n_rows = -(-(len(panels) - n_first) // columns)
+    heights = [first_height] * n_first + [picture.panel_height] * n_rows
+    width = max(9.0 if n_first or columns == 1 else 0.0, picture.panel_width * columns * (columns > 1))
+    figure = pyplot().figure(figsize=(width, 0.8 + sum(heights)), layout="constrained")
+    grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
+    all_axes: list[Axes] = []
+    for i, panel in enumerate(panels):
+        row, column = divmod(i - n_first, columns)
+        if i < n_first:
+            place, is_lowest, above = grid[i, :], i == n_first - 1, i - 1
+        else:
+            place, is_lowest = grid[n_first + row, column], i + columns >= len(panels)
+            above = i - columns if row else -1
+        shared = all_axes[above] if picture.share_x and above >= 0 else None
+        axes = figure.add_subplot(place, sharex=shared)
         _draw_panel(axes, panel)
-        lowest = i + columns >= len(picture.panels)
-        if lowest or not picture.share_x:
+        all_axes.append(axes)
+        if is_lowest or not picture.share_x:
             axes.set_xlabel(panel.x_label)
-            axes.tick_params(labelbottom=True)
-    figure.align_ylabels()
-    save_figure(path, figure, picture.title, dpi=100)
-
-
-def _with_large_first(picture: Picture, first_height: float) -> Figure:
-    """Draw the first panel over the whole width, and the others, small, in a grid below; surfaces share one scale."""
-    first, others = picture.panels[0], picture.panels[1:]
-    rows = -(-len(others) // picture.columns)
-    heights = [first_height, *[picture.panel_height] * rows]
-    size = (max(9.0, picture.panel_width * picture.columns), 0.8 + sum(heights))
-    figure = pyplot().figure(figsize=size, layout="constrained")
-    grid = figure.add_gridspec(len(heights), picture.columns, height_ratios=heights)
-    axes = figure.add_subplot(grid[0, :])
-    _draw_panel(axes, first)
-    axes.set_xlabel(first.x_label)
-    below: list[Axes] = []
-    surface = None
-    for i, panel in enumerate(others):
-        row, column = divmod(i, picture.columns)
-        axes = figure.add_subplot(grid[1 + row, column])
-        _draw_panel(axes, panel)
-        below.append(axes)
-        surface = panel.surface or surface
-        lowest = i + picture.columns >= len(others)
-        axes.set_xlabel(panel.x_label if lowest else "", fontsize="small")
-        axes.set_ylabel(panel.y_label.replace(" [", "\n[") if column == 0 else "", fontsize="x-small")
-        axes.tick_params(labelbottom=lowest, labelleft=column == 0, labelsize="small")
-    if surface is not None:
-        bar = figure.colorbar(mappable(surface), ax=below, label=surface.label, location="bottom", aspect=60)
+        axes.tick_params(labelbottom=is_lowest or not picture.share_x)
+        if 0 < n_first <= i:
+            axes.set_xlabel(axes.get_xlabel(), fontsize="small")
+            axes.set_ylabel(panel.y_label.replace(" [", "\n[") if column == 0 else "", fontsize="x-small")
+            axes.tick_params(labelleft=column == 0, labelsize="small")
+    surfaces = [panel.surface for panel in panels[n_first:] if panel.surface]
+    if surfaces:
+        surface = surfaces[-1]
+        bar = figure.colorbar(
+            mappable(surface), ax=all_axes[n_first:], label=surface.label, location="bottom", aspect=60
+        )
         ticks = sorted({*surface.levels, *([] if len(surface.levels) > 2 else surface.limits)})
         bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
         bar.minorticks_off()
-    return figure
+    figure.align_ylabels(all_axes[:n_first] or all_axes)
+    save_figure(path, figure, picture.title, dpi=100)
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:
-    palette = colours(line.color for line in panel.lines if isinstance(line.color, str))
+    from matplotlib.colors import is_color_like
+
+    names = [line.color for line in panel.lines if isinstance(line.color, str) and not is_color_like(line.color)]
+    palette = {name: hexadecimal(rgb) for name, rgb in colours(names).items()}
     for line in panel.lines:
-        style = {"linewidth": line.width, "label": line.label or None}
-        if line.color is not None:
-            style["color"] = hexadecimal(palette[line.color]) if isinstance(line.color, str) else f"C{line.color}"
+        color = f"C{line.color}" if isinstance(line.color, int) else palette.get(line.color or "", line.color)
+        style = {"linewidth": line.width, "label": line.label or None, "color": color}
         (curve,) = axes.plot(line.x, line.y, line.style, markersize=4, **style)
         if line.spread is not None:
             below, above = np.broadcast_to(line.spread, (2, len(line.y)))
@@ -199,14 +208,18 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
                 axes.vlines(line.x, low, high, color=curve.get_color(), alpha=0.6, linewidth=line.width)
             else:
                 axes.fill_between(line.x, low, high, color=curve.get_color(), alpha=0.2, linewidth=0)
-    for start, end in panel.shaded:
-        axes.axvspan(start, end, color="C3", alpha=0.25, linewidth=0, zorder=0)
+    for shaded in panel.shaded:
+        span = shaded if isinstance(shaded, Span) else Span(*shaded)
+        style = {"color": span.color, "alpha": 0.25, "linewidth": 0, "zorder": 0, "label": span.label or None}
+        axes.axvspan(span.start, span.end, ymax=span.height, **style)
     axes.set_xscale(panel.x_scale)
     axes.set_yscale(panel.y_scale)
     axes.set_ylabel(panel.y_label)
-    axes.set_title(panel.title, loc="left", fontsize="medium")
-    _mark(axes.xaxis, panel.x_ticks)
-    _mark(axes.yaxis, panel.y_ticks)
+    axes.set_title(panel.title, loc="left", fontsize="medium", parse_math=False)
+    for axis, ticks in ((axes.xaxis, panel.x_ticks), (axes.yaxis, panel.y_ticks)):
+        if ticks is not None:
+            axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+            axis.set_ticks([], minor=True)
     if panel.map is not None:
         draw_map(axes, panel.map)
         return
@@ -218,11 +231,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     axes.margins(x=0.0 if panel.x_scale == "linear" and not marks_only and panel.x_ticks is None else 0.03)
     if panel.y_range is not None:
         axes.set_ylim(*panel.y_range)
-    if any(line.label for line in panel.lines):
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=4, frameon=False, borderpad=0)
-
-
-def _mark(axis: Axis, ticks: Sequence[float] | None) -> None:
-    if ticks is not None:
-        axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
-        axis.set_ticks([], minor=True)
+    if labels := axes.get_legend_handles_labels()[1]:
+        n_columns = len(labels) if sum(map(len, labels)) < ROW_OF_LABELS else 4
+        style = {"fontsize": "small", "frameon": False, "borderpad": 0, "columnspacing": 1.4}
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=n_columns, **style)

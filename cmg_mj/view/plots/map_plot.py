@@ -88,56 +88,72 @@ class Surface:
 def draw_map(axes: Axes, spec: Map) -> None:
     """Draw a map on axes whose scales are set."""
     palette = colours([*spec.names, *spec.boundaries, *spec.ahead])
-    observers = list(spec.names)
-    names = short_names(list(palette))
+    # matplotlib hides a label that begins with an underscore
+    names = {name: label.lstrip("_") for name, label in short_names(list(palette)).items()}
     cells = np.array([*(palette[name] for name in spec.names), EMPTY], dtype=np.uint8)[spec.best]  # -1 is the last
-    x = edges(spec.x, log=axes.get_xscale() == "log")
-    y = edges(spec.y, log=axes.get_yscale() == "log")
-    axes.pcolormesh(x, y, cells)
-    _contours(axes, spec, x, y)
-    _boundaries(axes, spec, x, y, [hexadecimal(palette[name]) for name in spec.boundaries])
-    _dotted(axes, spec, x, y, [hexadecimal(palette[name]) for name in spec.ahead])
-    unsure = (spec.best >= 0) & ~spec.sure
-    across, up = np.meshgrid(spec.x, spec.y)
-    axes.plot(across[unsure], up[unsure], "o", color="0.1", markeredgecolor=CASING, markeredgewidth=0.6, markersize=3.5)
-    axes.set_xlim(x[0], x[-1])
-    axes.set_ylim(y[0], y[-1])
-    for index in np.unique(spec.best[spec.best >= 0]):
-        name = observers[index]
-        _in_legend(axes, "s", names[name], color=hexadecimal(palette[name]), markersize=9)
+    x, y = _draw_cells(axes, spec.x, spec.y, cells)
+
+    def contour(values: np.ndarray, levels: Sequence[float], width: float, **style: Any) -> QuadContourSet:
+        """Draw contours up to the map's edges, through the outermost cells, on a wider line of the casing's colour."""
+        across, up = (np.concatenate([ends[:1], at, ends[-1:]]) for at, ends in ((spec.x, x), (spec.y, y)))
+        padded = np.ma.masked_invalid(np.pad(values, 1, "edge"))
+        axes.contour(across, up, padded, levels, colors=CASING, linewidths=width + 2.0, zorder=1.9)
+        return axes.contour(across, up, padded, levels, linewidths=width, zorder=2.0, **style)
+
+    def in_legend(style: str, label: str, **properties: Any) -> None:
+        axes.plot([], [], style, label=label, **properties)
+
+    for name in (spec.names[int(index)] for index in np.unique(spec.best[spec.best >= 0])):
+        in_legend("s", names[name], color=hexadecimal(palette[name]), markersize=9)
     if (spec.best < 0).any():
-        _in_legend(axes, "s", spec.nobody, color=hexadecimal(EMPTY), markersize=9)
+        in_legend("s", spec.nobody, color=hexadecimal(EMPTY), markersize=9)
+    if len(spec.levels):
+        _label(axes, contour(spec.values, spec.levels, 0.8, colors="0.1"))
+    unsure = (spec.best >= 0) & ~spec.sure
     if unsure.any():
-        _in_legend(axes, "o", "not beyond chance", color="0.1", markersize=3.5)
+        across, up = np.meshgrid(spec.x, spec.y)
+        style = {"color": "0.1", "markeredgecolor": CASING, "markeredgewidth": 0.6, "markersize": 3.5}
+        axes.plot(across[unsure], up[unsure], "o", label="not beyond chance", **style)
     if spec.boundaries:
-        _in_legend(axes, " ", f"{spec.boundary}:")
-    for name in spec.boundaries:
-        _in_legend(axes, "--", names[name], color=hexadecimal(palette[name]), linewidth=BOUNDARY)
+        in_legend(" ", f"{spec.boundary}:")
+    n = min(len(spec.boundaries), 3)
+    for i, (name, share) in enumerate(spec.boundaries.items()):
+        color = hexadecimal(palette[name])
+        # Dashes alternate, so that two or three lines on each other are all seen.
+        dashes = (i % n * DASH, (DASH, DASH * (n - 1))) if n > 1 else "-"
+        contour(share, [0.5], BOUNDARY, colors=color, linestyles=[dashes])
+        in_legend("--", names[name], color=color, linewidth=BOUNDARY)
     if spec.ahead:
-        _in_legend(axes, " ", "less error than the best:")
+        in_legend(" ", "less error than the best:")
     for name, share in spec.ahead.items():
+        color, known = hexadecimal(palette[name]), share[np.isfinite(share)]
+        if known.min(initial=1.0) < 0.5 < known.max(initial=0.0):
+            contour(share, [0.5], AHEAD, colors=color, linestyles=["dotted"])
         label = f"{names[name]}, {int((share > 0.5).sum())} of {share.size} cells"
-        _in_legend(axes, ":", label, color=hexadecimal(palette[name]), linewidth=AHEAD)
+        in_legend(":", label, color=color, linewidth=AHEAD)
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize="small", frameon=False, borderpad=0)
+
+
+def _draw_cells(
+    axes: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray, **style: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Colour the cells of a map; return their edges to the right and upward."""
+    ends = edges(x, log=axes.get_xscale() == "log"), edges(y, log=axes.get_yscale() == "log")
+    axes.pcolormesh(*ends, values, **style)
+    axes.set_xlim(ends[0][0], ends[0][-1])
+    axes.set_ylim(ends[1][0], ends[1][-1])
+    return ends
 
 
 def edges(centres: np.ndarray, *, log: bool) -> np.ndarray:
     """Return the edges of cells, half-way between their centres on the axis, (n + 1,)."""
-    on_axis = np.log(centres) if log else np.asarray(centres, dtype=float)
-    inner = (on_axis[:-1] + on_axis[1:]) / 2.0
-    result = np.concatenate([[2 * on_axis[0] - inner[0]], inner, [2 * on_axis[-1] - inner[-1]]])
+    at = np.log(centres) if log else np.asarray(centres, dtype=float)
+    beyond = np.concatenate([[2.0 * at[0] - at[1]], at, [2.0 * at[-1] - at[-2]]])
+    result = (beyond[:-1] + beyond[1:]) / 2.0
     return np.exp(result) if log else result
 
 
-def _contours(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray) -> None:
-    if not len(spec.levels):
-        return
-    values = _to_edges(spec, x, y, spec.values)
-    axes.contour(*values, spec.levels, colors=CASING, linewidths=2.2)
-    _labelled(axes, axes.contour(*values, spec.levels, colors="0.1", linewidths=0.8))
-
-
-def _labelled(axes: Axes, lines: QuadContourSet) -> None:
+def _label(axes: Axes, lines: QuadContourSet) -> None:
     for text in axes.clabel(lines, fmt="%g", fontsize="small", inline=False):
         text.set_color("0.1")
         text.set_bbox({"facecolor": CASING, "edgecolor": "none", "alpha": 0.8, "pad": 0.8})
@@ -146,10 +162,9 @@ def _labelled(axes: Axes, lines: QuadContourSet) -> None:
 def draw_surface(axes: Axes, spec: Surface) -> None:
     """Draw one candidate's figure on axes whose scales are set: its value by colour, and as numbers or contours."""
     norm = _norm(spec)
-    x = edges(spec.x, log=axes.get_xscale() == "log")
-    y = edges(spec.y, log=axes.get_yscale() == "log")
+    values = np.ma.masked_invalid(spec.values)
     axes.set_facecolor(hexadecimal(EMPTY))
-    axes.pcolormesh(x, y, np.ma.masked_invalid(spec.values), cmap=COLOURS_OF_VALUES, norm=norm)
+    _draw_cells(axes, spec.x, spec.y, values, cmap=COLOURS_OF_VALUES, norm=norm)
     if max(spec.values.shape) <= NUMBERED:
         for (row, column), value in np.ndenumerate(spec.values):
             if np.isfinite(value):
@@ -157,11 +172,7 @@ def draw_surface(axes: Axes, spec: Surface) -> None:
                 text = axes.text(float(spec.x[column]), float(spec.y[row]), f"{value:.3g}", color=ink)
                 text.set(horizontalalignment="center", verticalalignment="center", fontsize="x-small")
     elif len(spec.levels) and np.isfinite(spec.values).any():
-        across, up = np.meshgrid(spec.x, spec.y)
-        lines = axes.contour(across, up, np.ma.masked_invalid(spec.values), spec.levels, colors=CASING, linewidths=0.9)
-        _labelled(axes, lines)
-    axes.set_xlim(x[0], x[-1])
-    axes.set_ylim(y[0], y[-1])
+        _label(axes, axes.contour(spec.x, spec.y, values, spec.levels, colors=CASING, linewidths=0.9))
 
 
 def mappable(spec: Surface) -> ScalarMappable:
@@ -175,34 +186,3 @@ def _norm(spec: Surface) -> Normalize:
     from matplotlib.colors import LogNorm, Normalize
 
     return (LogNorm if spec.scale == "log" else Normalize)(*spec.limits)
-
-
-def _boundaries(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Sequence[str]) -> None:
-    """Draw the boundaries; their dashes alternate, so that two or three lines on each other are all seen."""
-    shares = [_to_edges(spec, x, y, share) for share in spec.boundaries.values()]
-    for share in shares:
-        axes.contour(*share, [0.5], colors=CASING, linewidths=BOUNDARY + 2.0)
-    n = min(len(shares), 3)
-    for i, (share, color) in enumerate(zip(shares, palette, strict=True)):
-        style = (i % n * DASH, (DASH, DASH * (n - 1))) if n > 1 else "-"
-        axes.contour(*share, [0.5], colors=color, linewidths=BOUNDARY, linestyles=[style])
-
-
-def _dotted(axes: Axes, spec: Map, x: np.ndarray, y: np.ndarray, palette: Sequence[str]) -> None:
-    """Draw where each of what is no candidate is as good as the best; nothing where it is so in all cells or none."""
-    for share, color in zip(spec.ahead.values(), palette, strict=True):
-        known = share[np.isfinite(share)]
-        if known.min(initial=1.0) < 0.5 < known.max(initial=0.0):
-            line = _to_edges(spec, x, y, share)
-            axes.contour(*line, [0.5], colors=CASING, linewidths=AHEAD + 2.0)
-            axes.contour(*line, [0.5], colors=color, linewidths=AHEAD, linestyles=["dotted"])
-
-
-def _to_edges(spec: Map, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Extend values at the cells' centres to the map's edges: a line goes on through the outermost cell."""
-    across, up = (np.concatenate([ends[:1], centres, ends[-1:]]) for centres, ends in ((spec.x, x), (spec.y, y)))
-    return across, up, np.ma.masked_invalid(np.pad(values, 1, "edge"))
-
-
-def _in_legend(axes: Axes, style: str, label: str, **properties: Any) -> None:
-    axes.plot([], [], style, label=label.lstrip("_"), **properties)  # matplotlib hides a leading underscore

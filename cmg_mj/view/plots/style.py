@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.results.summary_keys import SummaryValue, section
 
 Colour = tuple[int, int, int]
 
@@ -128,13 +128,7 @@ def figures_by_observer(observers: Sequence[str], summary: Summary) -> dict[str,
     """
     in_loop, *others = observers
     open_loop = section(summary, "open_loop_observers")
-    return {in_loop: summary, **{name: section(open_loop, name) for name in others}}
-
-
-def section(summary: Summary, key: str) -> Summary:
-    """Return a part of a summary that has keys of its own; empty if the summary lacks the part."""
-    value = summary.get(key)
-    return value if isinstance(value, Mapping) else {}
+    return {in_loop: summary, **{name: open_loop.get(name, {}) for name in others}}
 
 
 def observers_to_draw(summaries: Mapping[str, Summary], always: Iterable[str] = ()) -> list[str]:

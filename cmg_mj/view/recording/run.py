@@ -1,4 +1,4 @@
-"""A run to record: its names and colours, and its torques, phases and poses in time."""
+"""A run to record: its names, colours and phases."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import rerun as rr
 
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Outcome
+from cmg_mj.results.summary_keys import section
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push
@@ -21,12 +22,8 @@ from cmg_mj.view.plots.style import (
     colours,
     figures_by_observer,
     observers_to_draw,
-    section,
     short_names,
 )
-
-POSE_RATE_HZ = 100.0
-"""Largest rate at which poses are recorded; the eye needs no more."""
 
 BALANCING, PUSH, RECOVERING, SETTLED = "balancing", "push", "recovering", "settled"
 ENDINGS = {"fell": "fallen", "stopped": "stopped", "interrupted": "interrupted"}
@@ -80,15 +77,9 @@ class Run:
         return figures_by_observer(self.trajectory.observers, self.summary)
 
     @property
-    def ranking(self) -> Summary:
-        """The numbers that rank the run: a run that did not reach its end ranks last."""
-        return {**self.summary, "fell": self.outcome.kind in ENDINGS}
-
-    @property
     def references(self) -> dict[str, Summary]:
         """The baselines, each with its numbers."""
-        references = section(self.summary, "references")
-        return {name: section(references, name) for name in references}
+        return {**section(self.summary, "references")}
 
     @property
     def open_loop_observers(self) -> tuple[str, ...]:
@@ -140,20 +131,6 @@ def numbered_parts(names: Sequence[str]) -> list[str]:
     ]
 
 
-def torque_steps(pushes: Sequence[Push], end_s: float) -> list[tuple[float, float]]:
-    """Add pushes up to the steps of one torque.
-
-    Args:
-        pushes: The pushes, which may overlap.
-        end_s: End of the run; later steps are discarded [s].
-
-    Returns:
-        (time [s], torque from then on [N m]), in order of time.
-    """
-    edges = sorted({time for push in pushes for time in (push.start_s, push.end_s) if time < end_s})
-    return [(t, sum(p.torque_n_m for p in pushes if p.start_s <= t < p.end_s)) for t in edges]
-
-
 def phases(run: Run, pushes: Sequence[Push], settings: MetricsSettings) -> list[tuple[float, str]]:
     """Divide a run into phases.
 
@@ -190,25 +167,7 @@ def _recovery(trajectory: Trajectory, start: float, end: float, band: float) -> 
     window = (time >= start - 1e-9) & (time < end - 1e-9)
     if not window.any():
         return [(start, RECOVERING)]
-    times = time[window]
-    excursions = np.flatnonzero(np.abs(trajectory["x1_rad"][window]) > band)
-    settle_index = int(excursions[-1]) + 1 if excursions.size else 0
-    steps = [(start, RECOVERING)] if settle_index > 0 else []
-    if settle_index < len(times):
-        steps.append((max(start, float(times[settle_index])), SETTLED))
-    return steps
-
-
-def recorded_poses(plant: Plant, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """Choose the poses that are recorded; the initial pose, if the run has no tick.
-
-    Returns:
-        Times, (n_poses,) [s], and joint angles, (n_poses, n_joints) [rad].
-    """
-    n = len(trajectory)
-    if n == 0:
-        return np.zeros(1), plant.new_data().qpos[None].copy()
-    time = trajectory["time_s"]
-    stride = max(1, round(1.0 / (POSE_RATE_HZ * (time[1] - time[0])))) if n > 1 else 1
-    ticks = np.union1d(np.arange(0, n, stride), n - 1)
-    return time[ticks], trajectory.qpos(ticks)
+    outside = np.flatnonzero(np.abs(trajectory["x1_rad"][window]) > band)
+    settled = time[window][outside[-1] + 1 if len(outside) else 0 :]
+    steps = [(start, RECOVERING)] if len(outside) else []
+    return [*steps, (max(start, float(settled[0])), SETTLED)] if len(settled) else steps

@@ -112,23 +112,17 @@ def make_branches(header: RecordingHeader, runs: Sequence[Run]) -> list[Branch]:
     names = [run.name for run in runs]
     if not names or len(set(names)) < len(names):
         raise ValueError(f"a recording needs runs of different names, not {names}")
-    entries = legend({run.name: run.ranking for run in runs})
-    return [_make_branch(header, run, entry) for run, entry in zip(runs, entries, strict=True)]
-
-
-def _make_branch(header: RecordingHeader, run: Run, entry: LegendEntry) -> Branch:
-    plant = header.plant if run.axis is None else header.plant.single_axis(run.axis)
-    observers = legend(run.observers, always=run.trajectory.observers[:1])
-    return Branch(
-        path=f"/{entry.part}",
-        label=entry.label,
-        series={row.path: row for row in _series(run, plant, observers, header)},
-        run=run,
-        entry=entry,
-        observers=observers,
-        plant=plant,
-        pushes=[push for push in header.pushes if run.axis is None or push.axis == run.axis],
-    )
+    # A run that did not reach its end ranks last.
+    entries = legend({run.name: {**run.summary, "fell": run.outcome.kind in ENDINGS} for run in runs})
+    branches = []
+    for run, entry in zip(runs, entries, strict=True):
+        plant = header.plant if run.axis is None else header.plant.single_axis(run.axis)
+        observers = legend(run.observers, always=run.trajectory.observers[:1])
+        series = {row.path: row for row in _series(run, plant, observers, header)}
+        pushes = [push for push in header.pushes if run.axis is None or push.axis == run.axis]
+        place = {"path": f"/{entry.part}", "label": entry.label, "series": series}
+        branches.append(Branch(**place, run=run, entry=entry, observers=observers, plant=plant, pushes=pushes))
+    return branches
 
 
 def instant(seconds: float) -> np.timedelta64:
@@ -174,19 +168,15 @@ def _estimates(run: Run, observer: LegendEntry) -> Iterator[Series]:
     """Make the series of one observer's estimates."""
     t, name = run.trajectory, observer.name
     time, rate = t["time_s"], t[f"estimate/{name}/x2_rad_s"]
-    part, label, color = observer.part, observer.label, observer.color
     width = 1.5 if name == t.observers[0] else 1.0
-
-    def line(folder: str, values: np.ndarray) -> Series:
-        return Series(f"{folder}/{part}", label, time, values, color, width, observer=name)
-
-    yield line("rate_estimate", rate)
-    yield line("rate_error", rate - t["x2_rad_s"])
+    signals = {"rate_estimate": rate, "rate_error": rate - t["x2_rad_s"]}
     if BIAS in t.extra_signals(name):
-        yield line("bias", np.degrees(t[f"estimate/{name}/{BIAS}"]))
-        if isinstance(bias := run.observers[name].get("bias_deg"), (int, float)):
-            ends = _ends(time)
-            yield Series("bias/true", "true", ends, np.full(len(ends), bias), BASELINE_COLOURS["true"], 2.5)
+        signals["bias"] = np.degrees(t[f"estimate/{name}/{BIAS}"])
+    for folder, values in signals.items():
+        path = f"{folder}/{observer.part}"
+        yield Series(path, observer.label, time, values, observer.color, width, observer=name)
+    if isinstance(bias := run.observers[name].get("bias_deg"), (int, float)):
+        yield _level("bias/true", "true", time, [bias], BASELINE_COLOURS["true"], 2.5)
 
 
 def log_styles(rec: rr.RecordingStream, branch: Lines) -> None:
@@ -227,10 +217,10 @@ def log_phases(rec: rr.RecordingStream, header: RecordingHeader, branch: Branch,
 
 def _bounds(path: str, name: str, time: np.ndarray, bound: float) -> Series:
     """Make two horizontal lines at +-bound."""
-    ends = _ends(time)
-    return Series(path, name, ends, np.tile([bound, -bound], (len(ends), 1)), BOUND_COLOURS[name], 1.0)
+    return _level(path, name, time, [bound, -bound], BOUND_COLOURS[name], 1.0)
 
 
-def _ends(time: np.ndarray) -> np.ndarray:
-    """Return the first and the last time."""
-    return time[[0, -1]] if len(time) > 1 else time
+def _level(path: str, name: str, time: np.ndarray, values: list[float], color: Colour, width: float) -> Series:
+    """Make horizontal lines from the first time to the last."""
+    ends = time[[0, -1]] if len(time) > 1 else time
+    return Series(path, name, ends, np.tile(values, (len(ends), 1)), color, width)

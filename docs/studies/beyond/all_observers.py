@@ -12,9 +12,9 @@ from beyond.league import MEANS, league
 from beyond.push_recovery import ERROR
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.results import markdown
 from cmg_mj.results.intervals import Interval
 from cmg_mj.results.summary_keys import format_figure, heading
+from cmg_mj.results.tables import markdown_table
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED, WORLDS = 90_000, 100
@@ -86,7 +86,7 @@ def league_table(rows: Sequence[Row]) -> str:
     blocks = []
     for (noise, bias), of_cell in by_cell(rows).items():
         blocks.append(f"**{noise:g} ug/rtHz, e = {bias:g} deg** (floor {of_cell[0]['floor_rad_s']:.4f} rad/s)")
-        blocks.append(markdown.table(headings, [_line(row) for row in of_cell]))
+        blocks.append(markdown_table(headings, [_line(row) for row in of_cell]))
     return "\n\n".join(blocks)
 
 

@@ -45,12 +45,12 @@ class RecordingStepping(Stepping):
         return is_done
 
 
-def recording(live: StudioSession, rows: list[tuple[float, ...]]) -> Callable[[mujoco.MjData], bool]:
-    step, lines = live.step, [axis.line for axis in live.plant.axes]
+def recording(live: StudioSession, rows: list[tuple[float, ...]]) -> Callable[[], bool]:
+    step, data, lines = live.step, live.data, [axis.line for axis in live.plant.axes]
 
-    def record_step(data: mujoco.MjData) -> bool:
+    def record_step() -> bool:
         time, q, v = data.time, data.qpos.tolist(), data.qvel.tolist()
-        has_ticked = step(data)
+        has_ticked = step()
         if has_ticked:
             row = [time]
             for line, part in zip(lines, live.controller.parts, strict=True):
@@ -83,8 +83,7 @@ class Session:
 
     @property
     def data(self) -> mujoco.MjData:
-        assert self.handle.data is not None
-        return self.handle.data
+        return self.live.data
 
     @property
     def rows(self) -> np.ndarray:

