@@ -17,7 +17,7 @@ from typing import Any
 from mujoco.batch import Batch
 
 from cmg_mj import load_scenario
-from cmg_mj.features.sweeps.chunk import compute
+from cmg_mj.features.sweeps.chunks import compute
 from cmg_mj.features.sweeps.study import SweepStudy, parse_axis
 
 WORLDS_A_PLANT = 4

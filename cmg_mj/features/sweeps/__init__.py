@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.features.sweeps.cells import Trials, cells_in_blocks
-from cmg_mj.features.sweeps.chunk import compute, table_of
+from cmg_mj.features.sweeps.chunks import compute, table_of
 from cmg_mj.features.sweeps.sobol import index_rows, index_table
 from cmg_mj.features.sweeps.study import SweepStudy, Variation, check_values, parse_axis, sampling
 from cmg_mj.results.trajectory import frame_of

@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 
 from cmg_mj.core.errors import shortened
-from cmg_mj.features.sweeps.chunk import as_table, point_columns
+from cmg_mj.features.sweeps.chunks import as_table, point_columns
 from cmg_mj.features.sweeps.study import SweepStudy
 from cmg_mj.results.intervals import Interval, finite_mean, known_interval
 from cmg_mj.results.summary_keys import KEYS, Figures, Summary

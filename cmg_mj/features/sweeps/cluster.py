@@ -18,8 +18,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cmg_mj.core.errors import InputError, RunStopped, raised
-from cmg_mj.features.sweeps.chunk import compute, rows_of_failed_chunk, table_of
-from cmg_mj.features.sweeps.store import GOES_ON, Store
+from cmg_mj.features.sweeps.chunks import GOES_ON, Store, compute, rows_of_failed_chunk, table_of
 from cmg_mj.features.sweeps.study import Chunk, Point, SweepStudy
 from cmg_mj.inputs.files import folder
 from cmg_mj.scenario.resolve import versions

@@ -20,8 +20,7 @@ from cmg_mj.cli.terminal import (
 from cmg_mj.core.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.features.sweeps.study import SweepStudy
-    from cmg_mj.features.sweeps.study_file import SweepFields
+    from cmg_mj.features.sweeps.study import SweepFields, SweepStudy
 
 
 class StudyOptions(TypedDict):
@@ -77,12 +76,11 @@ def sweep(
       study.toml      reruns the sweep
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.features.sweeps.cells import COLUMNS, Trials, cells_of
-    from cmg_mj.features.sweeps.chunk import estimate_cost
+    from cmg_mj.features.sweeps.chunks import Store, estimate_cost
+    from cmg_mj.features.sweeps.chunks import run as run_here
     from cmg_mj.features.sweeps.cluster import local_workers, on_cluster
     from cmg_mj.features.sweeps.report import save, summary
     from cmg_mj.features.sweeps.sobol import index_rows
-    from cmg_mj.features.sweeps.store import Store
-    from cmg_mj.features.sweeps.store import run as run_here
     from cmg_mj.features.sweeps.study import MOST_TRIALS, check_values, counted
     from cmg_mj.scenario.differences import safe_name
 
@@ -127,8 +125,16 @@ def sweep(
 def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.features.sweeps import WORLDS
-    from cmg_mj.features.sweeps.study import SweepStudy, parse_axis, sampling
-    from cmg_mj.features.sweeps.study_file import axes_of, design_of, locate_tracks, scenario_of, study_file
+    from cmg_mj.features.sweeps.study import (
+        SweepStudy,
+        axes_of,
+        design_of,
+        locate_tracks,
+        parse_axis,
+        sampling,
+        scenario_of,
+        study_file,
+    )
     from cmg_mj.inputs.files import find
 
     design = sampling(options["sample"], options["sobol"], prefix="--")

@@ -13,10 +13,9 @@ import pyarrow.parquet as pq
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.sweeps.cells import CLOSE, Count, Trials, cells_in_blocks, cells_of, cells_schema, lead_rows
-from cmg_mj.features.sweeps.chunk import schema_of
+from cmg_mj.features.sweeps.chunks import CELLS, GOES_ON, INDICES, REPORT, TRIALS, Store, schema_of
 from cmg_mj.features.sweeps.pictures import ERRORS, fall_counts, pictures_of
 from cmg_mj.features.sweeps.sobol import FEWEST, LOST, IndexRow, index_table
-from cmg_mj.features.sweeps.store import CELLS, GOES_ON, INDICES, REPORT, TRIALS, Store
 from cmg_mj.features.sweeps.study import SweepStudy, VariedField, counted
 from cmg_mj.results import markdown
 from cmg_mj.results.files import whole_file

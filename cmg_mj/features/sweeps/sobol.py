@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from cmg_mj.features.sweeps.cells import COMPARED, Trials
-from cmg_mj.features.sweeps.chunk import as_table
+from cmg_mj.features.sweeps.chunks import as_table
 from cmg_mj.results.intervals import CONFIDENCE
 
 RESAMPLES = 999

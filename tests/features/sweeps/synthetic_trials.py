@@ -8,7 +8,7 @@ from typing import Any
 import pyarrow as pa
 
 from cmg_mj.features.sweeps.cells import Trials
-from cmg_mj.features.sweeps.chunk import compute, table_of
+from cmg_mj.features.sweeps.chunks import compute, table_of
 from cmg_mj.features.sweeps.study import SweepStudy, parse_axis
 from cmg_mj.scenario.loading import load_scenario
 

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cmg_mj.features.sweeps.chunk import FIGURES
+from cmg_mj.features.sweeps.chunks import FIGURES
 from cmg_mj.inputs.files import folder
 from tests.command import cmg_mj
 

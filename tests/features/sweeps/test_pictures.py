@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.features.sweeps.cells import Trials
+from cmg_mj.features.sweeps.chunks import PICTURES
 from cmg_mj.features.sweeps.pictures import in_words, is_logarithmic, pictures_of, round_values
-from cmg_mj.features.sweeps.store import PICTURES
 from cmg_mj.view.plots.figure import Picture, draw
 from cmg_mj.view.plots.map_plot import Map
 from tests.features.sweeps.synthetic_trials import BIAS, NOISE, RATE, make_trials

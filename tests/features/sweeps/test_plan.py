@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cmg_mj.features.sweeps import chunk as plan
+from cmg_mj.features.sweeps import chunks as plan
 from cmg_mj.features.sweeps import study
 from cmg_mj.features.sweeps.study import Chunk, SweepStudy, parse_axis
 from cmg_mj.scenario.loading import load_scenario

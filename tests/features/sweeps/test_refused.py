@@ -32,7 +32,7 @@ class Broken:
 @pytest.fixture(autouse=True)
 def nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Until something is refused."""
-    for module in (".store", "", ".chunk"):
+    for module in (".chunks", ""):
         monkeypatch.setattr(f"cmg_mj.features.sweeps{module}.compute", lambda *_, **__: pytest.fail("computed"))
 
 

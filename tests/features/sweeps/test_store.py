@@ -16,10 +16,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.core.errors import InputError, RunStopped
-from cmg_mj.features.sweeps import store as module
+from cmg_mj.features.sweeps import chunks as module
 from cmg_mj.features.sweeps import study as study_module
-from cmg_mj.features.sweeps.chunk import table_of
-from cmg_mj.features.sweeps.store import Store, hash_of, resolved, run
+from cmg_mj.features.sweeps.chunks import Store, hash_of, resolved, run, table_of
 from cmg_mj.features.sweeps.study import Chunk, SweepStudy, parse_axis
 from cmg_mj.inputs.files import folder
 from cmg_mj.scenario.loading import load_scenario

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from cmg_mj.features.sweeps import chunk as work
+from cmg_mj.features.sweeps import chunks as work
 from cmg_mj.features.sweeps.study import SweepStudy, parse_axis
 from cmg_mj.observers import Estimate, Measurement
 from cmg_mj.results.result import Result

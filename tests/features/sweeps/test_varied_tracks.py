@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cmg_mj.features.sweeps.study import FieldValue, parse_axis
-from cmg_mj.features.sweeps.study_file import locate_tracks, varied_tracks
+from cmg_mj.features.sweeps.study import FieldValue, locate_tracks, parse_axis, varied_tracks
 from tests.command import cmg_mj
 
 MOTION = {"kind": "track", "file": "walk.csv"}
