@@ -39,7 +39,7 @@ def bench(observer: str, worlds: int, *, many_plants: bool) -> None:
     if many_plants:
         axes = tuple(parse_axis(field, values, field) for field, values in PLANTS.items())
         study = SweepStudy(scenario, axes, (observer,), WORLDS_A_PLANT, "sample", max(1, worlds // WORLDS_A_PLANT))
-    chunk = study.chunks[0]
+    chunk = study.chunk(0)
     with clocked() as in_batch:
         start = time.process_time()
         rows = compute(study, chunk, threads=1)
