@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,9 @@ from cmg_mj.features.sweeps.cells import Trials, baselines_ahead, fell_interval,
 from cmg_mj.features.sweeps.study import VariedField, counted
 from cmg_mj.results.summary_keys import heading
 from cmg_mj.view.plots.figure import pyplot
-from cmg_mj.view.plots.style import colours, hexadecimal, short_names
+from cmg_mj.view.plots.style import colours, hexadecimal
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
@@ -27,9 +26,9 @@ MAPS = {ERRORS[0]: "map_velocity_error", ERRORS[1]: "map_push_error"}
 """Figure -> its map."""
 TRUE_RATE = "true"
 """Name of the true rate in the loop, as baselines' trials have it, in a map."""
-COLUMNS, MAX_TICKS = 4, 10
-"""Small panels, one an observer, in a row below a map; marked values of an axis."""
-EMPTY = (232, 232, 232)
+COLUMNS, MAX_TICKS = 3, 6
+"""Panels of a map beside each other; marked values of an axis."""
+EMPTY = "0.9"
 """Colour of a cell without a best."""
 UNKNOWN = (math.nan, math.nan, math.nan)
 LOGARITHMIC = 10.0
@@ -58,7 +57,6 @@ class Map:
         label: The figure, in words.
         best: Place in the study's observers of each cell's best; negative for none.
         sure: Whether a cell's best is the best beyond chance; the other cells have a dot.
-        value: The best's figure; NaN for none.
         each: Observer or baseline -> its own figure.
         ahead: Baseline -> a share, above one half where it has less error than the best.
         falls: Observer, or the true rate -> its share of falls.
@@ -67,7 +65,6 @@ class Map:
     label: str
     best: np.ndarray
     sure: np.ndarray
-    value: np.ndarray
     each: Mapping[str, np.ndarray]
     ahead: Mapping[str, np.ndarray]
     falls: Mapping[str, np.ndarray]
@@ -106,7 +103,7 @@ def curves(trials: Trials, field: str) -> Figure:
             curve = fall_curve(trials, place) if key == FALLS else error_curve(trials.figure(key)[:, place])
             mean, low, high, is_part = curve[order].T
             color = hexadecimal(palette[name])
-            axes.errorbar(x[order], mean, [mean - low, high - mean], fmt=".-", color=color, label=name.lstrip("_"))
+            axes.errorbar(x[order], mean, [mean - low, high - mean], fmt=".-", color=color, label=name)
             axes.plot(x[order][is_part == 1], mean[is_part == 1], "x", color=color, markersize=9)
         axes.set_ylabel("share of falls" if key == FALLS else heading(key))
         if key != FALLS and scale_of(trials.figure(key)) == "log":
@@ -156,7 +153,7 @@ def maps(trials: Trials, across: VariedField, up: VariedField) -> dict[str, Map]
         if np.isfinite(figure).any():
             best, sure, value = least_error(figure, places)
             each = dict(zip(study.observers, np.moveaxis(figure.mean(axis=-1), -1, 0), strict=True))
-            found[name] = Map(heading(key), best, sure, value, each, baselines_ahead(study, figure, value), falls)
+            found[name] = Map(heading(key), best, sure, each, baselines_ahead(study, figure, value), falls)
     if trials.fell.any():
         best, value = least(shares, places)
         best[(shares[:, :, places] == value[:, :, None]).sum(axis=2) > 1] = -1  # several alike
@@ -167,63 +164,55 @@ def maps(trials: Trials, across: VariedField, up: VariedField) -> dict[str, Map]
             ]
             own = fell_interval(int(fell[at][best[at]]), int(known[at][best[at]]))
             sure[at] = all(own.high < other.low for other in others)
-        found[FALLS] = Map("share of falls", best, sure, value, falls, {}, falls)
+        found[FALLS] = Map("share of falls", best, sure, falls, {}, falls)
     return found
 
 
 def draw_map(a_map: Map, observers: Sequence[str], across: VariedField, up: VariedField) -> Figure:
-    """Draw the best observer of every cell, and below it a small panel of each one's own figure."""
-    columns = min(COLUMNS, len(a_map.each))
-    rows = -(-len(a_map.each) // columns)
-    figure = pyplot().figure(figsize=(10.4, 5.5 + 2.1 * rows), layout="constrained")
-    grid = figure.add_gridspec(2 + rows, columns)
-    top = figure.add_subplot(grid[:2, :], title="Best observer, by colour; thin lines: its figure")
-    _draw_best(top, a_map, observers)
-    top.set(ylabel=up.field)
-    below = [figure.add_subplot(grid[2 + i // columns, i % columns]) for i in range(len(a_map.each))]
-    values = np.stack(list(a_map.each.values()))
-    limits = {"vmin": np.nanmin(values), "vmax": np.nanmax(values)} if np.isfinite(values).any() else {}
-    titles = short_names(list(a_map.each))
-    for axes, (name, own) in zip(below, a_map.each.items(), strict=True):
-        axes.imshow(np.ma.masked_invalid(own), origin="lower", aspect="auto", norm=scale_of(values), **limits)
-        axes.set_title(titles[name], fontsize="medium")
-    figure.colorbar(below[0].images[0], ax=below, label=a_map.label, location="bottom", aspect=60)
-    for axes in (top, *below):
-        for axis, varied in ((axes.xaxis, across), (axes.yaxis, up)):
-            marks = sorted(varied.values)
-            step = -(-len(marks) // MAX_TICKS)
-            axis.set_ticks(range(0, len(marks), step), [f"{mark:g}" for mark in marks[::step]])
-        axes.set(xlabel=across.field)
-    return figure
+    """Draw a panel of the best observer of every cell, and one of each one's own figure; a value takes a step."""
+    from matplotlib.colors import to_rgb
 
-
-def _draw_best(axes: Axes, a_map: Map, observers: Sequence[str]) -> None:
-    palette = colours([*observers, *a_map.falls, *a_map.ahead])
-    names, color = short_names(list(palette)), {name: hexadecimal(rgb) for name, rgb in palette.items()}
-    cells = np.array([*(palette[name] for name in observers), EMPTY], dtype=np.uint8)  # -1 is the last
-
-    def in_legend(style: str, label: str, **properties: Any) -> None:
-        axes.plot([], [], style, label=label.lstrip("_"), **properties)  # matplotlib hides a leading underscore
-
-    axes.imshow(cells[a_map.best], origin="lower", aspect="auto")
-    for place, name in enumerate(observers):
-        if (a_map.best == place).any():
-            in_legend("s", names[name], color=color[name])
-    if (a_map.best < 0).any():
-        in_legend("s", "none, or several alike", color=hexadecimal(EMPTY))
-    if len(np.unique(a_map.value[np.isfinite(a_map.value)])) > 1:
-        axes.clabel(axes.contour(np.ma.masked_invalid(a_map.value), colors="0.1", linewidths=0.8), fontsize="small")
-    unsure = (a_map.best >= 0) & ~a_map.sure
-    if unsure.any():
-        rows, columns = np.nonzero(unsure)
-        axes.plot(columns, rows, "o", color="0.1", markersize=3.5, label="not beyond chance")
+    n = 1 + len(a_map.each)
+    columns = min(COLUMNS, n)
+    size = (3.4 * columns + 2.0, 1.2 + 3.0 * -(-n // columns))
+    figure, grid = pyplot().subplots(
+        -(-n // columns), columns, sharex=True, sharey=True, squeeze=False, layout="constrained", figsize=size
+    )
+    best, *others = grid.flat
+    for axes in others[n - 1 :]:
+        axes.set_visible(False)
+    image = {"origin": "lower", "aspect": "auto"}
+    color = {name: hexadecimal(rgb) for name, rgb in colours([*observers, *a_map.falls, *a_map.ahead]).items()}
+    kinds = [*((name, color[name]) for name in observers), ("none, or several alike", EMPTY)]
+    best.imshow(np.array([to_rgb(fill) for _, fill in kinds])[a_map.best], **image)  # -1 is the last
+    best.set_title("the best")
+    places = range(-1, len(observers))
+    handles = [
+        best.plot([], [], "s", color=kinds[i][1], label=kinds[i][0])[0] for i in places if (a_map.best == i).any()
+    ]
+    rows, steps = np.nonzero((a_map.best >= 0) & ~a_map.sure)
+    handles += best.plot(steps, rows, "o", color="0.1", markersize=3.5, label="not beyond chance")
     half, ahead = "{}: half of the worlds fall", "{}: less error than the best"
     for style, shares, label in (("--", a_map.falls, half), (":", a_map.ahead, ahead)):
         for name, share in shares.items():
             if (share < 0.5).any() and (share > 0.5).any():
-                axes.contour(np.ma.masked_invalid(share), [0.5], colors=color[name], linewidths=2.4, linestyles=style)
-                in_legend(style, label.format(names[name]), color=color[name], linewidth=2.4)
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize="small", frameon=False)
+                best.contour(np.ma.masked_invalid(share), [0.5], colors=color[name], linestyles=style)
+                handles += best.plot([], [], style, color=color[name], label=label.format(name))
+    values = np.stack(list(a_map.each.values()))
+    known = values[np.isfinite(values)]
+    limits = {"vmin": known.min(), "vmax": known.max(), "norm": scale_of(values)} if len(known) else {}
+    for axes, (name, own) in zip(others, a_map.each.items(), strict=False):
+        axes.imshow(np.ma.masked_invalid(own), **image, **limits)
+        axes.set_title(name)
+    figure.colorbar(others[0].images[0], ax=grid, label=a_map.label)
+    for axis, varied in ((best.xaxis, across), (best.yaxis, up)):
+        marks = sorted(varied.values)
+        step = -(-len(marks) // MAX_TICKS)
+        axis.set_ticks(range(0, len(marks), step), [f"{mark:g}" for mark in marks[::step]])
+    grid[-1, 0].set_xlabel(across.field)
+    grid[0, 0].set_ylabel(up.field)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
 
 
 def fall_counts(trials: Trials) -> tuple[np.ndarray, np.ndarray]:

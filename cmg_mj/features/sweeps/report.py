@@ -37,10 +37,9 @@ QUANTILES = {0.1: "10 % quantile", 0.5: "median", 0.9: "90 % quantile"}
 """Quantiles of a figure over the points of a design."""
 ERROR = ERRORS[0]
 ABOUT_MAPS = (
-    "A cell's colour is the observer of the smallest mean error among those that stood in every world, the contours "
-    "are its error. A dot: another one's mean difference to it, world by world, is within its 95 % interval. A dashed "
-    "line in an observer's colour: half of its worlds fall beyond it. For falls, a dot says that Wilson's intervals "
-    "overlap."
+    "A cell's colour in the first panel is the observer of the smallest mean error among those that stood in every "
+    "world. A dot: another one's mean difference to it, world by world, is within its 95 % interval. A dashed line in "
+    "an observer's colour: half of its worlds fall beyond it. For falls, a dot says that Wilson's intervals overlap."
 )
 ABOUT_AHEAD = (
     "Baselines close no loop: their errors are those on the motion of a loop with the true rate, and its falls are "
