@@ -39,13 +39,13 @@ def bench(observer: str, worlds: int, *, many_plants: bool) -> None:
     if many_plants:
         axes = tuple(parse_axis(field, values, field) for field, values in PLANTS.items())
         study = SweepStudy(scenario, axes, (observer,), WORLDS_A_PLANT, "sample", max(1, worlds // WORLDS_A_PLANT))
-    chunk = study.chunk(0)
+    _, trials = study.chunk(0)
     with clocked() as in_batch:
         start = time.process_time()
-        rows = compute(study, chunk, threads=1)
+        rows = compute(study, observer, trials, threads=1)
         whole = time.process_time() - start
     print(
-        f"{observer}: {len({number for number, _ in chunk.trials})} plants, {len(rows)} trials, "
+        f"{observer}: {len({number for number, _ in trials})} plants, {len(rows)} trials, "
         f"{sum(row['stood'] is True for row in rows)} stood: {whole:.1f} s, {in_batch[0]:.1f} s in the batch, "
         f"ratio {whole / in_batch[0]:.3f}, {len(rows) / whole:.1f} trials a second"
     )

@@ -104,7 +104,7 @@ def sweep(
     study = SweepStudy(base, axes, names, worlds, design, n)
 
     check_values(study)
-    rows = (compute(study, study.chunk(number)) for number in range(study.n_chunks))
+    rows = (compute(study, *study.chunk(number)) for number in range(study.n_chunks))
     table = pa.concat_tables(table_of(chunk_rows, trials_schema(study)) for chunk_rows in rows)
     trials = Trials(study, [table])
     return SweepResult(

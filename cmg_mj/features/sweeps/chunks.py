@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 import tomli_w
 
 from cmg_mj.core.errors import InputError, RunStopped, raised
-from cmg_mj.features.sweeps.study import CHUNK, MAX_TRIALS, Chunk, SweepStudy, varied_tracks
+from cmg_mj.features.sweeps.study import CHUNK, MAX_TRIALS, SweepStudy, Trial, varied_tracks
 from cmg_mj.inputs.files import find, model_files
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.folder import is_own, numbered, remove, write_marker
@@ -29,8 +29,6 @@ from cmg_mj.runs.experiment import Experiment, prepare, run_batch
 # --- computed
 
 OnProgress: TypeAlias = Callable[[float], None]
-Trial: TypeAlias = tuple[int, int]
-"""Number of the point, world."""
 FIGURES = [*(key for key in KEYS if key not in ("fell_fraction", "stopped_fraction")), "bias_deg"]
 """Figures of one trial."""
 
@@ -40,33 +38,39 @@ def no_progress(done: float) -> None:
 
 
 def compute(
-    study: SweepStudy, chunk: Chunk, on_progress: OnProgress = no_progress, *, threads: int = 0
+    study: SweepStudy,
+    observer: str,
+    trials: Sequence[Trial],
+    on_progress: OnProgress = no_progress,
+    *,
+    threads: int = 0,
 ) -> list[Summary]:
-    """Run the trials of a chunk.
+    """Run some of an observer's trials.
 
     A trial that fails is a row with the reason: values that do not fit, physics that fails, an observer that raises.
 
     Args:
         study: The sweep.
-        chunk: The trials.
-        on_progress: Called after every tick with the share of the chunk that is done.
+        observer: The observer in the loop, or a baseline.
+        trials: The trials; those of a point stand together.
+        on_progress: Called after every tick with the share that is done.
         threads: Number of threads that step the worlds; 0: as many as there are processors.
 
     Returns:
-        A row a trial, in the chunk's order: the point's number, the varied values, and the figures of the run.
+        A row a trial: the point's number, the varied values, and the figures of the run.
     """
-    base = prepare(study.scenario_with(chunk.observer))
+    base = prepare(study.scenario_with(observer))
     results: dict[Trial, Summary] = {}
     batches: dict[tuple[BatchKey, PlantStructure], dict[Trial, Experiment]] = {}
-    for number, group in itertools.groupby(chunk.trials, key=lambda trial: trial[0]):
-        trials = list(group)
+    for number, group in itertools.groupby(trials, key=lambda trial: trial[0]):
+        of_point = list(group)
         try:
             experiment = base.with_settings(study.point(number))
             key = experiment.batch_key, plant_structure(experiment.plant)
         except InputError as error:  # values that do not fit each other: these trials never begin
-            results |= dict.fromkeys(trials, unfinished("refused", str(error)))
+            results |= dict.fromkeys(of_point, unfinished("refused", str(error)))
         else:
-            batches.setdefault(key, {}).update(dict.fromkeys(trials, experiment))
+            batches.setdefault(key, {}).update(dict.fromkeys(of_point, experiment))
 
     def run(batch: Mapping[Trial, Experiment], tick: OnProgress) -> None:
         """Run trials in one batch. Where one raises, those that it stopped run again in halves, without it at last.
@@ -84,19 +88,19 @@ def compute(
         else:
             if any(outcome.kind == "interrupted" for outcome in result.outcomes):
                 raise KeyboardInterrupt
-            rows = result.rows(chunk.observer if chunk.observer in study.baselines else None)
+            rows = result.rows(observer if observer in study.baselines else None)
             results.update(zip(batch, rows, strict=True))
             again = [trial for trial, end in zip(batch, result.outcomes, strict=True) if end.with_others]
         half = (len(again) + 1) // 2
         for part in filter(None, (again[:half], again[half:])):
             run({trial: batch[trial] for trial in part}, tick)
 
-    done = len(results) / len(chunk.trials)
+    done = len(results) / len(trials)
     for batch in batches.values():
-        share = len(batch) / len(chunk.trials)
+        share = len(batch) / len(trials)
         run(batch, part_of(on_progress, done, share / study.scenario.duration_s))
         done += share
-    return rows_of(study, chunk, results)
+    return rows_of(study, observer, results, trials)
 
 
 def part_of(on_progress: OnProgress, start: float, size: float) -> OnProgress:
@@ -109,12 +113,14 @@ def unfinished(outcome: str, reason: str) -> Summary:
     return {"outcome": outcome, "stood": False, "end_time_s": 0.0, "reason": reason}
 
 
-def rows_of(study: SweepStudy, chunk: Chunk, results: Mapping[Trial, Summary]) -> list[Summary]:
-    """Put the point, the observer, the seed and the world before the result of each of a chunk's trials."""
-    common = {"observer": chunk.observer, "seed": study.scenario.seed}
+def rows_of(
+    study: SweepStudy, observer: str, results: Mapping[Trial, Summary], trials: Iterable[Trial]
+) -> list[Summary]:
+    """Put the point, the observer, the seed and the world before the result of each trial."""
+    common = {"observer": observer, "seed": study.scenario.seed}
     return [
         {"point": number, **study.point(number), **common, "world": world, **results[number, world]}
-        for number, world in chunk.trials
+        for number, world in trials
     ]
 
 
@@ -190,11 +196,11 @@ def _seconds_a_trial(study: SweepStudy, observer: str) -> float:
     stretches = min(STRETCHES, trials) if study.apart else 1
     count = min(TIMED, trials // stretches)
     starts = [trials * i // stretches for i in range(stretches)]
-    return sum(_seconds(study, Chunk(0, observer, study.stretch(first, count))) for first in starts) / stretches / count
+    return sum(_seconds(study, observer, study.stretch(first, count)) for first in starts) / stretches / count
 
 
-def _seconds(study: SweepStudy, piece: Chunk) -> float:
-    """Time a piece by its preparation and by its pace once it has begun [s]."""
+def _seconds(study: SweepStudy, observer: str, trials: Sequence[Trial]) -> float:
+    """Time trials by their preparation and by their pace once they have begun [s]."""
     ticks: list[tuple[float, float]] = []
 
     def tick(share: float) -> None:
@@ -204,7 +210,7 @@ def _seconds(study: SweepStudy, piece: Chunk) -> float:
 
     start = time.perf_counter()
     try:
-        compute(study, piece, tick)
+        compute(study, observer, trials, tick)
     except KeyboardInterrupt:
         (first, at), (last, to) = ticks[0], ticks[-1]
         if last - first <= SECONDS:  # Ctrl-C
@@ -336,30 +342,27 @@ def run(store: Store, left: Sequence[int], on_progress: OnProgress = no_progress
     done = study.trials - sum(map(study.chunk_size, left))
     for number in left:
         size = study.chunk_size(number)
-        store.keep(number, compute(study, study.chunk(number), part_of(on_progress, done, size)))
+        store.keep(number, compute(study, *study.chunk(number), part_of(on_progress, done, size)))
         done += size
         on_progress(done)
 
 
 def _may_take(folder: Path, fields: StudyFields, overwrite: bool) -> bool:
-    """Return whether a folder is new, empty, or this sweep's; one that may be replaced is removed."""
-    if folder.is_dir() and (not any(folder.iterdir()) or _study_in(folder) == _without_versions(fields)):
-        return True
+    """Return whether a folder is new, empty, or this sweep's, versions apart; one that may be replaced is removed."""
+    if folder.is_dir():
+        try:
+            there = tomllib.loads((folder / STUDY).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            there = {}
+        if not any(folder.iterdir()) or _without_versions(there) == _without_versions(fields):
+            return True
     if overwrite and is_own(folder):
         remove(folder)
     return not os.path.lexists(folder)
 
 
-def _study_in(folder: Path) -> StudyFields:
-    try:
-        return _without_versions(tomllib.loads((folder / STUDY).read_text(encoding="utf-8")))
-    except (OSError, ValueError):
-        return {}
-
-
 def _without_versions(fields: StudyFields) -> StudyFields:
-    scenario = {key: value for key, value in fields.get("scenario", {}).items() if key != "versions"}
-    return {**fields, "scenario": scenario}
+    return {**fields, "scenario": {**fields.get("scenario", {}), "versions": None}}
 
 
 def hash_of(study: SweepStudy, fields: StudyFields) -> str:

@@ -28,8 +28,8 @@ from cmg_mj.scenario.resolve import versions
 if TYPE_CHECKING:
     from distributed import Client, Future, Worker
 
-LOCAL, MAX_LOCAL = "local:", 256
-"""Beginning of the address of workers on this machine, and how many there may be."""
+MAX_LOCAL = 256
+"""Workers on this machine."""
 ADDRESS = re.compile(r"((tcp|tls)://)?[^/\s]+:\d{1,5}")
 PATIENCE_S = 10.0
 """Time for which a cluster may fail to answer."""
@@ -52,14 +52,15 @@ def local_workers(address: str) -> int | None:
     Raises:
         InputError: The address is written as neither.
     """
-    if not address.startswith(LOCAL):
-        if not ADDRESS.fullmatch(address):
-            raise InputError(f"--cluster {address}: write tcp://HOST:PORT of a scheduler that is running, or {LOCAL}2")
-        return None
-    count = address.removeprefix(LOCAL)
-    if not re.fullmatch("[0-9]{1,9}", count) or not 1 <= int(count) <= MAX_LOCAL:
-        raise InputError(f"--cluster {address}: write {LOCAL}N with the number of workers, 1 to {MAX_LOCAL}")
-    return int(count)
+    local = re.fullmatch(r"local:([0-9]{1,9})", address)
+    if local and 1 <= int(local[1]) <= MAX_LOCAL:
+        return int(local[1])
+    if address.startswith("local:") or not ADDRESS.fullmatch(address):
+        raise InputError(
+            f"--cluster {address}: write tcp://HOST:PORT of a scheduler that is running, or local:2 for 2 workers on "
+            f"this machine, at most {MAX_LOCAL}"
+        )
+    return None
 
 
 @contextmanager
@@ -156,9 +157,9 @@ def _run(
                     if not alone or killed[number] < KILLS:
                         suspects.append(number)
                         continue
-                    chunk = study.chunk(number)
+                    observer, trials = study.chunk(number)
                     reason = unfinished("stopped", f"its chunk has killed {killed[number]} workers")
-                    rows = rows_of(study, chunk, dict.fromkeys(chunk.trials, reason))
+                    rows = rows_of(study, observer, dict.fromkeys(trials, reason), trials)
                 store.keep(number, rows)
                 done += study.chunk_size(number)
             on_progress(done)
@@ -214,6 +215,6 @@ def compute_there(content: bytes, number: int, wanted: Mapping[str, str]) -> lis
                 raise InputError(f"worker {worker.address}: {name} {version} there, {wanted[name]} here")
         study = _unpacked(content)
         try:
-            return compute(study, study.chunk(number), threads=worker.state.nthreads)
+            return compute(study, *study.chunk(number), threads=worker.state.nthreads)
         except InputError as error:
             raise InputError(f"worker {worker.address}: {error}") from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING
 
 import click
 
@@ -20,17 +20,7 @@ from cmg_mj.cli.terminal import (
 from cmg_mj.core.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.features.sweeps.study import SweepStudy
-
-
-class StudyOptions(TypedDict):
-    """The options that make the study, by click's names."""
-
-    varied: tuple[str, ...]
-    observers: list[str] | None
-    worlds: int | None
-    sample: int | None
-    sobol: int | None
+    from cmg_mj.features.sweeps.study import SamplingDesign, SweepStudy
 
 
 @click.command(short_help="Run a scenario with varied fields, observers and noise.")
@@ -61,7 +51,15 @@ class StudyOptions(TypedDict):
 @click.option("--yes", is_flag=True, help="Run the sweep even if it is very large.")
 @users_code()
 def sweep(
-    arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool, **options: Unpack[StudyOptions]
+    arguments: RunArguments,
+    varied: tuple[str, ...],
+    observers: list[str] | None,
+    worlds: int | None,
+    sample: int | None,
+    sobol: int | None,
+    dry_run: bool,
+    cluster: str | None,
+    yes: bool,
 ) -> None:
     """Run SCENARIO, or the study file of a sweep, in many worlds with every observer at every varied value.
 
@@ -81,12 +79,12 @@ def sweep(
     from cmg_mj.features.sweeps.cluster import local_workers, on_cluster
     from cmg_mj.features.sweeps.report import save, summary
     from cmg_mj.features.sweeps.sobol import index_rows
-    from cmg_mj.features.sweeps.study import MAX_TRIALS, check_values, counted
+    from cmg_mj.features.sweeps.study import MAX_TRIALS, check_values, counted, sampling
     from cmg_mj.scenario.differences import safe_name
 
     if cluster is not None:
         local_workers(cluster)
-    study = _study(arguments, options)
+    study = _study(arguments, varied, observers, worlds, sampling(sample, sobol, prefix="--"))
     check_values(study)
     if dry_run:
         cost = estimate_cost(study)
@@ -126,7 +124,13 @@ def sweep(
         click.echo(f"Written to {store.folder}. Read {store.folder / 'report.md'}", err=True)
 
 
-def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
+def _study(
+    arguments: RunArguments,
+    varied: tuple[str, ...],
+    observers: list[str] | None,
+    worlds: int | None,
+    design: tuple[SamplingDesign, int] | None,
+) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.features.sweeps.study import (
         SweepSection,
@@ -134,13 +138,11 @@ def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
         locate_tracks,
         parse_axis,
         read_study,
-        sampling,
         scenario_of,
     )
     from cmg_mj.inputs.files import find
 
-    design = sampling(options["sample"], options["sobol"], prefix="--")
-    settings = [setting.partition("=") for setting in options["varied"]]
+    settings = [setting.partition("=") for setting in varied]
     axes = [parse_axis(field, values, f"--vary {field}{equals}{values}") for field, equals, values in settings]
     file = read_study(arguments.name)
     section = SweepSection() if file is None else file.sweep
@@ -156,7 +158,7 @@ def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
     return SweepStudy(
         scenario,
         tuple(locate_tracks(axis, beside) for axis in axes),
-        tuple(options["observers"] or section.observers or [scenario.observer.kind]),
-        options["worlds"] or section.worlds,
+        tuple(observers or section.observers or [scenario.observer.kind]),
+        worlds or section.worlds,
         *(design or (section.design, section.n)),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
@@ -131,20 +132,16 @@ def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarr
 def _refused(values: np.ndarray, outcome: np.ndarray, n: int) -> str | None:
     """Say why a quantity of a design of n rows has no indices, with counts; None if it has."""
     means = values.mean(axis=1)
-    if np.isfinite(means).all():
-        if np.ptp(means) == 0.0:
-            return "the same at every point"
-        independent = 2 * n  # A and B, of which the variance is taken
-        if np.ptp(means[:independent]) > 0.0:
-            return None
-        others = int((means[independent:] != means[0]).sum())
+    unknown = ~np.isfinite(values)
+    if unknown.any():
+        counts = ", ".join(f"{count} {end}" for end, count in Counter(outcome[unknown].tolist()).items())
+        points = f"{unknown.any(axis=1).sum()} of {len(means)} points"
+        return f"no value at {points}: of {values.size} trials {counts}"
+    if np.ptp(means) == 0.0:
+        return "the same at every point"
+    independent = 2 * n  # A and B, of which the variance is taken
+    if np.ptp(means[:independent]) == 0.0:
         return (
-            f"the same at all {independent} independent points of the design: no variance to share out "
-            f"(another value at {others} of the {len(means) - independent} made of them; take more rows)"
+            f"the same at all {independent} independent points of the design: no variance to share out; take more rows"
         )
-    fell = int((outcome == "fell").sum())
-    stopped = int(((outcome != "done") & (outcome != "fell")).sum())
-    none = int((~np.isfinite(values) & (outcome == "done")).sum())
-    counts = [f"{n} {what}" for n, what in ((fell, "fell"), (stopped, "stopped"), (none, "have no such figure")) if n]
-    points = f"no value at {int((~np.isfinite(means)).sum())} of {len(means)} points"
-    return f"{points}: of {values.size} trials {', '.join(counts)}"
+    return None

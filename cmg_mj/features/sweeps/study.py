@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -175,6 +175,8 @@ def _parse_list(text: str, where: str) -> list[Any]:
 SamplingDesign = Literal["grid", "sample", "sobol"]
 Point = dict[str, Any]
 """Varied field -> its value."""
+Trial = tuple[int, int]
+"""Number of the point, world."""
 WORLDS = 20
 """Worlds a cell by default."""
 MAX_TRIALS = 1_000_000
@@ -194,20 +196,6 @@ BASELINE_SETTINGS = {"feedback": "truth", "angle_source": "measured", "bias_trim
 """Fields of [controller] of a baseline's loop: with others the loop would depend on `BASELINE_LOOP`."""
 MAX_ALONE = 200
 """Values of a field that is varied alone that are tried before the sweep, at 5 ms each; the last one is, too."""
-
-
-class Chunk(NamedTuple):
-    """Trials of one observer that are computed and kept together.
-
-    Attributes:
-        number: Place among all chunks.
-        observer: The observer in the loop.
-        trials: (number of the point, world) of each trial; those of a point stand together.
-    """
-
-    number: int
-    observer: str
-    trials: Sequence[tuple[int, int]]
 
 
 @dataclass(frozen=True)
@@ -344,13 +332,13 @@ class SweepStudy:
         """Count the trials of a chunk."""
         return min(CHUNK, self.n_points * self.worlds - number % self._chunks_an_observer * CHUNK)
 
-    def chunk(self, number: int) -> Chunk:
-        """List the trials of a chunk; those that can run in one batch are next to each other."""
+    def chunk(self, number: int) -> tuple[str, list[Trial]]:
+        """Return the observer and the trials of a chunk."""
         observer, piece = divmod(number, self._chunks_an_observer)
-        return Chunk(number, self.observers[observer], self.stretch(piece * CHUNK, self.chunk_size(number)))
+        return self.observers[observer], self.stretch(piece * CHUNK, self.chunk_size(number))
 
-    def stretch(self, first: int, count: int) -> list[tuple[int, int]]:
-        """List so many of an observer's trials from one on, in the order in which they are run."""
+    def stretch(self, first: int, count: int) -> list[Trial]:
+        """List so many of an observer's trials from one on; those that can run in one batch are next to each other."""
         places = (divmod(place, self.worlds) for place in range(first, first + count))
         return [(int(self._order[at]), world) for at, world in places]
 

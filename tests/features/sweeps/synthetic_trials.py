@@ -50,5 +50,5 @@ def make_trials(
 
 def all_trials(study: SweepStudy) -> pa.Table:
     """Run a study in this process."""
-    chunks = (compute(study, study.chunk(number)) for number in range(study.n_chunks))
+    chunks = (compute(study, *study.chunk(number)) for number in range(study.n_chunks))
     return pa.concat_tables(table_of(rows, trials_schema(study)) for rows in chunks)

@@ -15,7 +15,6 @@ import cmg_mj as package
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.sweeps import chunks
 from cmg_mj.features.sweeps.chunks import FIGURES
-from cmg_mj.features.sweeps.study import Chunk, SweepStudy
 from cmg_mj.inputs.files import folder
 from tests.command import cmg_mj
 from tests.features.sweeps.synthetic_trials import BIAS, NOISE, VELOCITY
@@ -122,7 +121,7 @@ def test_a_study_file_with_settings_and_its_own_model(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_in_a_dry_run_after_it_has_begun(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(study: SweepStudy, piece: Chunk, tick: Callable[[float], None]) -> None:
+    def interrupt(study: object, observer: str, trials: object, tick: Callable[[float], None]) -> None:
         tick(0.1)
         tick(0.2)
         raise KeyboardInterrupt

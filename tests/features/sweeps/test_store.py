@@ -20,7 +20,7 @@ from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.features.sweeps import chunks as module
 from cmg_mj.features.sweeps import study as study_module
 from cmg_mj.features.sweeps.chunks import Store, hash_of, resolved, run
-from cmg_mj.features.sweeps.study import Chunk, SweepStudy
+from cmg_mj.features.sweeps.study import SweepStudy, Trial
 from cmg_mj.inputs.files import folder
 from tests.command import COMMAND, ROOT, cmg_mj
 from tests.features.sweeps.synthetic_trials import BIAS, VELOCITY, make_study
@@ -38,11 +38,11 @@ def study(values: str = "0:1:20", *settings: str, worlds: int = 2) -> SweepStudy
 def whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
     """A finished sweep of ten chunks, whose rows are made without a run, other ones in every chunk."""
 
-    def rows_of(sweep: SweepStudy, chunk: Chunk, *_: object) -> list[dict[str, Any]]:
-        common = {"observer": chunk.observer, "seed": 0, "outcome": "done"}
+    def rows_of(sweep: SweepStudy, observer: str, trials: list[Trial], *_: object) -> list[dict[str, Any]]:
+        common = {"observer": observer, "seed": 0, "outcome": "done"}
         return [
-            {"point": number, **sweep.point(number), **common, "world": world, VELOCITY: chunk.number + 1e-3 * world}
-            for number, world in chunk.trials
+            {"point": number, **sweep.point(number), **common, "world": world, VELOCITY: number + 1e-3 * world}
+            for number, world in trials
         ]
 
     monkeypatch.setattr(study_module, "CHUNK", 8)

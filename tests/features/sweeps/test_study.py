@@ -83,16 +83,15 @@ def test_a_grid_is_every_combination_and_fields_may_go_together() -> None:
 def test_every_trial_is_in_one_chunk() -> None:
     sweep = make_study({BIAS: "0:1:800"}, worlds=5)
     every = [sweep.chunk(number) for number in range(sweep.n_chunks)]
-    assert [chunk.number for chunk in every] == list(range(sweep.n_chunks))
-    assert [len(chunk.trials) for chunk in every] == [sweep.chunk_size(number) for number in range(sweep.n_chunks)]
-    assert max(len(chunk.trials) for chunk in every) == CHUNK
-    trials = [(chunk.observer, *trial) for chunk in every for trial in chunk.trials]
+    assert [len(trials) for _, trials in every] == [sweep.chunk_size(number) for number in range(sweep.n_chunks)]
+    assert max(len(trials) for _, trials in every) == CHUNK
+    trials = [(observer, *trial) for observer, trials in every for trial in trials]
     assert len(set(trials)) == len(trials) == sweep.trials == 8000
 
 
 def test_trials_that_run_in_one_batch_stand_together() -> None:
     sweep = make_study({BIAS: "0,1", RATE: "100,200"})
-    rates: list[Any] = [sweep.point(point)[RATE] for point, _ in sweep.chunk(0).trials]
+    rates: list[Any] = [sweep.point(point)[RATE] for point, _ in sweep.chunk(0)[1]]
     assert rates == sorted(rates)
 
 
@@ -139,7 +138,7 @@ def test_the_points_of_a_very_large_study_are_not_drawn(
     monkeypatch.setattr(
         module, "sampled", lambda d, n, *rest, **named: counts.append(n) or sample(d, n, *rest, **named)
     )
-    monkeypatch.setattr(chunks, "compute", lambda study, piece, _: [study.point(number) for number, _ in piece.trials])
+    monkeypatch.setattr(chunks, "compute", lambda study, _, trials, __: [study.point(number) for number, _ in trials])
     study = make_study({BIAS: values, "plant.initial_tilt_deg": values}, ("linear",), **design)
     cost = chunks.estimate_cost(study)
     assert counts == [chunks.POINTS]

@@ -104,6 +104,6 @@ def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(chunks, "run_batch", fail)
     study = make_study({TILT: "0,5,1,2"}, ("linear",), 1, SETTINGS)
-    ends = [(row["outcome"], row["reason"] or "") for row in chunks.compute(study, study.chunk(0))]
+    ends = [(row["outcome"], row["reason"] or "") for row in chunks.compute(study, *study.chunk(0))]
     assert ends == [("done", ""), ("stopped", "MemoryError: not in there"), ("done", ""), ("done", "")]
     assert batches == [4, 2, 1, 1, 2]
