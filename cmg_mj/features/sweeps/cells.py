@@ -167,12 +167,14 @@ def with_ends(key: str, values: np.ndarray, positive: bool = False) -> Figures:
 
 def cells_schema(study: SweepStudy) -> pa.Schema:
     """Declare the columns of `cells_of`."""
-    counts = [(name, "int64") for name in ("trials", "stood", "fell", "stopped")]
-    ends = [f"{name}{end}" for name in ("", "_behind_best") for end in ("", "_low", "_high")]
-    figures = [(f"{key}{end}", "float64") for key in ("fell",) for end in ("_share", "_low", "_high")]
+    columns = [*point_columns(study), ("observer", "string")]
+    columns += [(name, "int64") for name in ("trials", "stood", "fell", "stopped")]
+    columns += [(name, "float64") for name in ("fell_share", "fell_low", "fell_high")]
     for key in COMPARED:
-        figures += [*((f"{key}{end}", "float64") for end in ends), (f"{key}_best", "string")]
-    return pa.schema([*point_columns(study), ("observer", "string"), *counts, *figures])
+        for name in (key, f"{key}_behind_best"):
+            columns += [(f"{name}{end}", "float64") for end in ("", "_low", "_high")]
+        columns.append((f"{key}_best", "string"))
+    return pa.schema(columns)
 
 
 def cells_in_blocks(trials: Trials) -> Iterator[pa.Table]:

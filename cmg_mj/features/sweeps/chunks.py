@@ -137,11 +137,11 @@ def point_columns(study: SweepStudy) -> list[tuple[str, str]]:
 
 
 def _type_of(values: Sequence[SummaryValue]) -> str:
-    if all(isinstance(value, bool) for value in values):
-        return "bool"
-    if all(type(value) is int and -(2**63) <= value < 2**63 for value in values):
-        return "int64"
-    return "float64" if all(type(value) in (int, float) for value in values) else "string"
+    try:
+        kind = str(pa.array(values).type)
+    except (pa.ArrowException, OverflowError):  # no column holds all
+        return "string"
+    return kind if kind in ("bool", "int64", "double") else "string"
 
 
 def table_of(rows: Iterable[Mapping[str, SummaryValue]], schema: pa.Schema) -> pa.Table:

@@ -84,7 +84,7 @@ def sweep(
 
     if cluster is not None:
         local_workers(cluster)
-    study = _study(arguments, varied, observers, worlds, sampling(sample, sobol, prefix="--"))
+    study = _study(arguments, varied, observers, worlds, sampling(sample, sobol))
     check_values(study)
     if dry_run:
         cost = estimate_cost(study)

@@ -27,6 +27,7 @@ from cmg_mj.features.sweeps.study import SweepStudy, VariedField, counted
 from cmg_mj.results import markdown
 from cmg_mj.results.files import whole_file
 from cmg_mj.results.folder import write_text
+from cmg_mj.results.intervals import finite_mean
 from cmg_mj.results.summary_keys import Summary, SummaryValue, capitalised, format_figure, heading
 from cmg_mj.view.plots.figure import save_figure
 
@@ -174,8 +175,8 @@ def _over_points(trials: Trials) -> list[str]:
     error, (fell, known) = trials.figure(ERROR), fall_counts(trials)
     table = []
     for place, name in enumerate(study.observers):
-        means = _means(error[:, place])
-        figures = [means.mean(), *np.quantile(means, list(QUANTILES))] if len(means) else [None] * 4
+        means = [mean for mean in map(finite_mean, error[:, place]) if mean is not None]
+        figures = [np.mean(means), *np.quantile(means, list(QUANTILES))] if means else [None] * 4
         n_fell, n_known = fell[:, place].sum(), known[:, place].sum()
         share = f" ({100.0 * n_fell / n_known:.1f} %)" if n_known else ""
         formatted = [format_figure(ERROR, figure) for figure in figures]
@@ -186,12 +187,6 @@ def _over_points(trials: Trials) -> list[str]:
         markdown.table(["observer", "points", "mean", *QUANTILES.values(), "worlds that fell"], table),
         f"Every point is in {CELLS}.",
     ]
-
-
-def _means(values: np.ndarray) -> np.ndarray:
-    """Average over the known worlds of the points that have any, (n_points, n_worlds) -> (n_known,)."""
-    some = values[np.isfinite(values).any(axis=1)]
-    return np.nanmean(some, axis=1)
 
 
 def _unfinished(trials: Trials) -> list[str]:

@@ -416,19 +416,18 @@ def sampled(dimensions: int, n: int, seed: int, *, indices: bool) -> np.ndarray:
     return np.concatenate([a, b, *crossed])
 
 
-def sampling(sample: int | None, sobol: int | None, prefix: str = "") -> tuple[SamplingDesign, int] | None:
+def sampling(sample: int | None, sobol: int | None) -> tuple[SamplingDesign, int] | None:
     """Return the design of `sample` or `sobol` and its number of points; None without either.
 
     Args:
         sample: Number of points of a quasi-random design.
         sobol: Rows of a design for Sobol indices.
-        prefix: What the user writes before both names: `--` on the command line.
 
     Raises:
         InputError: Both are there.
     """
     if sample is not None and sobol is not None:
-        raise InputError(f"{prefix}sample and {prefix}sobol: one of them")
+        raise InputError("--sample and --sobol: one of them")
     if sobol is not None:
         return "sobol", sobol
     return None if sample is None else ("sample", sample)

@@ -172,14 +172,6 @@ def test_an_observer_that_a_worker_cannot_import_is_one_line(tmp_path: Path) -> 
         assert "cannot be reached" in sweep(sweep_folder, "gone", "--cluster", address).complaint
 
 
-@pytest.mark.slow
-@needs_distributed
-def test_a_cluster_that_is_not_there_is_one_line(tmp_path: Path) -> None:
-    outcome = sweep(tmp_path, "out", "--cluster", DEAD_ADDRESS)
-    assert f"--cluster {DEAD_ADDRESS}: cannot be reached" in outcome.complaint
-    assert not (tmp_path / "out").exists()
-
-
 @needs_distributed
 def test_a_worker_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("distributed.get_worker", lambda: SimpleNamespace(address="tcp://there"))

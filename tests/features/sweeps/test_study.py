@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import sobol_indices, uniform
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features import sweeps as swept
@@ -95,43 +94,19 @@ def test_trials_that_run_in_one_batch_stand_together() -> None:
     assert rates == sorted(rates)
 
 
-def test_a_design_for_indices_is_saltellis() -> None:
-    """scipy's own indices of a function, from its values at these points."""
-    d, n = 3, 64
-    sweep = make_study({"a": "0:1", "b": "0:1", "c": "0:1"}, design="sobol", n=n)
-    assert sweep.n_points == n * (d + 2)
-    x = np.array([list(sweep.point(number).values()) for number in range(sweep.n_points)])
-    y = 4.0 * x[:, 0] + 2.0 * x[:, 1] * x[:, 2]
-    f_A, f_B, f_AB = y[None, :n], y[None, n : 2 * n], y[2 * n :].reshape(d, 1, n)
-    result = sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": f_AB}, n=n)
-    generator: Any = {"random_state": np.random.default_rng(1)}  # as all versions of scipy call it
-
-    def function(z: np.ndarray) -> np.ndarray:
-        return 4.0 * z[0] + 2.0 * z[1] * z[2]
-
-    expected = sobol_indices(func=function, n=8192, dists=[uniform()] * d, **generator)
-    np.testing.assert_allclose(result.first_order, expected.first_order, atol=0.1)
-    np.testing.assert_allclose(result.total_order, expected.total_order, atol=0.1)
-
-
 @pytest.mark.parametrize("design", ["sample", "sobol"])
 def test_a_design_takes_each_value_of_a_list_equally_often(design: Any) -> None:
     sweep = make_study({BIAS: "-1:1", RATE: "50,100,200,400", NOISE: "log:100:800:4"}, design=design, n=64)
-    points = [sweep.point(number) for number in range(sweep.n_points)]
-    assert {type(point[RATE]) for point in points} == {int}
-    for field, values in ((RATE, [50, 100, 200, 400]), (NOISE, [100.0, 200.0, 400.0, 800.0])):
-        found, times = np.unique(np.array([point[field] for point in points[:64]]), return_counts=True)
-        assert (found.tolist(), times.tolist()) == (values, [16] * 4)
-    assert len({(point[RATE], point[NOISE]) for point in points}) == 16  # and every combination is there
-    assert len({point[BIAS] for point in points[:64]}) == 64
+    points = [sweep.point(number) for number in range(64)]
+    rates = [point[RATE] for point in points]
+    assert {rate: rates.count(rate) for rate in set(rates)} == dict.fromkeys([50, 100, 200, 400], 16)
+    assert len({(point[RATE], point[NOISE]) for point in points}) == 16  # every combination is there
+    assert len({point[BIAS] for point in points}) == 64
 
 
-@pytest.mark.parametrize(
-    ("values", "design", "points"),
-    [("-1:1", {"design": "sobol", "n": 2**22}, 2**24), ("-1:1:10000", {}, 100_000_000)],
-)
+@pytest.mark.parametrize("design", [{"design": "sobol", "n": 2**22}, {}])
 def test_the_points_of_a_very_large_study_are_not_drawn(
-    values: str, design: dict[str, Any], points: int, monkeypatch: pytest.MonkeyPatch
+    design: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     counts: list[int] = []
     sample = module.sampled
@@ -139,11 +114,11 @@ def test_the_points_of_a_very_large_study_are_not_drawn(
         module, "sampled", lambda d, n, *rest, **named: counts.append(n) or sample(d, n, *rest, **named)
     )
     monkeypatch.setattr(chunks, "compute", lambda study, _, trials, __: [study.point(number) for number, _ in trials])
-    study = make_study({BIAS: values, "plant.initial_tilt_deg": values}, ("linear",), **design)
+    study = make_study(dict.fromkeys((BIAS, "plant.initial_tilt_deg"), "-1:1" if design else "-1:1:10000"), **design)
     cost = chunks.estimate_cost(study)
     assert counts == [chunks.POINTS]
-    assert (cost["points"], cost["trials"]) == (points, 2 * points)
-    assert cost["chunks"] == -(-2 * points // CHUNK)
+    assert cost["points"] == study.n_points == (2**24 if design else 100_000_000)
+    assert cost["chunks"] == 2 * -(-2 * study.n_points // CHUNK)
 
 
 # --- refused before anything is computed
@@ -160,23 +135,17 @@ def nothing_is_computed(monkeypatch: pytest.MonkeyPatch, elsewhere: None) -> Non
     ("arguments", "field"),
     [
         ([], "--vary"),
-        ([BIAS], f"--vary {BIAS}"),
         (["plant.equilibrium_bias=0,1"], "plant.equilibrium_bias: no such field; did you mean"),
         ([f"{BIAS}=0,90"], f"{BIAS} = 90"),
         ([f"{BIAS}=0:1"], f"--vary {BIAS}"),
         ([f"{BIAS}+{BIAS}=0,1"], f"--vary {BIAS}: given twice"),
-        ([f"{RATE}+=100,200"], f"--vary {RATE}"),
         ([f"{BIAS}=0:1", "--sobol", "4"], "--sobol"),
         ([f"{BIAS}=0:1", "--sobol", "200"], "--sobol 200"),
         ([f"{BIAS}=0:1", "--sobol", "2", "--sample", "3"], "--sample and --sobol"),
         (["seed=1,2"], "--vary seed"),
-        (["observer.kind=linear,ltv"], "--vary observer.kind"),
-        (["title=a,b"], "--vary title"),
         ([f"{BIAS}+compare.worlds=1,2"], "--vary compare.worlds"),
-        (["observer.k1=10,-20"], "observer.k1 = -20"),
         (["observer.k1=10,20", "--observers", "homogeneous,linear"], "observer.k1: no such field of linear"),
         (["observer.k1=10,20", "--observers", "zero,homogeneous"], "--vary observer.k1"),
-        ([f"{BIAS}=0,1", "--observers", "linar"], "no such observer; did you mean 'linear'"),
         ([f"{BIAS}=0,1", "--observers", "linear,ltv,linear"], "observers: 'linear'"),
         ([f"{BIAS}=0,1", "--observers", "linear,broken:Broken"], "observer broken:Broken: ValueError: never"),
         ([f"{INNER}=0.05,0.5"], f"--vary {INNER}=0.5"),
@@ -197,9 +166,7 @@ def test_refused_on_the_command_line(arguments: list[str], field: str) -> None:
 @pytest.mark.parametrize(
     ("sweep", "field"),
     [
-        ("worlds = 0", "worlds = 0"),
         ('design = "sample"\nn = -4', "n = -4"),
-        ("n = 4", "n = 4"),
         ('design = "nope"', "s.toml: sweep.design = 'nope'"),
         ("observers = [1]", "s.toml: sweep.observers"),
         ("observers = ['nope']", "observers: 'nope'"),
@@ -217,13 +184,10 @@ def test_refused_in_a_study_file(sweep: str, field: str) -> None:
     ("options", "field"),
     [
         ({"worlds": 1.5}, "worlds = 1.5"),
-        ({"worlds": True}, "worlds = true"),
-        ({"sample": 2, "sobol": 2}, "sample and sobol"),
+        ({"sample": 2, "sobol": 2}, "--sample and --sobol"),
         ({"sobol": 2.0}, "--sobol 2.0"),
         ({"observers": "linear"}, "observers = 'linear'"),
-        ({"observers": []}, "observers"),
         ({"observers": ["zeroo"]}, "did you mean 'zero'"),
-        ({"vary": {BIAS: {"a": 1}}}, "must be a list of values, or text"),
         ({"vary": {BIAS: None}}, "must be a list of values, or text"),
     ],
 )

@@ -47,13 +47,6 @@ def test_a_baselines_trials_are_those_beside_the_true_rate() -> None:
     assert np.all(run.values(VELOCITY, "zero") > 0.0)
 
 
-def test_the_noise_of_a_world_is_the_same_in_every_cell() -> None:
-    rows = all_trials(make_study({BIAS: "0,0.0001"}, ("linear",), 3, SETTINGS)).to_pylist()
-    errors = np.array([row[VELOCITY] for row in rows]).reshape(2, 3)
-    np.testing.assert_allclose(errors[0], errors[1], rtol=1e-2)
-    assert np.ptp(errors[0]) > 0.05 * errors[0].mean()
-
-
 def test_values_that_do_not_fit_are_rows_with_a_reason() -> None:
     rows = all_trials(make_study({"sensors.encoder.rate_hz": "200,333.7"}, ("linear",), settings=SETTINGS)).to_pylist()
     assert [row["outcome"] for row in rows] == ["done", "done", "refused", "refused"]
