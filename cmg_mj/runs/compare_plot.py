@@ -10,8 +10,7 @@ import numpy as np
 
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import KEYS
-from cmg_mj.runs.comparison import ComparedObserver
-from cmg_mj.runs.statistics import ComparisonRow, comparison_rows
+from cmg_mj.runs.comparison import ComparedObserver, ComparisonRow, comparison_rows
 from cmg_mj.view.plots.figure import pyplot, save_figure
 from cmg_mj.view.plots.style import colours, hexadecimal, short_names
 
