@@ -236,8 +236,7 @@ def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:
         difference to the best observer in this figure, over the worlds in which both have it, with its interval.
     """
     rows = comparison_rows(compared)
-    keys = [key for entry in compared for key in entry.summary if key in KEYS and key in entry.result.summaries[0]]
-    keys = list(dict.fromkeys(keys))
+    keys = dict.fromkeys(key for entry in compared for key in entry.result.summaries[0] if key in KEYS)
     leaders = {
         key: ComparisonRow(leader) for key in keys if KEYS[key].better and (leader := best_observer(compared, key))
     }
