@@ -45,6 +45,7 @@ class Reasons:
         self._field = field
         self.counts: Counter[tuple[str, str]] = Counter()
         self._first: dict[tuple[str, str], str] = {}
+        self._differ: set[tuple[str, str]] = set()
 
     def add(self, outcome: str, reason: str | None) -> None:
         """Count a trial that neither stood nor fell."""
@@ -53,13 +54,14 @@ class Reasons:
             text = text.partition(f"{self._field}=")[2].partition(": ")[2] or text
         text = shortened(text, MAX_REASON)
         kind = (outcome, NUMBER.sub("#", text))
-        self._first.setdefault(kind, text)
+        if self._first.setdefault(kind, text) != text:
+            self._differ.add(kind)
         self.counts[kind] += 1
 
     def most(self, n: int) -> list[str]:
         """List the most frequent kinds of reasons, with counts."""
         return [
-            f"{count} {kind[0]}{', such as' if count > 1 else ''}: {self._first[kind]}"
+            f"{count} {kind[0]}{', such as' if kind in self._differ else ''}: {self._first[kind]}"
             for kind, count in self.counts.most_common(n)
         ]
 

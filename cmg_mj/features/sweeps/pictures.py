@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from cmg_mj.features.sweeps.study import VariedField, counted
 from cmg_mj.results.summary_keys import heading
 from cmg_mj.view.plots.figure import pyplot
 from cmg_mj.view.plots.style import colours, hexadecimal
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
 """Figures that are drawn, and whose indices are shown, where a trial has them; tables show the first."""
@@ -28,8 +25,8 @@ TRUE_RATE = "true"
 """Name of the true rate in the loop, as baselines' trials have it, in a map."""
 COLUMNS, MAX_TICKS = 3, 6
 """Panels of a map beside each other; marked values of an axis."""
-EMPTY = "0.9"
-"""Colour of a cell without a best."""
+NOBODY, EMPTY = "none, or several alike", (232, 232, 232)
+"""Name and colour of a cell without a best."""
 UNKNOWN = (math.nan, math.nan, math.nan)
 LOGARITHMIC = 10.0
 """Values that differ by more than this factor have a logarithmic scale."""
@@ -41,12 +38,12 @@ class Picture(NamedTuple):
     Attributes:
         name: Name of the file, without its ending.
         title: Its title.
-        draw: Makes the figure.
+        draw: Makes matplotlib's figure.
     """
 
     name: str
     title: str
-    draw: Callable[[], Figure]
+    draw: Callable[[], Any]
 
 
 @dataclass(frozen=True)
@@ -89,7 +86,7 @@ def pictures_of(trials: Trials) -> list[Picture]:
     return []
 
 
-def curves(trials: Trials, field: str) -> Figure:
+def curves(trials: Trials, field: str) -> Any:
     """Draw a panel a figure, and one of the share of falls if there are any, over the values of a field."""
     study = trials.study
     x = np.array([study.point(number)[field] for number in range(study.n_points)], dtype=float)
@@ -168,10 +165,8 @@ def maps(trials: Trials, across: VariedField, up: VariedField) -> dict[str, Map]
     return found
 
 
-def draw_map(a_map: Map, observers: Sequence[str], across: VariedField, up: VariedField) -> Figure:
+def draw_map(a_map: Map, observers: Sequence[str], across: VariedField, up: VariedField) -> Any:
     """Draw a panel of the best observer of every cell, and one of each one's own figure; a value takes a step."""
-    from matplotlib.colors import to_rgb
-
     n = 1 + len(a_map.each)
     columns = min(COLUMNS, n)
     size = (3.4 * columns + 2.0, 1.2 + 3.0 * -(-n // columns))
@@ -182,13 +177,15 @@ def draw_map(a_map: Map, observers: Sequence[str], across: VariedField, up: Vari
     for axes in others[n - 1 :]:
         axes.set_visible(False)
     image = {"origin": "lower", "aspect": "auto"}
-    color = {name: hexadecimal(rgb) for name, rgb in colours([*observers, *a_map.falls, *a_map.ahead]).items()}
-    kinds = [*((name, color[name]) for name in observers), ("none, or several alike", EMPTY)]
-    best.imshow(np.array([to_rgb(fill) for _, fill in kinds])[a_map.best], **image)  # -1 is the last
+    palette = {**colours([*observers, *a_map.falls, *a_map.ahead]), NOBODY: EMPTY}
+    color = {name: hexadecimal(rgb) for name, rgb in palette.items()}
+    kinds = [*observers, NOBODY]
+    best.imshow(np.array([palette[kind] for kind in kinds], dtype=np.uint8)[a_map.best], **image)  # -1 is the last
     best.set_title("the best")
-    places = range(-1, len(observers))
     handles = [
-        best.plot([], [], "s", color=kinds[i][1], label=kinds[i][0])[0] for i in places if (a_map.best == i).any()
+        best.plot([], [], "s", color=color[kind], label=kind)[0]
+        for place, kind in zip((*range(len(observers)), -1), kinds, strict=True)
+        if (a_map.best == place).any()
     ]
     rows, steps = np.nonzero((a_map.best >= 0) & ~a_map.sure)
     handles += best.plot(steps, rows, "o", color="0.1", markersize=3.5, label="not beyond chance")
@@ -210,7 +207,7 @@ def draw_map(a_map: Map, observers: Sequence[str], across: VariedField, up: Vari
         step = -(-len(marks) // MAX_TICKS)
         axis.set_ticks(range(0, len(marks), step), [f"{mark:g}" for mark in marks[::step]])
     grid[-1, 0].set_xlabel(across.field)
-    grid[0, 0].set_ylabel(up.field)
+    figure.supylabel(up.field)
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 

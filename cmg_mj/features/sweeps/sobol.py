@@ -134,7 +134,10 @@ def _refused(values: np.ndarray, outcome: np.ndarray, n: int) -> str | None:
     means = values.mean(axis=1)
     unknown = ~np.isfinite(values)
     if unknown.any():
-        counts = ", ".join(f"{count} {end}" for end, count in Counter(outcome[unknown].tolist()).items())
+        ends = [
+            {"done": "have no such figure", "fell": "fell"}.get(end, "stopped") for end in outcome[unknown].tolist()
+        ]
+        counts = ", ".join(f"{count} {end}" for end, count in sorted(Counter(ends).items()))
         points = f"{unknown.any(axis=1).sum()} of {len(means)} points"
         return f"no value at {points}: of {values.size} trials {counts}"
     if np.ptp(means) == 0.0:
