@@ -17,7 +17,7 @@ from typing import Any
 from mujoco.batch import Batch
 
 from cmg_mj import load_scenario
-from cmg_mj.features.sweeps.chunk import compute
+from cmg_mj.features.sweeps.chunks import compute
 from cmg_mj.features.sweeps.study import SweepStudy, parse_axis
 
 WORLDS_A_PLANT = 4
@@ -39,13 +39,13 @@ def bench(observer: str, worlds: int, *, many_plants: bool) -> None:
     if many_plants:
         axes = tuple(parse_axis(field, values, field) for field, values in PLANTS.items())
         study = SweepStudy(scenario, axes, (observer,), WORLDS_A_PLANT, "sample", max(1, worlds // WORLDS_A_PLANT))
-    chunk = study.chunks[0]
+    _, trials = study.chunk(0)
     with clocked() as in_batch:
         start = time.process_time()
-        rows = compute(study, chunk, threads=1)
+        rows = compute(study, observer, trials, threads=1)
         whole = time.process_time() - start
     print(
-        f"{observer}: {len({number for number, _ in chunk.trials})} plants, {len(rows)} trials, "
+        f"{observer}: {len({number for number, _ in trials})} plants, {len(rows)} trials, "
         f"{sum(row['stood'] is True for row in rows)} stood: {whole:.1f} s, {in_batch[0]:.1f} s in the batch, "
         f"ratio {whole / in_batch[0]:.3f}, {len(rows) / whole:.1f} trials a second"
     )

@@ -144,7 +144,7 @@ def compare(
     from cmg_mj.results import reports as report
     from cmg_mj.runs import comparison
     from cmg_mj.runs import save as runs
-    from cmg_mj.runs.statistics import standings
+    from cmg_mj.runs.comparison import standings
     from cmg_mj.scenario.resolve import describe_differences
     from cmg_mj.scenario.schema import CompareSettings
 

@@ -10,8 +10,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.results.summary_keys import Summary
 from cmg_mj.results.trajectory import frame_of
 from cmg_mj.runs import comparison
-from cmg_mj.runs.comparison import ComparedObserver
-from cmg_mj.runs.statistics import standings, worlds_table
+from cmg_mj.runs.comparison import ComparedObserver, standings, worlds_table
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 

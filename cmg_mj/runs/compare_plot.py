@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import KEYS
-from cmg_mj.runs.comparison import ComparedObserver
-from cmg_mj.runs.statistics import ComparisonRow, comparison_rows
+from cmg_mj.runs.comparison import ComparedObserver, ComparisonRow, comparison_rows
 from cmg_mj.view.plots.figure import pyplot, save_figure
 from cmg_mj.view.plots.style import colours, hexadecimal, short_names
 
@@ -32,25 +31,23 @@ def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) ->
         title: The scenario's title.
     """
     rows = comparison_rows(compared)
-    values = {
-        key: _Worlds([row.values(key) for row in rows], [_until_the_end(row, key) for row in rows]) for key in KEYS
-    }
-    drawn = [key for key in KEYS if KEYS[key].compared and np.isfinite(values[key].all).any()]
+    figures = {key: [_figures(row, key) for row in rows] for key, about in KEYS.items() if about.compared}
+    drawn = {key: worlds for key, worlds in figures.items() if np.isfinite(worlds).any()}
     down = -(-len(drawn) // COLUMNS)
     size = (12.0, 1.2 + down * (0.9 + 0.22 * len(rows)))
     figure, grid = pyplot().subplots(down, COLUMNS, sharey=True, figsize=size, layout="constrained", squeeze=False)
     for axes in grid.flat[len(drawn) :]:
         axes.set_visible(False)
     palette = [hexadecimal(colour) for colour in colours(row.name for row in rows).values()]
-    for axes, key in zip(grid.flat, drawn, strict=False):
-        _draw(axes, key, values[key], palette)
+    stood = [row.entry.result.stood for row in rows]
+    for axes, (key, worlds) in zip(grid.flat, drawn.items(), strict=False):
+        _draw(axes, key, worlds, stood, palette)
     first = grid.flat[0]
     names = short_names([row.name for row in rows])
     first.set_yticks(range(len(rows)), [_label(row, names[row.name]) for row in rows])
     first.invert_yaxis()  # shared: the table's order in every panel
-    worlds = len(rows[0].entry.result.outcomes)
-    heading = f"{title or 'Comparison'}: {worlds} worlds an observer. Lines: mean and its 95 % interval."
-    if not all(row.entry.result.stood.all() for row in rows):
+    heading = f"{title or 'Comparison'}: {len(stood[0])} worlds an observer. Lines: mean and its 95 % interval."
+    if not np.all(stood):
         heading += " Crosses: worlds that did not stand to the end, until then."
     save_figure(path, figure, heading, dpi=100)
 
@@ -61,36 +58,26 @@ def _label(row: ComparisonRow, name: str) -> str:
     return f"{name} ({lost} lost)" if lost and not row.reference else name
 
 
-class _Worlds(NamedTuple):
-    """A figure of every world of every row: of those that stood, and until their end of the others."""
-
-    stood: Sequence[np.ndarray]
-    lost: Sequence[np.ndarray]
-
-    @property
-    def all(self) -> np.ndarray:
-        return np.concatenate([*self.stood, *self.lost])
+def _figures(row: ComparisonRow, key: str) -> np.ndarray:
+    """Return a figure of every world, (n_worlds,): until its end, where it did not stand; NaN where there is none."""
+    figures = [world.get(key) for world in row.entry.result.rows(row.reference)]
+    return np.array([np.nan if figure is None else figure for figure in figures], dtype=float)
 
 
-def _draw(axes: Any, key: str, worlds: _Worlds, palette: Sequence[str]) -> None:
+def _draw(
+    axes: Any, key: str, rows: Sequence[np.ndarray], all_stood: Sequence[np.ndarray], palette: Sequence[str]
+) -> None:
     """Draw the panel of one figure."""
-    known = worlds.all[np.isfinite(worlds.all)]
-    if known.min() > 0.0 and known.max() > LOGARITHMIC * known.min():
+    known = np.concatenate(rows)
+    if np.nanmin(known) > 0.0 and np.nanmax(known) > LOGARITHMIC * np.nanmin(known):
         axes.set_xscale("log")
     axes.set_title(KEYS[key].heading, loc="left", fontsize="medium")
     axes.grid(alpha=0.3, axis="x")
-    for place, (stood, lost, color) in enumerate(zip(worlds.stood, worlds.lost, palette, strict=True)):
-        across = place + np.linspace(-0.3, 0.3, len(stood))
-        axes.scatter(stood, across, color=color, alpha=0.6, linewidth=0, s=9)
-        axes.scatter(lost, across, color="red", linewidth=0.8, marker="x", s=14)
-        interval = known_interval(stood, KEYS[key].positive)
+    for place, (figures, stood, color) in enumerate(zip(rows, all_stood, palette, strict=True)):
+        across = place + np.linspace(-0.3, 0.3, len(figures))
+        axes.scatter(figures[stood], across[stood], color=color, alpha=0.6, linewidth=0, s=9)
+        axes.scatter(figures[~stood], across[~stood], color="red", linewidth=0.8, marker="x", s=14)
+        interval = known_interval(figures[stood], KEYS[key].positive)
         if interval is not None:
             axes.plot([interval.low, interval.high], [place, place], color="black", linewidth=2.0)
             axes.plot([interval.mean], [place], "|", color="black", markersize=9)
-
-
-def _until_the_end(row: ComparisonRow, key: str) -> np.ndarray:
-    """Return a figure of the worlds that did not stand to the end, (n_worlds,); NaN for the others."""
-    figures = [world.get(key) for world in row.entry.result.rows(row.reference)]
-    values = np.array([np.nan if figure is None else figure for figure in figures], dtype=float)
-    return np.where(row.entry.result.stood, np.nan, values)

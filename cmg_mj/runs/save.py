@@ -16,9 +16,8 @@ from cmg_mj.results.reports import run_title
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs.comparison import ComparedObserver
+from cmg_mj.runs.comparison import ComparedObserver, standings, worlds_table
 from cmg_mj.runs.experiment import Experiment
-from cmg_mj.runs.statistics import standings, worlds_table
 
 if TYPE_CHECKING:
     from cmg_mj.runs.live import LiveView

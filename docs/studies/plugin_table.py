@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from cmg_mj.features.plugin.driver import set_world
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.tables import markdown_table
-from tests.features.plugin.made import SENSORS, Comparison, Made, bits, compare, make, pairs, run, variant
+from tests.features.plugin.made import SENSORS, Made, bits, make, pairs, run, variant
 from tests.features.plugin.robots import ROBOTS, is_missing, write_robot
 
 PARTS = ("rig", "axes", "worlds", "robots")

@@ -24,7 +24,7 @@ from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.reports import compared_keys, comparison_table
 from cmg_mj.runs import comparison
-from cmg_mj.runs.statistics import standings
+from cmg_mj.runs.comparison import standings
 from tests.command import COMMAND, cmg_mj, cmg_mj_process, environment
 from tests.run_folders import assert_whole
 

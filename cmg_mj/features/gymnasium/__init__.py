@@ -36,7 +36,7 @@ READINGS = ("mems_gyro", "acceleration", "fog")
 """Readings that can be observed beside y1 and y2."""
 STATE_COST = (100.0, 1.0, 1.0)
 """Weights of x1, x2, x3 in the reward; that of u is 1."""
-MOST = 1e6
+MAX_READING = 1e6
 """No reading is larger."""
 SIZE = (480, 640)
 """Height and width of a picture [pixels]."""
@@ -98,7 +98,7 @@ class ScissoredPairEnv(gymnasium.Env):
         self._unit = 1.0 if in_rad_s else limit
         most = limit if in_rad_s else 1.0
         self.action_space = gymnasium.spaces.Box(-most, most, (1,), np.float64)
-        bounds = np.array([math.pi, *[MOST] * (1 + len(self._readings))])
+        bounds = np.array([math.pi, *[MAX_READING] * (1 + len(self._readings))])
         self.observation_space = gymnasium.spaces.Box(-bounds, bounds, dtype=np.float64)
 
     @quiet()
@@ -216,7 +216,7 @@ class ScissoredPairEnv(gymnasium.Env):
         q, v = self._physics.state()
         x1 = plant.axis.line.lean(q) + plant.bias
         x = (x1, plant.axis.line.rate(v), plant.axis.gimbal_angle(q))
-        return x if all(abs(value) < MOST for value in x) else (self._fall, 0.0, 0.0)
+        return x if all(abs(value) < MAX_READING for value in x) else (self._fall, 0.0, 0.0)
 
     def _cost(self, u: float) -> float:
         squares = [weight * x * x for weight, x in zip(STATE_COST, self._state(), strict=True)]

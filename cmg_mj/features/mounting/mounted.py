@@ -13,7 +13,7 @@ import mujoco
 from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.files import expanded, model_files
 from cmg_mj.plant.build import check_rig
-from cmg_mj.plant.mjcf import as_mjcf, check_rig
+from cmg_mj.plant.mjcf import as_mjcf
 from cmg_mj.results.folder import is_signed, signed, whole_file
 
 

@@ -10,18 +10,15 @@ import pyarrow as pa
 
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.features.sweeps.cells import Trials, cells_in_blocks
-from cmg_mj.features.sweeps.chunk import compute, table_of
+from cmg_mj.features.sweeps.chunks import compute, table_of, trials_schema
 from cmg_mj.features.sweeps.sobol import index_rows, index_table
-from cmg_mj.features.sweeps.study import SweepStudy, Variation, check_values, parse_axis, sampling
+from cmg_mj.features.sweeps.study import WORLDS, SweepStudy, Variation, check_values, parse_axis, sampling
 from cmg_mj.results.trajectory import frame_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     import pandas as pd
-
-WORLDS = 20
-"""Worlds a cell by default."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,8 @@ def sweep(
     study = SweepStudy(base, axes, names, worlds, design, n)
 
     check_values(study)
-    table = pa.concat_tables(table_of(study, compute(study, chunk)) for chunk in study.chunks)
+    rows = (compute(study, *study.chunk(number)) for number in range(study.n_chunks))
+    table = pa.concat_tables(table_of(chunk_rows, trials_schema(study)) for chunk_rows in rows)
     trials = Trials(study, [table])
     return SweepResult(
         study,

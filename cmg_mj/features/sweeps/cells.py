@@ -14,14 +14,22 @@ import numpy as np
 import pyarrow as pa
 
 from cmg_mj.core.errors import shortened
-from cmg_mj.features.sweeps.chunk import as_table, point_columns
+from cmg_mj.features.sweeps.chunks import point_columns, table_of
 from cmg_mj.features.sweeps.study import SweepStudy
 from cmg_mj.results.intervals import Interval, finite_mean, known_interval
 from cmg_mj.results.summary_keys import KEYS, Figures, Summary
 
-LONGEST = 240
-"""Most letters of a reason."""
+MAX_REASON = 240
+"""Letters of a reason."""
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(\.\d+)?([eE][-+]?\d+)?(?![\w.]*\w)")
+COMPARED = [key for key, about in KEYS.items() if about.compared and about.better and not key.endswith("_fraction")]
+"""Figures of which a cell has the mean, and the difference to the best observer's."""
+COLUMNS = ["point", "observer", "world", "outcome", "reason", *COMPARED]
+"""Columns of the trials that cells are made of."""
+BLOCK = 1024
+"""Cells whose rows are held together."""
+CLOSE = 1.2
+"""Factor on the leader's error up to which another observer is close to it."""
 
 
 class Reasons:
@@ -39,17 +47,16 @@ class Reasons:
         self._first: dict[tuple[str, str], str] = {}
         self._differ: set[tuple[str, str]] = set()
 
-    def add(self, ended: Iterable[tuple[str, str | None]]) -> None:
-        """Count trials that neither stood nor fell: outcome and reason of each."""
-        for (outcome, reason), n in Counter(ended).items():
-            text = " ".join((reason or "no reason is given").split())
-            if outcome == "refused" and f"{self._field}=" in text:
-                text = text.partition(f"{self._field}=")[2].partition(": ")[2] or text
-            text = shortened(text, LONGEST)
-            kind = (outcome, NUMBER.sub("#", text))
-            if self._first.setdefault(kind, text) != text:
-                self._differ.add(kind)
-            self.counts[kind] += n
+    def add(self, outcome: str, reason: str | None) -> None:
+        """Count a trial that neither stood nor fell."""
+        text = " ".join((reason or "no reason is given").split())
+        if outcome == "refused" and f"{self._field}=" in text:
+            text = text.partition(f"{self._field}=")[2].partition(": ")[2] or text
+        text = shortened(text, MAX_REASON)
+        kind = (outcome, NUMBER.sub("#", text))
+        if self._first.setdefault(kind, text) != text:
+            self._differ.add(kind)
+        self.counts[kind] += 1
 
     def most(self, n: int) -> list[str]:
         """List the most frequent kinds of reasons, with counts."""
@@ -57,14 +64,6 @@ class Reasons:
             f"{count} {kind[0]}{', such as' if kind in self._differ else ''}: {self._first[kind]}"
             for kind, count in self.counts.most_common(n)
         ]
-
-
-COMPARED = [key for key, about in KEYS.items() if about.compared and about.better and not key.endswith("_fraction")]
-"""Figures of which a cell has the mean, and the difference to the best observer's."""
-COLUMNS = ["point", "observer", "world", "outcome", "reason", *COMPARED]
-"""Columns of the trials that cells are made of."""
-BLOCK = 1024
-"""Cells whose rows are held together."""
 
 
 class Trials:
@@ -77,29 +76,30 @@ class Trials:
     Attributes:
         study: The sweep.
         outcome: How each trial ended, (n_points, n_observers, n_worlds).
-        stood: Whether each trial stood to the end, (n_points, n_observers, n_worlds).
         reasons: Counts of the reasons why trials were refused or stopped.
     """
 
     def __init__(self, study: SweepStudy, tables: Iterable[pa.Table]) -> None:
         self.study = study
-        shape = (len(study.points), len(study.observers), study.worlds)
-        self.outcome = np.full(shape, "", dtype=object)
+        shape = (study.n_points, len(study.observers), study.worlds)
+        self.outcome = np.full(shape, "", dtype="U7")
         self._figures = {key: np.full(shape, math.nan) for key in COMPARED}
         self.reasons = Reasons(study.axes[-1].fields[-1])
-        place = {name: i for i, name in enumerate(study.observers)}
         for table in tables:
-            observers = _texts(table["observer"])
-            at = (table["point"].to_numpy(), np.array([place[name] for name in observers]), table["world"].to_numpy())
-            outcome = _texts(table["outcome"])
-            self.outcome[at] = outcome
-            unfinished = (outcome != "done") & (outcome != "fell")
-            if unfinished.any():
-                reasons = table["reason"].filter(pa.array(unfinished)).to_pylist()
-                self.reasons.add(zip(outcome[unfinished], reasons, strict=True))
+            observers = np.array([study.observers.index(name) for name in table["observer"].to_pylist()])
+            at = (table["point"].to_numpy(), observers, table["world"].to_numpy())
+            outcomes = table["outcome"].to_pylist()
+            self.outcome[at] = outcomes
+            for outcome, reason in zip(outcomes, table["reason"].to_pylist(), strict=True):
+                if outcome not in ("done", "fell"):
+                    self.reasons.add(outcome, reason)
             for key, values in self._figures.items():
                 values[at] = table[key].to_numpy(zero_copy_only=False)
-        self.stood = self.outcome == "done"
+
+    @property
+    def stood(self) -> np.ndarray:
+        """Mask of the trials that stood to the end, (n_points, n_observers, n_worlds)."""
+        return self.outcome == "done"
 
     @property
     def fell(self) -> np.ndarray:
@@ -111,12 +111,6 @@ class Trials:
         return np.where(self.stood, self._figures[key], math.nan)
 
 
-def _texts(column: pa.ChunkedArray) -> np.ndarray:
-    """Read a column of few words, each of which is one string object, (n,)."""
-    encoded = column.combine_chunks().dictionary_encode()
-    return np.array(encoded.dictionary.to_pylist(), dtype=object)[encoded.indices.to_numpy()]
-
-
 @cache  # of few different counts, at 0.3 ms each
 def fell_interval(fell: int, trials: int) -> Interval:
     """Compute the share of falls with Wilson's 95 % interval."""
@@ -126,6 +120,19 @@ def fell_interval(fell: int, trials: int) -> Interval:
     return Interval(fell / trials, float(ends.low), float(ends.high))
 
 
+def least(means: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Find the place of the least among some observers, -1 where there is none, (..., n_observers) -> (...) each.
+
+    Returns:
+        The place, and the value there; NaN where there is none.
+    """
+    known = np.full(means.shape, np.inf)
+    known[..., places] = np.where(np.isfinite(means), means, np.inf)[..., places]
+    value = known.min(axis=-1)
+    exists = np.isfinite(value)
+    return np.where(exists, known.argmin(axis=-1), -1), np.where(exists, value, np.nan)
+
+
 def cells_of(trials: Trials) -> Iterator[Summary]:
     """Make a row a cell, point by point: counts of falls, every figure's mean, and its difference to the best.
 
@@ -133,82 +140,53 @@ def cells_of(trials: Trials) -> Iterator[Summary]:
     every world, baselines apart; differences are taken world by world. The share of falls is among the trials that
     fell or stood; a cell of which all trials were refused or stopped has none.
     """
-    fallen = trials.fell
+    study, n = trials.study, trials.study.worlds
+    n_fell, n_stood = trials.fell.sum(axis=2), trials.stood.sum(axis=2)
     figures = {key: trials.figure(key) for key in COMPARED}
-    for number, point in enumerate(trials.study.points):
-        best = {key: _best(values[number], key, trials.study.contenders) for key, values in figures.items()}
-        for place, observer in enumerate(trials.study.observers):
-            n = trials.study.worlds
-            fell, stood = int(fallen[number, place].sum()), int(trials.stood[number, place].sum())
-            share = fell_interval(fell, fell + stood) if fell + stood else None
-            row: Summary = {"point": number, **point, "observer": observer, "trials": n, "stood": stood}
-            row |= {"fell": fell, "stopped": n - stood - fell}
-            mean, low, high = share or (None, None, None)
-            row |= {"fell_share": mean, "fell_low": low, "fell_high": high}
-            for key, values in figures.items():
-                row |= _with_ends(key, values[number, place], KEYS[key].positive)
-                leader = best[key]
-                behind = values[number, place] - (math.nan if leader is None else values[number, leader])
-                row |= _with_ends(f"{key}_behind_best", behind)
-                row[f"{key}_best"] = None if leader is None else trials.study.observers[leader]
-            yield row
+    best = {}
+    for key, values in figures.items():
+        means = values.mean(axis=-1)
+        best[key], _ = least(means if KEYS[key].better == "less" else -means, study.contenders)
+    for number, (place, observer) in itertools.product(range(study.n_points), enumerate(study.observers)):
+        fell, stood = int(n_fell[number, place]), int(n_stood[number, place])
+        share, low, high = fell_interval(fell, fell + stood) if fell + stood else (None, None, None)
+        row: Summary = {"point": number, **study.point(number), "observer": observer, "trials": n, "stood": stood}
+        row |= {"fell": fell, "stopped": n - stood - fell, "fell_share": share, "fell_low": low, "fell_high": high}
+        for key, values in figures.items():
+            leader = int(best[key][number])
+            behind = values[number, place] - (math.nan if leader < 0 else values[number, leader])
+            row |= with_ends(key, values[number, place], KEYS[key].positive)
+            row |= with_ends(f"{key}_behind_best", behind)
+            row[f"{key}_best"] = None if leader < 0 else study.observers[leader]
+        yield row
 
 
-def _best(values: np.ndarray, key: str, places: list[int]) -> int | None:
-    """Find the best mean among some observers that stood in every world, (n_observers, n_worlds)."""
-    means = values[places].mean(axis=1)
-    if not np.isfinite(means).any():
-        return None
-    return places[int(np.nanargmin(means if KEYS[key].better == "less" else -means))]
-
-
-def _with_ends(key: str, values: np.ndarray, positive: bool = False) -> Figures:
+def with_ends(key: str, values: np.ndarray, positive: bool = False) -> Figures:
     """Average the known values, with the mean's interval; too few values have none."""
-    interval = known_interval(values, positive)
-    if interval is not None:
-        return {key: interval.mean, f"{key}_low": interval.low, f"{key}_high": interval.high}
-    return {key: finite_mean(values), f"{key}_low": None, f"{key}_high": None}
+    _, low, high = known_interval(values, positive) or (None, None, None)
+    return {key: finite_mean(values), f"{key}_low": low, f"{key}_high": high}
 
 
 def cells_schema(study: SweepStudy) -> pa.Schema:
     """Declare the columns of `cells_of`."""
-    counts = [(name, "int64") for name in ("trials", "stood", "fell", "stopped")]
-    shares = [(name, "float64") for name in ("fell_share", "fell_low", "fell_high")]
-    figures: list[tuple[str, str]] = []
+    columns = [*point_columns(study), ("observer", "string")]
+    columns += [(name, "int64") for name in ("trials", "stood", "fell", "stopped")]
+    columns += [(name, "float64") for name in ("fell_share", "fell_low", "fell_high")]
     for key in COMPARED:
-        figures += [
-            (f"{name}{end}", "float64") for name in (key, f"{key}_behind_best") for end in ("", "_low", "_high")
-        ]
-        figures.append((f"{key}_best", "string"))
-    return pa.schema([*point_columns(study), ("observer", "string"), *counts, *shares, *figures])
+        for name in (key, f"{key}_behind_best"):
+            columns += [(f"{name}{end}", "float64") for end in ("", "_low", "_high")]
+        columns.append((f"{key}_best", "string"))
+    return pa.schema(columns)
 
 
 def cells_in_blocks(trials: Trials) -> Iterator[pa.Table]:
     """Make all cells, some thousand at a time."""
     rows = cells_of(trials)
     while block := list(itertools.islice(rows, BLOCK)):
-        yield as_table(block, cells_schema(trials.study))
+        yield table_of(block, cells_schema(trials.study))
 
 
-CLOSE = 1.2
-"""Factor on the leader's error up to which another observer is close to it."""
-
-
-class Count(NamedTuple):
-    """Numbers of points or worlds: those counted, and all that can tell."""
-
-    held: int
-    of: int
-
-    @property
-    def share(self) -> Interval | None:
-        """The share with Wilson's 95 % interval; None of nothing."""
-        return fell_interval(self.held, self.of) if self.of else None
-
-    @property
-    def words(self) -> str:
-        """Both numbers, as tables show them."""
-        return f"{self.held} of {self.of}"
+# --- who leads
 
 
 class LeadRow(NamedTuple):
@@ -220,13 +198,15 @@ class LeadRow(NamedTuple):
         leads: Points at which it leads; of a baseline, at which its error is less than the leader's.
         surely: Points at which it does so beyond 95 % intervals.
         close: Points at which it stood in every world, with at most `CLOSE` times the leader's error.
+        points: Points in all.
     """
 
     name: str
     is_baseline: bool
-    leads: Count
-    surely: Count
-    close: Count
+    leads: int
+    surely: int
+    close: int
+    points: int
 
 
 def least_error(figure: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -241,14 +221,13 @@ def least_error(figure: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.n
     Returns:
         Place of the best, -1 where there is none; whether it is sure; its mean.
     """
-    means = np.full(figure.shape[:-1], np.nan)
-    means[..., places] = figure[..., places, :].mean(axis=-1)
-    best, least = smallest(means)
+    means = figure.mean(axis=-1)
+    best, value = least(means, places)
     sure = np.zeros(best.shape, dtype=bool)
     for at in zip(*np.nonzero(best >= 0), strict=True):
-        others = [i for i in np.nonzero(np.isfinite(means[at]))[0] if i != best[at]]
-        sure[at] = all(_is_less(figure[at][best[at]], figure[at][i]) for i in others)
-    return best, sure, least
+        others = [place for place in places if place != best[at] and np.isfinite(means[at][place])]
+        sure[at] = all(_is_less(figure[at][best[at]], figure[at][place]) for place in others)
+    return best, sure, value
 
 
 def _is_less(values: np.ndarray, others: np.ndarray) -> bool:
@@ -257,14 +236,7 @@ def _is_less(values: np.ndarray, others: np.ndarray) -> bool:
     return behind is not None and behind.low > 0.0
 
 
-def smallest(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the place of the smallest along the last axis, -1 where there is none, and its value."""
-    filled = np.where(np.isfinite(values), values, np.inf)
-    least = filled.min(axis=-1)
-    return np.where(np.isfinite(least), filled.argmin(axis=-1), -1), np.where(np.isfinite(least), least, np.nan)
-
-
-def baselines_ahead(study: SweepStudy, figure: np.ndarray, least: np.ndarray) -> dict[str, np.ndarray]:
+def baselines_ahead(study: SweepStudy, figure: np.ndarray, best_error: np.ndarray) -> dict[str, np.ndarray]:
     """Compare baselines with the leader, (..., n_observers, n_worlds) and (...) -> baseline -> (...).
 
     Returns:
@@ -274,7 +246,7 @@ def baselines_ahead(study: SweepStudy, figure: np.ndarray, least: np.ndarray) ->
     shares = {}
     for name in study.references:
         mean = figure[..., study.observers.index(name), :].mean(axis=-1)
-        shares[name] = np.where(np.isnan(least) & np.isfinite(mean), 1.0, least / (least + mean))
+        shares[name] = np.where(np.isnan(best_error) & np.isfinite(mean), 1.0, best_error / (best_error + mean))
     return shares
 
 
@@ -292,18 +264,17 @@ def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
     figure = trials.figure(key)
     if study.design == "sobol":
         figure = figure[: 2 * study.n]
-    best, sure, least = least_error(figure, study.contenders)
-    ahead = baselines_ahead(study, figure, least)
+    best, sure, error = least_error(figure, study.contenders)
+    ahead = baselines_ahead(study, figure, error)
     rows = []
     for place, name in enumerate(study.observers):
         errors = figure[:, place]
         leads, surely = best == place, (best == place) & sure
         if name in ahead:
             leads = ahead[name] > 0.5
-            surely = [
-                bool(leads[i]) and (best[i] < 0 or _is_less(errors[i], figure[i, best[i]])) for i in range(len(best))
-            ]
-        close = errors.mean(axis=-1) <= CLOSE * least
-        counts = (Count(int(np.sum(mask)), len(figure)) for mask in (leads, surely, close))
-        rows.append(LeadRow(name, name in ahead, *counts))
+            against = zip(leads, errors, figure, best, strict=True)
+            surely = [leads_here and (i < 0 or _is_less(own, all_[i])) for leads_here, own, all_, i in against]
+        close = errors.mean(axis=-1) <= CLOSE * error
+        counts = (int(np.sum(mask)) for mask in (leads, surely, close))
+        rows.append(LeadRow(name, name in ahead, *counts, points=len(figure)))
     return sorted(rows, key=lambda row: row.is_baseline)

@@ -4,62 +4,41 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import pickle
 import re
 import signal
 import sys
 import threading
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
-from functools import partial
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from cmg_mj.core.errors import InputError, RunStopped, raised
-from cmg_mj.features.sweeps.chunk import compute, rows_of_failed_chunk, table_of
-from cmg_mj.features.sweeps.store import GOES_ON, Store
-from cmg_mj.features.sweeps.study import Chunk, Point, SweepStudy
+from cmg_mj.features.sweeps.chunks import RESUMES, OnProgress, Store, compute, no_progress, rows_of, unfinished
+from cmg_mj.features.sweeps.study import SweepStudy
 from cmg_mj.inputs.files import folder
+from cmg_mj.results.summary_keys import Summary
 from cmg_mj.scenario.resolve import versions
 
 if TYPE_CHECKING:
-    import pyarrow as pa
     from distributed import Client, Future, Worker
 
-LOCAL = "local:"
-MOST_LOCAL = 256
-"""Most workers on this machine."""
+MAX_LOCAL = 256
+"""Workers on this machine."""
 ADDRESS = re.compile(r"((tcp|tls)://)?[^/\s]+:\d{1,5}")
 PATIENCE_S = 10.0
 """Time for which a cluster may fail to answer."""
 LOOK_S = 0.25
 """Interval at which Ctrl-C is looked for while nothing comes back."""
-WINDOW = 256
-"""Chunks that are handed over at once; each takes about 0.1 MB there."""
 KILLS = 3
 """Workers that a chunk may kill before it is abandoned."""
 _one_at_a_time = threading.Lock()
 """A worker with many threads is handed as many chunks: one is computed, on all of its threads."""
-
-
-class Part(NamedTuple):
-    """A chunk with all that it takes to compute it elsewhere.
-
-    Attributes:
-        study: The sweep, without its points.
-        chunk: The trials.
-        points: The chunk's points by their numbers.
-        bundled: Name of a model that comes with the package, which a worker may have in another folder.
-        versions: Name -> version that the figures depend on.
-    """
-
-    study: SweepStudy
-    chunk: Chunk
-    points: Mapping[int, Point]
-    bundled: str | None
-    versions: Mapping[str, str]
 
 
 def dask_setup(worker: Worker) -> None:
@@ -73,14 +52,15 @@ def local_workers(address: str) -> int | None:
     Raises:
         InputError: The address is written as neither.
     """
-    if not address.startswith(LOCAL):
-        if not ADDRESS.fullmatch(address):
-            raise InputError(f"--cluster {address}: write tcp://HOST:PORT of a scheduler that is running, or {LOCAL}2")
-        return None
-    count = address.removeprefix(LOCAL)
-    if not (count.isascii() and count.isdecimal() and 1 <= int(count[:9]) <= MOST_LOCAL):
-        raise InputError(f"--cluster {address}: write {LOCAL}N with the number of workers, 1 to {MOST_LOCAL}")
-    return int(count)
+    local = re.fullmatch(r"local:([0-9]{1,9})", address)
+    if local and 1 <= int(local[1]) <= MAX_LOCAL:
+        return int(local[1])
+    if address.startswith("local:") or not ADDRESS.fullmatch(address):
+        raise InputError(
+            f"--cluster {address}: write tcp://HOST:PORT of a scheduler that is running, or local:2 for 2 workers on "
+            f"this machine, at most {MAX_LOCAL}"
+        )
+    return None
 
 
 @contextmanager
@@ -92,7 +72,7 @@ def on_cluster(address: str) -> Iterator[Callable[..., None]]:
             and ended with the context.
 
     Yields:
-        The function that runs the chunks, as `store.run` does.
+        The function that runs the chunks, as `chunks.run` does.
 
     Raises:
         InputError: The cluster cannot be reached, or `distributed` is not installed.
@@ -140,11 +120,7 @@ def _started(workers: int) -> Iterator[Any]:
 
 
 def _run(
-    client: Client,
-    address: str,
-    store: Store,
-    left: Sequence[int],
-    on_progress: Callable[[float], None] | None = None,
+    client: Client, address: str, store: Store, left: Sequence[int], on_progress: OnProgress = no_progress
 ) -> None:
     """Run the chunks that are left. The result does not depend on the workers, their number or their order.
 
@@ -156,46 +132,45 @@ def _run(
     """
     from distributed import CancelledError, KilledWorker, wait
 
-    chunks, waiting = store.study.chunks, deque(left)
-    suspects: deque[int] = deque()
+    study = store.study
+    task = partial(client.submit, compute_there, packed(study), wanted=versions(), pure=False)
+    done = study.trials - sum(map(study.chunk_size, left))
     killed: Counter[int] = Counter()
-    alone: int | None = None
-    done = store.study.trials - sum(chunks.size(number) for number in left)
-    running: dict[Future, int] = {}
+    suspects: list[int] = []
+    running: dict[Future, int] = {task(number): number for number in left}
+    alone = False
     try:
-        while waiting or suspects or running:
-            if suspects and not waiting and not running:
-                alone = suspects.popleft()
-                waiting.append(alone)
-            while waiting and len(running) < WINDOW:
-                number = waiting.popleft()
-                running[client.submit(_compute_part, _part_of(store.study, chunks[number]), pure=False)] = number
+        while running or suspects:
+            if not running:
+                alone = True
+                number = suspects.pop(0)
+                running[task(number)] = number
             waited: Any = None
             with client.as_current(), suppress(TimeoutError):
                 waited = wait(list(running), timeout=LOOK_S, return_when="FIRST_COMPLETED")
             for future in waited.done if waited else ():
                 number = running.pop(future)
                 try:
-                    table = _result(future, address)
+                    rows = _result(future, address)
                 except KilledWorker as error:
                     killed[number] += error.allowed_failures + 1
-                    if number != alone or killed[number] < KILLS:
+                    if not alone or killed[number] < KILLS:
                         suspects.append(number)
                         continue
-                    reason = f"its chunk has killed {killed[number]} workers"
-                    table = table_of(store.study, rows_of_failed_chunk(store.study, chunks[number], reason))
-                store.keep(number, table)
-                done += chunks.size(number)
-            if on_progress:
-                on_progress(done)
+                    observer, trials = study.chunk(number)
+                    reason = unfinished("stopped", f"its chunk has killed {killed[number]} workers")
+                    rows = rows_of(study, observer, dict.fromkeys(trials, reason), trials)
+                store.keep(number, rows)
+                done += study.chunk_size(number)
+            on_progress(done)
     except CancelledError as error:
-        raise RunStopped(f"--cluster {address}: is gone; {GOES_ON}") from error
+        raise RunStopped(f"--cluster {address}: is gone; {RESUMES}") from error
     finally:
         if client.status == "running":
             client.cancel(list(running))
 
 
-def _result(future: Future, address: str) -> pa.Table:
+def _result(future: Future, address: str) -> list[Summary]:
     from distributed import CancelledError, KilledWorker
 
     try:
@@ -209,18 +184,23 @@ def _result(future: Future, address: str) -> pa.Table:
         raise RunStopped(f"--cluster {address}: a chunk cannot be computed there: {why}") from error
 
 
-def _part_of(study: SweepStudy, chunk: Chunk) -> Part:
+def packed(study: SweepStudy) -> bytes:
+    """Pack a study without its points, and the name of a bundled model, which a worker may have in another folder."""
     model = Path(study.scenario.plant.model).resolve()
-    return Part(
-        dataclasses.replace(study),  # anew: the points that this one has made stay behind
-        chunk,
-        {number: study.points[number] for number, _ in chunk.trials},
-        model.name if model.parent == folder("models").resolve() else None,
-        versions(),
-    )
+    bundled = model.name if model.parent == folder("models").resolve() else None
+    return pickle.dumps((dataclasses.replace(study), bundled))
 
 
-def _compute_part(part: Part) -> pa.Table:
+@lru_cache(maxsize=1)  # a worker draws the points once
+def _unpacked(content: bytes) -> SweepStudy:
+    study, bundled = pickle.loads(content)
+    if bundled is None:
+        return study
+    plant = dataclasses.replace(study.scenario.plant, model=str(folder("models") / bundled))
+    return dataclasses.replace(study, scenario=study.scenario.model_copy(update={"plant": plant}))
+
+
+def compute_there(content: bytes, number: int, wanted: Mapping[str, str]) -> list[Summary]:
     """Compute a chunk on a worker.
 
     Raises:
@@ -228,15 +208,13 @@ def _compute_part(part: Part) -> pa.Table:
     """
     from distributed import get_worker
 
-    worker, study = get_worker(), part.study
+    worker = get_worker()
     with _one_at_a_time, redirect_stdout(sys.stderr):  # a user's observer may print
         for name, version in versions().items():
-            if part.versions[name] != version:
-                raise InputError(f"worker {worker.address}: {name} {version} there, {part.versions[name]} here")
-        if part.bundled is not None:
-            plant = dataclasses.replace(study.scenario.plant, model=str(folder("models") / part.bundled))
-            study = dataclasses.replace(study, scenario=study.scenario.model_copy(update={"plant": plant}))
+            if wanted[name] != version:
+                raise InputError(f"worker {worker.address}: {name} {version} there, {wanted[name]} here")
+        study = _unpacked(content)
         try:
-            return table_of(study, compute(study, part.chunk, points=part.points, threads=worker.state.nthreads))
+            return compute(study, *study.chunk(number), threads=worker.state.nthreads)
         except InputError as error:
             raise InputError(f"worker {worker.address}: {error}") from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING
 
 import click
 
@@ -20,18 +20,7 @@ from cmg_mj.cli.terminal import (
 from cmg_mj.core.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.features.sweeps.study import SweepStudy
-    from cmg_mj.features.sweeps.study_file import SweepFields
-
-
-class StudyOptions(TypedDict):
-    """The options that make the study, by click's names."""
-
-    varied: tuple[str, ...]
-    observers: list[str] | None
-    worlds: int | None
-    sample: int | None
-    sobol: int | None
+    from cmg_mj.features.sweeps.study import SamplingDesign, SweepStudy
 
 
 @click.command(short_help="Run a scenario with varied fields, observers and noise.")
@@ -62,7 +51,15 @@ class StudyOptions(TypedDict):
 @click.option("--yes", is_flag=True, help="Run the sweep even if it is very large.")
 @users_code()
 def sweep(
-    arguments: RunArguments, dry_run: bool, cluster: str | None, yes: bool, **options: Unpack[StudyOptions]
+    arguments: RunArguments,
+    varied: tuple[str, ...],
+    observers: list[str] | None,
+    worlds: int | None,
+    sample: int | None,
+    sobol: int | None,
+    dry_run: bool,
+    cluster: str | None,
+    yes: bool,
 ) -> None:
     """Run SCENARIO, or the study file of a sweep, in many worlds with every observer at every varied value.
 
@@ -77,33 +74,36 @@ def sweep(
       study.toml      reruns the sweep
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.features.sweeps.cells import COLUMNS, Trials, cells_of
-    from cmg_mj.features.sweeps.chunk import estimate_cost
+    from cmg_mj.features.sweeps.chunks import Store, estimate_cost
+    from cmg_mj.features.sweeps.chunks import run as run_here
     from cmg_mj.features.sweeps.cluster import local_workers, on_cluster
     from cmg_mj.features.sweeps.report import save, summary
     from cmg_mj.features.sweeps.sobol import index_rows
-    from cmg_mj.features.sweeps.store import Store
-    from cmg_mj.features.sweeps.store import run as run_here
-    from cmg_mj.features.sweeps.study import MOST_TRIALS, check_values, counted
+    from cmg_mj.features.sweeps.study import MAX_TRIALS, check_values, counted, sampling
     from cmg_mj.scenario.resolve import safe_name
 
     if cluster is not None:
         local_workers(cluster)
-    study = _study(arguments, options)
+    study = _study(arguments, varied, observers, worlds, sampling(sample, sobol))
     check_values(study)
     if dry_run:
         cost = estimate_cost(study)
-        show(cost, _cost_text(cost), arguments.as_json)
+        text = (
+            "{points} points x {observers} observers x {worlds} worlds = {trials} trials in {chunks} chunks; "
+            "about {minutes:.2g} min on this machine, {memory_mb:.0f} MB"
+        )
+        show(cost, text.format(**cost), arguments.as_json)
         return
-    if study.trials > MOST_TRIALS and not yes:
+    if study.trials > MAX_TRIALS and not yes:
         raise InputError(
             f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; for more than "
-            f"{MOST_TRIALS} give --yes (--dry-run prints the time and memory)"
+            f"{MAX_TRIALS} give --yes (--dry-run prints the time and memory)"
         )
     path = output_path(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
     with nullcontext(run_here) if cluster is None else on_cluster(cluster) as run:
         store = Store.open(path, study, overwrite=overwrites())
         left = store.left()
-        before = study.trials - sum(study.chunks.size(number) for number in left)
+        before = study.trials - sum(map(study.chunk_size, left))
         if before:
             note(f"resuming: {before} of {study.trials} trials are done")
         with CtrlC() as ctrl_c:
@@ -111,51 +111,54 @@ def sweep(
                 with progress(f"sweep {arguments.name}", study.trials, ctrl_c) as on_progress:
                     run(store, left, on_progress)
             except KeyboardInterrupt:
-                kept = f"finished trials are kept in {store.folder}"
-                end_interrupted(f"interrupted; {kept}, and the same command resumes the sweep")
+                kept = f"finished trials are kept in {store.folder}, and the same command resumes the sweep"
+                end_interrupted(f"interrupted; {kept}")
             trials = Trials(study, store.tables(COLUMNS))
             indices = index_rows(trials) if study.design == "sobol" else []
             save(store, trials, indices)
     figures = {"trials": study.trials, "cells": list(cells_of(trials))} if arguments.as_json else {}
     if study.design == "sobol":
-        figures["indices"] = [row._asdict() for row in indices]
+        figures["indices"] = indices
     show(figures, summary(trials, indices), arguments.as_json)
     if not arguments.as_json or store.folder != path:
         click.echo(f"Written to {store.folder}. Read {store.folder / 'report.md'}", err=True)
 
 
-def _study(arguments: RunArguments, options: StudyOptions) -> SweepStudy:
+def _study(
+    arguments: RunArguments,
+    varied: tuple[str, ...],
+    observers: list[str] | None,
+    worlds: int | None,
+    design: tuple[SamplingDesign, int] | None,
+) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
-    from cmg_mj.features.sweeps import WORLDS
-    from cmg_mj.features.sweeps.study import SweepStudy, parse_axis, sampling
-    from cmg_mj.features.sweeps.study_file import axes_of, design_of, locate_tracks, scenario_of, study_file
+    from cmg_mj.features.sweeps.study import (
+        SweepSection,
+        SweepStudy,
+        locate_tracks,
+        parse_axis,
+        read_study,
+        scenario_of,
+    )
     from cmg_mj.inputs.files import find
 
-    design = sampling(options["sample"], options["sobol"], prefix="--")
-    axes = []
-    for setting in options["varied"]:
-        field, _, values = setting.partition("=")
-        axes.append(parse_axis(field, values, f"--vary {setting}"))
-    fields = study_file(arguments.name)
-    settings: SweepFields = {}
-    if fields is None:
+    settings = [setting.partition("=") for setting in varied]
+    axes = [parse_axis(field, values, f"--vary {field}{equals}{values}") for field, equals, values in settings]
+    file = read_study(arguments.name)
+    section = SweepSection() if file is None else file.sweep
+    if file is None:
         scenario = arguments.scenario()
     else:
-        scenario = scenario_of(arguments.name, fields, arguments.settings)
+        scenario = scenario_of(arguments.name, file, arguments.settings)
         if arguments.seed is not None:
             scenario = scenario.model_copy(update={"seed": arguments.seed})
-        settings = fields.get("sweep", {})
-        axes = axes or axes_of(arguments.name, fields)
+        where = f"{arguments.name}: vary."
+        axes = axes or [parse_axis(field, values, where + field) for field, values in file.vary.items()]
     beside = find("scenarios", arguments.name, ".toml", "scenario").parent
-    axes = [locate_tracks(axis, beside) for axis in axes]
-    names = options["observers"] or settings.get("observers", [scenario.observer.kind])
-    worlds_per_cell = options["worlds"] or settings.get("worlds", WORLDS)
-    file_design = design_of(arguments.name, settings)  # refused if wrong, also where an option replaces it
-    return SweepStudy(scenario, tuple(axes), tuple(names), worlds_per_cell, *(design or file_design))
-
-
-def _cost_text(cost: dict[str, float]) -> str:
-    size = "{points} points x {observers} observers x {worlds} worlds = {trials} trials in {chunks} chunks".format(
-        **cost
+    return SweepStudy(
+        scenario,
+        tuple(locate_tracks(axis, beside) for axis in axes),
+        tuple(observers or section.observers or [scenario.observer.kind]),
+        worlds or section.worlds,
+        *(design or (section.design, section.n)),
     )
-    return f"{size}; about {cost['minutes']:.2g} min on this machine, {cost['memory_mb']:.0f} MB"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
@@ -12,26 +11,34 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.sweeps.cells import CLOSE, Count, Trials, cells_in_blocks, cells_of, cells_schema, lead_rows
-from cmg_mj.features.sweeps.chunk import schema_of
-from cmg_mj.features.sweeps.pictures import ERRORS, fall_counts, pictures_of
-from cmg_mj.features.sweeps.sobol import FEWEST, LOST, IndexRow, index_table
-from cmg_mj.features.sweeps.store import CELLS, GOES_ON, INDICES, REPORT, TRIALS, Store
+from cmg_mj.features.sweeps.cells import (
+    CLOSE,
+    Trials,
+    cells_in_blocks,
+    cells_of,
+    cells_schema,
+    fell_interval,
+    lead_rows,
+)
+from cmg_mj.features.sweeps.chunks import CELLS, INDICES, REPORT, RESUMES, TRIALS, Store, trials_schema
+from cmg_mj.features.sweeps.pictures import CURVES, ERRORS, Picture, fall_counts, pictures_of
+from cmg_mj.features.sweeps.sobol import LOST, MIN_ROWS, IndexRow, index_table
 from cmg_mj.features.sweeps.study import SweepStudy, VariedField, counted
 from cmg_mj.results.folder import whole_file, write_text
-from cmg_mj.results.summary_keys import KEYS, Summary, SummaryValue, capitalised, format_figure, heading
+from cmg_mj.results.intervals import finite_mean
+from cmg_mj.results.summary_keys import Summary, SummaryValue, capitalised, format_figure, heading
 from cmg_mj.results.tables import markdown_table
-from cmg_mj.view.plots.figure import Picture, draw
+from cmg_mj.view.plots.figure import save_figure
 
-MOST_ROWS = 60
+MAX_ROWS = 60
 """Rows of a table on the terminal or in the report; the files have all."""
-MOST_REASONS, MOST_VALUES = 5, 10
-QUANTILES = (0.1, 0.5, 0.9)
+MAX_REASONS, MAX_VALUES = 5, 10
+QUANTILES = {0.1: "10 % quantile", 0.5: "median", 0.9: "90 % quantile"}
 """Quantiles of a figure over the points of a design."""
 ERROR = ERRORS[0]
 ABOUT_MAPS = (
-    "A cell's colour is the observer of the smallest mean error among those that stood in every world, the contours "
-    "are its error. A dot: another one's mean difference to it, world by world, is within its 95 % interval. A line in "
+    "A cell's colour in the first panel is the observer of the smallest mean error among those that stood in every "
+    "world. A dot: another one's mean difference to it, world by world, is within its 95 % interval. A dashed line in "
     "an observer's colour: half of its worlds fall beyond it. For falls, a dot says that Wilson's intervals overlap."
 )
 ABOUT_AHEAD = (
@@ -45,13 +52,13 @@ ABOUT_LEADS = (
     "observer's, or no observer stood in every world."
 )
 ABOUT_CURVES = (
-    "Bands are 95 % intervals. A cross: some worlds did not stand to the end, and the mean is that of the others, "
+    "Bars are 95 % intervals. A cross: some worlds did not stand to the end, and the mean is that of the others, "
     "which had it easier."
 )
 ABOUT_INDICES = (
     "Shares of the variance of a point's mean over its worlds: first order, what a field explains by itself; "
     "total, with all that it acts together with. In brackets bootstrap 95 % intervals. Decisive: its total index's "
-    f"interval is above all others'. All figures are in {INDICES}."
+    f"interval is above all others', of {MIN_ROWS} rows or more. All figures are in {INDICES}."
 )
 
 
@@ -63,20 +70,21 @@ def save(store: Store, trials: Trials, indices: Sequence[IndexRow]) -> None:
     """
     study, pictures = store.study, pictures_of(trials)
     files: dict[str, Callable[[Path], object]] = {
-        TRIALS: lambda path: _write_tables(path, schema_of(study), store.tables()),
+        TRIALS: lambda path: _write_tables(path, trials_schema(study), store.tables()),
         CELLS: lambda path: _write_tables(path, cells_schema(study), cells_in_blocks(trials)),
-        **{f"{picture.name}.png": lambda path, picture=picture: draw(path, picture) for picture in pictures},
     }
+    for picture in pictures:
+        files[f"{picture.name}.png"] = lambda path, it=picture: save_figure(path, it.draw(), it.title, dpi=100)
     if study.design == "sobol":
         files[INDICES] = lambda path: pq.write_table(index_table(indices), path)
     files[REPORT] = lambda path: write_text(path, report(trials, indices, pictures))
     for name, write in files.items():
         path = store.folder / name
         try:
-            with whole_file(path, path.suffix) as temporary:
+            with whole_file(path) as temporary:
                 write(temporary)
         except OSError as error:
-            raise InputError(f"{path}: cannot be written: {error.strerror or error}; {GOES_ON}") from error
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}; {RESUMES}") from error
 
 
 def _write_tables(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
@@ -89,7 +97,7 @@ def _write_tables(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> 
 def report(trials: Trials, indices: Sequence[IndexRow], pictures: Sequence[Picture]) -> str:
     """Write the report as Markdown."""
     study = trials.study
-    sizes = ((len(study.points), "point"), (len(study.observers), "observer"), (study.worlds, "world"))
+    sizes = ((study.n_points, "point"), (len(study.observers), "observer"), (study.worlds, "world"))
     counts = ", ".join(counted(n, noun) for n, noun in sizes)
     is_grid = study.design == "grid"
     return "\n\n".join(
@@ -99,64 +107,60 @@ def report(trials: Trials, indices: Sequence[IndexRow], pictures: Sequence[Pictu
             *_varied(study),
             *_pictures(trials, pictures),
             *_leads(trials),
-            *(_indices(study, indices) if study.design == "sobol" else []),
+            *(["## What the errors depend on: Sobol indices", ABOUT_INDICES] if study.design == "sobol" else []),
+            *_indices(indices),
             *_unfinished(trials),
             *(["## Cells", f"Mean {heading(ERROR)}, with the falls:"] if is_grid else ["## Observers over all points"]),
-            _cells(trials),
+            *_cells(trials),
         ]
     )
 
 
 def summary(trials: Trials, indices: Sequence[IndexRow]) -> str:
     """Write for the terminal: cells, reasons of unfinished trials, total indices."""
-    parts = [_cells(trials)]
-    counts = trials.reasons.counts
-    if counts:
-        more = len(counts) - 1
+    parts = _cells(trials)
+    more = len(trials.reasons.counts) - 1
+    if more >= 0:
         others = f" (and {counted(more, 'other reason')}: see the report)" if more else ""
         parts.append(f"{_count_unfinished(trials)}. {trials.reasons.most(1)[0]}{others}")
-    if indices:
-        parts.append(_indices_in_short(indices))
-    return "\n\n".join(parts)
+    return "\n\n".join([*parts, *_indices(indices)])
 
 
 def _varied(study: SweepStudy) -> list[str]:
     """Say what a table of the cells does not: a design's values of every field, a grid's fields that vary together."""
-    if study.design == "grid":
-        return [f"With {axis.field} go, alike: {', '.join(axis.also)}." for axis in study.axes if axis.also]
-    return ["Varied:", "\n".join(f"- {axis.option}: {_values(axis)}" for axis in study.axes)]
+    if study.design != "grid":
+        return ["Varied:", "\n".join(f"- {axis.option}: {_values(axis)}" for axis in study.axes)]
+    together = [axis.fields for axis in study.axes if len(axis.fields) > 1]
+    return [f"With {first} go, alike: {', '.join(others)}." for first, *others in together]
 
 
 def _values(axis: VariedField) -> str:
-    if axis.is_range:
-        scale = ", evenly in the logarithm" if axis.log else ""
-        return f"{_format_value(axis.low)} to {_format_value(axis.high)}{scale}"
+    if not axis.values:
+        return f"{axis.low:g} to {axis.high:g}{', evenly in the logarithm' if axis.log else ''}"
     values = [_format_value(value) for value in axis.values]
-    if len(values) <= MOST_VALUES:
-        return ", ".join(values)
-    return f"{', '.join(values[: MOST_VALUES - 1])}, ..., {values[-1]} ({len(values)} values)"
+    if len(values) > MAX_VALUES:
+        values[MAX_VALUES - 1 :] = ["...", f"{values[-1]} ({len(values)} values)"]
+    return ", ".join(values)
 
 
 def _format_value(value: SummaryValue) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _cells(trials: Trials) -> str:
-    """Show a grid's cells, or how each observer does over the points of a design."""
-    return _table_of_cells(trials) if trials.study.design == "grid" else _over_points(trials)
-
-
-def _table_of_cells(trials: Trials) -> str:
-    """Make a table with a row a point, a column an observer."""
+def _cells(trials: Trials) -> list[str]:
+    """Show a grid's cells, a row a point, or how each observer does over the points of a design."""
     study = trials.study
+    if study.design != "grid":
+        return _over_points(trials)
     fields = [axis.field for axis in study.axes]
     rows, every_cell = [], cells_of(trials)
-    for point in itertools.islice(study.points, MOST_ROWS):
+    for number in range(min(study.n_points, MAX_ROWS)):
         of_point = itertools.islice(every_cell, len(study.observers))
-        rows.append([*(_format_value(point[field]) for field in fields), *map(_format_cell, of_point)])
+        values = study.point(number)
+        rows.append([*(_format_value(values[field]) for field in fields), *map(_format_cell, of_point)])
     table = markdown_table([*fields, *study.observers], rows, text_columns=0)
-    more = len(study.points) - MOST_ROWS
-    return f"{table}\n\n{more} points more are in {CELLS}." if more > 0 else table
+    more = study.n_points - MAX_ROWS
+    return [table, f"{more} points more are in {CELLS}."] if more > 0 else [table]
 
 
 def _format_cell(row: Summary) -> str:
@@ -164,36 +168,24 @@ def _format_cell(row: Summary) -> str:
     return format_figure(ERROR, row[ERROR]) + "".join(counts)
 
 
-def _over_points(trials: Trials) -> str:
+def _over_points(trials: Trials) -> list[str]:
     """Make a table with a row an observer: its error's mean and quantiles over the points, and its falls."""
     study = trials.study
     error, (fell, known) = trials.figure(ERROR), fall_counts(trials)
     table = []
     for place, name in enumerate(study.observers):
-        means = _means(error[:, place])
-        figures: list[float | None] = [None] * (1 + len(QUANTILES))
-        if len(means):
-            figures = [float(means.mean()), *np.quantile(means, QUANTILES)]
-        falls = Count(int(fell[:, place].sum()), int(known[:, place].sum()))
-        share = f" ({100.0 * falls.held / falls.of:.1f} %)" if falls.of else ""
-        counts = [name, f"{len(means)} of {len(study.points)}"]
-        table.append([*counts, *(format_figure(ERROR, figure) for figure in figures), falls.words + share])
-    shares = ["median" if share == 0.5 else f"{100.0 * share:.0f} % quantile" for share in QUANTILES]
-    return "\n\n".join(
-        [
-            f"{capitalised(heading(ERROR))} of a point: the mean over its worlds that stood, so that "
-            "where some fell it is that of the easier ones. Over the points at which any stood:",
-            markdown_table(["observer", "points", "mean", *shares, "worlds that fell"], table),
-            f"Every point is in {CELLS}.",
-        ]
-    )
-
-
-def _means(values: np.ndarray) -> np.ndarray:
-    """Average over the known worlds of the points that have any, (n_points, n_worlds) -> (n_known,)."""
-    known = np.isfinite(values)
-    some = known.any(axis=1)
-    return np.where(known, values, 0.0)[some].sum(axis=1) / known[some].sum(axis=1)
+        means = [mean for mean in map(finite_mean, error[:, place]) if mean is not None]
+        figures = [np.mean(means), *np.quantile(means, list(QUANTILES))] if means else [None] * 4
+        n_fell, n_known = fell[:, place].sum(), known[:, place].sum()
+        share = f" ({100.0 * n_fell / n_known:.1f} %)" if n_known else ""
+        formatted = [format_figure(ERROR, figure) for figure in figures]
+        table.append([name, f"{len(means)} of {study.n_points}", *formatted, f"{n_fell} of {n_known}{share}"])
+    return [
+        f"{capitalised(heading(ERROR))} of a point: the mean over its worlds that stood, so that "
+        "where some fell it is that of the easier ones. Over the points at which any stood:",
+        markdown_table(["observer", "points", "mean", *QUANTILES.values(), "worlds that fell"], table),
+        f"Every point is in {CELLS}.",
+    ]
 
 
 def _unfinished(trials: Trials) -> list[str]:
@@ -201,22 +193,21 @@ def _unfinished(trials: Trials) -> list[str]:
     if not trials.reasons.counts:
         return []
     about = f"{_count_unfinished(trials)}; no mean counts them. Every one's reason is in {TRIALS}, the most frequent:"
-    return ["## Refused and stopped", about, "\n".join(f"- {reason}" for reason in trials.reasons.most(MOST_REASONS))]
+    return ["## Refused and stopped", about, "\n".join(f"- {reason}" for reason in trials.reasons.most(MAX_REASONS))]
 
 
 def _count_unfinished(trials: Trials) -> str:
     return f"{trials.reasons.counts.total()} of {trials.study.trials} trials were refused or stopped"
 
 
-def _pictures(trials: Trials, drawings: Sequence[Picture]) -> list[str]:
+def _pictures(trials: Trials, pictures: Sequence[Picture]) -> list[str]:
     """Show the pictures, and say how to read them."""
-    if not drawings:
+    if not pictures:
         return []
-    is_map = any(panel.map is not None for picture in drawings for panel in picture.panels)
-    links = [f"![{picture.title}]({picture.name}.png)" for picture in drawings]
+    links = [f"![{picture.title}]({picture.name}.png)" for picture in pictures]
     falls = [] if trials.fell.any() else ["No world fell."]
-    about = [ABOUT_MAPS if is_map else ABOUT_CURVES, *([ABOUT_AHEAD] if trials.study.references else [])]
-    return [*links, *about, *falls]
+    about = ABOUT_CURVES if pictures[0].name == CURVES else ABOUT_MAPS
+    return [*links, about, *([ABOUT_AHEAD] if trials.study.references else []), *falls]
 
 
 def _leads(trials: Trials) -> list[str]:
@@ -227,29 +218,32 @@ def _leads(trials: Trials) -> list[str]:
     is_grid = study.design == "grid"
     table = []
     for row in lead_rows(trials, ERROR):
-        low, high = row.leads.share[1:] if row.leads.share else (math.nan, math.nan)
+        _, low, high = fell_interval(row.leads, row.points)
         interval = [] if is_grid else [f"{100.0 * low:.1f} % to {100.0 * high:.1f} %"]
-        name = f"{row.name} (baseline)" if row.is_baseline else row.name
-        table.append([name, row.leads.words, *interval, row.surely.words, row.close.words])
+        leads, *counts = (f"{count} of {row.points}" for count in (row.leads, row.surely, row.close))
+        table.append([f"{row.name} (baseline)" if row.is_baseline else row.name, leads, *interval, *counts])
     head = ["observer", "leads", *([] if is_grid else ["95 % interval"]), "surely", "close"]
     independent = " Of a design for indices, its independent points count." if study.design == "sobol" else ""
     return ["## Who leads", ABOUT_LEADS + independent, markdown_table(head, table)]
 
 
-def _indices(study: SweepStudy, rows: Sequence[IndexRow]) -> list[str]:
-    """Show the first-order and total indices of the figures that matter most."""
-    about = ABOUT_INDICES
-    if study.n < FEWEST:
-        about += f" With fewer than {FEWEST} rows the intervals are too narrow, and nothing is called decisive."
-    parts = ["## What the errors depend on: Sobol indices", about]
+def _indices(rows: Sequence[IndexRow]) -> list[str]:
+    """Show the first-order and total indices of the figures that matter most, or why there are none."""
+    parts = []
     for key, title in {**{key: heading(key) for key in ERRORS}, LOST: "share of worlds that fell or stopped"}.items():
-        of_figure = [row for row in rows if row.figure == key]
+        of_figure = [row for row in rows if row["figure"] == key]
         table = [
-            [row.observer, row.field, _index(row, "first"), _index(row, "total"), "yes" if row.decisive else ""]
+            [
+                row["observer"],
+                row["field"],
+                _index(row, "first"),
+                _index(row, "total"),
+                "yes" if row["decisive"] else "",
+            ]
             for row in of_figure
-            if not row.refused
+            if not row["refused"]
         ]
-        refused = {row.observer: row.refused for row in of_figure if row.refused}
+        refused = {row["observer"]: row["refused"] for row in of_figure if row["refused"]}
         if of_figure:
             parts.append(f"### {capitalised(title)}")
         if table:
@@ -260,30 +254,5 @@ def _indices(study: SweepStudy, rows: Sequence[IndexRow]) -> list[str]:
     return parts
 
 
-def _indices_in_short(rows: Sequence[IndexRow]) -> str:
-    """Show the total indices of the errors, or why there are none."""
-    rows = [row for row in rows if row.figure in ERRORS]
-    known = {(row.observer, row.field, row.figure): row for row in rows if not row.refused}
-    columns = [key for key in ERRORS if any(figure == key for _, _, figure in known)]
-    table = [
-        [name, field, *(_total(known.get((name, field, key))) for key in columns)]
-        for name, field in dict.fromkeys((name, field) for name, field, _ in known)
-    ]
-    parts = []
-    if table:
-        headings = ["observer", "field", *(f"total index, {KEYS[key].label}" for key in columns)]
-        parts.append(markdown_table(headings, table, text_columns=2))
-    if any(row.decisive for row in known.values()):
-        parts.append("*: decisive, its interval is above all others'.")
-    refused = dict.fromkeys((row.observer, row.figure, row.refused) for row in rows if row.refused)
-    parts += [f"No indices of {name}, {KEYS[figure].label}: {why}." for name, figure, why in refused]
-    return "\n\n".join(parts)
-
-
-def _total(row: IndexRow | None) -> str:
-    return "-" if row is None else f"{_index(row, 'total')}{'*' if row.decisive else ''}"
-
-
 def _index(row: IndexRow, kind: str) -> str:
-    value, low, high = (getattr(row, f"{kind}{end}") for end in ("", "_low", "_high"))
-    return f"{value:.3f} [{low:.3f}, {high:.3f}]"
+    return "{:.3f} [{:.3f}, {:.3f}]".format(*(row[f"{kind}{end}"] for end in ("", "_low", "_high")))

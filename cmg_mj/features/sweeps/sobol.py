@@ -2,39 +2,28 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pyarrow as pa
 
 from cmg_mj.features.sweeps.cells import COMPARED, Trials
-from cmg_mj.features.sweeps.chunk import as_table
+from cmg_mj.features.sweeps.chunks import table_of
 from cmg_mj.results.intervals import CONFIDENCE
 
 RESAMPLES = 999
-FEWEST = 16
+MIN_ROWS = 16
 """Rows of a design by whose intervals anything is called decisive: those of fewer are too narrow."""
 LOST = "lost_share"
 """Quantity that is decomposed besides the figures: the share of worlds that fell or stopped."""
-AT_ONCE = 2_000_000
+MAX_HELD = 2_000_000
 """Values of resamples held together."""
 
 
-class IndexRow(NamedTuple):
-    """A row of `indices.parquet`: the indices of a figure, observer and field, or why there are none."""
-
-    figure: str
-    observer: str
-    field: str
-    first: float | None = None
-    first_low: float | None = None
-    first_high: float | None = None
-    total: float | None = None
-    total_low: float | None = None
-    total_high: float | None = None
-    decisive: bool | None = None
-    refused: str | None = None
+IndexRow: TypeAlias = dict[str, Any]
+"""A row of `indices.parquet`: the indices of a figure, observer and field, or why there are none."""
 
 
 class Indices(NamedTuple):
@@ -80,7 +69,7 @@ def indices(values: np.ndarray, n: int, seed: int) -> Indices:
     blocks = values.reshape(-1, n)
     first, total = _estimated(blocks, np.arange(n)[None])
     rng = np.random.default_rng(seed)
-    size = max(1, AT_ONCE // len(values))
+    size = max(1, MAX_HELD // len(values))
     pieces = [min(size, RESAMPLES - done) for done in range(0, RESAMPLES, size)]
     resampled = [_estimated(blocks, rng.integers(n, size=(piece, n))) for piece in pieces]
     tail = (1.0 - CONFIDENCE) / 2.0
@@ -103,9 +92,7 @@ def index_table(rows: Sequence[IndexRow]) -> pa.Table:
     """Make the rows of `index_rows` into a table."""
     names = [(name, "string") for name in ("figure", "observer", "field")]
     figures = [(name, "float64") for name in Indices._fields]
-    return as_table(
-        (row._asdict() for row in rows), pa.schema([*names, *figures, ("decisive", "bool"), ("refused", "string")])
-    )
+    return table_of(rows, pa.schema([*names, *figures, ("decisive", "bool"), ("refused", "string")]))
 
 
 def index_rows(trials: Trials) -> list[IndexRow]:
@@ -114,19 +101,15 @@ def index_rows(trials: Trials) -> list[IndexRow]:
     The indices decompose the mean over a point's worlds, whose noise is the same at every point.
     """
     study = trials.study
-    fields = [axis.field for axis in study.axes]
     rows: list[IndexRow] = []
     for figure, observer, values, outcome in _quantities(trials):
-        why = _refused(values, outcome, study.n)
-        if why:
-            rows += (IndexRow(figure, observer, field, refused=why) for field in fields)
-            continue
-        result = indices(values.mean(axis=1), study.n, study.scenario.seed)
-        for i, field in enumerate(fields):
-            figures = (float(values[i]) for values in result)
-            rows.append(
-                IndexRow(figure, observer, field, *figures, decisive=bool(result.decisive[i]) and study.n >= FEWEST)
-            )
+        refused = _refused(values, outcome, study.n)
+        result = None if refused else indices(values.mean(axis=1), study.n, study.scenario.seed)
+        for i, axis in enumerate(study.axes):
+            row: IndexRow = {"figure": figure, "observer": observer, "field": axis.field}
+            row |= {name: result and float(getattr(result, name)[i]) for name in Indices._fields}
+            decisive = result and bool(result.decisive[i]) and study.n >= MIN_ROWS
+            rows.append(row | {"decisive": decisive, "refused": refused})
     return rows
 
 
@@ -149,20 +132,19 @@ def _quantities(trials: Trials) -> Iterator[tuple[str, str, np.ndarray, np.ndarr
 def _refused(values: np.ndarray, outcome: np.ndarray, n: int) -> str | None:
     """Say why a quantity of a design of n rows has no indices, with counts; None if it has."""
     means = values.mean(axis=1)
-    if np.isfinite(means).all():
-        if np.ptp(means) == 0.0:
-            return "the same at every point"
-        independent = 2 * n  # A and B, of which the variance is taken
-        if np.ptp(means[:independent]) > 0.0:
-            return None
-        others = int((means[independent:] != means[0]).sum())
+    unknown = ~np.isfinite(values)
+    if unknown.any():
+        ends = [
+            {"done": "have no such figure", "fell": "fell"}.get(end, "stopped") for end in outcome[unknown].tolist()
+        ]
+        counts = ", ".join(f"{count} {end}" for end, count in sorted(Counter(ends).items()))
+        points = f"{unknown.any(axis=1).sum()} of {len(means)} points"
+        return f"no value at {points}: of {values.size} trials {counts}"
+    if np.ptp(means) == 0.0:
+        return "the same at every point"
+    independent = 2 * n  # A and B, of which the variance is taken
+    if np.ptp(means[:independent]) == 0.0:
         return (
-            f"the same at all {independent} independent points of the design: no variance to share out "
-            f"(another value at {others} of the {len(means) - independent} made of them; take more rows)"
+            f"the same at all {independent} independent points of the design: no variance to share out; take more rows"
         )
-    fell = int((outcome == "fell").sum())
-    stopped = int(((outcome != "done") & (outcome != "fell")).sum())
-    none = int((~np.isfinite(values) & (outcome == "done")).sum())
-    counts = [f"{n} {what}" for n, what in ((fell, "fell"), (stopped, "stopped"), (none, "have no such figure")) if n]
-    points = f"no value at {int((~np.isfinite(means)).sum())} of {len(means)} points"
-    return f"{points}: of {values.size} trials {', '.join(counts)}"
+    return None

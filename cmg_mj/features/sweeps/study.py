@@ -1,49 +1,42 @@
-"""The study of a sweep: a scenario, what is varied in it and how, the observers, the worlds."""
+"""The study of a sweep: a scenario, what is varied in it and how, the observers, the worlds; and its file."""
 
 from __future__ import annotations
 
 import copy
 import math
+import re
 import tomllib
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, Protocol, TypeAlias, TypeGuard, runtime_checkable
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.core.types import law_needs
-from cmg_mj.inputs.files import find
-from cmg_mj.inputs.overrides import assign
+from cmg_mj.inputs.files import bundled, find, whole_path
+from cmg_mj.inputs.messages import complaints
+from cmg_mj.inputs.overrides import assign, override
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.plant.plant import load_scenario_plant
 from cmg_mj.results.baselines import RATES
 from cmg_mj.runs.batch import UNUSED, can_vary_in_batch
 from cmg_mj.runs.experiment import prepare
+from cmg_mj.scenario.loading import find_files, find_model, load_scenario
 from cmg_mj.scenario.schema import ObserverSettings, Scenario, parse_scenario
 
 # --- varied fields
 
-FieldValue: TypeAlias = "float | str | Sequence[FieldValue] | Mapping[str, FieldValue]"
-"""A value of a scenario's field, as TOML has it."""
+Variation: TypeAlias = Any
+"""Values of a field: a list or array of them, a single one, or text as `--vary` takes it."""
 
-
-@runtime_checkable
-class Array(Protocol):
-    """Numbers of numpy, pandas or the like."""
-
-    def tolist(self) -> FieldValue:
-        """Make plain numbers."""
-        ...
-
-
-Variation: TypeAlias = "FieldValue | Array"
-"""Values of a field: a list of them, a single one, or text as `--vary` takes it."""
-
-MOST_VALUES = 10_000
+MAX_VALUES = 10_000
 """Values of one field."""
 LOG = "log:"
 TOGETHER = "+"
@@ -57,39 +50,32 @@ class VariedField:
     """One varied field, or several that take the same values together.
 
     Attributes:
-        field: The field, as with `--set`; of several the first, which names the axis in tables and pictures.
+        fields: The fields, as with `--set`; the first names the axis in tables and pictures.
         values: The values of a list or of a range with a count; none for a range of which any value may be sampled.
         low: Lower end of a range to be sampled.
         high: Upper end of a range to be sampled.
         log: Whether the range is sampled evenly in its logarithm.
-        also: Fields that take the same value at every point.
     """
 
-    field: str
-    values: tuple[FieldValue, ...] = ()
+    fields: tuple[str, ...]
+    values: tuple[Any, ...] = ()
     low: float = math.nan
     high: float = math.nan
     log: bool = False
-    also: tuple[str, ...] = ()
 
     @property
-    def fields(self) -> tuple[str, ...]:
-        """All fields that take the value."""
-        return (self.field, *self.also)
+    def field(self) -> str:
+        """The first field."""
+        return self.fields[0]
 
     @property
     def option(self) -> str:
         """The fields as `--vary` takes them."""
         return TOGETHER.join(self.fields)
 
-    @property
-    def is_range(self) -> bool:
-        """Return whether the values are a range to be sampled."""
-        return not self.values
-
-    def at(self, shares: np.ndarray) -> list[FieldValue]:
+    def at(self, shares: np.ndarray) -> list[Any]:
         """Choose values at shares of the range between 0 and 1, (n,); of a list each value has an equal part."""
-        if not self.is_range:
+        if self.values:
             return [self.values[min(int(share * len(self.values)), len(self.values) - 1)] for share in shares]
         if self.log:
             values = np.exp(math.log(self.low) + shares * (math.log(self.high) - math.log(self.low)))
@@ -97,16 +83,16 @@ class VariedField:
             values = self.low + shares * (self.high - self.low)
         return [float(f"{value:.{DIGITS}g}") for value in values]
 
-    def as_field(self) -> FieldValue:
+    def as_field(self) -> Any:
         """Write the values as a study file has them: a list, or `low:high`."""
-        return list(self.values) if self.values else f"{LOG if self.log else ''}{self.low!r}:{self.high!r}"
+        return list(self.values) or f"{LOG if self.log else ''}{self.low!r}:{self.high!r}"
 
 
-def parse_axis(field: str, variation: Variation, where: str) -> VariedField:
+def parse_axis(option: str, variation: Variation, where: str) -> VariedField:
     """Read the values of a varied field.
 
     Args:
-        field: The field; several that take the same values with `+` between.
+        option: The field; several that take the same values with `+` between.
         variation: A list of values, or a single one; or text: values with commas between, `first:last:count` for as
             many evenly spaced, `low:high` for a range to be sampled, each also with `log:` before it.
         where: The setting's name in an error.
@@ -117,23 +103,23 @@ def parse_axis(field: str, variation: Variation, where: str) -> VariedField:
     Raises:
         InputError: The field or its values are not written so.
     """
-    field, *also = (part.strip() for part in field.split(TOGETHER))
-    if not field or "" in also:
+    fields = tuple(field.strip() for field in option.split(TOGETHER))
+    if "" in fields:
         raise InputError(f"{where}: write FIELD=VALUES, for example plant.equilibrium_bias_deg=-1.5:1.5:13")
     if isinstance(variation, str) and ":" in variation and not variation.lstrip().startswith(("[", '"')):
-        return replace(_parse_range(field, variation.strip(), where), also=tuple(also))
+        return _parse_range(fields, variation.strip(), where)
     values = _parse_list(variation, where) if isinstance(variation, str) else _as_list(variation, where)
     if not values:
         raise InputError(f"{where}: no values; write FIELD=VALUES, such as plant.equilibrium_bias_deg=0,0.5")
-    if len(values) > MOST_VALUES:
-        raise InputError(f"{where}: {len(values)} values; at most {MOST_VALUES}")
+    if len(values) > MAX_VALUES:
+        raise InputError(f"{where}: {len(values)} values; at most {MAX_VALUES}")
     twice = next((value for i, value in enumerate(values) if value in values[:i]), None)
     if twice is not None:
         raise InputError(f"{where}: {twice} is there twice")
-    return VariedField(field, tuple(values), also=tuple(also))
+    return VariedField(fields, tuple(values))
 
 
-def _parse_range(field: str, text: str, where: str) -> VariedField:
+def _parse_range(fields: tuple[str, ...], text: str, where: str) -> VariedField:
     log = text.startswith(LOG)
     try:
         first, last, *counts = text.removeprefix(LOG).split(":")
@@ -148,25 +134,29 @@ def _parse_range(field: str, text: str, where: str) -> VariedField:
         raise InputError(f"{where}: an empty range; its ends must be two different numbers, the lower one first")
     if log and min(low, high) <= 0.0:
         raise InputError(f"{where}: a logarithmic range needs ends above 0")
-    axis = VariedField(field, (), low, high, log)
+    axis = VariedField(fields, (), low, high, log)
     if count is None:
         return axis
-    if not 2 <= count <= MOST_VALUES:
-        raise InputError(f"{where}: {count} values; a range has at least 2, at most {MOST_VALUES}")
-    return VariedField(field, tuple(axis.at(np.linspace(0.0, 1.0, count))))
+    if not 2 <= count <= MAX_VALUES:
+        raise InputError(f"{where}: {count} values; a range has at least 2, at most {MAX_VALUES}")
+    return VariedField(fields, tuple(axis.at(np.linspace(0.0, 1.0, count))))
 
 
-def _as_list(variation: Variation, where: str) -> list[FieldValue]:
+def _as_list(variation: Variation, where: str) -> list[Any]:
     """Make values that are no text into a list, with numpy's numbers as Python's."""
-    values = variation.tolist() if isinstance(variation, Array) else variation
+    values = _plain(variation)
     if isinstance(values, (bool, int, float)):
         return [values]
     if isinstance(values, Mapping) or not isinstance(values, Iterable):
         raise InputError(f"{where}: {shown(values)}: must be a list of values, or text such as '-1:1:5'")
-    return [value.tolist() if isinstance(value, Array) else value for value in values]
+    return [_plain(value) for value in values]
 
 
-def _parse_list(text: str, where: str) -> list[FieldValue]:
+def _plain(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _parse_list(text: str, where: str) -> list[Any]:
     """Read values with commas between; a bare word is a string, as with `--set`."""
     try:
         return tomllib.loads(f"values = [{text}]")["values"]
@@ -174,230 +164,38 @@ def _parse_list(text: str, where: str) -> list[FieldValue]:
         words = [word.strip() for word in text.split(",")]
         if "" in words or any(mark in text for mark in "[]{}\"'="):
             raise InputError(f"{where}: {text!r} is no list; write values with commas between") from None
-        return [_word(word) for word in words]
-
-
-def _word(word: str) -> FieldValue:
-    try:
-        return tomllib.loads(f"value = {word}")["value"]
-    except ValueError:
-        return word
-
-
-def is_number(value: FieldValue) -> TypeGuard[float]:
-    """Tell a number from a truth value, a text and a list."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-# --- points
-
-Point = dict[str, FieldValue]
-"""Varied field -> its value."""
-
-
-class Points:
-    """Points by their numbers, each made when it is asked for.
-
-    Args:
-        axes: The varied fields.
-        shares: The place of a design's points in the axes' ranges, (n_points, n_axes); None for a grid: every
-            combination of values, of which the last field's change first.
-    """
-
-    def __init__(self, axes: Sequence[VariedField], shares: np.ndarray | None = None) -> None:
-        self._fields = [axis.fields for axis in axes]
-        self._values: list[Sequence[FieldValue]] = [axis.values for axis in axes]
-        self._is_grid = shares is None
-        if shares is not None:
-            self._values = [axis.at(share) for axis, share in zip(axes, shares.T, strict=True)]
-
-    def __len__(self) -> int:
-        return math.prod(map(len, self._values)) if self._is_grid else len(self._values[0])
-
-    def __iter__(self) -> Iterator[Point]:
-        return map(self.__getitem__, range(len(self)))
-
-    def __getitem__(self, number: int) -> Point:
-        if not 0 <= number < len(self):
-            raise IndexError(number)
-        row: list[FieldValue] = []
-        for values in reversed(self._values):
-            row.insert(0, values[number % len(values)])
-            if self._is_grid:
-                number //= len(values)
-        return {field: value for fields, value in zip(self._fields, row, strict=True) for field in fields}
-
-
-def sampled(dimensions: int, n: int, seed: int, *, indices: bool) -> np.ndarray:
-    """Spread points evenly in the unit cube, (n_points, dimensions).
-
-    For indices the points are those of Saltelli's scheme, as `scipy.stats.sobol_indices` wants them: A, B, then A with
-    each column in turn from B.
-    """
-    from scipy.stats import qmc  # half a second
-
-    # The argument is called `rng` since 1.15; all versions take this name.
-    generator: Any = {"seed": np.random.default_rng(seed)}
-    with warnings.catch_warnings():  # that n is no power of two
-        warnings.simplefilter("ignore", UserWarning)
-        drawn = qmc.Sobol(2 * dimensions if indices else dimensions, **generator).random(n)
-    if not indices:
-        return drawn
-    a, b = drawn[:, :dimensions], drawn[:, dimensions:]
-    crossed = [np.where(np.arange(dimensions) == i, b, a) for i in range(dimensions)]
-    return np.concatenate([a, b, *crossed])
-
-
-# --- checks
-
-NOT_VARIED = {
-    "seed": "worlds differ in it already: --worlds says how many, --seed which",
-    "observer": "--observers names them",
-    "observer.kind": "--observers names them",
-    "open_loop_observers": "a sweep runs without them; --observers puts each in the loop",
-    **dict.fromkeys(sorted(UNUSED), "no trial depends on it"),
-}
-"""Fields that a sweep does not vary, and why. Fields below them are not varied either, but for an observer's own."""
-
-
-def check_axes(axes: Sequence[VariedField], design: str) -> None:
-    """Check that something is varied, each field once, so that it makes a difference, and that a range is sampled."""
-    if not axes:
-        raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")
-    fields = [field for axis in axes for field in axis.fields]
-    for i, field in enumerate(fields):
-        if field in fields[:i]:
-            raise InputError(f"--vary {field}: given twice")
-        section = field.partition(".")[0]
-        why = NOT_VARIED.get(field) or (None if section == "observer" else NOT_VARIED.get(section))
-        if why is not None:
-            raise InputError(f"--vary {field}: is not varied: {why}")
-    for axis in axes:
-        if axis.is_range and design == "grid":
-            raise InputError(
-                f"--vary {axis.field}: a range without a count is for --sample and --sobol; write first:last:count"
-            )
-
-
-def check_points(design: str, n: int, axes: int) -> None:
-    """Check a design's number of points: for indices as many as Saltelli's scheme wants, none for a grid."""
-    if design == "grid" and n != 0:
-        raise InputError(f"n = {shown(n)}: is for the designs sample and sobol; a grid is every combination")
-    if design == "sample" and not _counts(n):
-        raise InputError(f"--sample, n = {shown(n)}: must be a whole number of points, 1 or more")
-    if design == "sobol" and (not _counts(n) or n < 2 or n & (n - 1)):
-        raise InputError(f"--sobol {shown(n)}: must be a power of two, such as 256")
-    if design == "sobol" and axes < 2:
-        raise InputError(
-            "--sobol: indices compare several fields; vary two or more (fields with + between count as one)"
-        )
-
-
-def check_observers(observers: Sequence[str]) -> None:
-    """Check that observers exist, as far as is known without importing them, and are there once."""
-    if not observers:
-        raise InputError("observers: there must be one at least")
-    for i, name in enumerate(observers):
-        if not isinstance(name, str):
-            raise InputError(f"observers: {shown(name)}: must be an observer's name")
-        if ":" not in name and name not in (*OBSERVERS, *RATES):
-            known = nearest(name, [*OBSERVERS, *RATES])
-            raise InputError(f"observers: {name!r}: no such observer; {known}, or your own as package.module:Class")
-        if name in observers[:i]:
-            raise InputError(f"observers: {name!r} is there twice")
-
-
-def _counts(number: float | str | None) -> bool:
-    return isinstance(number, (int, np.integer)) and not isinstance(number, bool) and number >= 1
+        values: dict[str, Any] = {}
+        for place, word in enumerate(words):
+            override(values, f"{place}={word}")
+        return list(values.values())
 
 
 # --- the study
 
 SamplingDesign = Literal["grid", "sample", "sobol"]
-MOST_TRIALS = 1_000_000
+Point = dict[str, Any]
+"""Varied field -> its value."""
+Trial = tuple[int, int]
+"""Number of the point, world."""
+WORLDS = 20
+"""Worlds a cell by default."""
+MAX_TRIALS = 1_000_000
 """Beyond it a sweep must be asked for twice (`--yes`)."""
 CHUNK = 1024
 """Trials of a chunk: so many fill a batch, and take minutes at most."""
+NOT_VARIED = {
+    "seed": "worlds differ in it already: --worlds says how many, --seed which",
+    "observer": "--observers names them",
+    "observer.kind": "--observers names them",
+    "open_loop_observers": "a sweep runs without them; --observers puts each in the loop",
+}
+"""Fields that a sweep does not vary, and why, besides those on which no trial depends."""
 BASELINE_LOOP = "linear"
 """Observer that runs where a baseline's trials have the true rate in the loop; nothing depends on it."""
 BASELINE_SETTINGS = {"feedback": "truth", "angle_source": "measured", "bias_trim_s": 0.0}
 """Fields of [controller] of a baseline's loop: with others the loop would depend on `BASELINE_LOOP`."""
-MOST_ALONE = 200
+MAX_ALONE = 200
 """Values of a field that is varied alone that are tried before the sweep, at 5 ms each; the last one is, too."""
-
-
-def sampling(sample: int | None, sobol: int | None, prefix: str = "") -> tuple[SamplingDesign, int] | None:
-    """Return the design of `sample` or `sobol` and its number of points; None without either.
-
-    Args:
-        sample: Number of points of a quasi-random design.
-        sobol: Rows of a design for Sobol indices.
-        prefix: What the user writes before both names: `--` on the command line.
-
-    Raises:
-        InputError: Both are there.
-    """
-    if sample is not None and sobol is not None:
-        raise InputError(f"{prefix}sample and {prefix}sobol: one of them")
-    if sobol is not None:
-        return "sobol", sobol
-    return None if sample is None else ("sample", sample)
-
-
-@dataclass(frozen=True)
-class Chunk:
-    """Trials of one observer that are computed and kept together.
-
-    Attributes:
-        number: Place among all chunks.
-        observer: The observer in the loop.
-        trials: (number of the point, world) of each trial.
-    """
-
-    number: int
-    observer: str
-    trials: tuple[tuple[int, int], ...]
-
-
-@dataclass(frozen=True)
-class Chunks:
-    """The chunks of a study by their numbers: a chunk's trials are made when it is asked for."""
-
-    study: SweepStudy
-
-    @property
-    def _trials(self) -> int:
-        """Trials of one observer."""
-        return self.study.n_points * self.study.worlds
-
-    @property
-    def _per_observer(self) -> int:
-        return -(-self._trials // CHUNK)
-
-    @property
-    def count(self) -> int:
-        """Number of chunks, also where that is more than `len` can say."""
-        return self._per_observer * len(self.study.observers)
-
-    def __len__(self) -> int:
-        return self.count
-
-    def __getitem__(self, number: int) -> Chunk:
-        if not 0 <= number < len(self):
-            raise IndexError(number)
-        observer, piece = divmod(number, self._per_observer)
-        trials = self.stretch(piece * CHUNK, self.size(number))
-        return Chunk(number, self.study.observers[observer], trials)
-
-    def stretch(self, first: int, count: int) -> tuple[tuple[int, int], ...]:
-        """List so many of an observer's trials from one on, in the order in which they are run."""
-        order, worlds = self.study._order, self.study.worlds
-        places = (divmod(place, worlds) for place in range(first, first + count))
-        return tuple((int(order[at]), world) for at, world in places)
-
-    def size(self, number: int) -> int:
-        """Count the trials of a chunk."""
-        return min(CHUNK, self._trials - number % self._per_observer * CHUNK)
 
 
 @dataclass(frozen=True)
@@ -410,8 +208,8 @@ class SweepStudy:
         observers: The observers in the loop, and baselines: `zero`, `mems_gyro` and the like close no loop, so that
             their trials are those of a loop with the true rate.
         worlds: Trials a point and observer: world i has the same noise at every point, for every observer.
-        design: `grid`: every combination of values. `sample`: a quasi-random design of the ranges and lists.
-            `sobol`: one for Sobol indices.
+        design: `grid`: every combination of values, of which the last field's change first. `sample`: a quasi-random
+            design of the ranges and lists. `sobol`: one for Sobol indices.
         n: Points of the design; a design for indices has as many for each axis, and for two more.
     """
 
@@ -423,24 +221,53 @@ class SweepStudy:
     n: int = 0
 
     def __post_init__(self) -> None:
-        """Check the study.
+        """Check the study, as far as is known without importing a user's observer.
 
         Raises:
             InputError: A number, a name or a field does not fit.
         """
-        check_axes(self.axes, self.design)
-        if not _counts(self.worlds):
+        if not self.axes:
+            raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")
+        for field, times in Counter(self._fields).items():
+            unused = "no trial depends on it" if field.partition(".")[0] in UNUSED else None
+            if why := NOT_VARIED.get(field, unused):
+                raise InputError(f"--vary {field}: is not varied: {why}")
+            if times > 1:
+                raise InputError(f"--vary {field}: given twice")
+        for axis in self.axes:
+            if not axis.values and self.design == "grid":
+                raise InputError(
+                    f"--vary {axis.field}: a range without a count is for --sample and --sobol; write first:last:count"
+                )
+        if not _is_count(self.worlds):
             raise InputError(f"worlds = {shown(self.worlds)}: must be a whole number, 1 or more")
-        check_points(self.design, self.n, len(self.axes))
-        check_observers(self.observers)
+        self._check_design()
+        for name, times in Counter(self.observers).items():
+            if not isinstance(name, str) or (":" not in name and name not in (*OBSERVERS, *RATES)):
+                known = nearest(str(name), [*OBSERVERS, *RATES])
+                raise InputError(f"observers: {name!r}: no such observer; {known}, or your own as package.module:Class")
+            if times > 1:
+                raise InputError(f"observers: {name!r} is there twice")
+        if not self.observers:
+            raise InputError("observers: there must be one at least")
 
-    @cached_property
-    def points(self) -> Points:
-        """The values of the varied fields, a point each."""
-        if self.design == "grid":
-            return Points(self.axes)
-        shares = sampled(len(self.axes), self.n, self.scenario.seed, indices=self.design == "sobol")
-        return Points(self.axes, shares)
+    def _check_design(self) -> None:
+        n = shown(self.n)
+        if self.design == "grid" and self.n != 0:
+            raise InputError(f"n = {n}: is for the designs sample and sobol; a grid is every combination")
+        if self.design == "sample" and not _is_count(self.n):
+            raise InputError(f"--sample, n = {n}: must be a whole number of points, 1 or more")
+        if self.design == "sobol":
+            if not _is_count(self.n) or self.n < 2 or self.n & (self.n - 1):
+                raise InputError(f"--sobol {n}: must be a power of two, such as 256")
+            if len(self.axes) < 2:
+                raise InputError(
+                    "--sobol: indices compare several fields; vary two or more (fields with + between count as one)"
+                )
+
+    @property
+    def _fields(self) -> list[str]:
+        return [field for axis in self.axes for field in axis.fields]
 
     @property
     def n_points(self) -> int:
@@ -460,18 +287,60 @@ class SweepStudy:
         return self.cells * self.worlds
 
     @cached_property
+    def _drawn(self) -> list[list[Any]]:
+        """The values of each axis at a design's points, (n_axes, n_points)."""
+        shares = sampled(len(self.axes), self.n, self.scenario.seed, indices=self.design == "sobol")
+        return [axis.at(share) for axis, share in zip(self.axes, shares.T, strict=True)]
+
+    def point(self, number: int) -> Point:
+        """Return the values of the varied fields at a point."""
+        if self.design == "grid":
+            places = np.unravel_index(number, [len(axis.values) for axis in self.axes])
+            row = [axis.values[place] for axis, place in zip(self.axes, places, strict=True)]
+        else:
+            row = [values[number] for values in self._drawn]
+        return {field: value for axis, value in zip(self.axes, row, strict=True) for field in axis.fields}
+
+    @property
+    def apart(self) -> list[str]:
+        """Varied fields whose values cannot run in one batch."""
+        return [field for field in self._fields if not can_vary_in_batch(field, self.scenario.controller.kind)]
+
+    @cached_property
     def _order(self) -> np.ndarray:
         """Numbers of the points, those that can run in one batch next to each other, (n_points,)."""
-        law = self.scenario.controller.kind
-        apart = [field for axis in self.axes for field in axis.fields if not can_vary_in_batch(field, law)]
+        apart = self.apart
         if not apart:
-            return np.arange(len(self.points))
+            return np.arange(self.n_points)
 
         def unpooled(number: int) -> list[str]:
-            point = self.points[number]
+            point = self.point(number)
             return [repr(point[field]) for field in apart]
 
-        return np.array(sorted(range(len(self.points)), key=unpooled))
+        return np.array(sorted(range(self.n_points), key=unpooled))
+
+    @property
+    def _chunks_an_observer(self) -> int:
+        return -(-self.n_points * self.worlds // CHUNK)
+
+    @property
+    def n_chunks(self) -> int:
+        """Number of chunks."""
+        return self._chunks_an_observer * len(self.observers)
+
+    def chunk_size(self, number: int) -> int:
+        """Count the trials of a chunk."""
+        return min(CHUNK, self.n_points * self.worlds - number % self._chunks_an_observer * CHUNK)
+
+    def chunk(self, number: int) -> tuple[str, list[Trial]]:
+        """Return the observer and the trials of a chunk."""
+        observer, piece = divmod(number, self._chunks_an_observer)
+        return self.observers[observer], self.stretch(piece * CHUNK, self.chunk_size(number))
+
+    def stretch(self, first: int, count: int) -> list[Trial]:
+        """List so many of an observer's trials from one on; those that can run in one batch are next to each other."""
+        places = (divmod(place, self.worlds) for place in range(first, first + count))
+        return [(int(self._order[at]), world) for at, world in places]
 
     @property
     def baselines(self) -> tuple[str, ...]:
@@ -505,29 +374,63 @@ class SweepStudy:
                 f"none; leave {observer} out, or take another law"
             )
         by_truth = alone.with_observer(BASELINE_LOOP).as_fields()
-        for name, value in BASELINE_SETTINGS.items():
-            assign(by_truth, f"controller.{name}", value, observer)
+        by_truth["controller"] |= BASELINE_SETTINGS
         return parse_scenario(by_truth, f"the baseline {observer}")
 
-    @property
-    def chunks(self) -> Chunks:
-        """All trials; those that can run in one batch are next to each other."""
-        return Chunks(self)
-
-    def as_fields(self, scenario: Mapping[str, FieldValue]) -> dict[str, dict[str, FieldValue]]:
+    def as_fields(self, scenario: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         """Make the sections of a study file, with the scenario as given."""
-        design: dict[str, FieldValue] = {
-            "observers": list(self.observers),
-            "worlds": self.worlds,
-            "design": self.design,
-        }
-        if self.design != "grid":
-            design["n"] = self.n
+        design: dict[str, Any] = {} if self.design == "grid" else {"n": self.n}
         return {
-            "sweep": design,
+            "sweep": {"observers": list(self.observers), "worlds": self.worlds, "design": self.design, **design},
             "vary": {axis.option: axis.as_field() for axis in self.axes},
             "scenario": dict(scenario),
         }
+
+
+def _is_count(number: float | str | None) -> bool:
+    return isinstance(number, (int, np.integer)) and not isinstance(number, bool) and number >= 1
+
+
+def counted(n: int, noun: str) -> str:
+    """Put a number before a noun: `1 world`, `2 worlds`."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
+def sampled(dimensions: int, n: int, seed: int, *, indices: bool) -> np.ndarray:
+    """Spread points evenly in the unit cube, (n_points, dimensions).
+
+    For indices the points are those of Saltelli's scheme, as `scipy.stats.sobol_indices` wants them: A, B, then A with
+    each column in turn from B.
+    """
+    from scipy.stats import qmc  # half a second
+
+    # The argument is called `rng` since 1.15; all versions take this name.
+    generator: Any = {"seed": np.random.default_rng(seed)}
+    with warnings.catch_warnings():  # that n is no power of two
+        warnings.simplefilter("ignore", UserWarning)
+        drawn = qmc.Sobol(2 * dimensions if indices else dimensions, **generator).random(n)
+    if not indices:
+        return drawn
+    a, b = drawn[:, :dimensions], drawn[:, dimensions:]
+    crossed = [np.where(np.arange(dimensions) == i, b, a) for i in range(dimensions)]
+    return np.concatenate([a, b, *crossed])
+
+
+def sampling(sample: int | None, sobol: int | None) -> tuple[SamplingDesign, int] | None:
+    """Return the design of `sample` or `sobol` and its number of points; None without either.
+
+    Args:
+        sample: Number of points of a quasi-random design.
+        sobol: Rows of a design for Sobol indices.
+
+    Raises:
+        InputError: Both are there.
+    """
+    if sample is not None and sobol is not None:
+        raise InputError("--sample and --sobol: one of them")
+    if sobol is not None:
+        return "sobol", sobol
+    return None if sample is None else ("sample", sample)
 
 
 def check_values(study: SweepStudy) -> None:
@@ -543,20 +446,19 @@ def check_values(study: SweepStudy) -> None:
     base = study.scenario.model_copy(update={"open_loop_observers": []})
     for observer in study.observers:
         prepare(study.scenario_with(observer), plant)
-    fields = base.as_fields()
     for axis in study.axes:
         parameters = {field.partition(".")[2] for field in axis.fields if field.startswith("observer.")}
         if parameters and study.baselines:
             raise InputError(f"--vary {axis.option}: a baseline has no parameters; leave {study.baselines[0]} out")
         values = axis.values or (axis.low, axis.high)
         for i, value in enumerate(values):
-            changed = copy.deepcopy(fields)
+            fields = base.as_fields()
             for field in axis.fields:
-                assign(changed, field, value, f"--vary {field}")
-            scenario = parse_scenario(changed, f"--vary {axis.option}={value}")
+                assign(fields, field, value, f"--vary {field}")
+            scenario = parse_scenario(fields, f"--vary {axis.option}={value}")
             if "plant.model" in axis.fields:
                 find("models", str(value), ".xml", f"--vary {axis.option}: plant.model =")
-            alone = len(study.axes) == 1 and (i < MOST_ALONE or i == len(values) - 1)
+            alone = len(study.axes) == 1 and (i < MAX_ALONE or i == len(values) - 1)
             changed_plant = load_scenario_plant(scenario, plant) if alone else plant
             for observer in study.observers if parameters else study.observers[: int(alone)]:
                 settings = scenario.observer
@@ -566,6 +468,92 @@ def check_values(study: SweepStudy) -> None:
                 prepare(scenario.model_copy(update={"observer": settings}), changed_plant)
 
 
-def counted(n: int, noun: str) -> str:
-    """Put a number before a noun: `1 world`, `2 worlds`."""
-    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+# --- its file
+
+
+class SweepSection(BaseModel):
+    """The section [sweep] of a study file."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    observers: list[str] | None = None
+    worlds: int = WORLDS
+    design: SamplingDesign = "grid"
+    n: int = 0
+
+
+class StudyFile(BaseModel):
+    """The sections of a study file; [scenario] is a table or a scenario's name."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    sweep: SweepSection = SweepSection()
+    vary: dict[str, Any] = {}
+    scenario: str | dict[str, Any]
+
+
+def read_study(name: str) -> StudyFile | None:
+    """Read a study file; None of a scenario.
+
+    Raises:
+        InputError: The file is neither.
+    """
+    path = find("scenarios", name, ".toml", "scenario")
+    if path.stem in bundled("scenarios"):
+        return None
+    try:
+        fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError):
+        return None  # as a scenario it is refused with what is wrong
+    if "vary" not in fields and "sweep" not in fields:
+        return None
+    try:
+        return StudyFile.model_validate(fields)
+    except ValidationError as error:
+        raise InputError(f"{name}: {'; '.join(complaints(StudyFile, error.errors(), fields))}") from error
+
+
+def scenario_of(name: str, file: StudyFile, settings: Sequence[str] = ()) -> Scenario:
+    """Load a study file's scenario, a table or a name, with settings `section.field=value` that replace its own."""
+    if isinstance(file.scenario, str):
+        return load_scenario(file.scenario, settings)
+    fields = {key: value for key, value in copy.deepcopy(file.scenario).items() if key != "versions"}
+    for setting in settings:
+        override(fields, setting)
+    scenario = parse_scenario(fields, " ".join([name, *(["with"] * bool(settings)), *(f"--set {s}" for s in settings)]))
+    beside = find("scenarios", name, ".toml", "scenario").parent
+    if not any(setting.partition("=")[0].strip() == "plant.model" for setting in settings):
+        scenario = find_model(scenario, beside)
+    return find_files(scenario, beside)
+
+
+MAY_NAME_TRACKS = re.compile(r"pivot(\.\d+(\.file)?)?")
+
+
+def locate_tracks(axis: VariedField, beside: Path) -> VariedField:
+    """Give the tracks that an axis varies whole paths, which may start from the folder of the study or scenario."""
+    return _change_tracks(axis, lambda file: whole_path(file, beside))
+
+
+def varied_tracks(axis: VariedField) -> list[str]:
+    """List the tracks that an axis varies."""
+    files: list[str] = []
+
+    def note(file: str) -> str:
+        files.append(file)
+        return file
+
+    _change_tracks(axis, note)
+    return files
+
+
+def _change_tracks(axis: VariedField, change: Callable[[str], str]) -> VariedField:
+    def changed(value: Any) -> Any:
+        """Change the paths in a value: of a file, of a motion, or of all motions."""
+        if isinstance(value, str):
+            return change(value)
+        if isinstance(value, Mapping):
+            return {**value, "file": changed(value["file"])} if "file" in value else value
+        return [changed(motion) for motion in value] if isinstance(value, Sequence) else value
+
+    if any(MAY_NAME_TRACKS.fullmatch(field) for field in axis.fields):
+        return replace(axis, values=tuple(map(changed, axis.values)))
+    return axis

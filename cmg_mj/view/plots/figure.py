@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from cmg_mj.results.folder import whole_file
-from cmg_mj.view.plots.map_plot import Map, Surface, draw_map, draw_surface, mappable
 from cmg_mj.view.plots.style import colours, hexadecimal
 
 if TYPE_CHECKING:
@@ -36,7 +35,6 @@ class Line:
         width: Line width [points].
         spread: Half height of a band around y, (n,), such as a confidence interval; or the heights below and above y,
             (2, n).
-        bars: Whether vertical bars replace the band.
     """
 
     x: Sequence[float] | np.ndarray
@@ -46,7 +44,6 @@ class Line:
     color: str | int | None = None
     width: float = 1.0
     spread: Sequence[float] | np.ndarray | None = None
-    bars: bool = False
 
 
 class Span(NamedTuple):
@@ -80,10 +77,6 @@ class Panel:
         y_scale: Linear or logarithmic.
         y_range: Limits of y; None to fit the data.
         shaded: Spans of x to shade, `Span` or its start and end.
-        x_ticks: Ticks on x; None for matplotlib's choice.
-        y_ticks: Ticks on y; None for matplotlib's choice.
-        map: A map to draw instead of lines.
-        surface: A candidate's figure to draw instead of lines.
     """
 
     y_label: str
@@ -94,10 +87,6 @@ class Panel:
     y_scale: Literal["linear", "log"] = "linear"
     y_range: tuple[float, float] | None = None
     shaded: Sequence[tuple[float, float]] | Sequence[Span] = ()
-    x_ticks: Sequence[float] | None = None
-    y_ticks: Sequence[float] | None = None
-    map: Map | None = None
-    surface: Surface | None = None
 
 
 @dataclass(frozen=True)
@@ -112,8 +101,8 @@ class Picture:
         columns: Number of panels beside each other.
         panel_height: Height of each panel [inch].
         panel_width: Width of each of several columns [inch].
-        first_height: Height of the first panels, which have a row each; the others are small, in a grid below, and
-            surfaces share one scale. None if all panels are alike [inch].
+        first_height: Height of the first panels, which have a row each; the others are small, in a grid below.
+            None if all panels are alike [inch].
         n_first: Number of first panels, if they have a height.
     """
 
@@ -179,15 +168,6 @@ def draw(path: Path, picture: Picture) -> None:
             axes.set_xlabel(axes.get_xlabel(), fontsize="small")
             axes.set_ylabel(panel.y_label.replace(" [", "\n[") if column == 0 else "", fontsize="x-small")
             axes.tick_params(labelleft=column == 0, labelsize="small")
-    surfaces = [panel.surface for panel in panels[n_first:] if panel.surface]
-    if surfaces:
-        surface = surfaces[-1]
-        bar = figure.colorbar(
-            mappable(surface), ax=all_axes[n_first:], label=surface.label, location="bottom", aspect=60
-        )
-        ticks = sorted({*surface.levels, *([] if len(surface.levels) > 2 else surface.limits)})
-        bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
-        bar.minorticks_off()
     figure.align_ylabels(all_axes[:n_first] or all_axes)
     save_figure(path, figure, picture.title, dpi=100)
 
@@ -204,10 +184,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
         if line.spread is not None:
             below, above = np.broadcast_to(line.spread, (2, len(line.y)))
             low, high = np.subtract(line.y, below), np.add(line.y, above)
-            if line.bars:
-                axes.vlines(line.x, low, high, color=curve.get_color(), alpha=0.6, linewidth=line.width)
-            else:
-                axes.fill_between(line.x, low, high, color=curve.get_color(), alpha=0.2, linewidth=0)
+            axes.fill_between(line.x, low, high, color=curve.get_color(), alpha=0.2, linewidth=0)
     for shaded in panel.shaded:
         span = shaded if isinstance(shaded, Span) else Span(*shaded)
         style = {"color": span.color, "alpha": 0.25, "linewidth": 0, "zorder": 0, "label": span.label or None}
@@ -216,19 +193,9 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     axes.set_yscale(panel.y_scale)
     axes.set_ylabel(panel.y_label)
     axes.set_title(panel.title, loc="left", fontsize="medium", parse_math=False)
-    for axis, ticks in ((axes.xaxis, panel.x_ticks), (axes.yaxis, panel.y_ticks)):
-        if ticks is not None:
-            axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
-            axis.set_ticks([], minor=True)
-    if panel.map is not None:
-        draw_map(axes, panel.map)
-        return
-    if panel.surface is not None:
-        draw_surface(axes, panel.surface)
-        return
     axes.grid(alpha=0.3)
     marks_only = all(set(line.style) <= set("o.x+s") for line in panel.lines)
-    axes.margins(x=0.0 if panel.x_scale == "linear" and not marks_only and panel.x_ticks is None else 0.03)
+    axes.margins(x=0.0 if panel.x_scale == "linear" and not marks_only else 0.03)
     if panel.y_range is not None:
         axes.set_ylim(*panel.y_range)
     if labels := axes.get_legend_handles_labels()[1]:

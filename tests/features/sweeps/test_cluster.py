@@ -19,16 +19,15 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.sweeps.cluster import _compute_part, _part_of
-from cmg_mj.features.sweeps.study import SweepStudy, parse_axis
-from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.features.sweeps.cluster import compute_there, packed
+from cmg_mj.scenario.resolve import versions
 from tests.command import COMMAND, HANGS_AFTER_S, ROOT, CommandOutcome, cmg_mj, cmg_mj_process, environment
+from tests.features.sweeps.synthetic_trials import BIAS, make_study
 
 needs_distributed = pytest.mark.skipif(
     find_spec("distributed") is None,
     reason='distributed is not installed: python -m pip install "cmg_mj[cluster]"',
 )
-BIAS = "plant.equilibrium_bias_deg"
 SWEEP = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--set", "push=[]", "--set", "duration_s=0.5"]
 DEAD_ADDRESS = "tcp://127.0.0.1:9"
 
@@ -134,26 +133,18 @@ def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> 
 def cluster(folder: Path, worker: Path) -> Iterator[tuple[str, subprocess.Popen]]:
     """A scheduler on the loopback and one worker that is started elsewhere."""
     file = folder / "scheduler.json"
-    host_options = ["--host", "127.0.0.1", "--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
     quiet = {
         "stdout": subprocess.DEVNULL,
         "stderr": subprocess.DEVNULL,
         "env": environment(DASK_TEMPORARY_DIRECTORY=str(folder)),
     }
-    start = [
-        sys.executable,
-        "-m",
-        "distributed.cli.dask_scheduler",
-        *host_options,
-        "--port",
-        "0",
-        "--scheduler-file",
-        str(file),
-    ]
-    scheduler = subprocess.Popen(start, cwd=ROOT, **quiet)
-    local = ["--nthreads", "1", "--no-nanny"]
-    start = [sys.executable, "-m", "distributed.cli.dask_worker", "--host", "127.0.0.1", "--no-dashboard", *local]
-    worker_process = subprocess.Popen([*start, "--scheduler-file", str(file)], cwd=worker, **quiet)
+
+    def start(kind: str, at: Path, *options: str) -> subprocess.Popen:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--host", "127.0.0.1", "--no-dashboard"]
+        return subprocess.Popen([*command, *options, "--scheduler-file", str(file)], cwd=at, **quiet)
+
+    scheduler = start("scheduler", ROOT, "--dashboard-address", "127.0.0.1:0", "--port", "0")
+    worker_process = start("worker", worker, "--nthreads", "1", "--no-nanny")
     try:
         while not file.exists():
             time.sleep(0.05)
@@ -182,28 +173,10 @@ def test_an_observer_that_a_worker_cannot_import_is_one_line(tmp_path: Path) -> 
 
 
 @needs_distributed
-@pytest.mark.parametrize("address", ["nowhere", "local:0", "local:x"])
-def test_a_word_that_is_no_cluster_is_refused(tmp_path: Path, address: str) -> None:
-    outcome = cmg_mj(*SWEEP, "--out", tmp_path / "out", "--cluster", address)
-    assert outcome.complaint.startswith(f"--cluster {address}: write ")
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.slow
-@needs_distributed
-def test_a_cluster_that_is_not_there_is_one_line(tmp_path: Path) -> None:
-    outcome = sweep(tmp_path, "out", "--cluster", DEAD_ADDRESS)
-    assert f"--cluster {DEAD_ADDRESS}: cannot be reached" in outcome.complaint
-    assert not (tmp_path / "out").exists()
-
-
-@needs_distributed
 def test_a_worker_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("distributed.get_worker", lambda: SimpleNamespace(address="tcp://there"))
-    study = SweepStudy(load_scenario("push_recovery"), (parse_axis(BIAS, "0", BIAS),), ("linear",), 1)
-    part = _part_of(study, study.chunks[0])
     with pytest.raises(InputError, match=r"^worker tcp://there: mujoco \S+ there, 2\.0 here"):
-        _compute_part(part._replace(versions={**part.versions, "mujoco": "2.0"}))
+        compute_there(packed(make_study({BIAS: "0"})), 0, {**versions(), "mujoco": "2.0"})
 
 
 def test_without_distributed_it_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

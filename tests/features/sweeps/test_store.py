@@ -9,6 +9,7 @@ import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -16,15 +17,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj.core.errors import InputError, RunStopped
-from cmg_mj.features.sweeps import store as module
+from cmg_mj.features.sweeps import chunks as module
 from cmg_mj.features.sweeps import study as study_module
-from cmg_mj.features.sweeps.chunk import table_of
-from cmg_mj.features.sweeps.store import Store, hash_of, resolved, run
-from cmg_mj.features.sweeps.study import Chunk, SweepStudy, parse_axis
+from cmg_mj.features.sweeps.chunks import Store, hash_of, resolved, run
+from cmg_mj.features.sweeps.study import SweepStudy, Trial
 from cmg_mj.inputs.files import folder
-from cmg_mj.scenario.loading import load_scenario
 from tests.command import COMMAND, ROOT, cmg_mj
-from tests.features.sweeps.synthetic_trials import BIAS, VELOCITY
+from tests.features.sweeps.synthetic_trials import BIAS, VELOCITY, make_study
 
 SWEEP = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--worlds", "2", "--set", "push=[]"]
 SWEEP += ["--set", "duration_s=0.2", "--observers", "linear,gyro_free,high_gain", "--out"]
@@ -32,27 +31,21 @@ MOTIONS = "pivot=[{{kind='track', file='{}'}}],[{{kind='track', file='{}', scale
 
 
 def study(values: str = "0:1:20", *settings: str, worlds: int = 2) -> SweepStudy:
-    scenario = load_scenario("push_recovery", ["duration_s=0.2", "push=[]", *settings])
-    return SweepStudy(scenario, (parse_axis(BIAS, values, BIAS),), ("linear", "ltv"), worlds)
-
-
-@pytest.fixture(autouse=True)
-def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(study_module, "CHUNK", 8)
-
-
-def rows_of(sweep: SweepStudy, chunk: Chunk, *_: object) -> list[dict]:
-    """Rows without a run, other ones in every chunk."""
-    of_all = {"observer": chunk.observer, "seed": 0, "outcome": "done"}
-    return [
-        {"point": number, **sweep.points[number], **of_all, "world": world, VELOCITY: chunk.number + 1e-3 * world}
-        for number, world in chunk.trials
-    ]
+    return make_study({BIAS: values}, worlds=worlds, settings=("duration_s=0.2", "push=[]", *settings))
 
 
 @pytest.fixture
 def whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
-    """A finished sweep of ten chunks."""
+    """A finished sweep of ten chunks, whose rows are made without a run, other ones in every chunk."""
+
+    def rows_of(sweep: SweepStudy, observer: str, trials: list[Trial], *_: object) -> list[dict[str, Any]]:
+        common = {"observer": observer, "seed": 0, "outcome": "done"}
+        return [
+            {"point": number, **sweep.point(number), **common, "world": world, VELOCITY: number + 1e-3 * world}
+            for number, world in trials
+        ]
+
+    monkeypatch.setattr(study_module, "CHUNK", 8)
     monkeypatch.setattr(module, "compute", rows_of)
     store = Store.open(tmp_path / "out", study())
     run(store, store.left())
@@ -60,7 +53,7 @@ def whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
     return store
 
 
-def test_it_goes_on_where_it_was(whole: Store) -> None:
+def test_it_resumes_with_the_chunks_that_are_missing(whole: Store) -> None:
     before = pa.concat_tables(whole.tables())
     for number in (3, 7):
         whole.path(number).unlink()
@@ -73,17 +66,14 @@ def test_it_goes_on_where_it_was(whole: Store) -> None:
     run(again, again.left(), done.append)
     assert done[-1] == again.study.trials == 80
     assert pa.concat_tables(again.tables()).equals(before)
-    assert table_of(whole.study, rows_of(whole.study, whole.study.chunks[3])).equals(again.read(3))
 
 
-def test_interrupted_it_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "compute", rows_of)
-    store = Store.open(tmp_path / "out", study())
-
+def test_interrupted_it_keeps_the_finished_chunks(whole: Store) -> None:
     def stop(n_trials: float) -> None:
         if n_trials > 20:
             raise KeyboardInterrupt
 
+    store = Store.open(whole.folder.with_name("other"), study())
     with pytest.raises(KeyboardInterrupt):
         run(store, store.left(), stop)
     assert store.left() == list(range(3, 10))
@@ -103,20 +93,11 @@ def test_every_flipped_bit_is_noticed(whole: Store) -> None:
         assert found is None or found.equals(table), place
 
 
-def shorten(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:100])
-
-
-def take_away_a_row(path: Path) -> None:
-    table = pq.read_table(path)
-    pq.write_table(table[1:], path)
-
-
 @pytest.mark.parametrize(
     "harm",
     [
-        shorten,
-        take_away_a_row,
+        lambda path: path.write_bytes(path.read_bytes()[:100]),
+        lambda path: pq.write_table(pq.read_table(path)[1:], path),
         lambda path: path.write_bytes(b""),
         lambda path: shutil.copy(path.with_name("000004.parquet"), path),
     ],
@@ -158,10 +139,9 @@ def test_an_edited_track_is_another(tmp_path: Path, varied: str) -> None:
     first, track = tmp_path / "first.csv", tmp_path / "track.csv"
     for file in (first, track):
         file.write_text("t,a\n0,0.1\n1,0.2\n", encoding="utf-8")
-    sweep = study("0,1", f"pivot=[{{kind='track', file='{first if varied else track}'}}]")
-    if varied:
-        field, _, values = varied.format(first, track).partition("=")
-        sweep = SweepStudy(sweep.scenario, (parse_axis(field, values, field),), ("linear",), 2)
+    field, _, values = (varied or f"{BIAS}=0,1").format(first, track).partition("=")
+    settings = (f"pivot=[{{kind='track', file='{first if varied else track}'}}]",)
+    sweep = make_study({field: values}, settings=settings)
     before = hash_of(sweep, {})
     track.write_text("t,a\n0,0.1\n1,0.3\n", encoding="utf-8")
     assert hash_of(sweep, {}) != before
@@ -186,19 +166,15 @@ def test_a_folder_with_a_users_file_is_never_replaced(whole: Store, name: str) -
     assert Store.open(whole.folder, study()).left() == []  # and goes on to be this sweep's
 
 
-def test_a_disk_that_is_full_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_is_full_is_one_line_and_the_sweep_resumes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
     out = tmp_path / "out"
-    monkeypatch.setattr(module.pq, "write_table", full)
-    complaint = cmg_mj(*SWEEP, out).complaint
-    assert complaint.startswith(f"{out / 'chunks' / '000000.parquet'}: cannot be written: No space left on device")
-    assert complaint.endswith("the same command resumes the sweep")
-    monkeypatch.undo()
-    monkeypatch.setattr("cmg_mj.features.sweeps.report.draw", full)
-    assert f"{out / 'curves.png'}: cannot be written" in cmg_mj(*SWEEP, out).complaint
-    monkeypatch.undo()
+    for place, file in (("chunks.pq.write_table", "chunks/000000.parquet"), ("report.save_figure", "curves.png")):
+        monkeypatch.setattr(f"cmg_mj.features.sweeps.{place}", full)
+        assert cmg_mj(*SWEEP, out).complaint.startswith(f"{out / file}: cannot be written: No space left on device")
+        monkeypatch.undo()
     outcome = cmg_mj(*SWEEP, out)
     assert (outcome.status, "resuming: 12 of 12 trials are done" in outcome.err) == (0, True)
     assert not [path for path in out.rglob(".*") if path.name != ".cmg_mj"]
@@ -213,28 +189,22 @@ def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 def test_killed_at_random_moments(tmp_path: Path) -> None:
     """The same command again and again, until it is done: the same trials as in one go."""
-    arguments = [
-        *SWEEP[:-1],
-        "--vary",
-        "controller.rate_hz=100,200",
-        "--set",
-        "duration_s=4",
-        "--worlds",
-        "40",
-        "--out",
-    ]
+    longer = ["--vary", "controller.rate_hz=100,200", "--set", "duration_s=4", "--worlds", "40", "--out"]
     uninterrupted, interrupted = tmp_path / "whole", tmp_path / "killed"
-    cmg_mj(*arguments, uninterrupted)
+    cmg_mj(*SWEEP[:-1], *longer, uninterrupted)
     rng = np.random.default_rng(5)
     for kill in range(int(os.environ.get("CMG_MJ_KILLS", "3"))):
         process = subprocess.Popen(
-            [*COMMAND, *arguments, str(interrupted)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, cwd=ROOT
+            [*COMMAND, *SWEEP[:-1], *longer, str(interrupted)],
+            stderr=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            cwd=ROOT,
         )
         time.sleep(rng.uniform(0.5, 6.0))
         process.kill()
         process.wait()
         if kill % 3 == 2:  # all over again, now and then
             shutil.rmtree(interrupted / "chunks", ignore_errors=True)
-    assert cmg_mj(*arguments, interrupted).status == 0
+    assert cmg_mj(*SWEEP[:-1], *longer, interrupted).status == 0
     for name in ("trials.parquet", "cells.parquet"):
         assert (interrupted / name).read_bytes() == (uninterrupted / name).read_bytes()

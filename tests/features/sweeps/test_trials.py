@@ -2,72 +2,56 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Unpack
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
-from cmg_mj.features.sweeps import chunk as work
-from cmg_mj.features.sweeps.study import SweepStudy, parse_axis
+from cmg_mj.features.sweeps import chunks
 from cmg_mj.observers import Estimate, Measurement
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import ID_COLUMNS
 from cmg_mj.runs.experiment import Experiment, prepare, run_batch
 from cmg_mj.runs.simulate import SimulationOptions
 from cmg_mj.scenario.loading import load_scenario
-from tests.features.sweeps.synthetic_trials import all_trials
+from tests.features.sweeps.synthetic_trials import BIAS, NOISE, RATE, VELOCITY, all_trials, make_study
 
 SETTINGS = ("duration_s=0.6", "push=[]")
-
-
-def study(
-    axes_text: dict[str, str], observers: tuple[str, ...] = ("linear", "gyro_free"), worlds: int = 2
-) -> SweepStudy:
-    axes = [parse_axis(field, text, field) for field, text in axes_text.items()]
-    return SweepStudy(load_scenario("push_recovery", SETTINGS), tuple(axes), observers, worlds)
-
-
-def small() -> SweepStudy:
-    return study(
-        {
-            "plant.equilibrium_bias_deg": "0,1",
-            "sensors.accelerometer.noise_density_ug_rthz": "200,400",
-            "controller.rate_hz": "100,200",
-        }
-    )
-
-
-@cache
-def trials() -> pa.Table:
-    return all_trials(small())
+TILT = "plant.initial_tilt_deg"
 
 
 @pytest.mark.slow
 def test_each_trial_is_the_run_of_its_own_row() -> None:
     """`cmg-mj run` with the row's own values, to the last bit."""
-    sweep = small()
-    assert trials().num_rows == sweep.trials == 32
-    for row in trials().to_pylist()[::5]:
-        settings = [f"{axis.field}={row[axis.field]}" for axis in sweep.axes]
+    varied = {BIAS: "0,1", NOISE: "200,400", RATE: "100,200"}
+    trials = all_trials(make_study(varied, ("linear", "gyro_free"), settings=SETTINGS))
+    known = [name for name in ID_COLUMNS if name != "in_loop_of"]
+    assert trials.schema.names[: 4 + len(known)] == ["point", *varied, *known]
+    assert trials.num_rows == 32
+    for row in trials.to_pylist()[::5]:
+        settings = [f"{field}={row[field]}" for field in varied]
         alone = prepare(load_scenario("push_recovery", [*SETTINGS, *settings], row["observer"]))
         (summary,) = alone.run(world=row["world"]).summaries
         assert {key: row[key] for key in summary if key in row} == {key: summary[key] for key in summary if key in row}
 
 
-def test_the_noise_of_a_world_is_the_same_in_every_cell() -> None:
-    rows = all_trials(study({"plant.equilibrium_bias_deg": "0,0.0001"}, ("linear",), 3)).to_pylist()
-    errors = np.array([row["velocity_rms_error_rad_s"] for row in rows]).reshape(2, 3)
-    np.testing.assert_allclose(errors[0], errors[1], rtol=1e-2)
-    assert np.ptp(errors[0]) > 0.05 * errors[0].mean()
+@pytest.mark.slow
+def test_a_baselines_trials_are_those_beside_the_true_rate() -> None:
+    baselines = ("zero", "mems_as_bought", "mems_fused")
+    rows = all_trials(make_study({BIAS: "0,0.5"}, (*baselines, "linear"), settings=SETTINGS)).to_pylist()
+    setup = prepare(load_scenario("push_recovery", [*SETTINGS, "controller.feedback=truth", f"{BIAS}=0.5"], "kalman"))
+    run: Result = setup.run_many(2, keep_trajectory=False)
+    for name in baselines:
+        errors = [row[VELOCITY] for row in rows if row["observer"] == name and row[BIAS] == 0.5]
+        assert errors == run.values(VELOCITY, name).tolist()
+    assert np.all(run.values(VELOCITY, "zero") > 0.0)
 
 
 def test_values_that_do_not_fit_are_rows_with_a_reason() -> None:
-    rows = all_trials(study({"sensors.encoder.rate_hz": "200,333.7"}, ("linear",))).to_pylist()
+    rows = all_trials(make_study({"sensors.encoder.rate_hz": "200,333.7"}, ("linear",), settings=SETTINGS)).to_pylist()
     assert [row["outcome"] for row in rows] == ["done", "done", "refused", "refused"]
     assert "does not fit" in rows[2]["reason"]
-    assert rows[2]["velocity_rms_error_rad_s"] is None
+    assert rows[2][VELOCITY] is None
 
 
 class Fails:
@@ -91,12 +75,12 @@ FAILS = "tests.features.sweeps.test_trials:Fails"
 @pytest.mark.slow
 def test_an_observer_that_raises_costs_its_own_trials_alone() -> None:
     """Its neighbours in the batch have the figures, and the ends, of their own runs."""
-    tilts = {"plant.initial_tilt_deg": "0,5,0.5,10,1"}
-    rows = all_trials(study(tilts, (FAILS,), 3)).to_pylist()
+    tilts = "0,5,0.5,10,1"
+    rows = all_trials(make_study({TILT: tilts}, (FAILS,), 3, SETTINGS)).to_pylist()
     assert [row["outcome"] for row in rows[::3]] == ["done", "stopped", "done", "stopped", "done"]
     for number, row in enumerate(rows):
-        tilt = tilts["plant.initial_tilt_deg"].split(",")[number // 3]
-        alone = all_trials(study({"plant.initial_tilt_deg": tilt}, (FAILS,), 3)).to_pylist()[number % 3]
+        tilt = tilts.split(",")[number // 3]
+        alone = all_trials(make_study({TILT: tilt}, (FAILS,), 3, SETTINGS)).to_pylist()[number % 3]
         assert row == alone | {"point": number // 3}
     assert all("ZeroDivisionError: too far" in row["reason"] for row in rows[3:6])
     assert all("not finite" in row["reason"] for row in rows[9:12])
@@ -111,19 +95,8 @@ def test_a_batch_that_cannot_begin_is_tried_in_parts(monkeypatch: pytest.MonkeyP
             raise MemoryError("not in there")
         return run_batch(experiments, worlds, **options)
 
-    monkeypatch.setattr(work, "run_batch", fail)
-    sweep = study({"plant.initial_tilt_deg": "0,5,1,2"}, ("linear",), 1)
-    rows = work.compute(sweep, sweep.chunks[0])
-    assert [(row["outcome"], row["reason"] or "") for row in rows] == [
-        ("done", ""),
-        ("stopped", "MemoryError: not in there"),
-        ("done", ""),
-        ("done", ""),
-    ]
+    monkeypatch.setattr(chunks, "run_batch", fail)
+    study = make_study({TILT: "0,5,1,2"}, ("linear",), 1, SETTINGS)
+    ends = [(row["outcome"], row["reason"] or "") for row in chunks.compute(study, *study.chunk(0))]
+    assert ends == [("done", ""), ("stopped", "MemoryError: not in there"), ("done", ""), ("done", "")]
     assert batches == [4, 2, 1, 1, 2]
-
-
-def test_columns_are_those_of_a_worlds_table() -> None:
-    assert [name for name in trials().schema.names if name in ID_COLUMNS] == [
-        n for n in ID_COLUMNS if n != "in_loop_of"
-    ]

@@ -19,9 +19,16 @@ from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.intervals import Interval, format_interval, in_line
 from cmg_mj.results.reports import comparison_markdown
 from cmg_mj.results.result import Outcome, Result
-from cmg_mj.runs.comparison import ComparedObserver, compare, prepare_comparison
+from cmg_mj.runs.comparison import (
+    ComparedObserver,
+    best_observer,
+    compare,
+    comparison_rows,
+    prepare_comparison,
+    standings,
+    worlds_table,
+)
 from cmg_mj.runs.experiment import Experiment
-from cmg_mj.runs.statistics import best_observer, comparison_rows, standings, worlds_table
 from cmg_mj.scenario.loading import load_scenario
 
 ERROR, PUSH_ERROR, FIT = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s", "velocity_fit"
