@@ -74,11 +74,11 @@ MUTANTS = [
            "return (momentum - momentum[0]) / parts.yaw",
            EIGHT + "test_small_mismatch_is_foreseen_from_the_symmetric_rig"),
     # --- sokolov2019 ---
-    Mutant("Fig. 4: figures from (9)'s runs", S + "figures_4_to_6.py", '_figures(loops, "linear", cycles)',
+    Mutant("Fig. 4: figures from (9)'s runs", S + "section_5.py", '_figures(loops, "linear", cycles)',
            '_figures(loops, "luenberger", cycles)', OWN_RUNS),
-    Mutant("a difference turned round", S + "loops.py", "b.values(key) - a.values(key)",
+    Mutant("a difference turned round", S + "section_5.py", "b.values(key) - a.values(key)",
            "a.values(key) - b.values(key)", LOOP + "test_smaller_is_beyond_chance_and_world_by_world"),
-    Mutant("a decaying motion counts as sustained", S + "release.py", "last >= STEADY * before",
+    Mutant("a decaying motion counts as sustained", S + "lag.py", "last >= STEADY * before",
            "last <= before / STEADY", "sokolov2019_lag.py::test_what_counts_as_sustained"),
     Mutant("the flywheel's torque on the gimbal, its sign", S + "sampled_loop.py",
            "A[3, [1, 2, 3, 4]] = -h / inertia", "A[3, [1, 2, 3, 4]] = h / inertia",
@@ -88,7 +88,7 @@ MUTANTS = [
            "sokolov2019_figure_3.py::test_9_and_its_form_with_y2_are_one_at_small_angles"),
     Mutant("the rest of (9), its sign", S + "paper.py", "@ [-e, 0.0])", "@ [e, 0.0])",
            "sokolov2019_observer_bias.py::test_observers_biases"),
-    Mutant("the gimbal's momentum, its sign", S + "vertical_torque.py", "spin - np.sin(q_b) * inertia * w_c",
+    Mutant("the gimbal's momentum, its sign", S + "bearing.py", "spin - np.sin(q_b) * inertia * w_c",
            "spin + np.sin(q_b) * inertia * w_c", "sokolov2019_bearing.py::test_momentum_about_the_vertical_is_mujocos"),
     # --- dao2023 ---
     Mutant("what does not settle counts", D + "figures.py",

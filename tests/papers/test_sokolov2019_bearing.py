@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.papers.sokolov2019 import bearing
-from cmg_mj.papers.sokolov2019.vertical_torque import Motion, vertical_momentum, vertical_torque
+from cmg_mj.papers.sokolov2019.bearing import Motion, vertical_momentum, vertical_torque
 from cmg_mj.plant.plant import load_plant
 
 SEED = 5_000

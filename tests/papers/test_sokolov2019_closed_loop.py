@@ -9,21 +9,24 @@ import pytest
 from scipy.signal import lsim
 
 from cmg_mj.papers.recorded import trajectory_of
-from cmg_mj.papers.sokolov2019 import comparison
-from cmg_mj.papers.sokolov2019.backlash import Cycle
-from cmg_mj.papers.sokolov2019.cycles import WITH_Y2, Cycles
-from cmg_mj.papers.sokolov2019.figures_4_to_6 import (
+from cmg_mj.papers.sokolov2019 import section_5
+from cmg_mj.papers.sokolov2019.backlash import WITH_Y2, Cycle, Cycles, PredictedCycle
+from cmg_mj.papers.sokolov2019.lag import LAGS_S, Lags, Sweep, Threshold, predict
+from cmg_mj.papers.sokolov2019.paper import OBSERVERS
+from cmg_mj.papers.sokolov2019.section_5 import (
+    Loops,
     cause_of_figure_5,
+    deviation,
     figure_4,
     figure_5,
     figure_6,
     figure_6_at_rest,
+    is_better,
+    is_smaller,
+    loops,
+    numbers,
+    tail,
 )
-from cmg_mj.papers.sokolov2019.gap_prediction import PredictedCycle
-from cmg_mj.papers.sokolov2019.lag import Lags, predict
-from cmg_mj.papers.sokolov2019.loops import Loops, deviation, is_better, is_smaller, loops, numbers, tail
-from cmg_mj.papers.sokolov2019.paper import OBSERVERS
-from cmg_mj.papers.sokolov2019.release import LAGS_S, Sweep, Threshold
 from cmg_mj.results.result import Result
 from tests.papers.worlds import make_result
 
@@ -72,8 +75,8 @@ def test_the_figures_on_other_seeds(runs: Loops, lags: Lags, cycles: Cycles) -> 
     assert cause_of_figure_5(lags, cycles).verdict == "not reproduced"
     assert figure_6(runs, cycles).verdict == WITHIN
     assert figure_6_at_rest(lags, cycles).verdict == "cannot be tested"
-    assert [claim.verdict for claim in comparison.best_claims(runs)] == [WITHIN, "not reproduced"]
-    assert [claim.verdict for claim in comparison.model_based_claims(runs)] == [WITHIN, "not reproduced"]
+    assert [claim.verdict for claim in section_5.best_claims(runs)] == [WITHIN, "not reproduced"]
+    assert [claim.verdict for claim in section_5.model_based_claims(runs)] == [WITHIN, "not reproduced"]
 
 
 def test_every_figure_shows_its_own_observers_runs(runs: Loops, lags: Lags, cycles: Cycles) -> None:
@@ -209,10 +212,10 @@ def ranking(linear: Result, luenberger: Result, homogeneous: Result) -> Mapping[
 
 def test_section_6_needs_both_steps_and_no_fall() -> None:
     worst, middle, best = (make_result([size, size + 0.1, size + 0.2, size + 0.31]) for size in (3.0, 2.0, 1.0))
-    assert comparison.is_ranked(ranking(worst, middle, best))
-    assert not comparison.is_ranked(ranking(middle, worst, best))  # without a model it is better than (9)
-    assert not comparison.is_ranked(ranking(worst, best, middle))  # (9) is better than (10)
-    assert not comparison.is_ranked(
+    assert section_5.is_ranked(ranking(worst, middle, best))
+    assert not section_5.is_ranked(ranking(middle, worst, best))  # without a model it is better than (9)
+    assert not section_5.is_ranked(ranking(worst, best, middle))  # (9) is better than (10)
+    assert not section_5.is_ranked(
         ranking(make_result([1.0] * 4, fell=4), make_result([2.0, 2.1, 2.0, 2.1], fell=1), best)
     )
 
@@ -223,12 +226,12 @@ def test_verdict_of_the_comparison_follows_the_errors(runs: Loops) -> None:
         return {**by_name, "homogeneous": replace_outcomes(by_name["homogeneous"], errors)}
 
     one_setting = runs.by_bias | {0.25: spoil(runs.by_bias[0.25])}
-    by_error, _ = comparison.best_claims(runs._replace(by_bias=one_setting))
+    by_error, _ = section_5.best_claims(runs._replace(by_bias=one_setting))
     assert by_error.verdict == "not reproduced"
     assert [setting for setting, wins in by_error.measures.items() if not wins] == ["e = 0.25 deg"]
     everywhere = {e: spoil(by_name) for e, by_name in runs.by_bias.items()}
     spoilt_results = runs._replace(by_bias=everywhere, gap=spoil(runs.gap))
-    assert comparison.model_based_claims(spoilt_results)[0].verdict == "not reproduced"
+    assert section_5.model_based_claims(spoilt_results)[0].verdict == "not reproduced"
 
 
 def test_by_the_tilt_the_comparison_follows_the_tilt(runs: Loops) -> None:
@@ -241,8 +244,8 @@ def test_by_the_tilt_the_comparison_follows_the_tilt(runs: Loops) -> None:
         return {name: Result(r.outcomes, r.summaries, by_name[name].trajectory) for name, r in made_up.items()}
 
     calm = runs._replace(by_bias={e: still(runs.by_bias[e]) for e in runs.by_bias}, gap=still(runs.gap))
-    assert [claim.verdict for claim in comparison.best_claims(calm)] == ["not reproduced", WITHIN]
-    assert [claim.verdict for claim in comparison.model_based_claims(calm)] == ["not reproduced", WITHIN]
+    assert [claim.verdict for claim in section_5.best_claims(calm)] == ["not reproduced", WITHIN]
+    assert [claim.verdict for claim in section_5.model_based_claims(calm)] == ["not reproduced", WITHIN]
 
 
 def test_the_three_pictures_share_their_scales(runs: Loops, lags: Lags, cycles: Cycles) -> None:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.papers.sokolov2019 import lag, paper, release
+from cmg_mj.papers.sokolov2019 import lag, paper
 from cmg_mj.papers.sokolov2019.rig import experiment, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, rig_matrices
 from cmg_mj.results.trajectory import Trajectory
@@ -23,7 +23,7 @@ def test_what_counts_as_sustained() -> None:
     wave = np.sin(24.0 * t)
     fallen = np.where(t > 5.0, np.nan, wave)
     rates = [np.exp(-0.05 * t) * wave, np.exp(0.05 * t) * wave, wave, 1e-4 * wave, fallen]
-    assert release.is_sustained(synthetic(rates, t)).tolist() == [False, True, True, False, True]
+    assert lag.is_sustained(synthetic(rates, t)).tolist() == [False, True, True, False, True]
 
 
 def servo() -> Servo:
@@ -41,7 +41,7 @@ def test_servo_is_the_models() -> None:
 
 def test_a_servo_too_fast_for_the_integrator_is_refused() -> None:
     with pytest.raises(ValueError, match=r"kv h/I = 3\.\d+ must be at most 2\.7"):
-        release.release("linear", [servo().damp(0.06)])
+        lag.release("linear", [servo().damp(0.06)])
 
 
 @pytest.mark.parametrize("lag_ms", [8.5, 15.0, 22.0])
@@ -51,7 +51,7 @@ def test_pole_of_the_sampled_loop_is_mujocos(lag_ms: float) -> None:
     slow_servo = model_servo.damp(1e-3 * lag_ms)
     pole = oscillation(loop(slow_servo), dt)
     settings = ["plant.initial_tilt_deg=0.02", "duration_s=3.0"]
-    trajectory = release.release("linear", [slow_servo], settings)
+    trajectory = lag.release("linear", [slow_servo], settings)
     t, x2 = trajectory["time_s"], trajectory["x2_rad_s"][:, 0]
     window = (t > 0.8) & (t < 1.6)  # when the faster poles have faded
     # A free oscillation obeys x[k+2] = 2 r cos(w) x[k+1] - r^2 x[k], here for steps of eight ticks.
@@ -116,18 +116,18 @@ def test_claim_of_the_lag(lags: lag.Lags) -> None:
     claim = lag.claim(lags)
     assert claim.verdict == "reproduced within stated conditions"
     assert claim.figures["predicted"]["linear"]["damping_ratio"] == pytest.approx(0.118, abs=0.01)
-    slower = lags._replace(thresholds=lags.thresholds | {"homogeneous": release.Threshold(0.01, 0.011)})
+    slower = lags._replace(thresholds=lags.thresholds | {"homogeneous": lag.Threshold(0.01, 0.011)})
     assert lag.claim(slower).verdict == "not reproduced"
 
 
 def test_a_soft_servo_does_not_make_it_oscillate() -> None:
     """As the linearised loop says: on MuJoCo, up to 100 ms."""
     servos = [servo().soften(lag_s) for lag_s in (0.02, 0.04, 0.07, 0.1)]
-    assert not release.is_sustained(release.release("linear", servos)).any()
+    assert not lag.is_sustained(lag.release("linear", servos)).any()
 
 
 def test_luenberger_oscillates_from_64_ms_on() -> None:
     """Beyond what RK4 takes at 1 ms."""
     settings = ["plant.timestep_s=0.0005"]
     servos = [servo().damp(lag_s) for lag_s in (0.060, 0.069)]
-    assert release.is_sustained(release.release("luenberger", servos, settings)).tolist() == [False, True]
+    assert lag.is_sustained(lag.release("luenberger", servos, settings)).tolist() == [False, True]

@@ -1,4 +1,4 @@
-"""Sections II and III: Table I, the equations of motion (1), the linearisation (5), where (6) and (7) rest."""
+"""Sections II to IV: Table I, the equations (1), the linearisation (5), the rests of (6) and (7), Proposition 1."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.papers import plvcc
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.linear_check import (
     controllability_margin,
@@ -104,3 +105,8 @@ def law_equilibria() -> Claim:
             "poles_of_7_1_s": poles_as_pairs(poles_7),
         },
     )
+
+
+def proposition_1_claims(on_share: OnShare) -> list[Claim]:
+    """Judge Proposition 1."""
+    return [plvcc.claim("sokolov2019")]
