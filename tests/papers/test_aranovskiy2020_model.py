@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.observers import make_observer
-from cmg_mj.papers.aranovskiy2020 import linearisation, model, paper
+from cmg_mj.papers.aranovskiy2020 import model, paper
 from cmg_mj.papers.linear_check import controllability_margin, equilibrium
 
 SEED = 910_000
@@ -61,7 +61,7 @@ def test_controllability_by_hautus() -> None:
 
 
 def test_the_linearisation_is_reproduced() -> None:
-    claims = [linearisation.linearisation(), linearisation.law_equilibria()]
+    claims = [model.linearisation(), model.law_equilibria()]
     assert [claim.verdict for claim in claims] == ["reproduced", "reproduced within stated conditions"]
 
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import solve_continuous_are
 
 from cmg_mj.laws.state_feedback import lqr_gains
-from cmg_mj.papers.aranovskiy2020 import optimality
-from cmg_mj.papers.aranovskiy2020.optimality import inverse_optimality, nearest_diagonal
+from cmg_mj.papers.aranovskiy2020 import gains
+from cmg_mj.papers.aranovskiy2020.gains import inverse_optimality, nearest_diagonal
 from cmg_mj.papers.aranovskiy2020.paper import K_E, K_E_ROUNDING, printed_model
 
 PAIR = printed_model()
@@ -47,7 +47,7 @@ def test_optimality_agrees_with_brute_force(scale: float) -> None:
 
 def test_a_diagonal_cost_gives_the_printed_gains_to_their_digits() -> None:
     """By python-control, which the search does not use; rounded as they are printed."""
-    claim = optimality.lqr_gains()
+    claim = gains.lqr_gains()
     assert claim.verdict == "reproduced"
     gain = lqr_gains(PAIR, claim.figures["diagonal_within_rounding"], 1.0)
     assert [round(k) for k in gain[:3]] + [round(gain[3], 1)] == list(K_E)
@@ -59,13 +59,13 @@ def test_a_diagonal_cost_gives_the_printed_gains_to_their_digits() -> None:
 
 def test_a_search_that_starts_far_off_comes_near() -> None:
     weights = np.array([900.0, 3.0, 0.8, 0.2])
-    K = optimality.lqr_gain(PAIR.A_e, PAIR.B_e, weights)
+    K = gains.lqr_gain(PAIR.A_e, PAIR.B_e, weights)
     result = nearest_diagonal(PAIR.A_e, PAIR.B_e, K, np.array(K_E_ROUNDING), 1.5 * weights)
     assert result.off < 0.1
 
 
 def test_to_more_digits_no_diagonal_cost_gives_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(optimality, "K_E_ROUNDING", (0.05, 0.05, 0.05, 0.005))
-    claim = optimality.lqr_gains()
+    monkeypatch.setattr(gains, "K_E_ROUNDING", (0.05, 0.05, 0.05, 0.005))
+    claim = gains.lqr_gains()
     assert claim.verdict == "reproduced within stated conditions"
     assert "not even to the digits printed" in claim.reason

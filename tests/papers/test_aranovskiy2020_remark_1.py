@@ -13,9 +13,9 @@ from scipy.linalg import solve_continuous_are
 
 from cmg_mj.features.replay import replay
 from cmg_mj.observers import Estimate, Measurement, make_observer
-from cmg_mj.papers.aranovskiy2020 import by_euler, delicacy, forms_of_10, misprint, on_the_board, update_cost
-from cmg_mj.papers.aranovskiy2020.delicacy import transient
+from cmg_mj.papers.aranovskiy2020 import forms_of_10, riccati, update_cost
 from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, printed_model, riccati_slope, settled_gains
+from cmg_mj.papers.aranovskiy2020.riccati import transient
 from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
 from cmg_mj.results.trajectory import Trajectory
 
@@ -54,10 +54,10 @@ def test_definiteness_is_lost_at_low_rates() -> None:
 
 def test_the_lowest_rate_lies_between_one_that_fails_and_one_that_does_not() -> None:
     sweep = {rate: transient("explicit Euler", rate) for rate in (100.0, 150.0, 190.0, 400.0)}
-    rate_hz = delicacy.lowest_rate("explicit Euler", sweep, lambda t: t.least > 0.0)
+    rate_hz = riccati.lowest_rate("explicit Euler", sweep, lambda t: t.least > 0.0)
     assert rate_hz is not None
     assert transient("explicit Euler", rate_hz).least > 0.0 >= transient("explicit Euler", rate_hz - 0.1).least
-    assert delicacy.lowest_rate("explicit Euler", sweep, lambda t: True) is None
+    assert riccati.lowest_rate("explicit Euler", sweep, lambda t: True) is None
 
 
 def test_single_precision_does_no_harm_to_runge_kutta() -> None:
@@ -92,7 +92,7 @@ def test_euler_makes_the_estimate_worse() -> None:
 
 def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matters() -> None:
     """It settles at a root of its nine equations."""
-    corrected_H, printed_H, rate = misprint.misprint(SEED)
+    corrected_H, printed_H, rate = riccati.misprint(SEED)
     A, lost = A_prime(), C.T @ C
     for H, first in ((corrected_H, A), (printed_H, printed_model().A)):
         slope = H @ first.T + A @ H - H @ lost @ H + Q
@@ -104,31 +104,31 @@ def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matte
 
 def test_the_misprint_is_one_that_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     """Judged as printed: symmetric, or as good as what is."""
-    claim = misprint.misprint_claim(SEED)
+    claim = riccati.misprint_claim(SEED)
     assert claim.verdict == "reproduced within stated conditions"
-    right = misprint.misprint(SEED)
+    right = riccati.misprint(SEED)
     mattering = right.rate._replace(difference=0.1 * right.rate.error)
-    monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(rate=mattering))
-    assert misprint.misprint_claim(SEED).verdict == "not reproduced"
-    monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(printed_H=right.corrected_H, rate=mattering))
-    assert misprint.misprint_claim(SEED).verdict == "reproduced"
+    monkeypatch.setattr(riccati, "misprint", lambda seed: right._replace(rate=mattering))
+    assert riccati.misprint_claim(SEED).verdict == "not reproduced"
+    monkeypatch.setattr(riccati, "misprint", lambda seed: right._replace(printed_H=right.corrected_H, rate=mattering))
+    assert riccati.misprint_claim(SEED).verdict == "reproduced"
 
 
 @pytest.mark.parametrize("exact_gain", [False, True])
 def test_ten_by_euler_on_floats_and_arrays_is_the_plain_one(exact_gain: bool) -> None:
     run = run_of_10(SEED)
     plain = replay(forms_of_10.Plain(forms_of_10.euler), run).x2
-    by_floats = replay(by_euler.TenByEuler(DT, printed_model(), exact_gain), run).x2
+    by_floats = replay(forms_of_10.TenByEuler(DT, printed_model(), exact_gain), run).x2
     late = slice(200 if exact_gain else 0, None)
     np.testing.assert_allclose(by_floats[late], plain[late], atol=2e-4 if exact_gain else 1e-9)
     columns = {name: np.stack([run[name]] * 2, axis=1) for name in ("y1_rad", "y2_rad", "u_rad_s")}
-    by_arrays = replay(by_euler.TenByEuler(DT, printed_model(), exact_gain), Trajectory(columns)).x2
+    by_arrays = replay(forms_of_10.TenByEuler(DT, printed_model(), exact_gain), Trajectory(columns)).x2
     np.testing.assert_allclose(by_arrays[:, 1], by_floats, rtol=1e-9, atol=1e-12)
 
 
 def test_with_the_exact_gain_h_is_the_benchs() -> None:
     """A step of H at rest, from H_0 and half settled."""
-    y, form = Measurement(0.0, 0.0), by_euler.TenByEuler(0.005, printed_model(), exact_gain=True)
+    y, form = Measurement(0.0, 0.0), forms_of_10.TenByEuler(0.005, printed_model(), exact_gain=True)
     state, exact = form.init(y), forms_of_10.make_exact(0.005)
     entries = exact.init(y)
     for _ in range(20):
@@ -140,7 +140,7 @@ def test_eleven_by_euler_approaches_the_benchs() -> None:
     """The difference fades with the step; with a J2 whose drag on the rate is seen."""
     model, differences = dataclasses.replace(printed_model(), J2=-0.03), []
     for dt in (1e-3, 2.5e-4):
-        euler, exact = by_euler.ElevenByEuler(dt, model), make_observer("homogeneous", dt, model)
+        euler, exact = forms_of_10.ElevenByEuler(dt, model), make_observer("homogeneous", dt, model)
         y = Measurement(0.01, 0.2)
         a, b, rates = euler.init(y), exact.init(y), (0.0, 0.0)
         for k in range(round(0.3 / dt)):
@@ -161,7 +161,7 @@ def test_what_an_update_costs() -> None:
 
 def test_the_verdict_on_the_cost_follows_from_the_instructions(monkeypatch: pytest.MonkeyPatch) -> None:
     """As they are recorded, (11) is the dearest; were its powers for nothing, (10) would be."""
-    recorded = json.loads(on_the_board.RECORDED.read_text())
+    recorded = json.loads(update_cost.RECORDED.read_text())
     for powers_cost, verdict in ((True, "not reproduced"), (False, "reproduced")):
         board = recorded if powers_cost else recorded | {"homogeneous": 2.0 * recorded["linear"]}
         monkeypatch.setattr(update_cost, "instructions", lambda board=board: board)

@@ -8,11 +8,21 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from cmg_mj.papers.aranovskiy2020 import comparison, figure_4, figures_5_to_7, second_place
-from cmg_mj.papers.aranovskiy2020.comparison import AngleSource, Measure, judge_order
-from cmg_mj.papers.aranovskiy2020.figures_5_to_7 import ANGLES, close_loops, figure
+from cmg_mj.papers.aranovskiy2020 import section_5
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.papers.aranovskiy2020.second_place import ELEVEN, ELEVEN_BY_EULER, TEN, TEN_BY_EULER, TEN_EXACT_GAIN
+from cmg_mj.papers.aranovskiy2020.section_5 import (
+    ANGLES,
+    ELEVEN,
+    ELEVEN_BY_EULER,
+    TEN,
+    TEN_BY_EULER,
+    TEN_EXACT_GAIN,
+    AngleSource,
+    Measure,
+    close_loops,
+    figure,
+    judge_order,
+)
 from cmg_mj.results.intervals import mean_interval
 from cmg_mj.results.result import Outcome, Result
 
@@ -30,11 +40,11 @@ def numbers(homogeneous: float, ltv: float, linear: float, scatter: float = 0.0)
 
 
 def test_figure_4_other_seeds() -> None:
-    after_push, whole = figure_4.figure_4(6, SEED)
+    after_push, whole = section_5.figure_4(6, SEED)
     assert after_push.verdict == "cannot be tested"
     assert (whole.verdict, whole.holds) == ("cannot be tested", True)
     figures = {**whole.figures, **after_push.figures}
-    assert figures["largest_by_smallest"] < figure_4.COMPARABLE < figures["largest_by_smallest_after_push"]
+    assert figures["largest_by_smallest"] < section_5.COMPARABLE < figures["largest_by_smallest_after_push"]
     errors = {name: figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
     assert errors["homogeneous"] > 1.3 * max(errors["linear"], errors["zero"])  # it misses the push
     assert max(figures[f"rms_{name}_rad_s"].low for name in OBSERVERS) > figures["rms_zero_rad_s"].high
@@ -45,17 +55,17 @@ def test_figure_4_other_seeds() -> None:
 @pytest.mark.parametrize(("last", "holds"), [(0.14, True), (0.16, False)])
 def test_figure_4_is_judged_by_each_span(monkeypatch: pytest.MonkeyPatch, last: float, holds: bool) -> None:
     """Errors within a factor of 1.5 after the push hold there, whatever the whole run says, and the other way round."""
-    runs = figure_4.run_open_loop(2, SEED)
+    runs = section_5.run_open_loop(2, SEED)
     push = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.12, last, 0.11), strict=True)}
     whole = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.5, 0.9, 0.01), strict=True)}
-    monkeypatch.setattr(figure_4, "run_open_loop", lambda *_: runs._replace(whole=whole, after_push=push))
-    after_push, over_all = figure_4.figure_4(2, SEED)
+    monkeypatch.setattr(section_5, "run_open_loop", lambda *_: runs._replace(whole=whole, after_push=push))
+    after_push, over_all = section_5.figure_4(2, SEED)
     assert (after_push.holds, over_all.holds) == (holds, False)
     assert after_push.verdict == over_all.verdict == "cannot be tested"
     assert "zero is closer than (10) and (11)." in after_push.reason
     assert "zero is closer than (9), (10) and (11)." in over_all.reason
-    monkeypatch.setattr(figure_4, "run_open_loop", lambda *_: runs._replace(whole=push, after_push=whole))
-    assert [claim.holds for claim in figure_4.figure_4(2, SEED)] == [False, holds]
+    monkeypatch.setattr(section_5, "run_open_loop", lambda *_: runs._replace(whole=push, after_push=whole))
+    assert [claim.holds for claim in section_5.figure_4(2, SEED)] == [False, holds]
 
 
 # --- the order --------------------------------------------------------------------------------------------------
@@ -70,18 +80,18 @@ def test_an_order_is_one_beyond_chance_in_both_steps() -> None:
     assert judge_order(numbers(0.05, 0.07, 0.11, 0.02)) == "does not hold"
     assert judge_order(numbers(0.11, 0.07, 0.05, 0.02)) == "does not hold"
     one_world = {name: np.array([0.05, math.nan, math.nan]) for name in OBSERVERS}
-    assert comparison.differences(one_world) == [None, None]
+    assert section_5.differences(one_world) == [None, None]
     assert judge_order(one_world) == "does not hold"
 
 
 @pytest.mark.parametrize("angles", ANGLES)
 def test_order_of_the_observers_in_the_loop(angles: AngleSource) -> None:
-    measures = comparison.read_measures({angles: close_loops(list(OBSERVERS), angles, 6, SEED, 8.0)})
+    measures = section_5.read_measures({angles: close_loops(list(OBSERVERS), angles, 6, SEED, 8.0)})
     print({m.key: {name: v.mean() for name, v in m.numbers[angles].items()} for m in measures})
     orders = {measure.key: measure.orders[angles] for measure in measures}
     assert orders["velocity_rms_error_rad_s"] == orders["command_rms_rad_s"] == "holds"
     assert orders["tilt_rms_deg"] != "holds"
-    verdicts = [claim.verdict for claim in comparison.orders(measures)]
+    verdicts = [claim.verdict for claim in section_5.orders(measures)]
     assert [verdicts[0], verdicts[2], verdicts[3]] == [WITHIN, "not reproduced", WITHIN]
 
 
@@ -92,7 +102,7 @@ def of_measures(velocity: Mapping[AngleSource, dict], tilt: Mapping[AngleSource,
 def test_the_order_is_judged_by_each_measure_on_all_angles() -> None:
     right, inverted = numbers(0.05, 0.07, 0.11), numbers(0.11, 0.07, 0.05)
     velocity: dict[AngleSource, dict] = {"measured": right, "estimated": right}
-    by_error, by_tilt = comparison.orders(of_measures(velocity, {"measured": inverted, "estimated": inverted}))
+    by_error, by_tilt = section_5.orders(of_measures(velocity, {"measured": inverted, "estimated": inverted}))
     assert (by_error.verdict, by_tilt.verdict) == (WITHIN, "not reproduced")
     assert "It is inverted: (9), (10), (11)." in by_tilt.reason
     assert by_error.place.endswith("velocity RMS error")
@@ -100,10 +110,10 @@ def test_the_order_is_judged_by_each_measure_on_all_angles() -> None:
     step = by_error.figures["linear_less_ltv_measured_angles_velocity_rms_error_rad_s"]
     assert step.mean == pytest.approx(0.04)
     assert by_tilt.figures["ltv_less_homogeneous_estimated_angles_tilt_rms_deg"].mean == pytest.approx(-0.04)
-    by_error, by_tilt = comparison.orders(of_measures({"measured": right, "estimated": inverted}, velocity))
+    by_error, by_tilt = section_5.orders(of_measures({"measured": right, "estimated": inverted}, velocity))
     assert (by_error.verdict, by_tilt.verdict) == ("not reproduced", WITHIN)
     assert by_error.measures == {"measured angles": True, "estimated angles": False}
-    _, by_tilt = comparison.orders(of_measures(velocity, {"measured": inverted, "estimated": right}))
+    _, by_tilt = section_5.orders(of_measures(velocity, {"measured": inverted, "estimated": right}))
     assert "The best is (11) and (9)." in by_tilt.reason
 
 
@@ -131,12 +141,12 @@ def test_every_figure_is_of_its_own_runs(monkeypatch: pytest.MonkeyPatch) -> Non
         more = 0.001 if angles == "estimated" else 0.0
         return {name: result_of(name, angles, sizes[name] + more) for name in names}
 
-    monkeypatch.setattr(figures_5_to_7, "close_loops", make_results)
+    monkeypatch.setattr(section_5, "close_loops", make_results)
     by_euler = {TEN_BY_EULER: 0.09, TEN_EXACT_GAIN: 0.088, ELEVEN_BY_EULER: 0.051}
     monkeypatch.setattr(
-        second_place, "errors_of", lambda forms, worlds, seed: {form: np.full(3, by_euler[form]) for form in forms}
+        section_5, "errors_of", lambda forms, worlds, seed: {form: np.full(3, by_euler[form]) for form in forms}
     )
-    *figures, order, _, _, _, cause = figures_5_to_7.claims(lambda share: None)
+    *figures, order, _, _, _, cause = section_5.claims(lambda share: None)
     assert [claim.place for claim in figures] == ["Fig. 5", "Fig. 6", "Fig. 7"]
     for claim, name in zip(figures, ("linear", "ltv", "homogeneous"), strict=True):
         assert claim.verdict == WITHIN  # the push, e and the noise are ours
@@ -182,12 +192,12 @@ def forms(exact: float, euler: float, gain: float = 0.0, scatter: float = 0.0) -
 
 
 def test_the_cause_is_partly_the_method() -> None:
-    claim = second_place.cause(forms(0.01, 0.03))
+    claim = section_5.cause(forms(0.01, 0.03))
     assert claim.verdict == "reproduced within stated conditions"
     assert claim.figures["of_it_by_the_method_share"] == pytest.approx(2.0 / 3.0)
     assert claim.figures["of_it_by_the_method_rad_s"].mean == pytest.approx(0.02)
     assert "none to speak of from the equations of H" in claim.reason
-    assert "have a part in it" in second_place.cause(forms(0.01, 0.03, gain=0.01)).reason
+    assert "have a part in it" in section_5.cause(forms(0.01, 0.03, gain=0.01)).reason
 
 
 @pytest.mark.parametrize(
@@ -196,10 +206,10 @@ def test_the_cause_is_partly_the_method() -> None:
     ids=["Euler helps", "all of it", "may be chance"],
 )
 def test_the_cause_is_not_partly_the_method(exact: float, euler: float, scatter: float) -> None:
-    assert second_place.cause(forms(exact, euler, scatter=scatter)).verdict == "not reproduced"
+    assert section_5.cause(forms(exact, euler, scatter=scatter)).verdict == "not reproduced"
 
 
 def test_euler_makes_ten_worse_in_the_loop_and_eleven_hardly() -> None:
-    errors = second_place.errors_of((TEN, TEN_BY_EULER, ELEVEN, ELEVEN_BY_EULER), 4, SEED)
+    errors = section_5.errors_of((TEN, TEN_BY_EULER, ELEVEN, ELEVEN_BY_EULER), 4, SEED)
     assert mean_interval(errors[TEN_BY_EULER] / errors[TEN]).low > 1.15
     assert abs(mean_interval(errors[ELEVEN_BY_EULER] / errors[ELEVEN]).mean - 1.0) < 0.05

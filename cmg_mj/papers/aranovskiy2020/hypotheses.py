@@ -1,20 +1,196 @@
-"""Hypotheses 1 to 3 of aranovskiy2020 kept, and broken on purpose."""
+"""Hypotheses 1 to 3 kept, and broken on purpose: pairs whose halves differ, and the turn of body A that follows.
+
+The controller and the observers do not know the change.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.mismatch import MISMATCHES, Mismatch, MismatchRuns, run_all
-from cmg_mj.papers.aranovskiy2020.rig import DURATION_S
-from cmg_mj.papers.aranovskiy2020.yaw_momentum import balanced_yaw_rate, predict_yaw_rate
+from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery, run_on_rigs
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
+from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.intervals import Interval, ratio_interval
+from cmg_mj.results.result import Result
+from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.view.plots.figure import Line, Panel, Picture
+
+Change = Callable[[Plant, float], None]
+"""Makes the second cube of a rig differ by so much."""
+
+
+def slower_flywheel(plant: Plant, share: float) -> None:
+    """Slow the second flywheel down by a share (Hypothesis 2 and 3: unequal speeds)."""
+    module, model = plant.axis.modules[1], plant.model
+    model.key_ctrl[plant.key, module.motor] *= 1.0 - share
+    model.key_qvel[plant.key, module.flywheel] *= 1.0 - share
+
+
+def gimbal_offset(plant: Plant, offset_deg: float) -> None:
+    """Start the second gimbal off its place (Hypothesis 2)."""
+    module, model = plant.axis.modules[1], plant.model
+    model.key_qpos[plant.key, module.gimbal] += module.direction * math.radians(offset_deg)
+    model.key_act[plant.key, model.actuator_actadr[module.servo]] += module.direction * math.radians(offset_deg)
+
+
+def servo_gain(plant: Plant, share: float) -> None:
+    """Let the second servo turn its gimbal farther than commanded, by a share (Hypothesis 1)."""
+    module, model = plant.axis.modules[1], plant.model
+    gear = 1.0 / (1.0 + share)
+    zero = model.key_qpos[plant.key, module.gimbal]
+    # Its setpoint counts in angle times gear, from where the gimbal starts.
+    model.actuator_gear[module.servo, 0] = gear
+    model.key_act[plant.key, model.actuator_actadr[module.servo]] = gear * zero
+
+
+def gimbal_friction(plant: Plant, torque_n_m: float) -> None:
+    """Give the second gimbal dry friction, the first none (Hypothesis 1)."""
+    plant.model.dof_frictionloss[plant.axis.modules[1].gimbal] = torque_n_m
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """One way in which the second cube differs.
+
+    Attributes:
+        kind: Its name.
+        change: Function that breaks a rig so.
+        sizes: Sizes of the mismatch that are tried.
+        unit: Unit of the sizes.
+        display_factor: Number by which a size is multiplied to be shown in that unit.
+        is_predictable: Whether `predict_yaw_rate` has it.
+    """
+
+    kind: str
+    change: Change
+    sizes: Sequence[float]
+    unit: str
+    display_factor: float
+    is_predictable: bool = True
+
+
+MISMATCHES = (
+    Mismatch("flywheel speed", slower_flywheel, (0.01, 0.02, 0.05, 0.1), "%", 100.0),
+    Mismatch("gimbal offset", gimbal_offset, (1.0, 2.0, 5.0, 10.0), "deg", 1.0),
+    Mismatch("servo gain", servo_gain, (0.02, 0.05, 0.1, 0.2), "%", 100.0),
+    Mismatch("gimbal friction", gimbal_friction, (0.1, 0.3, 1.0), "N m", 1.0, is_predictable=False),
+)
+
+
+class MismatchRuns(NamedTuple):
+    """Symmetric and broken rigs on the same noise and push."""
+
+    plant: Plant
+    """The symmetric rig."""
+    symmetric: Result
+    """Run of the symmetric rig, of all worlds."""
+    broken: dict[tuple[str, float], Result]
+    """(kind, size) -> run."""
+
+    @property
+    def fell(self) -> int:
+        """Number of worlds that fell."""
+        return int(sum(result.fell.sum() for result in (self.symmetric, *self.broken.values())))
+
+
+def run_all(
+    mismatches: Sequence[Mismatch], worlds: int, seed: int, duration_s: float, settings: Sequence[str] = ()
+) -> MismatchRuns:
+    """Run every mismatch in some worlds, all at once, with (11) in the loop and the push of Figs 5 to 7."""
+    # A rig is changed after its step has been chosen, and friction wants a short one to conserve momentum.
+    experiment = push_recovery("homogeneous", seed, ["plant.timestep_s=0.001", *settings], duration_s)
+    cases = [(mismatch, size) for mismatch in mismatches for size in mismatch.sizes]
+    rigs = [load_plant(experiment.scenario.plant) for _ in range(1 + len(cases))]
+    for rig, (mismatch, size) in zip(rigs[1:], cases, strict=True):
+        mismatch.change(rig, size)
+    symmetric, *broken = run_on_rigs(experiment, rigs, worlds)
+    kinds = [(mismatch.kind, size) for mismatch, size in cases]
+    return MismatchRuns(rigs[0], symmetric, dict(zip(kinds, broken, strict=True)))
+
+
+class Inertia(NamedTuple):
+    """The parts of the momentum about the vertical at the upright."""
+
+    yaw: float
+    """Inertia of all that turns with body A [kg m^2]."""
+    gimbal: float
+    """I_c + I_d of a gimbal about its own axis [kg m^2]."""
+    spin: float
+    """J_d [kg m^2]."""
+
+
+def inertia_of(plant: Plant) -> Inertia:
+    """Read off the mass matrix at the keyframe."""
+    data = mujoco.MjData(plant.model)
+    mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
+    mujoco.mj_forward(plant.model, data)
+    M = np.zeros((plant.model.nv, plant.model.nv))
+    mujoco.mj_fullM(plant.model, data, M)
+    module = plant.axis.modules[0]
+    return Inertia(*(float(M[i, i]) for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
+
+
+def carried_momentum(plant: Plant, trajectory: Trajectory) -> np.ndarray:
+    """Return the momentum of gimbals and flywheels about the vertical, (n_ticks, ...) [N m s].
+
+    The gimbals' axis is b_x, whose vertical part is -sin q_b; the flywheels' is b_y cos q_c + b_z sin q_c, whose
+    vertical part is cos q_b sin q_c.
+    """
+    parts, names = inertia_of(plant), plant.joint_names
+    tilt = trajectory[f"angle/{names[plant.tilt]}_rad"]
+    total = np.zeros_like(tilt)
+    for module in plant.axis.modules:
+        angle = trajectory[f"angle/{names[module.gimbal]}_rad"]
+        turning = trajectory[f"rate/{names[module.gimbal]}_rad_s"]
+        spinning = trajectory[f"rate/{names[module.flywheel]}_rad_s"]
+        total = total - parts.gimbal * turning * np.sin(tilt)
+        total = total + parts.spin * spinning * np.cos(tilt) * np.sin(angle)
+    return total
+
+
+def balanced_yaw_rate(plant: Plant, trajectory: Trajectory) -> np.ndarray:
+    """Body A's rate by conservation: no torque acts about the vertical, so I q_a' + carried stays [rad/s]."""
+    momentum = carried_momentum(plant, trajectory)
+    return (momentum[0] - momentum) / inertia_of(plant).yaw
+
+
+def predict_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajectory) -> np.ndarray:
+    """Body A's rate foretold from a run of the symmetric rig, for a small mismatch [rad/s].
+
+    The law holds the mean of both gimbal angles x3, whatever each does, so x3 and the tilt are those of the symmetric
+    rig to first order. With h = J_d omega_d cos q_b the flywheels carry h (cos x3_1 - cos x3_2).
+
+    Args:
+        kind: Kind of mismatch, of `MISMATCHES`.
+        size: Size of the mismatch.
+        plant: The symmetric rig.
+        trajectory: Its run.
+
+    Returns:
+        The rate, (n_ticks, ...).
+    """
+    parts = inertia_of(plant)
+    tilt = trajectory[f"angle/{plant.joint_names[plant.tilt]}_rad"]
+    x3, turning = trajectory["x3_rad"], np.gradient(trajectory["x3_rad"], trajectory["time_s"], axis=0)
+    h = parts.spin * abs(plant.axis.modules[0].speed) * np.cos(tilt)
+    if kind == "flywheel speed":
+        momentum = size * h * np.cos(x3)
+    elif kind == "gimbal offset":
+        half = math.radians(size) / 2.0
+        momentum = h * (np.cos(x3 - half) - np.cos(x3 + half))
+    else:  # servo gain
+        first = 2.0 * x3 / (2.0 + size)
+        momentum = h * (np.cos(first) - np.cos((1.0 + size) * first)) + parts.gimbal * size * turning * np.sin(tilt)
+    return (momentum[0] - momentum) / parts.yaw
+
 
 SEED = 75_000
 WORLDS = 4

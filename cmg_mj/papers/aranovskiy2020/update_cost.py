@@ -1,15 +1,16 @@
-"""Remark 1 of aranovskiy2020: what an update of the observer (10) costs beside those of (9) and (11)."""
+"""Remark 1: what an update of the observer (10) costs beside those of (9) and (11)."""
 
 from __future__ import annotations
 
+import json
 import statistics
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cmg_mj.observers import make_observer
-from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain
-from cmg_mj.papers.aranovskiy2020.on_the_board import PLAIN, instructions
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain, euler, rk4
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim, OnShare
@@ -64,3 +65,15 @@ def cost() -> Claim:
 def claims(on_share: OnShare) -> list[Claim]:
     """Judge the cost."""
     return [cost()]
+
+
+RECORDED = Path(__file__).with_name("on_the_board.json")
+"""Instructions of an update of the observer alone, by observer; `python benchmarks/board.py --paper` writes it."""
+
+PLAIN = {"ltv, plain Euler": euler, "ltv, plain Runge-Kutta 4": rk4}
+"""(10) written out with 3x3 matrices, by the method for H."""
+
+
+def instructions() -> dict[str, float]:
+    """Read the recorded instructions by observer, those of the package and (10) written out."""
+    return json.loads(RECORDED.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""The cycles that the backlash of the servo makes (`cmg_mj.stages.backlash`): on MuJoCo, and by a describing function."""
+"""The cycles that backlash of the servo makes (`cmg_mj.stages.backlash`): on MuJoCo, and by a describing function."""
 
 from __future__ import annotations
 

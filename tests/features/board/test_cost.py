@@ -11,7 +11,7 @@ import pytest
 
 from cmg_mj.features.board import Board, temporary_export
 from cmg_mj.features.board.image import available
-from cmg_mj.papers.aranovskiy2020 import on_the_board
+from cmg_mj.papers.aranovskiy2020 import update_cost
 from tests.command import HANGS_AFTER_S, ROOT
 from tests.features.board.toy import short, toy
 
@@ -37,7 +37,7 @@ def test_what_they_cost() -> None:
         assert 40 <= row["stack_bytes"] <= 1000
         assert 100 <= row["flash_bytes"] <= 20_000
         # The recorded ones are of half a second; another compiler or C library makes some per cent more or less.
-        assert row["step_instructions"] == pytest.approx(on_the_board.instructions()[row["observer"]], rel=0.1)
+        assert row["step_instructions"] == pytest.approx(update_cost.instructions()[row["observer"]], rel=0.1)
     # Of the observer tilt, rate and last sample; integrator, last command, whether it has started, status.
     assert linear["state_bytes"] == 7 * 4
 
@@ -52,4 +52,4 @@ def test_most_of_11_is_powers(tmp_path: Path) -> None:
         with Board(toy(tmp_path, step=more), counting=True) as board:
             steps.append(board.step(0.013, 0.85, 0.0, 0.0)[1].instructions)
     assert powers == 4
-    assert powers * (steps[1] - steps[0]) > 0.5 * on_the_board.instructions()["homogeneous"]
+    assert powers * (steps[1] - steps[0]) > 0.5 * update_cost.instructions()["homogeneous"]

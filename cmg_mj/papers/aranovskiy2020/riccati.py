@@ -1,4 +1,4 @@
-"""Remark 1 of aranovskiy2020: how delicate the Riccati equation of (10) is, by method and step."""
+"""The Riccati equation of (10): how delicate it is, its misprint, and whether the pair (A', C) is observable."""
 
 from __future__ import annotations
 
@@ -9,11 +9,24 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.observers import Measurement
-from cmg_mj.papers.aranovskiy2020.forms_of_10 import METHODS, compare_euler, make_exact, matrix_of
-from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, settled_gains
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import (
+    METHODS,
+    Comparison,
+    Method,
+    Plain,
+    compare,
+    compare_euler,
+    make_exact,
+    matrix_of,
+    rk4,
+    rk4_as_printed,
+)
+from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, damping, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.linear_check import rank_margin
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
@@ -151,6 +164,146 @@ def _picture(sweeps: Sweeps, at_200: Mapping[str, Transient]) -> Picture:
     )
 
 
-def claims(on_share: OnShare) -> list[Claim]:
+def delicacy_claims(on_share: OnShare) -> list[Claim]:
     """Judge the delicacy."""
     return [delicacy()]
+
+
+SETTLING_S = 8.0
+"""The slowest entry, H33, takes 1 s to fall by e^2 [s]."""
+HARMLESS = 0.05
+"""Share of the rate's error: if the misprint changes the rate by less, either equation may have been run."""
+
+
+class Misprint(NamedTuple):
+    """The changes that the printed Riccati equation makes."""
+
+    corrected_H: np.ndarray
+    """H where the corrected equation settles at rest, (3, 3)."""
+    printed_H: np.ndarray
+    """H where the printed one does, (3, 3)."""
+    rate: Comparison
+    """The corrected form and the printed one along a closed-loop run."""
+
+
+def settle(method: Method, h: float = 1e-3) -> np.ndarray:
+    """Return H where a method settles at rest, (3, 3)."""
+    H = H_0
+    for _ in range(round(SETTLING_S / h)):
+        H = method(H, A_prime(), h)
+    return H
+
+
+def misprint(seed: int = SEED_OF_10) -> Misprint:
+    """Integrate both equations, at rest and along a run, with Runge-Kutta 4."""
+    comparison = compare(Plain(rk4), Plain(rk4_as_printed), seed)
+    return Misprint(settle(rk4), settle(rk4_as_printed), comparison)
+
+
+def misprint_claim(seed: int = SEED_OF_10) -> Claim:
+    """Judge the Riccati equation as printed."""
+    H, printed_H, rate = misprint(seed)
+    asymmetry = float(abs(printed_H[0, 1] - printed_H[1, 0]) / printed_H[1, 0])
+    gain = float(np.abs(printed_H[:, ::2] - H[:, ::2]).max() / np.abs(H[:, ::2]).max())
+    return Claim(
+        place="After (10), the Riccati equation",
+        statement="The symmetric gain matrix of (10) is the solution of H' = H A^T + A' H - H C^T C H + Q.",
+        holds=asymmetry < 1e-6 or rate.difference < HARMLESS * rate.error,
+        conditions=(
+            ""
+            if asymmetry < 1e-6
+            else "With A'^T for the printed A^T, which is that of (6): a misprint. The observer's rate is the same to "
+            f"{rate.difference / rate.error:.1%} of its error, whichever of them was run."
+        ),
+        otherwise="As printed it is not symmetric, and the observer would be another one.",
+        figures={
+            "H12_printed": float(printed_H[0, 1]),
+            "H21_printed": float(printed_H[1, 0]),
+            "H12": float(H[0, 1]),
+            "largest_change_of_gain_share": gain,
+            "rate_changed_rad_s": rate.difference,
+            "rate_error_rad_s": rate.error,
+            "rate_error_printed_rad_s": rate.other_error,
+        },
+    )
+
+
+def misprint_claims(on_share: OnShare) -> list[Claim]:
+    """Judge the misprint."""
+    return [misprint_claim()]
+
+
+def observability_margin(a: float, outputs: np.ndarray = C) -> float:
+    """Return the rank margin of [C; C A'; C A'^2], for the outputs C."""
+    A = A_prime(a)
+    return rank_margin(np.vstack([outputs, outputs @ A, outputs @ A @ A]))
+
+
+def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, float]:
+    """Return the least and largest eigenvalue of the observability Gramian over every span of a run.
+
+    Phi(t, s) of A' has the first row [1, phi, 0] with phi' = exp(integral of a): Simpson's rule over the span, a held
+    between ticks.
+
+    Args:
+        a: The entry of A' tick by tick, (n_ticks,) [1/s].
+        dt: Between ticks [s].
+        span_s: T_0 [s], an even number of ticks.
+
+    Returns:
+        delta_1 and delta_2 of the condition after (10) [s], [s^3].
+    """
+    n = round(span_s / dt)
+    weights = np.ones(n + 1)
+    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
+    weights *= dt / 3.0
+    least, largest = math.inf, 0.0
+    for start in range(len(a) - n):
+        a_span = a[start : start + n]
+        growth = np.exp(np.concatenate([[0.0], np.cumsum(a_span * dt)]))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            step = np.where(np.abs(a_span) < 1e-9, dt, np.expm1(a_span * dt) / a_span)
+        phi = np.concatenate([[0.0], np.cumsum(growth[:-1] * step)])
+        gramian = np.array([[span_s, weights @ phi], [weights @ phi, weights @ phi**2]])
+        values = np.linalg.eigvalsh(gramian)
+        least, largest = min(least, float(values[0]), span_s), max(largest, float(values[1]), span_s)
+    return least, largest
+
+
+def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
+    """Judge the uniform observability that (10) needs."""
+    grid = [
+        (u, y2)
+        for u in np.linspace(-StateFeedback.rate_limit, StateFeedback.rate_limit, 21)
+        for y2 in np.linspace(-math.pi, math.pi, 41)
+    ]
+    dampings = [float(damping(u, float(y2))) for u, y2 in grid]
+    margin = min(observability_margin(a) for a in dampings)
+    margin_without_tilt = max(observability_margin(a, C[1:]) for a in dampings)
+    run = run_of_10(seed)
+    least, largest = gramian_bounds(np.asarray(damping(run["u_rad_s"], run["y2_rad"])), DT, span_s)
+    extremes = [gramian_bounds(np.full(round(span_s / DT) + 1, a), DT, span_s) for a in (min(dampings), max(dampings))]
+    bound = min(pair[0] for pair in extremes), max(pair[1] for pair in extremes)
+    return Claim(
+        place="After (10)",
+        statement="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
+        assumes={"servo": f"at most {StateFeedback.rate_limit:g} rad/s"},
+        holds=margin > 0.1 and margin_without_tilt < 1e-12 and bound[0] > 0.0 and math.isfinite(bound[1]),
+        conditions=(
+            "Pointwise observability alone is not uniform; a bounded u, as the servos have it, closes the gap."
+        ),
+        otherwise="The pair is not observable for some u and y2, or not uniformly.",
+        figures={
+            "rank_margin": margin,
+            "rank_margin_without_tilt": margin_without_tilt,
+            "largest_damping_1_s": max(map(abs, dampings)),
+            "span_s": span_s,
+            "gramian_along_run": [least, largest],
+            "gramian_any_u": list(bound),
+        },
+    )
+
+
+def observability_claims(on_share: OnShare) -> list[Claim]:
+    """Judge the uniform observability that (10) needs."""
+    return [observability()]
