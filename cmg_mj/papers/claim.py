@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Literal
 
 from cmg_mj.view.plots.figure import Picture
@@ -124,3 +125,8 @@ def obtain(parts: Sequence[Callable[[], Claim]], on_share: OnShare) -> list[Clai
         on_share(i / len(parts))
         claims.append(part())
     return claims
+
+
+def section(title: str, seconds: float, *parts: Callable[[], Claim]) -> Section:
+    """Make a section of claims that are obtained one by one."""
+    return Section(title, seconds, partial(obtain, parts))

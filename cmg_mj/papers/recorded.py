@@ -1,9 +1,13 @@
-"""Readings of a recorded run that several papers need."""
+"""Readings and pictures of recorded runs that several papers need."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
+from cmg_mj.papers.claim import Claim
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.view.plots.figure import Line, Panel
@@ -52,4 +56,25 @@ def loop_panels(run: Trajectory, name: str, equation: str, title: str, noise_wid
         Panel("tilt [deg]", tilt, title, shaded=shaded),
         Panel("tilt rate [rad/s]", rates, shaded=shaded),
         Panel("command u [rad/s]", [Line(t, run["u_rad_s"], "u", color=3, width=0.6)], shaded=shaded),
+    ]
+
+
+ROOM = 0.05
+"""Left above and below what is drawn, as a share of its range."""
+
+
+def on_common_scales(claims: Sequence[Claim]) -> list[Claim]:
+    """Give all panels of one quantity, in all claims' pictures, the range that they all need."""
+    values: dict[str, list[np.ndarray]] = {}
+    for panel in (panel for claim in claims for picture in claim.pictures for panel in picture.panels):
+        values.setdefault(panel.y_label, []).extend(np.asarray(line.y) for line in panel.lines)
+
+    def scaled(panel: Panel) -> Panel:
+        drawn = np.concatenate(values[panel.y_label])
+        low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
+        return replace(panel, y_range=(low - ROOM * (high - low), high + ROOM * (high - low)))
+
+    return [
+        replace(claim, pictures=[replace(p, panels=[scaled(panel) for panel in p.panels]) for p in claim.pictures])
+        for claim in claims
     ]

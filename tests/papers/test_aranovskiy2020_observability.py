@@ -12,14 +12,6 @@ from cmg_mj.papers.aranovskiy2020.paper import A_prime, C
 SEED = 910_000
 
 
-def test_gramian_of_the_double_integrator() -> None:
-    """Closed form for a = 0: [[T, T^2/2], [T^2/2, T^3/3]] and T."""
-    T = 0.4
-    values = np.linalg.eigvalsh([[T, T**2 / 2.0], [T**2 / 2.0, T**3 / 3.0]])
-    bounds = riccati.gramian_bounds(np.zeros(101), 0.005, T)
-    assert bounds == pytest.approx((values[0], values[1]), rel=1e-9)
-
-
 def test_gramian_by_integration() -> None:
     """An a far larger than the rig's, held; Phi integrated by scipy."""
     a, T = 3.0, 0.5

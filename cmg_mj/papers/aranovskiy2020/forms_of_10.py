@@ -115,9 +115,7 @@ def compare(form: Observer, other_form: Observer, seed: int) -> Comparison:
     return Comparison(*(float(rms(error)) for error in (other_rate - rate, rate - truth, other_rate - truth)))
 
 
-def compare_euler(seed: int) -> Comparison:
-    """Compare all twelve equations by explicit Euler with the exact form."""
-    return compare(make_exact(), Plain(euler), seed)
+# --- by explicit Euler, on floats and arrays ---------------------------------------------------------------------
 
 
 class Ten(NamedTuple):

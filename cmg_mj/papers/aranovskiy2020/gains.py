@@ -21,20 +21,21 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.side_by_side import run_of, run_side_by_side
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
+# --- inverse optimality -----------------------------------------------------------------------------------------
+
 
 class Inverse(NamedTuple):
     """The answer of the return difference for a gain."""
 
     least: float
     """min over w of |1 + K (jw - A)^-1 B|."""
-    optimal: bool
-    """True if some Q >= 0 makes K the LQR gain (Kalman 1964: the minimum is not below 1)."""
-    Q: np.ndarray | None
-    """A Q of that kind, (n, n), of rank 1."""
-    recovered: float
-    """Relative error of the Riccati equation's gain for that Q."""
     diagonal: np.ndarray
     """The one diagonal of Q that would give K: with a negative entry no diagonal Q >= 0 does."""
+    Q: np.ndarray | None
+    """A Q >= 0 of rank 1 that makes K the LQR gain, (n, n); None if there is none (Kalman 1964: the minimum is below
+    1)."""
+    recovered: float | None
+    """Relative error of the Riccati equation's gain for that Q."""
 
 
 def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
@@ -51,62 +52,50 @@ def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
     Returns:
         The answer.
     """
-    n = len(A)
     d, p = np.poly(A), np.poly(A - B @ K[None, :])
-    unit = np.eye(n)
-    numerators = np.array([np.poly(A - B @ unit[i][None, :]) - d for i in range(n)])  # d + n_i is that of u = -x_i
+    numerators = np.array(
+        [np.poly(A - B @ unit[None, :]) - d for unit in np.eye(len(A))]
+    )  # d + n_i is that of u = -x_i
     gap = (_squared(p) - _squared(d))[1:]  # in w^2, degree n - 1
     roots = np.roots(gap)
     crossings = [w for w in roots if abs(w.imag) < 1e-9 * (1.0 + abs(w)) and w.real > 0.0]
     grid = np.concatenate([np.logspace(-6, 8, 4001), [abs(w.real) for w in crossings]])
-    ratio = np.polyval(_squared(p), grid) / np.polyval(_squared(d), grid)
-    optimal = bool(np.polyval(gap, grid).min() >= 0.0 and gap[-1] >= 0.0)
+    least = float(np.sqrt((np.polyval(_squared(p), grid) / np.polyval(_squared(d), grid)).min()))
     basis = np.column_stack([_squared(row) for row in numerators])[1:]
     diagonal = np.linalg.lstsq(basis, gap, rcond=None)[0]
-    if not optimal:
-        return Inverse(float(np.sqrt(ratio.min())), False, None, math.inf, diagonal)
+    if np.polyval(gap, grid).min() < 0.0 or gap[-1] < 0.0:
+        return Inverse(least, diagonal, None, None)
     # Spectral factor: the half of the roots of gap(-s^2) to the left.
     left_roots = [-np.sqrt(-w) if np.sqrt(-w).real > 0.0 else np.sqrt(-w) for w in roots.astype(complex)]
     factor = math.sqrt(abs(gap[0])) * np.real(np.poly(left_roots))
     c = np.linalg.solve(numerators[:, 1:].T, factor)
     Q = np.outer(c, c)
-    P = solve_continuous_are(A, B, Q, np.eye(1))
-    recovered = float(np.abs((B.T @ P)[0] / K - 1.0).max())
-    return Inverse(float(np.sqrt(ratio.min())), True, Q, recovered, diagonal)
+    return Inverse(least, diagonal, Q, float(np.abs(lqr_gain(A, B, Q) / K - 1.0).max()))
 
 
 def _squared(polynomial: np.ndarray) -> np.ndarray:
     """Return |p(jw)|^2 as a polynomial in w^2, highest power first."""
     n = len(polynomial) - 1
-    mirrored = polynomial * (-1.0) ** (n - np.arange(n + 1))
-    even = np.convolve(polynomial, mirrored)[::2]  # p(s) p(-s) in s^2
-    return even * (-1.0) ** (n - np.arange(n + 1))  # s^2 = -w^2
+    signs = (-1.0) ** (n - np.arange(n + 1))
+    even = np.convolve(polynomial, polynomial * signs)[::2]  # p(s) p(-s) in s^2
+    return even * signs  # s^2 = -w^2
 
 
-class Diagonal(NamedTuple):
-    """The diagonal Q whose LQR gain comes nearest to a printed one."""
-
-    Q: np.ndarray
-    """Entries of the diagonal, none below 0, (n,)."""
-    gain: np.ndarray
-    """LQR gain with R = 1, (n,)."""
-    off: float
-    """Largest difference from the printed gain, by half a unit of the digit it is printed with: 1 is rounding's."""
+def lqr_gain(A: np.ndarray, B: np.ndarray, Q: np.ndarray) -> np.ndarray:
+    """Return the LQR gain for Q and R = 1, (n,)."""
+    return (B.T @ solve_continuous_are(A, B, Q, np.eye(1)))[0]
 
 
-def lqr_gain(A: np.ndarray, B: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
-    """Return the gain for Q = diag(diagonal), R = 1, (n,)."""
-    return (B.T @ solve_continuous_are(A, B, np.diag(diagonal), np.eye(1)))[0]
-
-
-LEAST_WEIGHT = 1e-3
+MIN_WEIGHT = 1e-3
 """Least weight in a diagonal Q: a state that hardly counts."""
+SEARCHES = 3
+"""Number of starts of a search, each from where it ended: a simplex may collapse."""
 
 
 def nearest_diagonal(
-    A: np.ndarray, B: np.ndarray, K: np.ndarray, rounding: np.ndarray, start: np.ndarray, searches: int = 3
-) -> Diagonal:
-    """Search the diagonal Q whose gain comes nearest to K.
+    A: np.ndarray, B: np.ndarray, K: np.ndarray, rounding: Sequence[float], start: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Search the diagonal Q whose LQR gain with R = 1 comes nearest to K.
 
     Args:
         A: State matrix, (n, n).
@@ -114,62 +103,51 @@ def nearest_diagonal(
         K: The gain as printed, (n,).
         rounding: Half a unit of the digit that each entry of it is printed with, (n,).
         start: A diagonal near the one sought, (n,); entries below 0.01 count as 0.01.
-        searches: Number of starts of the search, each from where it ended: a simplex may collapse.
 
     Returns:
-        The best that was found.
+        The diagonal, (n,), and the largest difference of its gain from K by the rounding: 1 is rounding's.
     """
 
     def weights(logarithms: np.ndarray) -> np.ndarray:
-        return np.maximum(np.exp(logarithms), LEAST_WEIGHT)
+        return np.maximum(np.exp(logarithms), MIN_WEIGHT)
 
     def off(logarithms: np.ndarray) -> float:
         try:
-            return float((np.abs(lqr_gain(A, B, weights(logarithms)) - K) / rounding).max())
+            return float((np.abs(lqr_gain(A, B, np.diag(weights(logarithms))) - K) / rounding).max())
         except LinAlgError:  # Q with entries too far apart for the solver
             return math.inf
 
     optimum = np.log(np.maximum(start, 0.01))
-    for _ in range(searches):
+    for _ in range(SEARCHES):
         optimum = minimize(off, optimum, method="Nelder-Mead", options={"maxiter": 150, "xatol": 1e-3, "fatol": 1e-3}).x
-    return Diagonal(weights(optimum), lqr_gain(A, B, weights(optimum)), off(optimum))
+    return weights(optimum), off(optimum)
 
 
 def lqr_gains() -> Claim:
     """Judge whether Table 2's K_e is an LQR gain."""
-    model = printed_model()
-    K = np.array(K_E)
-    inverse = inverse_optimality(model.A_e, model.B_e, K)
-    nearest = nearest_diagonal(model.A_e, model.B_e, K, np.array(K_E_ROUNDING), inverse.diagonal)
+    A, B, K = printed_model().A_e, printed_model().B_e, np.array(K_E)
+    inverse = inverse_optimality(A, B, K)
+    diagonal, off = nearest_diagonal(A, B, K, K_E_ROUNDING, inverse.diagonal)
     return Claim(
         place="Table 2, K_e",
         statement="K_e = [35, 4, -1, 0.3] are LQR gains; the weights are not given.",
-        holds=inverse.optimal and inverse.recovered < 1e-6,
-        conditions=(
-            ""
-            if nearest.off < 1.0
-            else "The cost is not a weighted sum of squares of the single states, not even to the digits printed."
-        ),
-        otherwise="They are no LQR gains.",
+        holds=inverse.recovered is not None and inverse.recovered < 1e-6,
+        conditions="" if off < 1.0 else "The cost is not a weighted sum of squares of the single states.",
         figures={
             "least_return_difference": inverse.least,
-            "recovered_gain_relative_error": inverse.recovered if inverse.optimal else None,
+            "recovered_gain_relative_error": inverse.recovered,
             "Q": None if inverse.Q is None else inverse.Q.tolist(),
             "diagonal_candidate": inverse.diagonal.tolist(),
-            "diagonal_within_rounding": nearest.Q.tolist(),
-            "gain_within_rounding": nearest.gain.tolist(),
-            "difference_by_rounding": nearest.off,
+            "diagonal_within_rounding": diagonal.tolist(),
+            "gain_within_rounding": lqr_gain(A, B, np.diag(diagonal)).tolist(),
+            "difference_by_rounding": off,
         },
     )
 
 
-def optimality_claims(on_share: OnShare) -> list[Claim]:
-    """Judge the gains of (8)."""
-    return [lqr_gains()]
+# --- the rest ---------------------------------------------------------------------------------------------------
 
-
-SEED = 73_000
-WORLDS = 6
+SEED, WORLDS = 73_000, 6
 DURATION_S = 26.0
 AVERAGED_S = 6.0
 """The last so many seconds are averaged [s]; the slowest poles, -0.2 +- 0.29j 1/s, have then faded to 2 %."""
@@ -177,23 +155,13 @@ BIAS_DEG = 0.5
 ASSUMED: Mapping[Assumption, str] = {"e": f"{BIAS_DEG:g} deg", "noise": PUSH_RECOVERY["noise"]}
 
 TRUE_RATE = "the true rate, (8)"
-
-
-class Case(NamedTuple):
-    """The law's inputs in one case."""
-
-    observer: str
-    settings: Sequence[str]
-    true_rate: bool = False
-    estimated_angles: bool = False
-
-
 ESTIMATED = ['controller.angle_source="estimated"']
-CASES = {
-    TRUE_RATE: Case("homogeneous", ['controller.feedback="truth"'], true_rate=True),
-    "(10), estimated angles": Case("ltv", ESTIMATED, estimated_angles=True),
-    "(11), estimated angles": Case("homogeneous", ESTIMATED, estimated_angles=True),
+CASES: Mapping[str, tuple[str, Sequence[str]]] = {
+    TRUE_RATE: ("homogeneous", ['controller.feedback="truth"']),
+    "(10), estimated angles": ("ltv", ESTIMATED),
+    "(11), estimated angles": ("homogeneous", ESTIMATED),
 }
+"""The law's inputs -> the observer, and the settings."""
 
 
 class Rest(NamedTuple):
@@ -220,23 +188,18 @@ def find_rests(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> li
     common = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
     runs = []
     for case, worlds, extra in cases:
-        observer, settings, *_ = CASES[case]
+        observer, settings = CASES[case]
         runs.append(run_of(push_recovery(observer, seed, [*common, *settings, *extra], DURATION_S), worlds))
     results = run_side_by_side(runs)
-    return [
-        _average(CASES[case].observer, trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)
-    ]
+    return [_average(CASES[case][0], trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)]
 
 
-def _average(observer: str, trajectory: Trajectory) -> Rest:
-    late = trajectory["time_s"] >= DURATION_S - AVERAGED_S
-
-    def mean(name: str, factor: float = 1.0) -> Interval:
-        return mean_interval(factor * trajectory[name][late].mean(axis=0))
-
-    degrees = math.degrees(1.0)
-    rate = mean(f"estimate/{observer}/x2_rad_s")
-    return Rest(mean("x1_rad", degrees), mean("x3_rad", degrees), mean("x_e_rad_times_s"), rate, trajectory.world(0))
+def _average(observer: str, run: Trajectory) -> Rest:
+    late = run["time_s"] >= DURATION_S - AVERAGED_S
+    names = ("x1_rad", "x3_rad", "x_e_rad_times_s", f"estimate/{observer}/x2_rad_s")
+    factors = (math.degrees(1.0), math.degrees(1.0), 1.0, 1.0)
+    x1, x3, x_e, x2 = (mean_interval(f * run[name][late].mean(axis=0)) for name, f in zip(names, factors, strict=True))
+    return Rest(x1, x3, x_e, x2, run.world(0))
 
 
 def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple[float, float]:
@@ -260,13 +223,10 @@ def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple
     return float(estimate.x1[settling:].mean()), float(estimate.x2[settling:].mean())
 
 
-def expected_integrator(case: str, e_deg: float, sigma: float, seed: int = SEED) -> float:
-    """x_e at which the law's command is zero [rad s]: 0 = k1 x1 + k2 x2 + k4 x_e, of what the law is fed with."""
-    observer, _, true_rate, estimated_angles = CASES[case]
+def expected_integrator(observer: str, sigma: float) -> float:
+    """x_e at which the command of the law on an observer's estimates is zero: 0 = k1 x1 + k2 x2 + k4 x_e [rad s]."""
     k1, k2, _, k4 = K_E
-    x1, x2 = steady(observer, e_deg, sigma, seed)
-    x1 = x1 if estimated_angles else -math.radians(e_deg)
-    x2 = 0.0 if true_rate else x2
+    x1, x2 = steady(observer, BIAS_DEG, sigma)
     return -(k1 * x1 + k2 * x2) / k4
 
 
@@ -279,7 +239,6 @@ def laws_claim(rest: Rest, static: Rest) -> Claim:
         assumes=ASSUMED,
         holds=rest.is_at_zero(x_e) and abs(static.x3.mean / x3 - 1.0) < 0.05,
         conditions="With the signs that follow from y1 = x1 - e: k1/k3 e and +k_e1/k_e4 e.",
-        otherwise="They rest elsewhere.",
         figures={
             "gimbal_rest_without_integrator_deg": static.x3.mean,
             "gimbal_rest_expected_deg": x3,
@@ -293,26 +252,24 @@ def laws_claim(rest: Rest, static: Rest) -> Claim:
 
 def observers_claim(rests: Mapping[str, Rest]) -> Claim:
     """Judge the rests by case, with an observer in the law, which the bias biases."""
-    observer_rests = {case: rest for case, rest in rests.items() if case != TRUE_RATE}
     example = rests[TRUE_RATE].example
     sigma = float(np.std(example["y1_rad"] - example["x1_rad"]))
-    expected_x_e = {case: expected_integrator(case, BIAS_DEG, sigma) for case in observer_rests}
+    figures, at_zero = {}, []
+    for case in list(CASES)[1:]:
+        rest, expected = rests[case], expected_integrator(CASES[case][0], sigma)
+        at_zero.append(rest.is_at_zero(expected))
+        figures |= {
+            f"tilt_rest {case}_deg": rest.x1,
+            f"integrator_rest {case}_rad_s": rest.x_e,
+            f"integrator_expected {case}_rad_s": expected,
+            f"rate_estimated {case}_rad_s": rest.x2_estimated,
+        }
     return Claim(
         place="After (10), the equilibrium",
         statement="The integral action makes x = 0 the equilibrium even with an observer whose estimate e biases.",
         assumes=ASSUMED,
-        holds=all(rest.is_at_zero(expected_x_e[case]) for case, rest in observer_rests.items()),
-        otherwise="The rest is not where it should be.",
-        figures={
-            key: value
-            for case, rest in observer_rests.items()
-            for key, value in (
-                (f"tilt_rest {case}_deg", rest.x1),
-                (f"integrator_rest {case}_rad_s", rest.x_e),
-                (f"integrator_expected {case}_rad_s", expected_x_e[case]),
-                (f"rate_estimated {case}_rad_s", rest.x2_estimated),
-            )
-        },
+        holds=all(at_zero),
+        figures=figures,
         pictures=[_picture(rests)],
     )
 

@@ -17,7 +17,7 @@ from cmg_mj.papers.aranovskiy2020.forms_of_10 import (
     Method,
     Plain,
     compare,
-    compare_euler,
+    euler,
     make_exact,
     matrix_of,
     rk4,
@@ -25,10 +25,12 @@ from cmg_mj.papers.aranovskiy2020.forms_of_10 import (
 )
 from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, damping, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import rank_margin
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.view.plots.figure import Line, Panel, Picture
+
+# --- delicacy ---------------------------------------------------------------------------------------------------
 
 RATES_HZ = tuple(float(rate) for rate in np.geomspace(20.0, 2000.0, 41))
 
@@ -44,24 +46,23 @@ class Transient(NamedTuple):
     """H12 sample by sample, (n_samples,)."""
 
 
-def transient(method: str, rate_hz: float, span_s: float = 0.2, single_precision: bool = False) -> Transient:
-    """Integrate the Riccati equation beside its exact solution.
+def transient(method: str, rate_hz: float, kind: type = np.float64) -> Transient:
+    """Integrate the Riccati equation beside its exact solution, over 0.2 s but at least 50 steps.
 
     Args:
         method: One of `METHODS`.
         rate_hz: Steps a second.
-        span_s: Simulated time [s], but at least 50 steps.
-        single_precision: Whether in single precision, which is what the paper's STM32F746 computes in hardware.
+        kind: Precision; single is what the paper's STM32F746 computes in hardware.
 
     Returns:
         What was met.
     """
     h, A = 1.0 / rate_hz, A_prime()
     E = expm(h * np.block([[-A.T, C.T @ C], [Q, A]]))
-    H, truth = H_0.astype(np.float32 if single_precision else np.float64), H_0
+    H, truth = H_0.astype(kind), H_0
     _, steady = settled_gains()
     least, error, path = math.inf, 0.0, []
-    for _ in range(max(50, round(span_s * rate_hz))):
+    for _ in range(max(50, round(0.2 * rate_hz))):
         with np.errstate(all="ignore"):
             H = METHODS[method](H, A, h)
         truth = (E[3:, :3] + E[3:, 3:] @ truth) @ np.linalg.inv(E[:3, :3] + E[:3, 3:] @ truth)
@@ -71,10 +72,6 @@ def transient(method: str, rate_hz: float, span_s: float = 0.2, single_precision
         least = min(least, float(np.linalg.eigvalsh(H.astype(float))[0]))
         error = max(error, abs(float(H[0, 1]) - truth[0, 1]) / steady)
     return Transient(least, error, np.array(path))
-
-
-Sweeps = Mapping[str, Mapping[float, Transient]]
-"""Method -> rate [Hz] -> what was met."""
 
 
 def lowest_rate(method: str, sweep: Mapping[float, Transient], passes: Callable[[Transient], bool]) -> float | None:
@@ -100,32 +97,27 @@ def matrices_along(run: Trajectory) -> np.ndarray:
     return np.array(matrices)
 
 
-def delicacy(seed: int = SEED_OF_10) -> Claim:
+def delicacy() -> Claim:
     """Judge the condition and definiteness of H over step size and method."""
     sweeps = {name: {rate: transient(name, rate) for rate in RATES_HZ} for name in METHODS}
-    definite = {name: lowest_rate(name, sweeps[name], lambda t: t.least > 0.0) for name in METHODS}
-    finite = {name: lowest_rate(name, sweeps[name], lambda t: math.isfinite(t.error)) for name in METHODS}
+    definite = {name: lowest_rate(name, sweep, lambda t: t.least > 0.0) for name, sweep in sweeps.items()}
+    finite = {name: lowest_rate(name, sweep, lambda t: math.isfinite(t.error)) for name, sweep in sweeps.items()}
     at_200 = {name: transient(name, 1.0 / DT) for name in METHODS}
-    float32 = {name: transient(name, 1.0 / DT, single_precision=True) for name in ("explicit Euler", "Runge-Kutta 4")}
-    comparison = compare_euler(seed)
-    matrices = matrices_along(run_of_10(seed))
-    condition = float(np.linalg.cond(matrices).max())
-    least = float(np.linalg.eigvalsh(matrices).min())
-    euler_first = at_200["explicit Euler"].error > 0.1
-    rk4_fine = at_200["Runge-Kutta 4"].error < 1e-2
-    ours_fine = at_200["exact step (ours)"].error < 1e-8 and definite["exact step (ours)"] is None
+    float32 = {name: transient(name, 1.0 / DT, np.float32) for name in ("explicit Euler", "Runge-Kutta 4")}
+    comparison = compare(make_exact(), Plain(euler), SEED_OF_10)
+    matrices = matrices_along(run_of_10(SEED_OF_10))
     return Claim(
         place="Remark 1, delicacy",
         statement="The Riccati equation is sensitive to the numerical method; six decades between Q's entries amplify "
         "it.",
         assumes={"control rate": f"{1.0 / DT:g} Hz", "method": "explicit Euler, Runge-Kutta 4, the exact step"},
-        holds=euler_first and rk4_fine and ours_fine,
-        conditions=(
-            "At 200 Hz the equation is delicate for explicit Euler alone: H until it has settled, the estimate "
-            "throughout. Runge-Kutta 4 does well enough even in single precision. The exact (Davison-Maki) step does "
-            "so at any rate."
-        ),
-        otherwise="It is not the method by which they are told apart.",
+        holds=at_200["explicit Euler"].error > 0.1
+        and at_200["Runge-Kutta 4"].error < 1e-2
+        and at_200["exact step (ours)"].error < 1e-8
+        and definite["exact step (ours)"] is None,
+        conditions="At 200 Hz the equation is delicate for explicit Euler alone: H until it has settled, the estimate "
+        "throughout. Runge-Kutta 4 does well enough even in single precision. The exact (Davison-Maki) step does so at "
+        "any rate.",
         figures={
             "definite_above_hz": definite,
             "finite_above_hz": finite,
@@ -134,19 +126,18 @@ def delicacy(seed: int = SEED_OF_10) -> Claim:
             "rate_changed_by_euler_rad_s": comparison.difference,
             "rate_error_euler_rad_s": comparison.other_error,
             "rate_error_exact_rad_s": comparison.error,
-            "condition_along_run": condition,
-            "least_eigenvalue_along_run": least,
+            "condition_along_run": float(np.linalg.cond(matrices).max()),
+            "least_eigenvalue_along_run": float(np.linalg.eigvalsh(matrices).min()),
         },
         pictures=[_picture(sweeps, at_200)],
     )
 
 
-def _picture(sweeps: Sweeps, at_200: Mapping[str, Transient]) -> Picture:
+def _picture(sweeps: Mapping[str, Mapping[float, Transient]], at_200: Mapping[str, Transient]) -> Picture:
     errors, least, paths = [], [], []
     for i, (name, by_rate) in enumerate(sweeps.items()):
-        transients = by_rate.values()
-        finite = [t.error if math.isfinite(t.error) else math.nan for t in transients]
-        positive = [t.least if t.least > 0.0 else math.nan for t in transients]
+        finite = [t.error if math.isfinite(t.error) else math.nan for t in by_rate.values()]
+        positive = [t.least if t.least > 0.0 else math.nan for t in by_rate.values()]
         path = np.concatenate([[0.0], at_200[name].path[:24]])
         errors.append(Line(RATES_HZ, finite, name, color=i))
         least.append(Line(RATES_HZ, positive, name, color=i, style="o-" if i < 2 else "--"))
@@ -164,26 +155,12 @@ def _picture(sweeps: Sweeps, at_200: Mapping[str, Transient]) -> Picture:
     )
 
 
-def delicacy_claims(on_share: OnShare) -> list[Claim]:
-    """Judge the delicacy."""
-    return [delicacy()]
-
+# --- the misprint -----------------------------------------------------------------------------------------------
 
 SETTLING_S = 8.0
 """The slowest entry, H33, takes 1 s to fall by e^2 [s]."""
 HARMLESS = 0.05
 """Share of the rate's error: if the misprint changes the rate by less, either equation may have been run."""
-
-
-class Misprint(NamedTuple):
-    """The changes that the printed Riccati equation makes."""
-
-    corrected_H: np.ndarray
-    """H where the corrected equation settles at rest, (3, 3)."""
-    printed_H: np.ndarray
-    """H where the printed one does, (3, 3)."""
-    rate: Comparison
-    """The corrected form and the printed one along a closed-loop run."""
 
 
 def settle(method: Method, h: float = 1e-3) -> np.ndarray:
@@ -194,33 +171,32 @@ def settle(method: Method, h: float = 1e-3) -> np.ndarray:
     return H
 
 
-def misprint(seed: int = SEED_OF_10) -> Misprint:
-    """Integrate both equations, at rest and along a run, with Runge-Kutta 4."""
-    comparison = compare(Plain(rk4), Plain(rk4_as_printed), seed)
-    return Misprint(settle(rk4), settle(rk4_as_printed), comparison)
+def compare_printed(seed: int = SEED_OF_10) -> Comparison:
+    """Compare the corrected equation with the printed one along a run, by Runge-Kutta 4."""
+    return compare(Plain(rk4), Plain(rk4_as_printed), seed)
 
 
-def misprint_claim(seed: int = SEED_OF_10) -> Claim:
-    """Judge the Riccati equation as printed."""
-    H, printed_H, rate = misprint(seed)
-    asymmetry = float(abs(printed_H[0, 1] - printed_H[1, 0]) / printed_H[1, 0])
-    gain = float(np.abs(printed_H[:, ::2] - H[:, ::2]).max() / np.abs(H[:, ::2]).max())
+def misprint() -> Claim:
+    """Judge the Riccati equation as printed: symmetric, or as good as what is."""
+    return misprint_claim(settle(rk4), settle(rk4_as_printed), compare_printed())
+
+
+def misprint_claim(H: np.ndarray, printed_H: np.ndarray, rate: Comparison) -> Claim:
+    """Judge by H where either equation settles at rest, and by the rates that they estimate."""
+    is_symmetric = abs(printed_H[0, 1] - printed_H[1, 0]) < 1e-6 * printed_H[1, 0]
     return Claim(
         place="After (10), the Riccati equation",
         statement="The symmetric gain matrix of (10) is the solution of H' = H A^T + A' H - H C^T C H + Q.",
-        holds=asymmetry < 1e-6 or rate.difference < HARMLESS * rate.error,
-        conditions=(
-            ""
-            if asymmetry < 1e-6
-            else "With A'^T for the printed A^T, which is that of (6): a misprint. The observer's rate is the same to "
-            f"{rate.difference / rate.error:.1%} of its error, whichever of them was run."
-        ),
-        otherwise="As printed it is not symmetric, and the observer would be another one.",
+        holds=is_symmetric or rate.difference < HARMLESS * rate.error,
+        conditions=""
+        if is_symmetric
+        else "With A'^T for the printed A^T, which is that of (6): a misprint. The observer's rate is the same to less "
+        "than a hundredth of its error, whichever of them was run.",
         figures={
             "H12_printed": float(printed_H[0, 1]),
             "H21_printed": float(printed_H[1, 0]),
             "H12": float(H[0, 1]),
-            "largest_change_of_gain_share": gain,
+            "largest_change_of_gain_share": float(np.abs((printed_H - H)[:, ::2]).max() / np.abs(H[:, ::2]).max()),
             "rate_changed_rad_s": rate.difference,
             "rate_error_rad_s": rate.error,
             "rate_error_printed_rad_s": rate.other_error,
@@ -228,9 +204,7 @@ def misprint_claim(seed: int = SEED_OF_10) -> Claim:
     )
 
 
-def misprint_claims(on_share: OnShare) -> list[Claim]:
-    """Judge the misprint."""
-    return [misprint_claim()]
+# --- observability ----------------------------------------------------------------------------------------------
 
 
 def observability_margin(a: float, outputs: np.ndarray = C) -> float:
@@ -272,38 +246,27 @@ def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, floa
 
 def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
     """Judge the uniform observability that (10) needs."""
-    grid = [
-        (u, y2)
-        for u in np.linspace(-StateFeedback.rate_limit, StateFeedback.rate_limit, 21)
-        for y2 in np.linspace(-math.pi, math.pi, 41)
-    ]
-    dampings = [float(damping(u, float(y2))) for u, y2 in grid]
+    limit = StateFeedback.rate_limit
+    u, y2 = np.meshgrid(np.linspace(-limit, limit, 21), np.linspace(-math.pi, math.pi, 41))
+    dampings = np.ravel(damping(u, y2)).tolist()
     margin = min(observability_margin(a) for a in dampings)
     margin_without_tilt = max(observability_margin(a, C[1:]) for a in dampings)
     run = run_of_10(seed)
-    least, largest = gramian_bounds(np.asarray(damping(run["u_rad_s"], run["y2_rad"])), DT, span_s)
+    along_run = gramian_bounds(np.asarray(damping(run["u_rad_s"], run["y2_rad"])), DT, span_s)
     extremes = [gramian_bounds(np.full(round(span_s / DT) + 1, a), DT, span_s) for a in (min(dampings), max(dampings))]
-    bound = min(pair[0] for pair in extremes), max(pair[1] for pair in extremes)
+    bounds = min(pair[0] for pair in extremes), max(pair[1] for pair in extremes)
     return Claim(
         place="After (10)",
         statement="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
-        assumes={"servo": f"at most {StateFeedback.rate_limit:g} rad/s"},
-        holds=margin > 0.1 and margin_without_tilt < 1e-12 and bound[0] > 0.0 and math.isfinite(bound[1]),
-        conditions=(
-            "Pointwise observability alone is not uniform; a bounded u, as the servos have it, closes the gap."
-        ),
-        otherwise="The pair is not observable for some u and y2, or not uniformly.",
+        assumes={"servo": f"at most {limit:g} rad/s"},
+        holds=margin > 0.1 and margin_without_tilt < 1e-12 and bounds[0] > 0.0 and math.isfinite(bounds[1]),
+        conditions="Pointwise observability alone is not uniform; a bounded u, as the servos have it, closes the gap.",
         figures={
             "rank_margin": margin,
             "rank_margin_without_tilt": margin_without_tilt,
             "largest_damping_1_s": max(map(abs, dampings)),
             "span_s": span_s,
-            "gramian_along_run": [least, largest],
-            "gramian_any_u": list(bound),
+            "gramian_along_run": list(along_run),
+            "gramian_any_u": list(bounds),
         },
     )
-
-
-def observability_claims(on_share: OnShare) -> list[Claim]:
-    """Judge the uniform observability that (10) needs."""
-    return [observability()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,21 +26,23 @@ RELEASE_S, WINDOW_S = 24.0, 6.0
 
 
 class Cycle(NamedTuple):
-    """The loop's motion by itself, let go without noise."""
+    """The loop's motion by itself."""
 
     sustained: bool
     """True if it oscillates without end."""
     amplitude_deg: float
-    """Half of the tilt's range over the last window [deg]."""
+    """Half of the tilt's range [deg]."""
     frequency_hz: float
-    """Frequency at which the tilt rate's spectrum has its peak there [Hz]."""
+    """Frequency of the tilt rate [Hz]."""
 
-    @property
-    def words(self) -> str:
-        """The cycle in words."""
-        if not self.sustained:
-            return "comes to rest"
-        return f"goes on oscillating by {self.amplitude_deg:.2f} deg to either side at {self.frequency_hz:.1f} Hz"
+
+class Cycles(NamedTuple):
+    """Releases without noise, behind the datasheet's gap."""
+
+    ends: Mapping[str, Cycle]
+    """Observer, and (9) with all terms in y2 -> what the loop ends in."""
+    predicted: Mapping[str, Cycle | None]
+    """Linear observer -> the same by its describing function."""
 
 
 def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Experiment:
@@ -51,7 +53,7 @@ def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -
 
 
 def find_cycles(releases: Sequence[Experiment]) -> list[Cycle]:
-    """Find the cycles that rigs let go end in, one world each."""
+    """Find the cycles that rigs let go end in, one world each: size and main frequency over the last window."""
     return [_cycle(trajectory_of(result)) for result in run_side_by_side([run_of(release, 1) for release in releases])]
 
 
@@ -66,12 +68,17 @@ def _cycle(trajectory: Trajectory) -> Cycle:
     )
 
 
-class PredictedCycle(NamedTuple):
-    """A cycle of the linear loop with the gap."""
+def cycles() -> Cycles:
+    """Find all cycles."""
+    releases = {name: make_release(name) for name in OBSERVERS}
+    # (9) but for J2, cos y2 and the sine: see `figure_3.nine_with_y2`.
+    nine = {"k1": L1, "k2": stiffness(experiment().plant.reduced), "alpha": 1.0}
+    releases[WITH_Y2] = make_release("homogeneous", **nine)
+    ends = dict(zip(releases, find_cycles(list(releases.values())), strict=True))
+    return Cycles(ends, {name: predict_cycle(name) for name in ("linear", "luenberger")})
 
-    amplitude_deg: float
-    """Amplitude of the tilt [deg]."""
-    frequency_hz: float
+
+# --- by the describing function of the linearised, sampled loop -------------------------------------------------
 
 
 def describing_function(c: float) -> complex:
@@ -84,7 +91,7 @@ def describing_function(c: float) -> complex:
     return complex(0.5 - (math.asin(c) + c * root) / math.pi, -root * root / math.pi)
 
 
-def predict_cycle(observer: str, points: int = 60) -> PredictedCycle | None:
+def predict_cycle(observer: str, points: int = 60) -> Cycle | None:
     """Return the largest motion that neither grows nor decays, of which larger ones decay and smaller ones grow.
 
     Args:
@@ -99,15 +106,14 @@ def predict_cycle(observer: str, points: int = 60) -> PredictedCycle | None:
     def turning(c: float) -> tuple[complex, np.ndarray]:
         """Return the least damped motion that turns forward faster than 1 rad/s: its factor a period, its shape."""
         factors, shapes = np.linalg.eig(loop(servo, share=describing_function(c)))
-        forward = np.angle(factors) > dt
-        index = int(np.argmax(np.where(forward, np.abs(factors), 0.0)))
+        index = int(np.argmax(np.where(np.angle(factors) > dt, np.abs(factors), 0.0)))
         return complex(factors[index]), shapes[:, index]
 
     def growth(c: float) -> float:
         return math.log(abs(turning(c)[0])) / dt
 
-    grid = np.linspace(-1.0, 0.98, points)
-    rates = [growth(float(c)) for c in grid]
+    grid = np.linspace(-1.0, 0.98, points).tolist()
+    rates = [growth(c) for c in grid]
     first = next((i for i in range(1, points) if rates[i - 1] < 0.0 <= rates[i]), None)
     if first is None:
         return None
@@ -115,23 +121,5 @@ def predict_cycle(observer: str, points: int = 60) -> PredictedCycle | None:
     factor, shape = turning(c)
     rate = math.atan2(factor.imag, factor.real) / dt
     motor = math.radians(GAP_ARCMIN / ARCMIN_A_DEGREE) / (1.0 + c)
-    return PredictedCycle(math.degrees(motor * rate * float(abs(shape[0]) / abs(shape[-1]))), rate / (2.0 * math.pi))
-
-
-class Cycles(NamedTuple):
-    """Releases without noise."""
-
-    ends: dict[str, Cycle]
-    """Observer, and (9) with all terms in y2 -> what the loop ends in."""
-    predicted: dict[str, PredictedCycle | None]
-    """Linear observer -> the same by its describing function."""
-
-
-def cycles() -> Cycles:
-    """Find all cycles."""
-    releases = {name: make_release(name) for name in OBSERVERS}
-    # (9) but for J2, cos y2 and the sine: see `figure_3.nine_with_y2`.
-    nine = {"k1": L1, "k2": stiffness(experiment().plant.reduced), "alpha": 1.0}
-    releases[WITH_Y2] = make_release("homogeneous", **nine)
-    ends = dict(zip(releases, find_cycles(list(releases.values())), strict=True))
-    return Cycles(ends, {name: predict_cycle(name) for name in ("linear", "luenberger")})
+    amplitude = math.degrees(motor * rate * float(abs(shape[0]) / abs(shape[-1])))
+    return Cycle(True, amplitude, rate / (2.0 * math.pi))

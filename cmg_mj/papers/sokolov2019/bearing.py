@@ -12,6 +12,7 @@ spring of stiffness (J_d w_d)^2/(2 I_z).
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -36,146 +37,15 @@ UPRIGHT = "plant.initial_tilt_deg=0.0"
 LOCKED = (BALANCED, UPRIGHT, "duration_s=3.0")
 """A push at 1 s is over by then."""
 FREE = (BALANCED, "plant.lock_thrust_bearing=false", "duration_s=7.0")
+PUSHED = "a push of the upright rig"
 CASES = {
-    "a push of the upright rig": (UPRIGHT,),
+    PUSHED: (UPRIGHT,),
     "let go 1 deg off, no push": ("plant.initial_tilt_deg=1.0", "push=[]"),
     "let go upright, no push": (UPRIGHT, "push=[]"),
 }
 """The cases of the rig on a free bearing."""
 
-
-class Stiffness(NamedTuple):
-    """The free bearing's numbers."""
-
-    yaw_inertia: float
-    """I_z upright, everything that yaws [kg m^2]."""
-    gyroscopic: float
-    """(J_d w_d)^2/(2 I_z) [N m/rad]."""
-    gravity: float
-    """m g l [N m/rad], the wrong way."""
-    poles: np.ndarray
-    """Poles of the law with the true rate on the linearised rig [1/s]."""
-
-
-def stiffness() -> Stiffness:
-    """Read off the model, with the law's poles when the tilt has lost its gravity to the yaw."""
-    plant = load_plant(model="single_gimbal.xml", equilibrium_bias_deg=0.0, initial_tilt_deg=0.0)
-    M = np.zeros((plant.model.nv, plant.model.nv))
-    mujoco.mj_fullM(plant.model, plant.new_data(), M)
-    r, law = plant.reduced, experiment().law
-    assert isinstance(law, StateFeedback)
-    I_z = float(M[plant.yaw, plant.yaw])
-    gyroscopic = (r.J_d * r.omega_d) ** 2 / (2.0 * I_z)
-    A_e = r.A_e.copy()
-    A_e[1, 0] = (r.gravity_torque - gyroscopic) / r.J1
-    return Stiffness(I_z, gyroscopic, r.gravity_torque, np.linalg.eigvals(A_e - r.B_e @ np.array([law.gains])))
-
-
-class Study(NamedTuple):
-    """Locked and free, over seeds, the law fed with the exact rate."""
-
-    locked: list[Locked]
-    """One run a world, with the push."""
-    pair: Locked
-    """The scissored pair in the same experiment."""
-    free: dict[str, Result]
-    """Case -> runs on a free bearing."""
-
-    @property
-    def mean_torque(self) -> np.ndarray:
-        """The torque without most of its noise: the mean over the worlds, (n_ticks,) [N m]."""
-        return np.mean([run.torque for run in self.locked], axis=0)
-
-    @property
-    def closed_form_error(self) -> float:
-        """Largest difference of dH/dt from MuJoCo's torque [N m]."""
-        plant = experiment([BALANCED]).plant
-        return float(max(np.abs(vertical_torque(plant, run.motion) - run.torque).max() for run in self.locked))
-
-
-def study(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Study:
-    """Run them all."""
-    settings = [f"seed={seed}", *LOCKED]
-    prepared = experiment(settings, feedback="truth")
-    locked = []
-    for world in range(worlds):
-        locked.append(locked_run(prepared, world))
-        on_share(0.6 * (world + 1) / worlds)
-    pair_settings = ["plant.model=scissored_pair.xml", "plant.lock_thrust_bearing=true"]
-    pair = locked_run(experiment([*settings, *pair_settings], feedback="truth"))
-    free = {
-        case: experiment([f"seed={seed}", *FREE, *changes], feedback="truth").run_many(worlds)
-        for case, changes in CASES.items()
-    }
-    return Study(locked, pair, free)
-
-
-def claim(runs: Study) -> Claim:
-    """Judge the thrust bearing, which the model of one tilt angle leaves out."""
-    worlds, error, k = len(runs.locked), runs.closed_form_error, stiffness()
-    peak = mean_interval([float(np.abs(run.torque_between(1.0, 1.6)).max()) for run in runs.locked])
-    noise_torque = mean_interval([float(rms(run.torque_between(0.5, 1.0))) for run in runs.locked])
-    peak_of_mean, pair = float(np.abs(runs.mean_torque).max()), float(np.abs(runs.pair.torque).max())
-    falls = {case: float(result.fell.mean()) for case, result in runs.free.items()}
-    ends = {
-        case: mean_interval([trajectory_of(result).world(i)["time_s"][-1] for i in range(worlds)])
-        for case, result in runs.free.items()
-    }
-    return Claim(
-        place="Fig. 2, the bearing",
-        statement="The pendulum has one degree of freedom, its tilt: there is no yaw in (1).",
-        assumes={**PUSH_AND_NOISE, "bearing": "locked"},
-        holds=error < 1e-9 and pair < 1e-6 * peak.mean,
-        conditions=(
-            "It is so with the thrust bearing locked. On a free bearing the tilt turns the rig about the vertical, and "
-            "the law lets the rig fall."
-            if falls["a push of the upright rig"] > 0.5
-            else ""
-        ),
-        otherwise="The bearing does not carry the torque of the closed form.",
-        figures={
-            "peak_torque_at_push_n_m": list(peak),
-            "peak_of_the_mean_torque_n_m": peak_of_mean,
-            "rms_torque_before_push_n_m": list(noise_torque),
-            "closed_form_error_n_m": error,
-            "peak_torque_of_the_pair_n_m": pair,
-            "yaw_inertia_kg_m2": k.yaw_inertia,
-            "gyroscopic_stiffness_n_m_rad": k.gyroscopic,
-            "gravity_stiffness_n_m_rad": k.gravity,
-            "poles_on_free_bearing_1_s": poles_as_pairs(k.poles),
-            "free": {case: {"fell_fraction": falls[case], "end_time_s": list(ends[case])} for case in CASES},
-            "worlds": worlds,
-        },
-        pictures=[_picture(runs)],
-    )
-
-
-def _picture(runs: Study) -> Picture:
-    example = runs.locked[0]
-    free = trajectory_of(runs.free["a push of the upright rig"]).world(0)
-    plant = experiment([BALANCED]).plant
-    t, s, push = example.time_s, free["time_s"], push_intervals(free)
-    x1, x3 = example.motion.q[:, 0] - plant.tilt_zero, example.motion.q[:, 1] - plant.axis.modules[0].gimbal_zero
-    torques = [
-        Line(t, example.torque, "on the bearing", color=1, width=0.5),
-        Line(t, runs.mean_torque, f"mean of {len(runs.locked)} seeds", color=3, width=1.2),
-        Line(runs.pair.time_s, runs.pair.torque, "scissored pair", color=2),
-    ]
-    panels = [
-        Panel("tilt [deg]", [Line(t, np.degrees(x1), color=0)], "locked bearing", shaded=push),
-        Panel("tilt [deg]", [Line(s, np.degrees(free["x1_rad"]), color=0)], "free bearing", shaded=push),
-        Panel("gimbal angle [deg]", [Line(t, np.degrees(x3), color=0)], shaded=push),
-        Panel("gimbal angle [deg]", [Line(s, np.degrees(free["x3_rad"]), color=0)], shaded=push),
-        Panel("torque about the\nvertical [N m]", torques, shaded=push),
-        Panel("yaw rate [rad/s]", [Line(s, free["rate/yaw_rad_s"], color=1)], shaded=push),
-    ]
-    title = "sokolov2019, Fig. 2: one gimbal on its thrust bearing, the exact rate in the law, a push at 1 s"
-    return Picture("sokolov2019-bearing", title, panels, columns=2)
-
-
-def claims(on_share: OnShare) -> list[Claim]:
-    """Judge Fig. 2."""
-    return [claim(study(on_share))]
+# --- the torque on a locked bearing -------------------------------------------------------------------------
 
 
 class Motion(NamedTuple):
@@ -186,17 +56,8 @@ class Motion(NamedTuple):
     a: np.ndarray
 
 
-def vertical_momentum(plant: Plant, motion: Motion) -> np.ndarray:
-    """Return H of the module's docstring, (...) [N m s]."""
-    r, inertia = plant.reduced, read_servo(plant).inertia
-    q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.axis.modules[0].gimbal_zero
-    w_b, w_c, w_d = np.moveaxis(motion.v, -1, 0)
-    spin = r.J_d * w_d * np.cos(x3) - 0.5 * r.J2 * np.sin(2.0 * x3) * w_b
-    return np.cos(q_b) * spin - np.sin(q_b) * inertia * w_c
-
-
 def vertical_torque(plant: Plant, motion: Motion) -> np.ndarray:
-    """Return dH/dt, (...) [N m]."""
+    """Return dH/dt of the module's docstring, (...) [N m]."""
     r, inertia = plant.reduced, read_servo(plant).inertia
     q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.axis.modules[0].gimbal_zero
     w_b, w_c, w_d = np.moveaxis(motion.v, -1, 0)
@@ -249,3 +110,125 @@ def locked_run(prepared: Experiment, world: int = 0) -> Locked:
             torques.append(float(inverse.qfrc_inverse[free.yaw]))
         mujoco.mj_step(plant.model, data)
     return Locked(np.array(times), Motion(*np.swapaxes(np.array(rows), 0, 1)), np.array(torques))
+
+
+# --- the study ----------------------------------------------------------------------------------------------
+
+
+class Study(NamedTuple):
+    """Locked and free, over seeds, the law fed with the exact rate."""
+
+    locked: Sequence[Locked]
+    """One run a world, with the push."""
+    pair: Locked
+    """The scissored pair in the same experiment."""
+    free: Mapping[str, Result]
+    """Case -> runs on a free bearing."""
+
+    @property
+    def mean_torque(self) -> np.ndarray:
+        """The torque without most of its noise: the mean over the worlds, (n_ticks,) [N m]."""
+        return np.mean([run.torque for run in self.locked], axis=0)
+
+
+def study(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Study:
+    """Run them all."""
+    settings = [f"seed={seed}", *LOCKED]
+    prepared = experiment(settings, feedback="truth")
+    locked = []
+    for world in range(worlds):
+        locked.append(locked_run(prepared, world))
+        on_share(0.6 * (world + 1) / worlds)
+    pair_settings = ["plant.model=scissored_pair.xml", "plant.lock_thrust_bearing=true"]
+    pair = locked_run(experiment([*settings, *pair_settings], feedback="truth"))
+    free = {
+        case: experiment([f"seed={seed}", *FREE, *changes], feedback="truth").run_many(worlds)
+        for case, changes in CASES.items()
+    }
+    return Study(locked, pair, free)
+
+
+def stiffness() -> dict[str, float | list]:
+    """Read a free bearing's numbers off the model.
+
+    Returns:
+        I_z upright, of everything that yaws [kg m^2]; (J_d w_d)^2/(2 I_z) and m g l, the wrong way [N m/rad]; the poles
+        of the law with the true rate when the tilt has lost its gravity to the yaw [1/s].
+    """
+    plant = load_plant(model="single_gimbal.xml", equilibrium_bias_deg=0.0, initial_tilt_deg=0.0)
+    M = np.zeros((plant.model.nv, plant.model.nv))
+    mujoco.mj_fullM(plant.model, plant.new_data(), M)
+    r, law = plant.reduced, experiment().law
+    assert isinstance(law, StateFeedback)
+    I_z = float(M[plant.yaw, plant.yaw])
+    gyroscopic = (r.J_d * r.omega_d) ** 2 / (2.0 * I_z)
+    A_e = r.A_e.copy()
+    A_e[1, 0] = (r.gravity_torque - gyroscopic) / r.J1
+    return {
+        "yaw_inertia_kg_m2": I_z,
+        "gyroscopic_stiffness_n_m_rad": gyroscopic,
+        "gravity_stiffness_n_m_rad": r.gravity_torque,
+        "poles_on_free_bearing_1_s": poles_as_pairs(np.linalg.eigvals(A_e - r.B_e @ np.array([law.gains]))),
+    }
+
+
+def claim(runs: Study) -> Claim:
+    """Judge the thrust bearing, which the model of one tilt angle leaves out."""
+    plant, worlds = experiment([BALANCED]).plant, len(runs.locked)
+    error = float(max(np.abs(vertical_torque(plant, run.motion) - run.torque).max() for run in runs.locked))
+    peak = mean_interval([float(np.abs(run.torque_between(1.0, 1.6)).max()) for run in runs.locked])
+    pair = float(np.abs(runs.pair.torque).max())
+    free = {
+        case: {
+            "fell_fraction": float(result.fell.mean()),
+            "end_time_s": mean_interval([trajectory_of(result).world(i)["time_s"][-1] for i in range(worlds)]),
+        }
+        for case, result in runs.free.items()
+    }
+    return Claim(
+        place="Fig. 2, the bearing",
+        statement="The pendulum has one degree of freedom, its tilt: there is no yaw in (1).",
+        assumes={**PUSH_AND_NOISE, "bearing": "locked"},
+        holds=error < 1e-9 and pair < 1e-6 * peak.mean,
+        conditions="It is so with the thrust bearing locked. On a free bearing the tilt turns the rig about the "
+        "vertical, and the law lets the rig fall.",
+        figures={
+            "peak_torque_at_push_n_m": peak,
+            "peak_of_the_mean_torque_n_m": float(np.abs(runs.mean_torque).max()),
+            "rms_torque_before_push_n_m": mean_interval(
+                [float(rms(run.torque_between(0.5, 1.0))) for run in runs.locked]
+            ),
+            "closed_form_error_n_m": error,
+            "peak_torque_of_the_pair_n_m": pair,
+            **stiffness(),
+            "free": free,
+            "worlds": worlds,
+        },
+        pictures=[_picture(runs, plant)],
+    )
+
+
+def _picture(runs: Study, plant: Plant) -> Picture:
+    example, free = runs.locked[0], trajectory_of(runs.free[PUSHED]).world(0)
+    t, s, push = example.time_s, free["time_s"], push_intervals(free)
+    x1, x3 = example.motion.q[:, 0] - plant.tilt_zero, example.motion.q[:, 1] - plant.axis.modules[0].gimbal_zero
+    torques = [
+        Line(t, example.torque, "on the bearing", color=1, width=0.5),
+        Line(t, runs.mean_torque, f"mean of {len(runs.locked)} seeds", color=3, width=1.2),
+        Line(runs.pair.time_s, runs.pair.torque, "scissored pair", color=2),
+    ]
+    panels = [
+        Panel("tilt [deg]", [Line(t, np.degrees(x1), color=0)], "locked bearing", shaded=push),
+        Panel("tilt [deg]", [Line(s, np.degrees(free["x1_rad"]), color=0)], "free bearing", shaded=push),
+        Panel("gimbal angle [deg]", [Line(t, np.degrees(x3), color=0)], shaded=push),
+        Panel("gimbal angle [deg]", [Line(s, np.degrees(free["x3_rad"]), color=0)], shaded=push),
+        Panel("torque about the\nvertical [N m]", torques, shaded=push),
+        Panel("yaw rate [rad/s]", [Line(s, free["rate/yaw_rad_s"], color=1)], shaded=push),
+    ]
+    title = "sokolov2019, Fig. 2: one gimbal on its thrust bearing, the exact rate in the law, a push at 1 s"
+    return Picture("sokolov2019-bearing", title, panels, columns=2)
+
+
+def claims(on_share: OnShare) -> list[Claim]:
+    """Judge Fig. 2."""
+    return [claim(study(on_share))]
