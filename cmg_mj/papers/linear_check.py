@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from cmg_mj.core.reduced_model import ReducedModel
@@ -22,6 +23,14 @@ def controllability_margin(A: np.ndarray, B: np.ndarray) -> float:
     for _ in range(len(A) - 1):
         columns.append(A @ columns[-1])
     return rank_margin(np.hstack(columns))
+
+
+def mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """Return MuJoCo's mass matrix at a state, (nv, nv)."""
+    mujoco.mj_forward(model, data)
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    return M
 
 
 def finite_difference_error(model: ReducedModel, h: float = 1e-5) -> float:

@@ -31,15 +31,7 @@ def test_a_true_lqr_gain_is_recognised_and_its_weights_found(weights: tuple[floa
     assert result.recovered < 1e-5
 
 
-def test_a_stabilising_gain_that_is_no_lqrs_is_recognised() -> None:
-    """Poles in the left half plane, but too little gain: the return difference dips below 1."""
-    K = np.array([22.0, 2.9, -1.0, 0.3])
-    assert np.linalg.eigvals(PAIR.A_e - PAIR.B_e @ K[None, :]).real.max() < 0.0
-    assert least_return_difference(K) < 1.0 - 1e-6
-    assert inverse_optimality(PAIR.A_e, PAIR.B_e, K).Q is None
-
-
-@pytest.mark.parametrize("scale", [0.55, 0.7, 0.85, 1.0, 1.3])
+@pytest.mark.parametrize("scale", [0.4, 0.55, 0.7, 0.85, 1.0, 1.3])
 def test_optimality_agrees_with_brute_force(scale: float) -> None:
     K = np.array(K_E) * [1.0, scale, 1.0, 1.0]
     assert (inverse_optimality(PAIR.A_e, PAIR.B_e, K).Q is not None) == (least_return_difference(K) >= 1.0 - 1e-9)

@@ -34,13 +34,9 @@ WITHIN = "reproduced within stated conditions"
 
 def test_figure_4_other_seeds() -> None:
     after_push, whole = section_5.figure_4(lambda share: None, 6, SEED)
-    assert after_push.verdict == "cannot be tested"
-    assert (whole.verdict, whole.holds) == ("cannot be tested", True)
-    figures = {**whole.figures, **after_push.figures}
-    assert figures["largest_by_smallest"] < section_5.COMPARABLE < figures["largest_by_smallest_after_push"]
-    errors = {name: figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
+    assert (after_push.verdict, after_push.holds) == (whole.verdict, not whole.holds) == ("cannot be tested", False)
+    errors = {name: after_push.figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
     assert errors["homogeneous"] > 1.3 * max(errors["linear"], errors["zero"])  # it misses the push
-    assert max(figures[f"rms_{name}_rad_s"].low for name in OBSERVERS) > figures["rms_zero_rad_s"].high
 
 
 @pytest.mark.parametrize(("last", "holds"), [(0.14, True), (0.16, False)])

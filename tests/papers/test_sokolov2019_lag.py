@@ -9,7 +9,7 @@ import pytest
 
 from cmg_mj.papers.sokolov2019 import lag, sampled_loop
 from cmg_mj.papers.sokolov2019.rig import experiment, read_servo
-from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, oscillation, rig_matrices
+from cmg_mj.papers.sokolov2019.sampled_loop import Servo, oscillation, rig_matrices
 from cmg_mj.results.trajectory import Trajectory
 from tests.plant import paper_model
 
@@ -54,12 +54,6 @@ def test_pole_of_the_sampled_loop_is_mujocos(lag_ms: float) -> None:
     pole_on_mujoco = np.log(np.roots([1.0, -a, -b]).astype(complex)[0]) / (8.0 * dt)
     assert abs(pole_on_mujoco.imag) == pytest.approx(pole.imag, rel=0.02)
     assert pole_on_mujoco.real == pytest.approx(pole.real, abs=0.15)
-
-
-def test_first_crossing() -> None:
-    assert first_crossing(lambda x: x**2 - 2.0, 0.0, 3.0) == pytest.approx(math.sqrt(2.0), abs=1e-6)
-    assert first_crossing(lambda x: -1.0 - x, 0.0, 3.0) is None
-    assert first_crossing(math.sin, 4.0, 9.0) == pytest.approx(2.0 * math.pi, abs=1e-6)
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ import numpy as np
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery, run_on_rigs
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.linear_check import mass_matrix
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.intervals import ratio_interval
@@ -134,11 +135,8 @@ def inertia_of(plant: Plant) -> Inertia:
     """Read off the mass matrix at the keyframe."""
     data = mujoco.MjData(plant.model)
     mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
-    mujoco.mj_forward(plant.model, data)
-    M = np.zeros((plant.model.nv, plant.model.nv))
-    mujoco.mj_fullM(plant.model, data, M)
-    module = plant.axis.modules[0]
-    return Inertia(*(float(M[i, i]) for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
+    M, module = np.diag(mass_matrix(plant.model, data)), plant.axis.modules[0]
+    return Inertia(*(float(M[i]) for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
 
 
 def carried_momentum(plant: Plant, trajectory: Trajectory) -> np.ndarray:

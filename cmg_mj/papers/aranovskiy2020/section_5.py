@@ -11,7 +11,7 @@ from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.recorded import loop_panels, on_common_scales, push_intervals, rms, trajectory_of
+from cmg_mj.papers.recorded import loop_panels, on_common_scales, open_loop_panels, rms, side_by_side, trajectory_of
 from cmg_mj.results.intervals import Interval, known_interval, mean_interval
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import KEYS
@@ -81,19 +81,12 @@ def comparable(span: str, rms_errors: Numbers, suffix: str = "", pictures: Seque
 
 
 def _open_loop_picture(example: Trajectory) -> Picture:
-    t, shaded = example["time_s"], push_intervals(example)
-    panels = [
-        Panel("tilt y1 [deg]", [Line(t, np.degrees(example["y1_rad"]), "measured", width=0.7)], "(a)", shaded=shaded),
-        Panel("command u [rad/s]", [Line(t, example["u_rad_s"], "u", color=3, width=0.7)], shaded=shaded),
-    ]
-    for i, (name, equation) in enumerate(OBSERVERS.items()):
-        lines = [
-            Line(t, example[f"estimate/{name}/x2_rad_s"], f"{equation} {name}", color=name, width=0.7),
-            Line(t, example["fog_rad_s"], "gyro", "k-", width=1.0),
-        ]
-        panels.append(Panel("tilt rate [rad/s]", lines, "(b)" if i == 0 else "", shaded=shaded, y_range=(-0.5, 0.45)))
+    tilt = Line(example["time_s"], np.degrees(example["y1_rad"]), "measured", width=0.7)
+    rates = {name: example[f"estimate/{name}/x2_rad_s"] for name in OBSERVERS}
     return Picture(
-        "aranovskiy2020-fig-4", "aranovskiy2020, Fig. 4: tuning, the law fed by the gyro, a push at 2 s", panels
+        "aranovskiy2020-fig-4",
+        "aranovskiy2020, Fig. 4: tuning, the law fed by the gyro, a push at 2 s",
+        open_loop_panels(example, rates, OBSERVERS, tilt, (-0.5, 0.45)),
     )
 
 
@@ -144,13 +137,8 @@ def _loop_picture(name: str, results: Mapping[str, Result]) -> Picture:
         column.insert(2, Panel("gimbal angle [deg]", gimbal, shaded=column[0].shaded))
         columns.append(column)
     number = FIGURES[name].removeprefix("Fig. ")
-    return Picture(
-        f"aranovskiy2020-fig-{number}",
-        f"aranovskiy2020, Fig. {number}: the loop closed on {OBSERVERS[name]}, the law on measured and on estimated "
-        "angles",
-        [panel for row in zip(*columns, strict=True) for panel in row],
-        columns=2,
-    )
+    title = f"the loop closed on {OBSERVERS[name]}, the law on measured and on estimated angles"
+    return side_by_side(f"aranovskiy2020-fig-{number}", f"aranovskiy2020, Fig. {number}: {title}", columns)
 
 
 # --- the order --------------------------------------------------------------------------------------------------

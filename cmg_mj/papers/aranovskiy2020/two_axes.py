@@ -15,6 +15,7 @@ from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_1
 from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.linear_check import mass_matrix
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 AXES = ("pitch", "roll")
@@ -68,15 +69,8 @@ def addresses(model: mujoco.MjModel, axis: int) -> Addresses:
     wheels = [int(model.joint(f"c{i}/flywheel").dofadr[0]) for i in cubes]
     data = at_rest(model)
     data.qpos[gimbals] -= math.pi / 2.0  # the wheel's momentum lies along the tilt axis: u > 0 turns it away
-    M = _mass_matrix(model, data)
+    M = mass_matrix(model, data)
     return Addresses(tilt, gimbals, servos, [math.copysign(1.0, M[tilt, wheel] * data.qvel[wheel]) for wheel in wheels])
-
-
-def _mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    mujoco.mj_forward(model, data)
-    M = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, M)
-    return M
 
 
 def at_rest(model: mujoco.MjModel) -> mujoco.MjData:
@@ -95,7 +89,7 @@ def at_rest(model: mujoco.MjModel) -> mujoco.MjData:
 def reduced(model: mujoco.MjModel, axis: int) -> ReducedModel:
     """Return the reduced model of an axis, by a gimbal's share of its pair, off the mass matrix; J2 is small."""
     data, tilt = at_rest(model), addresses(model, axis).tilt
-    J1 = float(_mass_matrix(model, data)[tilt, tilt]) / 2.0
+    J1 = float(mass_matrix(model, data)[tilt, tilt]) / 2.0
     data.qvel[:] = 0.0
     data.qpos[tilt] = math.pi / 2.0
     mujoco.mj_forward(model, data)

@@ -21,7 +21,7 @@ import numpy as np
 
 from cmg_mj.laws import StateFeedback
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.linear_check import poles_as_pairs
+from cmg_mj.papers.linear_check import mass_matrix, poles_as_pairs
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, experiment, read_servo
 from cmg_mj.plant.plant import Plant, load_plant
@@ -156,11 +156,9 @@ def stiffness() -> dict[str, float | list]:
         of the law with the true rate when the tilt has lost its gravity to the yaw [1/s].
     """
     plant = load_plant(model="single_gimbal.xml", equilibrium_bias_deg=0.0, initial_tilt_deg=0.0)
-    M = np.zeros((plant.model.nv, plant.model.nv))
-    mujoco.mj_fullM(plant.model, plant.new_data(), M)
     r, law = plant.reduced, experiment().law
     assert isinstance(law, StateFeedback)
-    I_z = float(M[plant.yaw, plant.yaw])
+    I_z = float(mass_matrix(plant.model, plant.new_data())[plant.yaw, plant.yaw])
     gyroscopic = (r.J_d * r.omega_d) ** 2 / (2.0 * I_z)
     A_e = r.A_e.copy()
     A_e[1, 0] = (r.gravity_torque - gyroscopic) / r.J1

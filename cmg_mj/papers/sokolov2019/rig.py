@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.papers.claim import Assumption
-from cmg_mj.papers.sokolov2019.paper import K_E, TABLE_II
+from cmg_mj.papers.sokolov2019.paper import TABLE_II
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -31,7 +30,7 @@ FINE = "plant.timestep_s=0.001"
 
 
 def experiment(settings: Sequence[str] = (), observer: str = "homogeneous", feedback: str = "observer") -> Experiment:
-    """Prepare the scenario `single_gimbal` with Table II.
+    """Prepare the scenario `single_gimbal`, which comes with Table II.
 
     Args:
         settings: Settings `section.field=value` that differ.
@@ -41,9 +40,7 @@ def experiment(settings: Sequence[str] = (), observer: str = "homogeneous", feed
     Returns:
         The experiment, ready to run.
     """
-    table_settings = {"controller.gains": K_E} | {f"observer.{key}": value for key, value in TABLE_II[observer].items()}
-    fields = [f"{key}={json.dumps(value)}" for key, value in table_settings.items()]
-    return prepare(load_scenario("single_gimbal", [*fields, f"controller.feedback={feedback}", *settings], observer))
+    return prepare(load_scenario("single_gimbal", [f"controller.feedback={feedback}", *settings], observer))
 
 
 def estimator(name: str, prepared: Experiment, **changes: Any) -> Observer:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cmg_mj.papers.claim import Assumption, Claim, OnShare
-from cmg_mj.papers.recorded import loop_panels, on_common_scales, trajectory_of
+from cmg_mj.papers.recorded import loop_panels, on_common_scales, side_by_side, trajectory_of
 from cmg_mj.papers.sokolov2019 import lag
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN, Cycles, cycles
 from cmg_mj.papers.sokolov2019.figure_3 import WITH_Y2
@@ -155,9 +155,7 @@ def picture(name: str, loops: Loops) -> Picture:
     ]
     number = NUMBERS[name]
     title = f"sokolov2019, Fig. {number}: {OBSERVERS[name]} in the loop, a push at 1 s (e = {SHOWN_DEG} deg)"
-    return Picture(
-        f"sokolov2019-fig-{number}", title, [panel for row in zip(*columns, strict=True) for panel in row], columns=2
-    )
+    return side_by_side(f"sokolov2019-fig-{number}", title, columns)
 
 
 def oscillation(
