@@ -9,11 +9,7 @@ from typing import Any, Literal
 
 from cmg_mj.view.plots.figure import Picture
 
-Verdict = Literal[
-    "reproduced", "reproduced within stated conditions", "illustrated", "cannot be tested", "not reproduced"
-]
-
-VERDICTS: dict[Verdict, str] = {
+VERDICTS = {
     "reproduced": "the claim holds, and the paper prints all that the claim depends on",
     "reproduced within stated conditions": "the claim holds with an assumption of ours (a push, a bias e, noise, a "
     "drive), with a misprint mended, or in part, as its row says",
@@ -87,7 +83,7 @@ class Claim:
         object.__setattr__(self, "holds", all(measures.values()) if measures else bool(self.holds))
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> str:
         """The comparison of the paper with what was obtained: the one rule, whose words are `VERDICTS`."""
         if self.missing_data:
             return "cannot be tested"

@@ -238,8 +238,8 @@ def printed_entries() -> dict[str, bool]:
     return {name: vanishes(entry - formula) for name, (entry, formula) in pairs.items()}
 
 
-def mixed_derivatives(sign: int = 1) -> bool:
-    """Step 2: whether the two expressions for db/dq demand m1 (m1'/m1)' d = sign * 2 d''.
+def mixed_derivatives() -> bool:
+    """Step 2: whether the two expressions for db/dq demand m1 (m1'/m1)' d = 2 d''.
 
     The appendix prints it with the other sign, which does not touch its conclusion.
     """
@@ -247,7 +247,7 @@ def mixed_derivatives(sign: int = 1) -> bool:
     db_dq1 = -d / (2 * m1) * sp.diff(m1, q2)
     db_dq2 = -sp.diff(d, q1) / m1
     difference = sp.diff(db_dq1, q2) - sp.diff(db_dq2, q1)
-    demanded = condition(m1) * d - sign * 2 * sp.diff(d, q1, 2)
+    demanded = condition(m1) * d - 2 * sp.diff(d, q1, 2)
     return vanishes(2 * m1 * difference + demanded)
 
 

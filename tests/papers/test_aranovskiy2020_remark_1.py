@@ -55,7 +55,8 @@ def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matte
         slope = H @ first.T + A @ H - H @ lost @ H + Q
         assert np.abs(slope).max() < 1e-6 * np.abs(H @ lost @ H).max()
     assert abs(printed_H[0, 1] / printed_H[1, 0] - 1.0) > 0.02
-    rate = riccati.compare_printed(SEED)
+    corrected, printed = forms_of_10.Plain(forms_of_10.rk4), forms_of_10.Plain(forms_of_10.rk4_as_printed)
+    rate = forms_of_10.compare(corrected, printed, SEED)
     assert 0.0 < rate.difference < 0.02 * rate.error
     assert riccati.misprint_claim(corrected_H, printed_H, rate).verdict == "reproduced within stated conditions"
     mattering = rate._replace(difference=0.1 * rate.error)

@@ -102,11 +102,6 @@ def test_a_wrong_bracket_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not plvcc.symmetric_part_is_lie_derivative(1, plvcc.ANY_M1)
 
 
-def test_the_sign_of_the_mixed_derivatives() -> None:
-    assert plvcc.mixed_derivatives()
-    assert not plvcc.mixed_derivatives(sign=-1)
-
-
 @pytest.mark.parametrize(
     ("paper", "place", "verdict", "factor"),
     [

@@ -20,7 +20,7 @@ from cmg_mj.papers.aranovskiy2020 import (
 from cmg_mj.papers.claim import Section, section
 
 SECTIONS: list[Section] = [
-    Section("two pairs at right angles", 2.0, two_axes.claims),
+    section("two pairs at right angles", 2.0, two_axes.one_axis_at_a_time),
     Section("constants and reduced model", 0.2, model.claims),
     section("linearisation", 0.1, model.linearisation, model.law_equilibria),
     Section("Hypotheses 1 to 3 kept and broken", 3.0, hypotheses.claims),

@@ -171,14 +171,10 @@ def settle(method: Method, h: float = 1e-3) -> np.ndarray:
     return H
 
 
-def compare_printed(seed: int = SEED_OF_10) -> Comparison:
-    """Compare the corrected equation with the printed one along a run, by Runge-Kutta 4."""
-    return compare(Plain(rk4), Plain(rk4_as_printed), seed)
-
-
 def misprint() -> Claim:
     """Judge the Riccati equation as printed: symmetric, or as good as what is."""
-    return misprint_claim(settle(rk4), settle(rk4_as_printed), compare_printed())
+    rates = compare(Plain(rk4), Plain(rk4_as_printed), SEED_OF_10)
+    return misprint_claim(settle(rk4), settle(rk4_as_printed), rates)
 
 
 def misprint_claim(H: np.ndarray, printed_H: np.ndarray, rate: Comparison) -> Claim:

@@ -14,7 +14,7 @@ from cmg_mj.inputs.files import find
 from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_1
 from cmg_mj.papers.aranovskiy2020.rig import DT
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
@@ -153,8 +153,13 @@ def coupling(push_n_m: float) -> Coupling:
     return Coupling(tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), float(np.abs(vertical).max()))
 
 
+def one_axis_at_a_time() -> Claim:
+    """Judge each axis alone."""
+    return axes_claim({push: coupling(push) for push in PUSHES_N_M})
+
+
 def axes_claim(couplings: dict[float, Coupling]) -> Claim:
-    """Judge each axis alone, by the first push."""
+    """Judge by the first push."""
     first, last = min(couplings), max(couplings)
     return Claim(
         place="Section I, one axis at a time",
@@ -192,12 +197,3 @@ def _picture(push: float, tilts: Coupling) -> Picture:
         f"aranovskiy2020, Section I: two pairs at right angles, {push:g} N m on an axis",
         panels,
     )
-
-
-def claims(on_share: OnShare) -> list[Claim]:
-    """Judge the two axes."""
-    couplings = {}
-    for i, push in enumerate(PUSHES_N_M):
-        couplings[push] = coupling(push)
-        on_share((i + 1) / len(PUSHES_N_M))
-    return [axes_claim(couplings)]
