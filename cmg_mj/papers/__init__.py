@@ -24,8 +24,8 @@ PAPERS = {
 }
 """Paper -> its title."""
 
-NEEDS = {"aranovskiy2020": ("sympy",), "sokolov2019": ("sympy",)}
-"""Paper -> the packages that it needs beyond the bench's; the extra `[papers]` has them all."""
+SYMBOLIC = {"aranovskiy2020", "sokolov2019"}
+"""The papers that need sympy, which the extra `[papers]` has."""
 
 
 @dataclass
@@ -54,12 +54,9 @@ def check_installed(papers: Iterable[str]) -> None:
     Raises:
         InputError: A package is missing.
     """
-    needed = {(paper, package) for paper in papers for package in NEEDS.get(paper, ())}
-    missing = sorted((paper, package) for paper, package in needed if find_spec(package) is None)
-    if missing:
-        paper_names = " and ".join(dict.fromkeys(paper for paper, _ in missing))
-        packages = " and ".join(dict.fromkeys(package for _, package in missing))
-        raise InputError(f'{paper_names}: {packages} is not installed: python -m pip install "cmg_mj[papers]"')
+    if (needing := sorted(SYMBOLIC.intersection(papers))) and find_spec("sympy") is None:
+        needing = " and ".join(needing)
+        raise InputError(f'{needing}: sympy is not installed: python -m pip install "cmg_mj[papers]"')
 
 
 def sections_of(paper: str) -> list[Section]:
@@ -83,25 +80,22 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
     check_installed(papers)
     sections = {paper: sections_of(paper) for paper in papers}
     entries = [Reproduction(paper) for paper in papers]
-    total = sum(section.seconds for paper_sections in sections.values() for section in paper_sections)
-    begin = 0.0
+    total = sum(section.seconds for of_paper in sections.values() for section in of_paper)
+    done = 0.0
     try:
         for entry in entries:
             for section in sections[entry.paper]:
-                on_share = _on_share(on_progress, f"{entry.paper}: {section.title}", begin, section.seconds, total)
+                label, begin, seconds = f"{entry.paper}: {section.title}", done, section.seconds
+
+                def on_share(share: float, label: str = label, begin: float = begin, span: float = seconds) -> None:
+                    on_progress(label, (begin + share * span) / total)
+
                 on_share(0.0)
                 start = time.perf_counter()
                 entry.claims += section.claims(on_share)
                 entry.seconds += time.perf_counter() - start
-                begin += section.seconds
+                done += seconds
             entry.complete = True
     except KeyboardInterrupt:
         pass
     return entries
-
-
-def _on_share(
-    on_progress: Callable[[str, float], None], label: str, begin: float, seconds: float, total: float
-) -> Callable[[float], None]:
-    """Turn a section's share into that of the whole, of which so many seconds lie before the section."""
-    return lambda share: on_progress(label, (begin + share * seconds) / total)

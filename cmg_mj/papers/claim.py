@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Literal
 
 from cmg_mj.view.plots.figure import Picture
 
-Verdict = Literal[
-    "reproduced", "reproduced within stated conditions", "illustrated", "cannot be tested", "not reproduced"
-]
-
-VERDICTS: dict[Verdict, str] = {
+VERDICTS = {
     "reproduced": "the claim holds, and the paper prints all that the claim depends on",
     "reproduced within stated conditions": "the claim holds with an assumption of ours (a push, a bias e, noise, a "
     "drive), with a misprint mended, or in part, as its row says",
@@ -86,7 +83,7 @@ class Claim:
         object.__setattr__(self, "holds", all(measures.values()) if measures else bool(self.holds))
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> str:
         """The comparison of the paper with what was obtained: the one rule, whose words are `VERDICTS`."""
         if self.missing_data:
             return "cannot be tested"
@@ -124,3 +121,8 @@ def obtain(parts: Sequence[Callable[[], Claim]], on_share: OnShare) -> list[Clai
         on_share(i / len(parts))
         claims.append(part())
     return claims
+
+
+def section(title: str, seconds: float, *parts: Callable[[], Claim]) -> Section:
+    """Make a section of claims that are obtained one by one."""
+    return Section(title, seconds, partial(obtain, parts))

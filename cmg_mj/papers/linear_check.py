@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
 import numpy as np
 
 from cmg_mj.core.reduced_model import ReducedModel
@@ -21,6 +25,14 @@ def controllability_margin(A: np.ndarray, B: np.ndarray) -> float:
     return rank_margin(np.hstack(columns))
 
 
+def mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """Return MuJoCo's mass matrix at a state, (nv, nv)."""
+    mujoco.mj_forward(model, data)
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    return M
+
+
 def finite_difference_error(model: ReducedModel, h: float = 1e-5) -> float:
     """Return the error of a model's A and B against central differences of its nonlinear form, by the largest entry."""
 
@@ -37,6 +49,16 @@ def model_difference(model: ReducedModel, reference: ReducedModel) -> float:
     """Return the largest relative difference of a reduced model's constants from the printed ones."""
     names = ("J1", "J2", "J_d", "omega_d", "gravity_torque")
     return max(abs(getattr(model, name) / getattr(reference, name) - 1.0) for name in names)
+
+
+def constants_of(model: ReducedModel) -> dict[str, float]:
+    """Return the constants of a reduced model for a claim's figures."""
+    return {
+        "J1_kg_m2": model.J1,
+        "J2_kg_m2": model.J2,
+        "spin_momentum_n_m_s": model.J_d * model.omega_d,
+        "gravity_torque_n_m": model.gravity_torque,
+    }
 
 
 def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[np.ndarray, np.ndarray]:
@@ -58,3 +80,23 @@ def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[
 def poles_as_pairs(poles: np.ndarray) -> list[list[float]]:
     """List poles, (n,), as [real part, imaginary part], which JSON can hold."""
     return [[float(p.real), float(p.imag)] for p in poles]
+
+
+def law_rests(model: ReducedModel, K_e: Sequence[float], static: int, integral: int) -> tuple[bool, dict[str, Any]]:
+    """Solve for the rests of the static law and of the one with the integrator, by their equations' numbers.
+
+    Returns:
+        Whether both are stable, the static one resting with the gimbal at k1/k3 e alone and the other with x_e at
+        k1/k4 e alone; and what was found, for a claim's figures.
+    """
+    K = np.array(K_e)
+    rest, poles = equilibrium(model.A, model.B, K[:3], 1.0)
+    rest_e, poles_e = equilibrium(model.A_e, model.B_e, K, 1.0)
+    x3, x_e = K[0] / K[2], K[0] / K[3]
+    miss = max(np.abs(rest - [0.0, 0.0, x3]).max() / abs(x3), np.abs(rest_e - [0.0, 0.0, 0.0, x_e]).max() / x_e)
+    return bool(miss < 1e-9 and max(np.real(poles).max(), np.real(poles_e).max()) < 0.0), {
+        f"gimbal_rest_of_{static}_rad_per_rad": rest[2],
+        f"integrator_rest_of_{integral}_s_per_rad": rest_e[3],
+        f"poles_of_{static}_1_s": poles_as_pairs(poles),
+        f"poles_of_{integral}_1_s": poles_as_pairs(poles_e),
+    }

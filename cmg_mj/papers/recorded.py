@@ -1,12 +1,16 @@
-"""Readings of a recorded run that several papers need."""
+"""Readings and pictures of recorded runs that several papers need."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
 import numpy as np
 
+from cmg_mj.papers.claim import Claim
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.view.plots.figure import Line, Panel
+from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 
 def trajectory_of(result: Result) -> Trajectory:
@@ -52,4 +56,63 @@ def loop_panels(run: Trajectory, name: str, equation: str, title: str, noise_wid
         Panel("tilt [deg]", tilt, title, shaded=shaded),
         Panel("tilt rate [rad/s]", rates, shaded=shaded),
         Panel("command u [rad/s]", [Line(t, run["u_rad_s"], "u", color=3, width=0.6)], shaded=shaded),
+    ]
+
+
+def side_by_side(name: str, title: str, columns: Sequence[Sequence[Panel]]) -> Picture:
+    """Lay out columns of panels."""
+    return Picture(name, title, [panel for row in zip(*columns, strict=True) for panel in row], columns=len(columns))
+
+
+def open_loop_panels(
+    run: Trajectory,
+    rates: Mapping[str, np.ndarray],
+    observers: Mapping[str, str],
+    tilt: Line,
+    y_range: tuple[float, float],
+) -> list[Panel]:
+    """Draw one world's measured tilt and command, and what each observer makes of it in open loop, beside the gyro.
+
+    Args:
+        run: Recording of one world.
+        rates: Observer -> its estimated tilt rate, (n_ticks,) [rad/s].
+        observers: Observer -> its equation in the paper.
+        tilt: Curve of the tilt; the others are as wide.
+        y_range: Limits of the rates [rad/s].
+
+    Returns:
+        The panels.
+    """
+    t, shaded = run["time_s"], push_intervals(run)
+    panels = [
+        Panel("tilt y1 [deg]", [tilt], "(a)", shaded=shaded),
+        Panel("command u [rad/s]", [Line(t, run["u_rad_s"], "u", color=3, width=tilt.width)], shaded=shaded),
+    ]
+    for name, equation in observers.items():
+        lines = [
+            Line(t, rates[name], f"{equation} {name}", color=name, width=tilt.width),
+            Line(t, run["fog_rad_s"], "gyro", "k-", width=1.0),
+        ]
+        panels.append(Panel("tilt rate [rad/s]", lines, "" if panels[2:] else "(b)", shaded=shaded, y_range=y_range))
+    return panels
+
+
+ROOM = 0.05
+"""Left above and below what is drawn, as a share of its range."""
+
+
+def on_common_scales(claims: Sequence[Claim]) -> list[Claim]:
+    """Give all panels of one quantity, in all claims' pictures, the range that they all need."""
+    values: dict[str, list[np.ndarray]] = {}
+    for panel in (panel for claim in claims for picture in claim.pictures for panel in picture.panels):
+        values.setdefault(panel.y_label, []).extend(np.asarray(line.y) for line in panel.lines)
+
+    def scaled(panel: Panel) -> Panel:
+        drawn = np.concatenate(values[panel.y_label])
+        low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
+        return replace(panel, y_range=(low - ROOM * (high - low), high + ROOM * (high - low)))
+
+    return [
+        replace(claim, pictures=[replace(p, panels=[scaled(panel) for panel in p.panels]) for p in claim.pictures])
+        for claim in claims
     ]

@@ -79,10 +79,21 @@ def found(claim: Claim) -> str:
     return "; ".join([*measures, *flat[:SHOWN], *more])
 
 
+def _place(claim: Claim) -> str:
+    return f"{claim.place} (not the paper's)" if claim.is_ours else claim.place
+
+
 def verdict_table(entries: Sequence[Reproduction]) -> str:
     """Write every claim and its verdict as a Markdown table."""
     rows = [(entry.paper, _place(claim), claim.statement, claim.verdict) for entry in entries for claim in entry.claims]
     return markdown_table(("paper", "place", "claim", "verdict"), rows, text_columns=4)
+
+
+def _row(claim: Claim) -> tuple[str, ...]:
+    pictures = [f"[picture]({picture.name}.png)" for picture in claim.pictures]
+    assumed = "; ".join(f"{name}: {size}" for name, size in claim.assumes.items())
+    conditions = " ".join(filter(None, (f"Assumed: {assumed}." if assumed else "", claim.reason)))
+    return " ".join([_place(claim), *pictures]), claim.statement, found(claim), claim.verdict, conditions
 
 
 def report_text(entries: Sequence[Reproduction]) -> str:
@@ -97,31 +108,15 @@ def report_text(entries: Sequence[Reproduction]) -> str:
     claims = [claim for entry in entries for claim in entry.claims]
     for is_ours, whose in ((False, "claims of the papers"), (True, "claims beside them, not the papers'")):
         counts = Counter(claim.verdict for claim in claims if claim.is_ours is is_ours)
-        if counts:
-            counted = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
-            parts.append(f"{sum(counts.values())} {whose}: {counted}.")
+        counted = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+        parts += [f"{counts.total()} {whose}: {counted}."] if counts else []
     for entry in entries:
         parts.append(f"## {entry.paper}: {PAPERS[entry.paper]}")
         if not entry.complete:
             parts.append("**Interrupted: not all of this paper's claims are here.**")
         headings = ("place", "claim", "found", "verdict", "conditions")
         parts.append(markdown_table(headings, [_row(claim) for claim in entry.claims], text_columns=5))
-    return "\n\n".join(wrap(part) for part in parts) + "\n"
-
-
-def _place(claim: Claim) -> str:
-    return f"{claim.place} (not the paper's)" if claim.is_ours else claim.place
-
-
-def _row(claim: Claim) -> tuple[str, str, str, str, str]:
-    pictures = [f"[picture]({picture.name}.png)" for picture in claim.pictures]
-    assumed = "; ".join(f"{name}: {size}" for name, size in claim.assumes.items())
-    conditions = " ".join(filter(None, (f"Assumed: {assumed}." if assumed else "", claim.reason)))
-    return " ".join([_place(claim), *pictures]), claim.statement, found(claim), claim.verdict, conditions
-
-
-REPORT_FILES = ["report.md", "figures.json"]
-"""The files of every report; its pictures are beside them."""
+    return "\n\n".join(map(wrap, parts)) + "\n"
 
 
 def save_report(folder: RunFolder | Path, entries: Sequence[Reproduction]) -> Path:

@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import solve_continuous_are
 
 from cmg_mj.laws.state_feedback import lqr_gains
-from cmg_mj.papers.aranovskiy2020 import optimality
-from cmg_mj.papers.aranovskiy2020.optimality import inverse_optimality, nearest_diagonal
+from cmg_mj.papers.aranovskiy2020 import gains
+from cmg_mj.papers.aranovskiy2020.gains import inverse_optimality, nearest_diagonal
 from cmg_mj.papers.aranovskiy2020.paper import K_E, K_E_ROUNDING, printed_model
 
 PAIR = printed_model()
@@ -26,46 +26,26 @@ def least_return_difference(K: np.ndarray) -> float:
 def test_a_true_lqr_gain_is_recognised_and_its_weights_found(weights: tuple[float, ...]) -> None:
     P = solve_continuous_are(PAIR.A_e, PAIR.B_e, np.diag(weights), np.eye(1))
     result = inverse_optimality(PAIR.A_e, PAIR.B_e, (PAIR.B_e.T @ P)[0])
-    assert result.optimal
+    assert result.recovered is not None
     np.testing.assert_allclose(result.diagonal, weights, rtol=1e-5)
     assert result.recovered < 1e-5
 
 
-def test_a_stabilising_gain_that_is_no_lqrs_is_recognised() -> None:
-    """Poles in the left half plane, but too little gain: the return difference dips below 1."""
-    K = np.array([22.0, 2.9, -1.0, 0.3])
-    assert np.linalg.eigvals(PAIR.A_e - PAIR.B_e @ K[None, :]).real.max() < 0.0
-    assert least_return_difference(K) < 1.0 - 1e-6
-    assert not inverse_optimality(PAIR.A_e, PAIR.B_e, K).optimal
-
-
-@pytest.mark.parametrize("scale", [0.55, 0.7, 0.85, 1.0, 1.3])
+@pytest.mark.parametrize("scale", [0.4, 0.55, 0.7, 0.85, 1.0, 1.3])
 def test_optimality_agrees_with_brute_force(scale: float) -> None:
     K = np.array(K_E) * [1.0, scale, 1.0, 1.0]
-    assert inverse_optimality(PAIR.A_e, PAIR.B_e, K).optimal == (least_return_difference(K) >= 1.0 - 1e-9)
+    assert (inverse_optimality(PAIR.A_e, PAIR.B_e, K).Q is not None) == (least_return_difference(K) >= 1.0 - 1e-9)
 
 
 def test_a_diagonal_cost_gives_the_printed_gains_to_their_digits() -> None:
     """By python-control, which the search does not use; rounded as they are printed."""
-    claim = optimality.lqr_gains()
+    claim = gains.lqr_gains()
     assert claim.verdict == "reproduced"
     gain = lqr_gains(PAIR, claim.figures["diagonal_within_rounding"], 1.0)
     assert [round(k) for k in gain[:3]] + [round(gain[3], 1)] == list(K_E)
-    # Another one than the search finds.
-    other_gain = np.array(lqr_gains(PAIR, (405.6, 2.26, 0.223, 0.096), 1.0))
-    assert (np.abs(other_gain - K_E) / K_E_ROUNDING).max() < 1.0
-    np.testing.assert_allclose(other_gain, (34.68, 4.07, -1.325, 0.310), atol=0.005)
 
 
 def test_a_search_that_starts_far_off_comes_near() -> None:
     weights = np.array([900.0, 3.0, 0.8, 0.2])
-    K = optimality.lqr_gain(PAIR.A_e, PAIR.B_e, weights)
-    result = nearest_diagonal(PAIR.A_e, PAIR.B_e, K, np.array(K_E_ROUNDING), 1.5 * weights)
-    assert result.off < 0.1
-
-
-def test_to_more_digits_no_diagonal_cost_gives_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(optimality, "K_E_ROUNDING", (0.05, 0.05, 0.05, 0.005))
-    claim = optimality.lqr_gains()
-    assert claim.verdict == "reproduced within stated conditions"
-    assert "not even to the digits printed" in claim.reason
+    K = gains.lqr_gain(PAIR.A_e, PAIR.B_e, np.diag(weights))
+    assert nearest_diagonal(PAIR.A_e, PAIR.B_e, K, K_E_ROUNDING, 1.5 * weights)[1] < 0.1

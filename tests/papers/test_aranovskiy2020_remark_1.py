@@ -5,17 +5,17 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
 from cmg_mj.features.replay import replay
 from cmg_mj.observers import Estimate, Measurement, make_observer
-from cmg_mj.papers.aranovskiy2020 import by_euler, delicacy, forms_of_10, misprint, on_the_board, update_cost
-from cmg_mj.papers.aranovskiy2020.delicacy import transient
-from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, printed_model, riccati_slope, settled_gains
+from cmg_mj.papers.aranovskiy2020 import forms_of_10, riccati, update_cost
+from cmg_mj.papers.aranovskiy2020.paper import A_prime, C, Q, printed_model, settled_gains
+from cmg_mj.papers.aranovskiy2020.riccati import transient
 from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
 from cmg_mj.results.trajectory import Trajectory
 
@@ -27,44 +27,6 @@ def test_methods_converge_with_their_orders_and_ours_is_exact() -> None:
         errors = [transient(method, rate).error for rate in (1000.0, 2000.0)]
         assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
     assert transient("exact step (ours)", 37.0).error < 1e-10
-
-
-def test_error_of_the_gain_by_another_integration() -> None:
-    """H12 by scipy, where Euler at 200 Hz has it."""
-    euler = transient("explicit Euler", 200.0)
-    t = np.arange(1, len(euler.path) + 1) / 200.0
-    truth = solve_ivp(
-        lambda _, h: riccati_slope(h.reshape(3, 3), A_prime()).ravel(),
-        (0.0, t[-1]),
-        H_0.ravel(),
-        t_eval=t,
-        rtol=1e-10,
-        atol=1e-10,
-    ).y[1]
-    assert euler.error == pytest.approx(np.abs(euler.path - truth).max() / math.sqrt(5e6), rel=1e-6)
-
-
-def test_definiteness_is_lost_at_low_rates() -> None:
-    assert transient("explicit Euler", 150.0).least < 0.0
-    assert transient("explicit Euler", 190.0).least > 0.0
-    assert transient("Runge-Kutta 4", 31.0).least < 0.0
-    assert transient("Runge-Kutta 4", 40.0).least > 0.0
-    assert transient("exact step (ours)", 5.0).least > 0.0
-
-
-def test_the_lowest_rate_lies_between_one_that_fails_and_one_that_does_not() -> None:
-    sweep = {rate: transient("explicit Euler", rate) for rate in (100.0, 150.0, 190.0, 400.0)}
-    rate_hz = delicacy.lowest_rate("explicit Euler", sweep, lambda t: t.least > 0.0)
-    assert rate_hz is not None
-    assert transient("explicit Euler", rate_hz).least > 0.0 >= transient("explicit Euler", rate_hz - 0.1).least
-    assert delicacy.lowest_rate("explicit Euler", sweep, lambda t: True) is None
-
-
-def test_single_precision_does_no_harm_to_runge_kutta() -> None:
-    double, single = (transient("Runge-Kutta 4", 200.0, single_precision=s) for s in (False, True))
-    assert single.error == pytest.approx(double.error, rel=0.2)
-    assert single.error != double.error
-    assert single.least > 0.0
 
 
 def test_plain_form_agrees_with_ours_at_a_small_step() -> None:
@@ -85,62 +47,40 @@ def test_plain_form_agrees_with_ours_at_a_small_step() -> None:
     assert abs(2.0 * differences[1] - differences[0]) < 0.05 * differences[1]  # in proportion to it, to nothing
 
 
-def test_euler_makes_the_estimate_worse() -> None:
-    comparison = forms_of_10.compare_euler(SEED)
-    assert comparison.other_error > 1.1 * comparison.error
-
-
 def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matters() -> None:
-    """It settles at a root of its nine equations."""
-    corrected_H, printed_H, rate = misprint.misprint(SEED)
+    """It settles at a root of its nine equations. Judged as printed: symmetric, or as good as what is."""
+    corrected_H, printed_H = riccati.settle(forms_of_10.rk4), riccati.settle(forms_of_10.rk4_as_printed)
     A, lost = A_prime(), C.T @ C
     for H, first in ((corrected_H, A), (printed_H, printed_model().A)):
         slope = H @ first.T + A @ H - H @ lost @ H + Q
         assert np.abs(slope).max() < 1e-6 * np.abs(H @ lost @ H).max()
-    assert abs(corrected_H[0, 1] / corrected_H[1, 0] - 1.0) < 1e-9
     assert abs(printed_H[0, 1] / printed_H[1, 0] - 1.0) > 0.02
+    corrected, printed = forms_of_10.Plain(forms_of_10.rk4), forms_of_10.Plain(forms_of_10.rk4_as_printed)
+    rate = forms_of_10.compare(corrected, printed, SEED)
     assert 0.0 < rate.difference < 0.02 * rate.error
-
-
-def test_the_misprint_is_one_that_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Judged as printed: symmetric, or as good as what is."""
-    claim = misprint.misprint_claim(SEED)
-    assert claim.verdict == "reproduced within stated conditions"
-    right = misprint.misprint(SEED)
-    mattering = right.rate._replace(difference=0.1 * right.rate.error)
-    monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(rate=mattering))
-    assert misprint.misprint_claim(SEED).verdict == "not reproduced"
-    monkeypatch.setattr(misprint, "misprint", lambda seed: right._replace(printed_H=right.corrected_H, rate=mattering))
-    assert misprint.misprint_claim(SEED).verdict == "reproduced"
+    assert riccati.misprint_claim(corrected_H, printed_H, rate).verdict == "reproduced within stated conditions"
+    mattering = rate._replace(difference=0.1 * rate.error)
+    assert riccati.misprint_claim(corrected_H, printed_H, mattering).verdict == "not reproduced"
+    assert riccati.misprint_claim(corrected_H, corrected_H, mattering).verdict == "reproduced"
 
 
 @pytest.mark.parametrize("exact_gain", [False, True])
 def test_ten_by_euler_on_floats_and_arrays_is_the_plain_one(exact_gain: bool) -> None:
     run = run_of_10(SEED)
     plain = replay(forms_of_10.Plain(forms_of_10.euler), run).x2
-    by_floats = replay(by_euler.TenByEuler(DT, printed_model(), exact_gain), run).x2
+    by_floats = replay(forms_of_10.TenByEuler(DT, printed_model(), exact_gain), run).x2
     late = slice(200 if exact_gain else 0, None)
     np.testing.assert_allclose(by_floats[late], plain[late], atol=2e-4 if exact_gain else 1e-9)
     columns = {name: np.stack([run[name]] * 2, axis=1) for name in ("y1_rad", "y2_rad", "u_rad_s")}
-    by_arrays = replay(by_euler.TenByEuler(DT, printed_model(), exact_gain), Trajectory(columns)).x2
+    by_arrays = replay(forms_of_10.TenByEuler(DT, printed_model(), exact_gain), Trajectory(columns)).x2
     np.testing.assert_allclose(by_arrays[:, 1], by_floats, rtol=1e-9, atol=1e-12)
-
-
-def test_with_the_exact_gain_h_is_the_benchs() -> None:
-    """A step of H at rest, from H_0 and half settled."""
-    y, form = Measurement(0.0, 0.0), by_euler.TenByEuler(0.005, printed_model(), exact_gain=True)
-    state, exact = form.init(y), forms_of_10.make_exact(0.005)
-    entries = exact.init(y)
-    for _ in range(20):
-        state, entries = form.step(state, y, 0.0)[0], exact.step(entries, y, 0.0)[0]
-        assert state[3:] == pytest.approx((entries.h11, entries.h12, entries.h22, entries.h33), rel=1e-9)
 
 
 def test_eleven_by_euler_approaches_the_benchs() -> None:
     """The difference fades with the step; with a J2 whose drag on the rate is seen."""
     model, differences = dataclasses.replace(printed_model(), J2=-0.03), []
     for dt in (1e-3, 2.5e-4):
-        euler, exact = by_euler.ElevenByEuler(dt, model), make_observer("homogeneous", dt, model)
+        euler, exact = forms_of_10.ElevenByEuler(dt, model), make_observer("homogeneous", dt, model)
         y = Measurement(0.01, 0.2)
         a, b, rates = euler.init(y), exact.init(y), (0.0, 0.0)
         for k in range(round(0.3 / dt)):
@@ -152,21 +92,17 @@ def test_eleven_by_euler_approaches_the_benchs() -> None:
     assert differences[1] < 0.01
 
 
-def test_what_an_update_costs() -> None:
-    """Four slopes of H a step take longer than one, and (10) longer than (11), that longer than (9)."""
-    times = update_cost.update_times(None, turns=1, updates=20)
+def test_the_cost_of_an_update(tmp_path: Path) -> None:
+    """As the instructions are recorded, (11) is the dearest; were its powers for nothing, (10) would be."""
+    recorded = json.loads(update_cost.RECORDED.read_text())
+    claim = update_cost.cost()
+    assert claim.verdict == "not reproduced"
+    times = claim.figures["update_us"]
     assert times["ltv, plain Runge-Kutta 4"] > times["ltv, plain Euler"]
     assert times["ltv"] > times["homogeneous"] > times["linear"] > 0.0
-
-
-def test_the_verdict_on_the_cost_follows_from_the_instructions(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As they are recorded, (11) is the dearest; were its powers for nothing, (10) would be."""
-    recorded = json.loads(on_the_board.RECORDED.read_text())
-    for powers_cost, verdict in ((True, "not reproduced"), (False, "reproduced")):
-        board = recorded if powers_cost else recorded | {"homogeneous": 2.0 * recorded["linear"]}
-        monkeypatch.setattr(update_cost, "instructions", lambda board=board: board)
-        claim = update_cost.cost()
-        assert claim.verdict == verdict
+    path = tmp_path / "cheap.json"
+    path.write_text(json.dumps(recorded | {"homogeneous": 2.0 * recorded["linear"]}))
+    assert update_cost.cost(path).verdict == "reproduced"
 
 
 def test_settled_gains_solve_the_algebraic_riccati_equation() -> None:

@@ -3,21 +3,50 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
-from cmg_mj.papers.aranovskiy2020 import comparison, figure_4, figures_5_to_7, second_place
-from cmg_mj.papers.aranovskiy2020.comparison import AngleSource, Measure, judge_order
-from cmg_mj.papers.aranovskiy2020.figures_5_to_7 import ANGLES, close_loops, figure
+from cmg_mj.papers.aranovskiy2020 import section_5
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.papers.aranovskiy2020.second_place import ELEVEN, ELEVEN_BY_EULER, TEN, TEN_BY_EULER, TEN_EXACT_GAIN
+from cmg_mj.papers.aranovskiy2020.section_5 import (
+    ANGLES,
+    ELEVEN,
+    ELEVEN_BY_EULER,
+    JUDGED,
+    TEN,
+    TEN_BY_EULER,
+    TEN_EXACT_GAIN,
+    close_loops,
+    figure,
+    order,
+)
 from cmg_mj.results.intervals import mean_interval
 from cmg_mj.results.result import Outcome, Result
 
 SEED = 910_000
 WITHIN = "reproduced within stated conditions"
+
+
+# --- Fig. 4 -----------------------------------------------------------------------------------------------------
+
+
+def test_figure_4_other_seeds() -> None:
+    after_push, whole = section_5.figure_4(lambda share: None, 6, SEED)
+    assert (after_push.verdict, after_push.holds) == (whole.verdict, not whole.holds) == ("cannot be tested", False)
+    errors = {name: after_push.figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
+    assert errors["homogeneous"] > 1.3 * max(errors["linear"], errors["zero"])  # it misses the push
+
+
+@pytest.mark.parametrize(("last", "holds"), [(0.14, True), (0.16, False)])
+def test_comparable_is_within_a_factor(last: float, holds: bool) -> None:
+    """Of the observers; zero does not count."""
+    sizes = zip((*OBSERVERS, "zero"), (0.1, 0.12, last, 9.0), strict=True)
+    assert section_5.comparable("", {name: np.full(2, size) for name, size in sizes}).holds is holds
+
+
+# --- the order --------------------------------------------------------------------------------------------------
 
 
 def numbers(homogeneous: float, ltv: float, linear: float, scatter: float = 0.0) -> dict[str, np.ndarray]:
@@ -26,91 +55,36 @@ def numbers(homogeneous: float, ltv: float, linear: float, scatter: float = 0.0)
     return {"homogeneous": homogeneous + wave, "ltv": ltv - wave, "linear": linear + wave}
 
 
-# --- Fig. 4 -----------------------------------------------------------------------------------------------------
-
-
-def test_figure_4_other_seeds() -> None:
-    after_push, whole = figure_4.figure_4(6, SEED)
-    assert after_push.verdict == "cannot be tested"
-    assert (whole.verdict, whole.holds) == ("cannot be tested", True)
-    figures = {**whole.figures, **after_push.figures}
-    assert figures["largest_by_smallest"] < figure_4.COMPARABLE < figures["largest_by_smallest_after_push"]
-    errors = {name: figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
-    assert errors["homogeneous"] > 1.3 * max(errors["linear"], errors["zero"])  # it misses the push
-    assert max(figures[f"rms_{name}_rad_s"].low for name in OBSERVERS) > figures["rms_zero_rad_s"].high
-    assert "closer than (10) and (11)." in after_push.reason
-    assert "closer than (9), (10) and (11)." in whole.reason
-
-
-@pytest.mark.parametrize(("last", "holds"), [(0.14, True), (0.16, False)])
-def test_figure_4_is_judged_by_each_span(monkeypatch: pytest.MonkeyPatch, last: float, holds: bool) -> None:
-    """Errors within a factor of 1.5 after the push hold there, whatever the whole run says, and the other way round."""
-    runs = figure_4.run_open_loop(2, SEED)
-    push = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.12, last, 0.11), strict=True)}
-    whole = {name: np.full(2, size) for name, size in zip((*OBSERVERS, "zero"), (0.1, 0.5, 0.9, 0.01), strict=True)}
-    monkeypatch.setattr(figure_4, "run_open_loop", lambda *_: runs._replace(whole=whole, after_push=push))
-    after_push, over_all = figure_4.figure_4(2, SEED)
-    assert (after_push.holds, over_all.holds) == (holds, False)
-    assert after_push.verdict == over_all.verdict == "cannot be tested"
-    assert "zero is closer than (10) and (11)." in after_push.reason
-    assert "zero is closer than (9), (10) and (11)." in over_all.reason
-    monkeypatch.setattr(figure_4, "run_open_loop", lambda *_: runs._replace(whole=push, after_push=whole))
-    assert [claim.holds for claim in figure_4.figure_4(2, SEED)] == [False, holds]
-
-
-# --- the order --------------------------------------------------------------------------------------------------
-
-
-def test_an_order_is_one_beyond_chance_in_both_steps() -> None:
-    assert judge_order(numbers(0.05, 0.07, 0.11)) == "holds"
-    assert judge_order(numbers(0.11, 0.07, 0.05)) == "is inverted"
-    assert judge_order(numbers(0.07, 0.05, 0.11)) == "does not hold"
-    assert judge_order(numbers(0.05, 0.11, 0.07)) == "does not hold"
-    # The means are in order, or inverted, but a difference of this scatter may be none.
-    assert judge_order(numbers(0.05, 0.07, 0.11, 0.02)) == "does not hold"
-    assert judge_order(numbers(0.11, 0.07, 0.05, 0.02)) == "does not hold"
-    one_world = {name: np.array([0.05, math.nan, math.nan]) for name in OBSERVERS}
-    assert comparison.differences(one_world) == [None, None]
-    assert judge_order(one_world) == "does not hold"
+@pytest.mark.parametrize(
+    ("by_name", "holds"),
+    [
+        (numbers(0.05, 0.07, 0.11), True),
+        (numbers(0.11, 0.07, 0.05), False),
+        (numbers(0.07, 0.05, 0.11), False),
+        (numbers(0.05, 0.11, 0.07), False),
+        (numbers(0.05, 0.07, 0.11, 0.02), False),  # a difference of this scatter may be none
+        ({name: np.array([0.05, math.nan, math.nan]) for name in OBSERVERS}, False),
+    ],
+)
+def test_an_order_is_one_beyond_chance_in_both_steps(by_name: dict[str, np.ndarray], holds: bool) -> None:
+    """On all angles."""
+    right = numbers(0.05, 0.07, 0.11)
+    claim = order("tilt_rms_deg", {"measured": right, "estimated": by_name})
+    assert claim.measures == {"measured angles": True, "estimated angles": holds}
+    assert claim.figures["linear_less_ltv_measured_angles_tilt_rms_deg"].mean == pytest.approx(0.04)
 
 
 @pytest.mark.parametrize("angles", ANGLES)
-def test_order_of_the_observers_in_the_loop(angles: AngleSource) -> None:
-    measures = comparison.read_measures({angles: close_loops(list(OBSERVERS), angles, 6, SEED, 8.0)})
-    print({m.key: {name: v.mean() for name, v in m.numbers[angles].items()} for m in measures})
-    orders = {measure.key: measure.orders[angles] for measure in measures}
-    assert orders["velocity_rms_error_rad_s"] == orders["command_rms_rad_s"] == "holds"
-    assert orders["tilt_rms_deg"] != "holds"
-    verdicts = [claim.verdict for claim in comparison.orders(measures)]
+def test_order_of_the_observers_in_the_loop(angles: str) -> None:
+    claims = section_5.orders({angles: close_loops(list(OBSERVERS), angles, 6, SEED, 8.0)})
+    verdicts = [claim.verdict for claim in claims]
     assert [verdicts[0], verdicts[2], verdicts[3]] == [WITHIN, "not reproduced", WITHIN]
-
-
-def of_measures(velocity: Mapping[AngleSource, dict], tilt: Mapping[AngleSource, dict]) -> list[Measure]:
-    return [Measure("velocity_rms_error_rad_s", velocity), Measure("tilt_rms_deg", tilt)]
-
-
-def test_the_order_is_judged_by_each_measure_on_all_angles() -> None:
-    right, inverted = numbers(0.05, 0.07, 0.11), numbers(0.11, 0.07, 0.05)
-    velocity: dict[AngleSource, dict] = {"measured": right, "estimated": right}
-    by_error, by_tilt = comparison.orders(of_measures(velocity, {"measured": inverted, "estimated": inverted}))
-    assert (by_error.verdict, by_tilt.verdict) == (WITHIN, "not reproduced")
-    assert "It is inverted: (9), (10), (11)." in by_tilt.reason
-    assert by_error.place.endswith("velocity RMS error")
-    assert by_tilt.place.endswith("tilt RMS")
-    step = by_error.figures["linear_less_ltv_measured_angles_velocity_rms_error_rad_s"]
-    assert step.mean == pytest.approx(0.04)
-    assert by_tilt.figures["ltv_less_homogeneous_estimated_angles_tilt_rms_deg"].mean == pytest.approx(-0.04)
-    by_error, by_tilt = comparison.orders(of_measures({"measured": right, "estimated": inverted}, velocity))
-    assert (by_error.verdict, by_tilt.verdict) == ("not reproduced", WITHIN)
-    assert by_error.measures == {"measured angles": True, "estimated angles": False}
-    _, by_tilt = comparison.orders(of_measures(velocity, {"measured": inverted, "estimated": right}))
-    assert "The best is (11) and (9)." in by_tilt.reason
 
 
 # --- Figs 5 to 7 ------------------------------------------------------------------------------------------------
 
 
-def result_of(observer: str, angles: AngleSource, error: float, *, fell: int = 0, settles: bool = True) -> Result:
+def result_of(observer: str, angles: str, error: float, *, fell: int = 0, settles: bool = True) -> Result:
     """Runs of three worlds with made-up summaries, and a recording of the observer for the pictures."""
     summary = {
         "velocity_rms_error_rad_s": error,
@@ -127,28 +101,28 @@ def test_every_figure_is_of_its_own_runs(monkeypatch: pytest.MonkeyPatch) -> Non
     """A number of its own for every observer and kind of angles: each must come out in its own place."""
     sizes = {"linear": 0.11, "ltv": 0.07, "homogeneous": 0.05}
 
-    def make_results(names: Sequence[str], angles: AngleSource, worlds: int, seed: int) -> dict[str, Result]:
+    def make_results(names: Sequence[str], angles: str, worlds: int, seed: int) -> dict[str, Result]:
         more = 0.001 if angles == "estimated" else 0.0
         return {name: result_of(name, angles, sizes[name] + more) for name in names}
 
-    monkeypatch.setattr(figures_5_to_7, "close_loops", make_results)
+    monkeypatch.setattr(section_5, "close_loops", make_results)
     by_euler = {TEN_BY_EULER: 0.09, TEN_EXACT_GAIN: 0.088, ELEVEN_BY_EULER: 0.051}
     monkeypatch.setattr(
-        second_place, "errors_of", lambda forms, worlds, seed: {form: np.full(3, by_euler[form]) for form in forms}
+        section_5, "errors_of", lambda forms, worlds, seed: {form: np.full(3, by_euler[form]) for form in forms}
     )
-    *figures, order, _, _, _, cause = figures_5_to_7.claims(lambda share: None)
+    *figures, by_error, _, _, _, cause = section_5.claims(lambda share: None)
     assert [claim.place for claim in figures] == ["Fig. 5", "Fig. 6", "Fig. 7"]
     for claim, name in zip(figures, ("linear", "ltv", "homogeneous"), strict=True):
         assert claim.verdict == WITHIN  # the push, e and the noise are ours
         assert claim.figures["velocity_rms_error_measured_angles_rad_s"].mean == pytest.approx(sizes[name])
         assert claim.figures["velocity_rms_error_estimated_angles_rad_s"].mean == pytest.approx(sizes[name] + 0.001)
-        rates = claim.pictures[0].panels[2].lines
         truth = close_loops([name], "measured", 3, SEED, 3.0)[name].trajectory
         assert truth is not None
+        rates = claim.pictures[0].panels[2].lines
         np.testing.assert_array_equal(rates[0].y, truth.world(0)[f"estimate/{name}/x2_rad_s"])
     axes = [[panel.y_range for panel in claim.pictures[0].panels] for claim in figures]
     assert axes[0] == axes[1] == axes[2]
-    assert order.figures["linear_less_ltv_measured_angles_velocity_rms_error_rad_s"].mean == pytest.approx(0.04)
+    assert by_error.figures[f"linear_less_ltv_measured_angles_{JUDGED}"].mean == pytest.approx(0.04)
     assert cause.figures["ltv_less_homogeneous_exact_rad_s"].mean == pytest.approx(0.02)
     assert cause.figures["of_it_by_the_method_rad_s"].mean == pytest.approx(0.02 - 0.001)
 
@@ -167,39 +141,27 @@ def test_a_world_that_falls_is_seen_and_left_out_of_the_mean() -> None:
 # --- the cause --------------------------------------------------------------------------------------------------
 
 
-def forms(exact: float, euler: float, gain: float = 0.0, scatter: float = 0.0) -> dict[str, np.ndarray]:
-    """Errors with (10) less (11) so much by either method, of four worlds."""
-    wave = scatter * np.array([1.0, -1.0, 1.0, -1.0])
-    eleven = np.full(4, 0.05)
-    ten_by_euler = eleven + 0.001 + euler + wave
-    return {
-        TEN: eleven + exact,
-        ELEVEN: eleven,
-        TEN_BY_EULER: ten_by_euler,
-        TEN_EXACT_GAIN: ten_by_euler - gain,
-        ELEVEN_BY_EULER: eleven + 0.001,
-    }
-
-
-def test_the_cause_is_partly_the_method() -> None:
-    claim = second_place.cause(forms(0.01, 0.03))
-    assert claim.verdict == "reproduced within stated conditions"
-    assert claim.figures["of_it_by_the_method_share"] == pytest.approx(2.0 / 3.0)
-    assert claim.figures["of_it_by_the_method_rad_s"].mean == pytest.approx(0.02)
-    assert "none to speak of from the equations of H" in claim.reason
-    assert "have a part in it" in second_place.cause(forms(0.01, 0.03, gain=0.01)).reason
-
-
 @pytest.mark.parametrize(
-    ("exact", "euler", "scatter"),
-    [(0.01, 0.005, 0.0), (-0.01, 0.03, 0.0), (0.01, 0.03, 0.03)],
-    ids=["Euler helps", "all of it", "may be chance"],
+    ("exact", "euler", "scatter", "verdict"),
+    [
+        (0.01, 0.03, 0.0, WITHIN),
+        (0.01, 0.005, 0.0, "not reproduced"),
+        (-0.01, 0.03, 0.0, "not reproduced"),
+        (0.01, 0.03, 0.03, "not reproduced"),
+    ],
+    ids=["partly", "Euler helps", "all of it", "may be chance"],
 )
-def test_the_cause_is_not_partly_the_method(exact: float, euler: float, scatter: float) -> None:
-    assert second_place.cause(forms(exact, euler, scatter=scatter)).verdict == "not reproduced"
+def test_the_cause_is_partly_the_method(exact: float, euler: float, scatter: float, verdict: str) -> None:
+    """Errors with (10) less (11) so much by either method, of four worlds."""
+    eleven, wave = np.full(4, 0.05), scatter * np.array([1.0, -1.0, 1.0, -1.0])
+    ten_by_euler = eleven + 0.001 + euler + wave
+    forms = {TEN: eleven + exact, ELEVEN: eleven, TEN_BY_EULER: ten_by_euler, ELEVEN_BY_EULER: eleven + 0.001}
+    claim = section_5.cause(forms | {TEN_EXACT_GAIN: ten_by_euler})
+    assert claim.verdict == verdict
+    assert claim.figures["of_it_by_the_method_share"] == pytest.approx((euler - exact) / euler)
 
 
 def test_euler_makes_ten_worse_in_the_loop_and_eleven_hardly() -> None:
-    errors = second_place.errors_of((TEN, TEN_BY_EULER, ELEVEN, ELEVEN_BY_EULER), 4, SEED)
+    errors = section_5.errors_of((TEN, TEN_BY_EULER, ELEVEN, ELEVEN_BY_EULER), 4, SEED)
     assert mean_interval(errors[TEN_BY_EULER] / errors[TEN]).low > 1.15
     assert abs(mean_interval(errors[ELEVEN_BY_EULER] / errors[ELEVEN]).mean - 1.0) < 0.05

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.papers.sokolov2019 import backlash
-from cmg_mj.papers.sokolov2019.cycles import cycles
-from cmg_mj.papers.sokolov2019.gap_prediction import describing_function
+from cmg_mj.papers.sokolov2019.backlash import cycles, describing_function
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.stages.backlash import Backlash
 

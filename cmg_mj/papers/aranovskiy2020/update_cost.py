@@ -1,22 +1,30 @@
-"""Remark 1 of aranovskiy2020: what an update of the observer (10) costs beside those of (9) and (11)."""
+"""Remark 1: what an update of the observer (10) costs beside those of (9) and (11)."""
 
 from __future__ import annotations
 
+import json
 import statistics
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cmg_mj.observers import make_observer
-from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain
-from cmg_mj.papers.aranovskiy2020.on_the_board import PLAIN, instructions
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain, euler, rk4
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
 from cmg_mj.runs.benchmark import time_of_update
 
 CLOCK_MHZ = 216.0
 """Clock of the rig's processor, an STM32F746 [MHz]."""
+
+RECORDED = Path(__file__).with_name("on_the_board.json")
+"""Instructions of an update of the observer alone, by observer, as far as an emulator of that processor can say;
+`python benchmarks/board.py --paper` writes it."""
+
+PLAIN = {"ltv, plain Euler": euler, "ltv, plain Runge-Kutta 4": rk4}
+"""(10) written out with 3x3 matrices, by the method for H."""
 
 
 def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, float]:
@@ -29,21 +37,18 @@ def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, floa
         cases |= {name: Plain(method) for name, method in PLAIN.items()}
     value: Any = 0.01 if worlds is None else np.full(worlds, 0.01)
     y1, y2, acceleration, u = ([factor * value] * updates for factor in (1.0, 2.0, 0.0, 3.0))
-    signals = y1, y2, acceleration, u
-    times = [{name: time_of_update(observer, *signals) for name, observer in cases.items()} for _ in range(turns)]
+    times = [
+        {name: time_of_update(observer, y1, y2, acceleration, u) for name, observer in cases.items()}
+        for _ in range(turns)
+    ]
     return {name: statistics.median(turn[name] for turn in times) for name in cases}
 
 
-def cost() -> Claim:
+def cost(recorded: Path = RECORDED) -> Claim:
     """Instructions of an update of (10) beside those of (9) and (11) on the rig's processor; times on this one."""
-    single_times = update_times(None, turns=3, updates=200)
-    worlds = 4096
-    batch_times = update_times(worlds, turns=1, updates=4)
-    ratios = {name: single_times[name] / single_times["linear"] for name in single_times}
-    arithmetic = {name: batch_times[name] / batch_times["linear"] for name in batch_times}
-    board = instructions()
+    board = json.loads(recorded.read_text(encoding="utf-8"))
+    single_times, batch_times = update_times(None, turns=3, updates=200), update_times(4096, turns=1, updates=4)
     dearest = max(board[name] for name in ("ltv", *PLAIN))
-    share = dearest / CLOCK_MHZ / (1e6 * DT)
     return Claim(
         place="Remark 1, cost",
         statement="The observer (10) is computationally heavy in embedded systems: its gain takes differential "
@@ -53,14 +58,9 @@ def cost() -> Claim:
         "whichever way that is taken.",
         figures={
             "instructions": board,
-            "share_of_period": share,
+            "share_of_period": dearest / CLOCK_MHZ / (1e6 * DT),
             "update_us": single_times,
-            "update_by_linear": ratios,
-            "update_by_linear_4096_worlds": arithmetic,
+            "update_by_linear": {name: time / single_times["linear"] for name, time in single_times.items()},
+            "update_by_linear_4096_worlds": {name: time / batch_times["linear"] for name, time in batch_times.items()},
         },
     )
-
-
-def claims(on_share: OnShare) -> list[Claim]:
-    """Judge the cost."""
-    return [cost()]

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from cmg_mj.papers.claim import Section
-from cmg_mj.papers.sokolov2019 import (
-    bearing,
-    closed_loop,
-    equations,
-    figure_3,
-    observer_bias,
-    proposition_1,
-    table_2,
-)
+from cmg_mj.papers import plvcc
+from cmg_mj.papers.claim import Section, section
+from cmg_mj.papers.sokolov2019 import bearing, equations, figure_3, observer_bias, section_5, table_2
 
 SECTIONS: list[Section] = [
-    Section("the equations", 0.1, equations.claims),
-    Section("the observers' bias", 1.2, observer_bias.claims),
-    Section("Proposition 1", 1.3, proposition_1.claims),
+    section("the equations", 0.1, equations.table_i, equations.equations_of_motion, equations.law_equilibria),
+    section("the observers' bias", 1.2, observer_bias.biased_luenberger, observer_bias.homogeneous_vicinity),
+    section("Proposition 1", 1.3, lambda: plvcc.claim("sokolov2019")),
     Section("Fig. 3", 0.8, figure_3.claims),
     Section("Table II", 12.0, table_2.claims),
-    Section("Figs 4 to 6, and the lag", 10.0, closed_loop.claims),
+    Section("Figs 4 to 6, and the lag", 10.0, section_5.claims),
     Section("the thrust bearing", 3.0, bearing.claims),
 ]

@@ -1,18 +1,23 @@
-"""The cycles that the backlash of the gimbal's servo makes (`cmg_mj.stages.backlash`)."""
+"""The cycles that backlash of the servo makes (`cmg_mj.stages.backlash`): on MuJoCo, and by a describing function."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from cmg_mj.papers.recorded import trajectory_of
-from cmg_mj.papers.sokolov2019.release import RELEASE, is_sustained
+from cmg_mj.papers.sokolov2019.figure_3 import L1, WITH_Y2, stiffness
+from cmg_mj.papers.sokolov2019.lag import RELEASE, is_sustained, linearise
+from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.stages.backlash import ARCMIN_A_DEGREE
 
 GAP_ARCMIN = 20.0
 """Backlash of the Dynamixel MX-106 (Robotis e-Manual, MX-106: 20 arcmin), from one side of the gap to the other."""
@@ -21,21 +26,23 @@ RELEASE_S, WINDOW_S = 24.0, 6.0
 
 
 class Cycle(NamedTuple):
-    """The loop's motion by itself, let go without noise."""
+    """The loop's motion by itself."""
 
     sustained: bool
     """True if it oscillates without end."""
     amplitude_deg: float
-    """Half of the tilt's range over the last window [deg]."""
+    """Half of the tilt's range [deg]."""
     frequency_hz: float
-    """Frequency at which the tilt rate's spectrum has its peak there [Hz]."""
+    """Frequency of the tilt rate [Hz]."""
 
-    @property
-    def words(self) -> str:
-        """The cycle in words."""
-        if not self.sustained:
-            return "comes to rest"
-        return f"goes on oscillating by {self.amplitude_deg:.2f} deg to either side at {self.frequency_hz:.1f} Hz"
+
+class Cycles(NamedTuple):
+    """Releases without noise, behind the datasheet's gap."""
+
+    ends: Mapping[str, Cycle]
+    """Observer, and (9) with all terms in y2 -> what the loop ends in."""
+    predicted: Mapping[str, Cycle | None]
+    """Linear observer -> the same by its describing function."""
 
 
 def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -> Experiment:
@@ -46,7 +53,7 @@ def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -
 
 
 def find_cycles(releases: Sequence[Experiment]) -> list[Cycle]:
-    """Find the cycles that rigs let go end in, one world each."""
+    """Find the cycles that rigs let go end in, one world each: size and main frequency over the last window."""
     return [_cycle(trajectory_of(result)) for result in run_side_by_side([run_of(release, 1) for release in releases])]
 
 
@@ -59,3 +66,60 @@ def _cycle(trajectory: Trajectory) -> Cycle:
         float(np.degrees(np.ptp(last["x1_rad"][:, 0]))) / 2.0,
         float(np.fft.rfftfreq(8 * len(x2), t[1] - t[0])[spectrum.argmax()]),
     )
+
+
+def cycles() -> Cycles:
+    """Find all cycles."""
+    releases = {name: make_release(name) for name in OBSERVERS}
+    # (9) but for J2, cos y2 and the sine: see `figure_3.nine_with_y2`.
+    nine = {"k1": L1, "k2": stiffness(experiment().plant.reduced), "alpha": 1.0}
+    releases[WITH_Y2] = make_release("homogeneous", **nine)
+    ends = dict(zip(releases, find_cycles(list(releases.values())), strict=True))
+    return Cycles(ends, {name: predict_cycle(name) for name in ("linear", "luenberger")})
+
+
+# --- by the describing function of the linearised, sampled loop -------------------------------------------------
+
+
+def describing_function(c: float) -> complex:
+    """Return the fundamental of the gimbal's angle by that of the motor's, a sine, behind a gap.
+
+    Args:
+        c: gap/A - 1, with A the motor's amplitude: -1 without a gap, 1 where the motor only just crosses it.
+    """
+    root = math.sqrt(max(1.0 - c * c, 0.0))
+    return complex(0.5 - (math.asin(c) + c * root) / math.pi, -root * root / math.pi)
+
+
+def predict_cycle(observer: str, points: int = 60) -> Cycle | None:
+    """Return the largest motion that neither grows nor decays, of which larger ones decay and smaller ones grow.
+
+    Args:
+        observer: A linear one, in the loop.
+        points: Number of points of the grid.
+
+    Returns:
+        The cycle; None if there is none.
+    """
+    loop, servo, dt = linearise(observer)
+
+    def turning(c: float) -> tuple[complex, np.ndarray]:
+        """Return the least damped motion that turns forward faster than 1 rad/s: its factor a period, its shape."""
+        factors, shapes = np.linalg.eig(loop(servo, share=describing_function(c)))
+        index = int(np.argmax(np.where(np.angle(factors) > dt, np.abs(factors), 0.0)))
+        return complex(factors[index]), shapes[:, index]
+
+    def growth(c: float) -> float:
+        return math.log(abs(turning(c)[0])) / dt
+
+    grid = np.linspace(-1.0, 0.98, points).tolist()
+    rates = [growth(c) for c in grid]
+    first = next((i for i in range(1, points) if rates[i - 1] < 0.0 <= rates[i]), None)
+    if first is None:
+        return None
+    c = float(brentq(growth, grid[first - 1], grid[first], xtol=1e-9))  # type: ignore[arg-type]
+    factor, shape = turning(c)
+    rate = math.atan2(factor.imag, factor.real) / dt
+    motor = math.radians(GAP_ARCMIN / ARCMIN_A_DEGREE) / (1.0 + c)
+    amplitude = math.degrees(motor * rate * float(abs(shape[0]) / abs(shape[-1])))
+    return Cycle(True, amplitude, rate / (2.0 * math.pi))

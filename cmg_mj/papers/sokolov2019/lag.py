@@ -1,55 +1,143 @@
-"""Section V: which lag makes the loop oscillate by itself, on MuJoCo and by the sampled loop's eigenvalues."""
+"""Section V: which lag makes the loop oscillate by itself: on MuJoCo, and by the eigenvalues of the sampled loop."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.laws import StateFeedback
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
-from cmg_mj.papers.sokolov2019.release import (
-    LARGEST_LATENCY_STEPS,
-    Sweep,
-    Threshold,
-    lag_thresholds,
-    latency_threshold,
-    sweeps,
-)
-from cmg_mj.papers.sokolov2019.rig import FINE, estimator, experiment, read_servo
+from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, estimator, experiment, make_rig, read_servo
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
+from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
+from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
-LARGEST_S = 0.12
+# --- releases on MuJoCo -----------------------------------------------------------------------------------------
+
+RELEASE = (
+    *NO_NOISE,
+    "plant.equilibrium_bias_deg=0.0",
+    "plant.initial_tilt_deg=0.2",
+    "push=[]",
+    "duration_s=6.0",
+)
+"""Let go 0.2 degrees off, nothing else disturbing it."""
+
+WINDOW_S = 2.0
+"""Two windows of this length, the last of a release, are compared."""
+FLOOR_RAD_S = 1e-3
+"""A tilt rate below this is no oscillation: a release begins with thirty times as much."""
+STEADY = 0.98
+"""Share of the amplitude that an oscillation keeps from one window to the next if it is sustained."""
+LAGS_S = (0.012, 0.015, 0.017, 0.019, 0.020, 0.022, 0.025, 0.030, 0.035, 0.040, 0.045)
+"""Servo lags tried, after the model's own [s]. RK4 at 1 ms forbids more than 49 ms at the model's stiffness."""
+PARTS = 10
+"""A threshold is found to this part of the spacing of the lags."""
+MAX_LATENCY_STEPS = 64
+"""The largest latency tried [physics steps]."""
+
+
+def is_sustained(trajectory: Trajectory, window_s: float = WINDOW_S) -> np.ndarray:
+    """Find the worlds of a release that oscillate without end, grow or fall, (n_worlds,).
+
+    Sustained: the tilt rate's peak over the last window is at least 98 % of that over the window before, and above 1e-3
+    rad/s. A fall counts too.
+    """
+    t = trajectory["time_s"]
+    x2 = np.abs(trajectory["x2_rad_s"].reshape(len(t), -1))
+    middle, end = t[-1] - window_s, t[-1]
+    before, last = x2[(t > middle - window_s) & (t <= middle)].max(axis=0), x2[(t > middle) & (t <= end)].max(axis=0)
+    return ~np.isfinite(x2[-1]) | ((last > FLOOR_RAD_S) & (last >= STEADY * before))
+
+
+def releases(servos: Mapping[str, Sequence[Servo]], settings: Sequence[str] = ()) -> dict[str, Trajectory]:
+    """Let the rig go without noise, with each observer in the loop: one world a servo of its own."""
+    runs = []
+    for observer, observer_servos in servos.items():
+        base = experiment([*RELEASE, FINE, *settings], observer)
+        rigs = [replace(base, plant=make_rig(base.scenario.plant, servo)) for servo in observer_servos]
+        runs.append(BatchJob(rigs, range(len(rigs))))
+    results = run_side_by_side(runs)
+    return {observer: trajectory_of(result) for observer, result in zip(servos, results, strict=True)}
+
+
+class Sweep(NamedTuple):
+    """Releases over the servo's lag."""
+
+    lags_s: np.ndarray
+    """(n_lags,)."""
+    sustained: np.ndarray
+    """True where the loop oscillates by itself, (n_lags,)."""
+    amplitude_deg: np.ndarray
+    """Largest tilt over the last two seconds, (n_lags,); NaN where the rig fell."""
+
+
+def sweep_lags() -> dict[str, Sweep]:
+    """Release the rig with the model's servo and with slower ones, as stiff, with each observer."""
+    servo = read_servo(experiment().plant)
+    lags = np.array([servo.lag_s, *LAGS_S])
+    servos = [servo.damp(lag) for lag in lags]
+    sweeps = {}
+    for observer, run in releases(dict.fromkeys(OBSERVERS, servos)).items():
+        t = run["time_s"]
+        amplitude = np.degrees(np.abs(run["x1_rad"][t > t[-1] - WINDOW_S]).max(axis=0))
+        sweeps[observer] = Sweep(lags, is_sustained(run), amplitude)
+    return sweeps
+
+
+Threshold = tuple[float, float | None]
+"""Begin of something: not yet at the first, already at the second, which is None if nowhere in the range."""
+
+
+def lag_thresholds(sweeps: Mapping[str, Sweep]) -> dict[str, Threshold]:
+    """Find the least servo lag at which each loop oscillates by itself, to a tenth of the sweep's spacing [s]."""
+    thresholds: dict[str, Threshold] = {}
+    servo = read_servo(experiment().plant)
+    for observer, (lags, sustained, _) in sweeps.items():
+        first = int(np.argmax(sustained))
+        if not sustained.any():
+            thresholds[observer] = float(lags[-1]), None
+        elif first == 0:
+            thresholds[observer] = 0.0, float(lags[0])
+        else:
+            grid = np.linspace(lags[first - 1], lags[first], PARTS + 1)
+            refined = releases({observer: [servo.damp(lag) for lag in grid[1:]]})[observer]
+            i = int(np.argmax(is_sustained(refined)))  # the last of them is the sweep's own
+            thresholds[observer] = float(grid[i]), float(grid[i + 1])
+    return thresholds
+
+
+def latency_threshold(observer: str) -> Threshold:
+    """Find the least latency of the accelerometers at which the loop oscillates, to one physics step [s].
+
+    They are sampled at every physics step here, so that the latency is not rounded up to control periods.
+    """
+
+    def oscillates(steps: int) -> bool:
+        latency = f"sensors.accelerometer.latency_s={steps / 1000}"
+        result = experiment([*RELEASE, FINE, "sensors.accelerometer.rate_hz=1000.0", latency], observer).run()
+        return not result.stood.all() or bool(is_sustained(trajectory_of(result))[0])
+
+    low, high = 0, MAX_LATENCY_STEPS
+    if not oscillates(high):
+        return high / 1000, None
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if oscillates(middle) else (middle, high)
+    return low / 1000, high / 1000
+
+
+# --- the sampled loop -------------------------------------------------------------------------------------------
+
+MAX_LAG_S = 0.12
 """Lags are searched up to here in the linearised loop [s]."""
-
-
-class Prediction(NamedTuple):
-    """One observer in the linearised, sampled loop; None for an event that is not in the range searched."""
-
-    servo_lag_s: float | None
-    """The least servo lag at which it oscillates, as stiff."""
-    softened_lag_s: float | None
-    """The least servo lag of a critically damped servo that is less stiff."""
-    latency_s: float | None
-    """The least latency of y1, in whole physics steps."""
-    pole: complex
-    """Pole of its least damped oscillation with the model's servo [1/s]."""
-
-    @property
-    def damping(self) -> float:
-        """Damping ratio of that oscillation."""
-        return -self.pole.real / abs(self.pole)
-
-    @property
-    def frequency_hz(self) -> float:
-        """Frequency of that oscillation [Hz]."""
-        return self.pole.imag / (2.0 * np.pi)
-
 
 Loop = Callable[..., np.ndarray]
 """(servo, age_steps=0, share=1.0) -> the map of a control period."""
@@ -64,31 +152,36 @@ def _rig() -> Experiment:
 def linearise(observer: str | None, **parameters: float) -> tuple[Loop, Servo, float]:
     """Linearise the sampled loop with an observer, or with the true rate (None); parameters differ from Table II's."""
     prepared = _rig()
-    plant, law = prepared.plant, prepared.law
-    assert isinstance(law, StateFeedback)
     o = None if observer is None else estimator(observer, prepared, **parameters)
 
     def loop(servo: Servo, age_steps: int = 0, share: complex = 1.0) -> np.ndarray:
-        step = plant.model.opt.timestep
-        return period_map(plant.reduced, servo, o, law, timestep=step, age_steps=age_steps, share=share)
+        return period_map(prepared, servo, o, age_steps, share)
 
-    return loop, read_servo(plant), law.dt
+    return loop, read_servo(prepared.plant), prepared.law.dt
 
 
-def predict(observer: str | None) -> Prediction:
-    """Predict the linearised loop's behaviour with a linear observer, or with the true rate (None)."""
+def predict(observer: str | None) -> dict[str, float | list[float] | None]:
+    """Predict the linearised loop's behaviour with a linear observer, or with the true rate (None).
+
+    Returns:
+        The least servo lag at which it oscillates, as stiff, and of a critically damped servo that is less stiff; the
+        least latency of y1, in whole physics steps; None if it is not in the range searched. Pole and damping ratio of
+        its least damped oscillation with the model's servo.
+    """
     loop, servo, dt = linearise(observer)
 
     def growth(changed_servo: Servo, age_steps: int = 0) -> float:
         return float(modes(loop(changed_servo, age_steps), dt)[0].real)
 
-    latencies = range(LARGEST_LATENCY_STEPS + 1) if observer else ()
-    return Prediction(
-        first_crossing(lambda lag: growth(servo.damp(lag)), 5e-3, LARGEST_S),
-        first_crossing(lambda lag: growth(servo.soften(lag)), 5e-3, LARGEST_S),
-        next((steps / 1000 for steps in latencies if growth(servo, steps) > 0.0), None),
-        oscillation(loop(servo), dt),
-    )
+    latencies = range(MAX_LATENCY_STEPS + 1) if observer else ()
+    pole = oscillation(loop(servo), dt)
+    return {
+        "servo_lag_s": first_crossing(lambda lag: growth(servo.damp(lag)), 5e-3, MAX_LAG_S),
+        "softened_servo_lag_s": first_crossing(lambda lag: growth(servo.soften(lag)), 5e-3, MAX_LAG_S),
+        "latency_s": next((steps / 1000 for steps in latencies if growth(servo, steps) > 0.0), None),
+        "pole_1_s": [pole.real, pole.imag],
+        "damping_ratio": -pole.real / abs(pole),
+    }
 
 
 def largest_tau() -> float | None:
@@ -101,67 +194,46 @@ def largest_tau() -> float | None:
     return first_crossing(growth, 0.01, 0.1)
 
 
-class Lags(NamedTuple):
-    """All of it."""
+# --- the claim --------------------------------------------------------------------------------------------------
 
-    sweeps: dict[str, Sweep]
-    thresholds: dict[str, Threshold]
-    latencies: dict[str, Threshold]
-    predictions: dict[str, Prediction]
+
+class Lags(NamedTuple):
+    """All of it, by observer."""
+
+    sweeps: Mapping[str, Sweep]
+    thresholds: Mapping[str, Threshold]
+    latencies: Mapping[str, Threshold]
+    predictions: Mapping[str, Mapping]
     """Predictions for the linear observers and, under `truth`, for the true rate."""
-    tau: float | None
-    own_lag_s: float
-    """Lag of the model's servo."""
 
 
 def lags(on_share: OnShare) -> Lags:
     """Sweep, sharpen and predict all lags."""
-    lag_sweeps = sweeps(list(OBSERVERS))
-    thresholds = lag_thresholds(lag_sweeps)
+    sweeps = sweep_lags()
+    thresholds = lag_thresholds(sweeps)
     latencies: dict[str, Threshold] = {}
     for i, name in enumerate(OBSERVERS):
         latencies[name] = latency_threshold(name)
         on_share((i + 1) / 4.0)
     predictions = {name: predict(name) for name in ("linear", "luenberger")} | {"truth": predict(None)}
-    return Lags(lag_sweeps, thresholds, latencies, predictions, largest_tau(), float(lag_sweeps["linear"].lags_s[0]))
-
-
-def in_ms(seconds: float | None, otherwise: str = "none") -> str:
-    """Write a time in words."""
-    return otherwise if seconds is None else f"{1e3 * seconds:.1f} ms"
+    return Lags(sweeps, thresholds, latencies, predictions)
 
 
 def claim(results: Lags) -> Claim:
     """Judge section V: the differentiator's lag."""
-    own_lag, lags, latencies = results.own_lag_s, results.thresholds, results.latencies
-    begin, least = lags["linear"], min(lags[name].low for name in ("luenberger", "homogeneous"))
+    begin, others = results.thresholds["linear"][1], [results.thresholds[n][0] for n in ("luenberger", "homogeneous")]
     return Claim(
         place="Section V, the lag",
         statement="Finite differences lag, and the lag brings the loop into sustained oscillations.",
-        assumes={"servo": f"a lag of up to {1e3 * LARGEST_S:.0f} ms"},
-        holds=begin.high is not None and begin.high < least,
-        conditions=(
-            f"It does with a servo lag from {in_ms(begin.middle)} or a latency of y1 from "
-            f"{in_ms(latencies['linear'].high)}; at the model's servo lag of {in_ms(own_lag)} the oscillation decays."
-            if begin.middle is not None and begin.middle > own_lag
-            else ""
-        ),
-        otherwise="The loop of (8) is not the first to oscillate.",
+        assumes={"servo": f"a lag of up to {1e3 * MAX_LAG_S:.0f} ms"},
+        holds=begin is not None and begin < min(others),
+        conditions="It does with a slower servo or a later y1; at the model's servo lag the oscillation decays.",
         figures={
-            "servo_lag_of_the_model_s": own_lag,
-            "servo_lag_threshold_s": {name: list(begin) for name, begin in lags.items()},
-            "latency_threshold_s": {name: list(begin) for name, begin in latencies.items()},
-            "predicted": {
-                name: {
-                    "servo_lag_s": p.servo_lag_s,
-                    "softened_servo_lag_s": p.softened_lag_s,
-                    "latency_s": p.latency_s,
-                    "pole_1_s": [p.pole.real, p.pole.imag],
-                    "damping_ratio": p.damping,
-                }
-                for name, p in results.predictions.items()
-            },
-            "tau_threshold_s": results.tau,
+            "servo_lag_of_the_model_s": float(results.sweeps["linear"].lags_s[0]),
+            "servo_lag_threshold_s": {name: list(threshold) for name, threshold in results.thresholds.items()},
+            "latency_threshold_s": {name: list(threshold) for name, threshold in results.latencies.items()},
+            "predicted": results.predictions,
+            "tau_threshold_s": largest_tau(),
         },
         pictures=[_picture(results)],
     )
@@ -174,7 +246,7 @@ def _growth(observer: str, lags_s: np.ndarray) -> list[float]:
 
 
 def _picture(results: Lags) -> Picture:
-    grid = np.linspace(5e-3, 0.07, 66)
+    grid, x_label = np.linspace(5e-3, 0.07, 66), "servo lag [ms]"
     rates = [
         Line(1e3 * grid, _growth(name, grid), f"{OBSERVERS[name]} {name}", color=name)
         for name in ("linear", "luenberger")
@@ -184,15 +256,9 @@ def _picture(results: Lags) -> Picture:
         Line(1e3 * s.lags_s, s.amplitude_deg, f"{OBSERVERS[name]} {name}", "os^"[i] + "-", color=name)
         for i, (name, s) in enumerate(results.sweeps.items())
     ]
+    title = "MuJoCo, released at 0.2 deg, no noise"
     panels = [
-        Panel("growth of the tilt's\noscillation [1/s]", rates, "linearised and sampled", x_label="servo lag [ms]"),
-        Panel(
-            "largest tilt after\n4 s [deg]",
-            tilts,
-            "MuJoCo, released at 0.2 deg, no noise",
-            x_label="servo lag [ms]",
-            y_scale="log",
-        ),
+        Panel("growth of the tilt's\noscillation [1/s]", rates, "linearised and sampled", x_label),
+        Panel("largest tilt after\n4 s [deg]", tilts, title, x_label, y_scale="log"),
     ]
-    title = "sokolov2019, Section V: which servo lag brings sustained oscillation"
-    return Picture("sokolov2019-lag", title, panels)
+    return Picture("sokolov2019-lag", "sokolov2019, Section V: which servo lag brings sustained oscillation", panels)

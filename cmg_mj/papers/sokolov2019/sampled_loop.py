@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from scipy.optimize import brentq
 from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
 from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.observers import Measurement, Observer
+from cmg_mj.runs.experiment import Experiment
 
 
 @dataclass(frozen=True)
@@ -70,48 +72,37 @@ def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[np.ndarray, np.ndar
 
 
 def period_map(
-    model: ReducedModel,
-    servo: Servo,
-    observer: Observer | None,
-    law: StateFeedback,
-    *,
-    timestep: float,
-    age_steps: int = 0,
-    share: complex = 1.0,
+    experiment: Experiment, servo: Servo, observer: Observer | None, age_steps: int, share: complex
 ) -> np.ndarray:
     """Return the matrix that takes the loop from one control tick to the next.
 
     Args:
-        model: The reduced model.
+        experiment: Its rig, but for the servo, and its law; the law's rate limit does not count.
         servo: The gimbal's servo.
         observer: A linear observer; None for the true rate in the law.
-        law: The law; its rate limit does not count.
-        timestep: Physics step [s].
         age_steps: Age of y1 at a tick [physics steps]: the latency of the accelerometers.
         share: Share of the commanded rate that reaches the gimbal's setpoint: 1, or the describing function of a gap.
 
     Returns:
         A square matrix. Its state is that of the rig, the tilts not yet seen, the observer's, x_e and the last u.
     """
-    law = replace(law, rate_limit=math.inf)
-    steps = round(law.dt / timestep)
-    Phi, hold, _ = hold_matrices(*rig_matrices(model, servo), timestep)
-    gamma = hold[:, 0]
-    state_type: Any = type(observer.init(Measurement(0.0, 0.0))) if observer else tuple
-    n_observer = len(observer.init(Measurement(0.0, 0.0))) if observer else 0
-    parts = np.cumsum([5, age_steps, n_observer])
+    assert isinstance(experiment.law, StateFeedback)
+    law, timestep = replace(experiment.law, rate_limit=math.inf), experiment.plant.model.opt.timestep
+    Phi, hold, _ = hold_matrices(*rig_matrices(experiment.plant.reduced, servo), timestep)
+    start: Any = observer.init(Measurement(0.0, 0.0)) if observer else ()
+    parts = np.cumsum([5, age_steps, len(start)])
 
     def period(v: np.ndarray) -> np.ndarray:
         rig, pending_tilts, observer_state, (x_e, u) = np.split(v, parts)
         y1, y2 = (pending_tilts[-1] if age_steps else rig[0]), rig[2]
         x2 = rig[1]
         if observer:
-            state, estimate = observer.step(state_type(*observer_state), Measurement(y1, y2), u)
+            state, estimate = observer.step(type(start)(*observer_state), Measurement(y1, y2), u)
             observer_state, x2 = np.array(state), estimate.x2
         u, x_e = law(y1, x2, y2, x_e)
-        for _ in range(steps):
+        for _ in range(round(law.dt / timestep)):
             pending_tilts = np.concatenate([rig[:1], pending_tilts])[:age_steps]
-            rig = Phi @ rig + gamma * (share * u)
+            rig = Phi @ rig + hold[:, 0] * (share * u)
         return np.concatenate([rig, pending_tilts, observer_state, [x_e, u]])
 
     return np.column_stack([period(unit) for unit in np.eye(parts[-1] + 2)])
@@ -129,11 +120,11 @@ def oscillation(matrix: np.ndarray, dt: float) -> complex:
     return complex(next(s for s in modes(matrix, dt) if s.imag > 1.0))
 
 
-def first_crossing(value: Callable[[float], float], low: float, high: float, points: int = 40) -> float | None:
+def first_crossing(value: Callable[[float], float], low: float, high: float) -> float | None:
     """Return the smallest argument at which a function rises through zero; None if it does not."""
-    grid = np.linspace(low, high, points)
-    values = [value(float(x)) for x in grid]
-    for a, b, at_a, at_b in zip(grid, grid[1:], values, values[1:], strict=False):
+    grid = np.linspace(low, high, 40).tolist()
+    values = [value(x) for x in grid]
+    for (a, at_a), (b, at_b) in pairwise(zip(grid, values, strict=True)):
         if at_a < 0.0 <= at_b:
             root: Any = brentq(value, a, b, xtol=1e-7)
             return float(root)

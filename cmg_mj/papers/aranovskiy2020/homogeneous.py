@@ -1,0 +1,238 @@
+"""The homogeneous differentiator (11): is its error gone in finite time, and where does it converge to?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cmg_mj.core.arrays import signed_power
+from cmg_mj.observers import Measurement, make_observer
+from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
+from cmg_mj.papers.aranovskiy2020.rig import DT, replay_at_rest
+from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.recorded import rms
+from cmg_mj.view.plots.figure import Line, Panel, Picture
+
+ALPHAS = (0.55, 0.7, 0.85, 1.0)
+
+
+def rates_at_rest(alpha: float, dt: float, span_s: float, **start: float) -> np.ndarray:
+    """Run the bench's (11) at rest from a wrong state, without noise: sizes of its rate, (n_samples,) [rad/s]."""
+    observer, measurement = make_observer("homogeneous", dt, printed_model(), alpha=alpha), Measurement(0.0, 0.0)
+    state, rates = observer.init(measurement)._replace(**start), []
+    for _ in range(round(span_s / dt)):
+        state, estimate = observer.step(state, measurement, 0.0)
+        rates.append(abs(estimate.x2))
+    return np.array(rates)
+
+
+# --- finite time ------------------------------------------------------------------------------------------------
+
+DECADES = 12
+"""Powers of ten that the error is followed down."""
+STEP = 5e-4
+"""Step of the integration [s], at the error's first size."""
+FINE_DT = 1e-4
+"""Sample period at which the bench's observer is compared with the differential equation [s]."""
+SEEN = 1e-3
+"""Share of the rate's first error: when the error has fallen to it for good, the two are compared."""
+
+
+class Decay(NamedTuple):
+    """The course of an error that fades."""
+
+    decades: np.ndarray
+    """Powers of ten by which its homogeneous size has fallen, (n,)."""
+    time_s: np.ndarray
+    """Times of these sizes, (n,) [s]."""
+    rate: np.ndarray
+    """The rate's error then, of 1 at first, (n,) [rad/s]."""
+
+    @property
+    def turns(self) -> np.ndarray:
+        """Changes of the sign of the rate's error: rows of `time_s`, (n_turns,)."""
+        return np.flatnonzero(np.diff(np.sign(self.rate)))
+
+    @property
+    def shrink_factor(self) -> float:
+        """Mean factor by which a half turn of the error is quicker than the one before it."""
+        spans = np.diff(self.time_s[self.turns])
+        return float((spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1)))
+
+    @property
+    def decades_a_turn(self) -> float:
+        """Powers of ten by which the size falls in a half turn."""
+        return float(np.diff(self.decades[self.turns]).mean())
+
+    @property
+    def end_s(self) -> float:
+        """Time at which the error is zero: the last turn plus the geometric series of all turns to come, or inf."""
+        factor, (before, last) = self.shrink_factor, self.time_s[self.turns[-2:]]
+        return math.inf if factor > 0.99 else float(last + (last - before) * factor / (1.0 - factor))
+
+
+def decay(alpha: float) -> Decay:
+    """Follow e1' = e2 - k1 [e1]^alpha, e2' = -k2 [e1]^(2 alpha - 1) from e = (0, 1 rad/s) down by twelve decades.
+
+    In e1 = r z1, e2 = r^alpha z2 with z1^2 + |z2|^(2/alpha) = 1 and a time that runs faster as r^(alpha - 1), nothing
+    gets steep as r falls.
+    """
+    k1, k2, _ = TABLE_2["homogeneous"].values()
+
+    def slope(state: np.ndarray) -> np.ndarray:
+        z1, z2, log_r, _ = state.tolist()
+        f1, f2 = z2 - k1 * signed_power(z1, alpha), -k2 * signed_power(z1, 2.0 * alpha - 1.0)
+        fall = z1 * f1 + signed_power(z2, 2.0 / alpha - 1.0) * f2 / alpha
+        fall /= z1 * z1 + abs(z2) ** (2.0 / alpha)  # 1, but for this it would stray from it
+        return np.array([f1 - fall * z1, f2 - alpha * fall * z2, fall, math.exp((1.0 - alpha) * log_r)])
+
+    states, h = [np.array([0.0, 1.0, 0.0, 0.0])], STEP
+    while states[-1][2] > -DECADES * math.log(10.0):  # one classical Runge-Kutta step
+        start = states[-1]
+        a = slope(start)
+        b = slope(start + h / 2.0 * a)
+        c = slope(start + h / 2.0 * b)
+        d = slope(start + h * c)
+        states.append(start + h * ((a + 2.0 * (b + c) + d) / 6.0))
+    _, z2, log_r, time = np.array(states).T
+    lowest = np.minimum.accumulate(log_r)  # the size is not monotonic where the error turns
+    return Decay(-lowest / math.log(10.0), time, np.exp(alpha * log_r) * z2)
+
+
+def time_below(times: np.ndarray, rate: np.ndarray) -> float:
+    """Return the time from which a rate stays below `SEEN` [s]."""
+    return float(times[np.flatnonzero(np.abs(rate) > SEEN)[-1] + 1])
+
+
+def finite_time() -> Claim:
+    """Judge whether the time is finite for alpha below 1, not for 1."""
+    decays = {alpha: decay(alpha) for alpha in ALPHAS}
+    ends = {alpha: d.end_s for alpha, d in decays.items()}
+    factor_error = max(
+        abs(d.shrink_factor / 10.0 ** ((alpha - 1.0) * d.decades_a_turn) - 1.0) for alpha, d in decays.items()
+    )
+    printed = decays[TABLE_2["homogeneous"]["alpha"]]
+    rates = rates_at_rest(TABLE_2["homogeneous"]["alpha"], FINE_DT, 1.5, x2=1.0)
+    observer_s = time_below(FINE_DT * np.arange(1, len(rates) + 1), rates)
+    equation_s = time_below(printed.time_s, printed.rate)
+    lines = [Line(d.time_s[::5], 10.0 ** (-d.decades[::5]), f"alpha = {alpha:g}") for alpha, d in decays.items()]
+    return Claim(
+        place="After (11), finite time",
+        statement="Were it not for the replaced x2 and sin(x1), the error would converge to the origin in finite time.",
+        is_general=True,
+        holds=all(math.isfinite(end) == (alpha < 1.0) for alpha, end in ends.items())
+        and factor_error < 0.02
+        and abs(observer_s / equation_s - 1.0) < 0.02,
+        conditions="Tried with k1, k2 of Table 2 and alpha = 0.55, 0.7, 0.85, 1. For alpha below 1; the printed "
+        "(1/2, 1] has 1 in it, with which the error fades exponentially.",
+        figures={
+            "gone_after_s": {str(alpha): end for alpha, end in ends.items() if alpha < 1.0},
+            "time_of_a_half_turn_by_the_one_before": {str(alpha): d.shrink_factor for alpha, d in decays.items()},
+            "fallen_to_a_thousandth_after_s": {"observer": observer_s, "equation": equation_s},
+        },
+        pictures=[
+            Picture(
+                "aranovskiy2020-finite-time",
+                "aranovskiy2020, (11) without bias and noise: how its error fades from 1 rad/s",
+                [Panel("homogeneous size of the error", lines, y_scale="log")],
+            )
+        ],
+    )
+
+
+# --- the vicinity -----------------------------------------------------------------------------------------------
+
+SEED = 77_000
+SETTLING = ALPHAS[1:]
+"""The exponents without much chatter."""
+BIASES_DEG = (0.125, 0.25, 0.5, 1.0, 2.0)
+NOISES_RAD = (0.0005, 0.001, 0.002, 0.004, 0.008)
+TICKS = 2000
+VANISHED = 1e-3
+"""Share of the rate's first error that counts as none."""
+SEEN_RAD_S = 0.01
+"""Biases of the rate above this one are compared with the closed form by their ratio, those below by the difference."""
+
+
+def remaining_error(alpha: float, dt: float) -> float:
+    """Return what is left after 3 s of a wrong rate of -1 rad/s at rest: the last 0.5 s' largest [rad/s]."""
+    return float(rates_at_rest(alpha, dt, 3.0, x1=0.05, x2=-1.0)[-round(0.5 / dt) :].max())
+
+
+def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
+    """Return the RMS of the rate estimated at rest, (n_worlds,) [rad/s], from y1, (n_ticks, n_worlds) [rad]."""
+    observer = make_observer("homogeneous", DT, printed_model(), alpha=alpha)
+    return rms(replay_at_rest(observer, y1).x2[len(y1) // 2 :])
+
+
+def bias_bound(alpha: float, e_rad: float) -> float:
+    """k1 (M sin e/(J1 k2))^(alpha/(2 alpha - 1)), where (11) rests if y1 = -e [rad/s]."""
+    model, (k1, k2, _) = printed_model(), TABLE_2["homogeneous"].values()
+    pull = model.gravity_torque * math.sin(e_rad) / model.J1
+    return k1 * (pull / k2) ** (alpha / (2.0 * alpha - 1.0))
+
+
+def vicinity(seed: int = SEED) -> Claim:
+    """Judge convergence to a vicinity of the origin, and how large it is."""
+    errors, fine_errors = ({alpha: remaining_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
+    # Sampled, (11) chatters with an amplitude that falls as dt^(alpha/(1 - alpha)), by homogeneity.
+    converges = all(errors[a] < VANISHED or fine_errors[a] < errors[a] / 10.0 for a in ALPHAS)
+    biases, noise = np.radians(BIASES_DEG), np.random.default_rng(seed).normal(0.0, 1.0, (TICKS, 16))
+    biased, noisy = np.tile(-biases, (TICKS, 1)), np.hstack([sigma * noise for sigma in NOISES_RAD])
+    by_bias = {alpha: errors_at_rest(alpha, biased) for alpha in SETTLING}
+    bounds = {alpha: np.array([bias_bound(alpha, e) for e in biases]) for alpha in SETTLING}
+    by_noise = {alpha: errors_at_rest(alpha, noisy).reshape(len(NOISES_RAD), -1).mean(axis=1) for alpha in SETTLING}
+    pairs = [pair for alpha in SETTLING for pair in zip(by_bias[alpha].tolist(), bounds[alpha].tolist(), strict=True)]
+    relative_difference = max(abs(x / b - 1.0) for x, b in pairs if b > SEEN_RAD_S)
+    difference = max(abs(x - b) for x, b in pairs if b <= SEEN_RAD_S)
+    slopes = {a: float(np.polyfit(np.log(NOISES_RAD), np.log(error), 1)[0]) for a, error in by_noise.items()}
+    return Claim(
+        place="After (11), the vicinity",
+        statement="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
+        is_general=True,
+        assumes={"e": "0.125 to 2 deg", "noise": "0.0005 to 0.008 rad", "control rate": f"{1.0 / DT:g} Hz"},
+        holds=converges and relative_difference < 0.01 and difference < 0.1 * SEEN_RAD_S and min(slopes.values()) > 0.5,
+        conditions="Tried with k1, k2 of Table 2 and alpha = 0.55, 0.7, 0.85, 1. With s^2 + k1 s + k2 Hurwitz; the "
+        "printed s^2 + k2 s + k1 has k1 and k2 exchanged, without consequence: either is Hurwitz just when both gains "
+        "are positive.",
+        figures={
+            "error_left_share": _by_name(errors),
+            "bias_deg": list(BIASES_DEG),
+            "rate_error_by_bias_rad_s": _by_name(by_bias),
+            "error_left_share_2000_hz": _by_name(fine_errors),
+            "closed_form_relative_difference": relative_difference,
+            "closed_form_difference_where_small_rad_s": difference,
+            "noise_rad": list(NOISES_RAD),
+            "rate_error_by_noise_rad_s": _by_name(by_noise),
+            "exponent_of_noise": _by_name(slopes),
+        },
+        pictures=[_vicinity_picture(by_bias, bounds, by_noise)],
+    )
+
+
+def _by_name(by_alpha: Mapping[float, Any]) -> dict[str, Any]:
+    return {str(alpha): np.asarray(value).tolist() for alpha, value in by_alpha.items()}
+
+
+def _vicinity_picture(
+    by_bias: Mapping[float, np.ndarray], bounds: Mapping[float, np.ndarray], by_noise: Mapping[float, np.ndarray]
+) -> Picture:
+    biased, noisy = [], []
+    for i, alpha in enumerate(SETTLING, 1):
+        label = f"alpha = {alpha:g}"
+        biased.append(Line(BIASES_DEG, by_bias[alpha], label, "o", color=i))
+        biased.append(Line(BIASES_DEG, bounds[alpha], color=i, width=0.8))
+        noisy.append(Line(np.degrees(NOISES_RAD), by_noise[alpha], label, "o-", color=i))
+    e, sigma = "equilibrium bias e [deg]", "standard deviation of y1's noise [deg]"
+    return Picture(
+        "aranovskiy2020-vicinity",
+        "aranovskiy2020, (11): how far from the true rate its estimate rests, k1 and k2 of Table 2",
+        [
+            Panel("rate error [rad/s]", biased, "no noise; lines: closed form; above: chatter", e, "log", "log"),
+            Panel("RMS rate error\n[rad/s]", noisy, "with noise, no bias", sigma, "log", "log"),
+        ],
+        share_x=False,
+    )

@@ -1,0 +1,268 @@
+"""The Riccati equation of (10): how delicate it is, its misprint, and whether the pair (A', C) is observable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from cmg_mj.laws.state_feedback import StateFeedback
+from cmg_mj.observers import Measurement
+from cmg_mj.papers.aranovskiy2020.forms_of_10 import (
+    METHODS,
+    Comparison,
+    Method,
+    Plain,
+    compare,
+    euler,
+    make_exact,
+    matrix_of,
+    rk4,
+    rk4_as_printed,
+)
+from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, damping, settled_gains
+from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
+from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.linear_check import rank_margin
+from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.view.plots.figure import Line, Panel, Picture
+
+# --- delicacy ---------------------------------------------------------------------------------------------------
+
+RATES_HZ = tuple(float(rate) for rate in np.geomspace(20.0, 2000.0, 41))
+
+
+class Transient(NamedTuple):
+    """H from H_0 at rest, by one method at one rate."""
+
+    least: float
+    """Least eigenvalue met; minus infinity if H was lost."""
+    error: float
+    """Largest error of H12, which weighs the measurement in the rate's estimate, by its steady value."""
+    path: np.ndarray
+    """H12 sample by sample, (n_samples,)."""
+
+
+def transient(method: str, rate_hz: float, kind: type = np.float64) -> Transient:
+    """Integrate the Riccati equation beside its exact solution, over 0.2 s but at least 50 steps.
+
+    Args:
+        method: One of `METHODS`.
+        rate_hz: Steps a second.
+        kind: Precision; single is what the paper's STM32F746 computes in hardware.
+
+    Returns:
+        What was met.
+    """
+    h, A = 1.0 / rate_hz, A_prime()
+    E = expm(h * np.block([[-A.T, C.T @ C], [Q, A]]))
+    H, truth = H_0.astype(kind), H_0
+    _, steady = settled_gains()
+    least, error, path = math.inf, 0.0, []
+    for _ in range(max(50, round(0.2 * rate_hz))):
+        with np.errstate(all="ignore"):
+            H = METHODS[method](H, A, h)
+        truth = (E[3:, :3] + E[3:, 3:] @ truth) @ np.linalg.inv(E[:3, :3] + E[:3, 3:] @ truth)
+        path.append(float(H[0, 1]))
+        if not np.isfinite(H).all():
+            return Transient(-math.inf, math.inf, np.array(path))
+        least = min(least, float(np.linalg.eigvalsh(H.astype(float))[0]))
+        error = max(error, abs(float(H[0, 1]) - truth[0, 1]) / steady)
+    return Transient(least, error, np.array(path))
+
+
+def lowest_rate(method: str, sweep: Mapping[float, Transient], passes: Callable[[Transient], bool]) -> float | None:
+    """Return the rate above which a method passes, by bisection to 0.1 Hz; None if it does at the lowest tried [Hz]."""
+    failing_rates = [rate for rate, result in sweep.items() if not passes(result)]
+    if not failing_rates:
+        return None
+    low, high = max(failing_rates), min((rate for rate in sweep if rate > max(failing_rates)), default=math.inf)
+    while math.isfinite(high) and high - low > 0.1:
+        middle = (low + high) / 2.0
+        low, high = (low, middle) if passes(transient(method, middle)) else (middle, high)
+    return high
+
+
+def matrices_along(run: Trajectory) -> np.ndarray:
+    """Return H of this package's observer along a run, from the second sample on, (n_ticks - 1, 3, 3)."""
+    observer = make_exact()
+    y1, y2, u = (run[name].tolist() for name in ("y1_rad", "y2_rad", "u_rad_s"))
+    state, matrices = observer.init(Measurement(y1[0], y2[0])), []
+    for k in range(1, len(y1)):
+        state, _ = observer.step(state, Measurement(y1[k], y2[k]), u[k - 1])
+        matrices.append(matrix_of(state))
+    return np.array(matrices)
+
+
+def delicacy() -> Claim:
+    """Judge the condition and definiteness of H over step size and method."""
+    sweeps = {name: {rate: transient(name, rate) for rate in RATES_HZ} for name in METHODS}
+    definite = {name: lowest_rate(name, sweep, lambda t: t.least > 0.0) for name, sweep in sweeps.items()}
+    finite = {name: lowest_rate(name, sweep, lambda t: math.isfinite(t.error)) for name, sweep in sweeps.items()}
+    at_200 = {name: transient(name, 1.0 / DT) for name in METHODS}
+    float32 = {name: transient(name, 1.0 / DT, np.float32) for name in ("explicit Euler", "Runge-Kutta 4")}
+    comparison = compare(make_exact(), Plain(euler), SEED_OF_10)
+    matrices = matrices_along(run_of_10(SEED_OF_10))
+    return Claim(
+        place="Remark 1, delicacy",
+        statement="The Riccati equation is sensitive to the numerical method; six decades between Q's entries amplify "
+        "it.",
+        assumes={"control rate": f"{1.0 / DT:g} Hz", "method": "explicit Euler, Runge-Kutta 4, the exact step"},
+        holds=at_200["explicit Euler"].error > 0.1
+        and at_200["Runge-Kutta 4"].error < 1e-2
+        and at_200["exact step (ours)"].error < 1e-8
+        and definite["exact step (ours)"] is None,
+        conditions="At 200 Hz the equation is delicate for explicit Euler alone: H until it has settled, the estimate "
+        "throughout. Runge-Kutta 4 does well enough even in single precision. The exact (Davison-Maki) step does so at "
+        "any rate.",
+        figures={
+            "definite_above_hz": definite,
+            "finite_above_hz": finite,
+            "error_of_H12_at_200_hz": {name: t.error for name, t in at_200.items()},
+            "error_of_H12_at_200_hz_single": {name: t.error for name, t in float32.items()},
+            "rate_changed_by_euler_rad_s": comparison.difference,
+            "rate_error_euler_rad_s": comparison.other_error,
+            "rate_error_exact_rad_s": comparison.error,
+            "condition_along_run": float(np.linalg.cond(matrices).max()),
+            "least_eigenvalue_along_run": float(np.linalg.eigvalsh(matrices).min()),
+        },
+        pictures=[_picture(sweeps, at_200)],
+    )
+
+
+def _picture(sweeps: Mapping[str, Mapping[float, Transient]], at_200: Mapping[str, Transient]) -> Picture:
+    errors, least, paths = [], [], []
+    for i, (name, by_rate) in enumerate(sweeps.items()):
+        finite = [t.error if math.isfinite(t.error) else math.nan for t in by_rate.values()]
+        positive = [t.least if t.least > 0.0 else math.nan for t in by_rate.values()]
+        path = np.concatenate([[0.0], at_200[name].path[:24]])
+        errors.append(Line(RATES_HZ, finite, name, color=i))
+        least.append(Line(RATES_HZ, positive, name, color=i, style="o-" if i < 2 else "--"))
+        paths.append(Line(np.arange(len(path)) * 5.0, path, name, color=i, style="--" if i == 2 else "o-"))
+    rate, span = "steps a second [Hz]", "largest in the first 0.2 s or 50 steps"
+    return Picture(
+        "aranovskiy2020-remark-1",
+        "aranovskiy2020, Remark 1: the Riccati equation of (10) from H(0) = I, Q of Table 2",
+        [
+            Panel("error of H12\nby its steady value", errors, span, rate, "log", "log"),
+            Panel("least eigenvalue\nof H", least, "none where negative", rate, "log", y_range=(0.0, 1.1)),
+            Panel("H12 [1/s]", paths, "at 200 Hz", "time [ms]"),
+        ],
+        share_x=False,
+    )
+
+
+# --- the misprint -----------------------------------------------------------------------------------------------
+
+SETTLING_S = 8.0
+"""The slowest entry, H33, takes 1 s to fall by e^2 [s]."""
+HARMLESS = 0.05
+"""Share of the rate's error: if the misprint changes the rate by less, either equation may have been run."""
+
+
+def settle(method: Method, h: float = 1e-3) -> np.ndarray:
+    """Return H where a method settles at rest, (3, 3)."""
+    H = H_0
+    for _ in range(round(SETTLING_S / h)):
+        H = method(H, A_prime(), h)
+    return H
+
+
+def misprint() -> Claim:
+    """Judge the Riccati equation as printed: symmetric, or as good as what is."""
+    rates = compare(Plain(rk4), Plain(rk4_as_printed), SEED_OF_10)
+    return misprint_claim(settle(rk4), settle(rk4_as_printed), rates)
+
+
+def misprint_claim(H: np.ndarray, printed_H: np.ndarray, rate: Comparison) -> Claim:
+    """Judge by H where either equation settles at rest, and by the rates that they estimate."""
+    is_symmetric = abs(printed_H[0, 1] - printed_H[1, 0]) < 1e-6 * printed_H[1, 0]
+    return Claim(
+        place="After (10), the Riccati equation",
+        statement="The symmetric gain matrix of (10) is the solution of H' = H A^T + A' H - H C^T C H + Q.",
+        holds=is_symmetric or rate.difference < HARMLESS * rate.error,
+        conditions=""
+        if is_symmetric
+        else "With A'^T for the printed A^T, which is that of (6): a misprint. The observer's rate is the same to less "
+        "than a hundredth of its error, whichever of them was run.",
+        figures={
+            "H12_printed": float(printed_H[0, 1]),
+            "H21_printed": float(printed_H[1, 0]),
+            "H12": float(H[0, 1]),
+            "largest_change_of_gain_share": float(np.abs((printed_H - H)[:, ::2]).max() / np.abs(H[:, ::2]).max()),
+            "rate_changed_rad_s": rate.difference,
+            "rate_error_rad_s": rate.error,
+            "rate_error_printed_rad_s": rate.other_error,
+        },
+    )
+
+
+# --- observability ----------------------------------------------------------------------------------------------
+
+
+def observability_margin(a: float, outputs: np.ndarray = C) -> float:
+    """Return the rank margin of [C; C A'; C A'^2], for the outputs C."""
+    A = A_prime(a)
+    return rank_margin(np.vstack([outputs, outputs @ A, outputs @ A @ A]))
+
+
+def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, float]:
+    """Return the least and largest eigenvalue of the observability Gramian over every span of a run.
+
+    Phi(t, s) of A' has the first row [1, phi, 0] with phi' = exp(integral of a): Simpson's rule over the span, a held
+    between ticks.
+
+    Args:
+        a: The entry of A' tick by tick, (n_ticks,) [1/s].
+        dt: Between ticks [s].
+        span_s: T_0 [s], an even number of ticks.
+
+    Returns:
+        delta_1 and delta_2 of the condition after (10) [s], [s^3].
+    """
+    n = round(span_s / dt)
+    weights = np.ones(n + 1)
+    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
+    weights *= dt / 3.0
+    least, largest = math.inf, 0.0
+    for start in range(len(a) - n):
+        a_span = a[start : start + n]
+        growth = np.exp(np.concatenate([[0.0], np.cumsum(a_span * dt)]))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            step = np.where(np.abs(a_span) < 1e-9, dt, np.expm1(a_span * dt) / a_span)
+        phi = np.concatenate([[0.0], np.cumsum(growth[:-1] * step)])
+        gramian = np.array([[span_s, weights @ phi], [weights @ phi, weights @ phi**2]])
+        values = np.linalg.eigvalsh(gramian)
+        least, largest = min(least, float(values[0]), span_s), max(largest, float(values[1]), span_s)
+    return least, largest
+
+
+def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
+    """Judge the uniform observability that (10) needs."""
+    limit = StateFeedback.rate_limit
+    u, y2 = np.meshgrid(np.linspace(-limit, limit, 21), np.linspace(-math.pi, math.pi, 41))
+    dampings = np.ravel(damping(u, y2)).tolist()
+    margin = min(observability_margin(a) for a in dampings)
+    margin_without_tilt = max(observability_margin(a, C[1:]) for a in dampings)
+    run = run_of_10(seed)
+    along_run = gramian_bounds(np.asarray(damping(run["u_rad_s"], run["y2_rad"])), DT, span_s)
+    extremes = [gramian_bounds(np.full(round(span_s / DT) + 1, a), DT, span_s) for a in (min(dampings), max(dampings))]
+    bounds = min(pair[0] for pair in extremes), max(pair[1] for pair in extremes)
+    return Claim(
+        place="After (10)",
+        statement="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
+        assumes={"servo": f"at most {limit:g} rad/s"},
+        holds=margin > 0.1 and margin_without_tilt < 1e-12 and bounds[0] > 0.0 and math.isfinite(bounds[1]),
+        conditions="Pointwise observability alone is not uniform; a bounded u, as the servos have it, closes the gap.",
+        figures={
+            "rank_margin": margin,
+            "rank_margin_without_tilt": margin_without_tilt,
+            "largest_damping_1_s": max(map(abs, dampings)),
+            "span_s": span_s,
+            "gramian_along_run": list(along_run),
+            "gramian_any_u": list(bounds),
+        },
+    )
