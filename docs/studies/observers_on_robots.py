@@ -25,9 +25,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj import mount
 from cmg_mj.core.zero_order_hold import hold_matrices
-from cmg_mj.features.mounting.largest_push import push_margin
-from cmg_mj.features.mounting.mount_files import write_scenario
-from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.features.mounting.limits import prospects, push_margin
+from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.features.tuning import Recorded, halves, recorder, tune
 from cmg_mj.features.tuning.simulations import WARM_UP_S
 from cmg_mj.observers import OBSERVERS

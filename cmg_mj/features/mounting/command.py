@@ -12,11 +12,9 @@ from cmg_mj.cli.terminal import CtrlC, end_interrupted, note, note_hints, progre
 from cmg_mj.core.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.features.mounting.axes import AxisLike
-    from cmg_mj.features.mounting.held_joints import Hold
-    from cmg_mj.features.mounting.mount_files import MountResult
-    from cmg_mj.features.mounting.mount_tuning import MountTuning
-    from cmg_mj.features.mounting.request import Base
+    from cmg_mj.features.mounting.hold import Hold
+    from cmg_mj.features.mounting.request import AxisLike, Base
+    from cmg_mj.features.mounting.write import MountResult, MountTuning
 
 
 class MountOptions(TypedDict):
@@ -141,10 +139,10 @@ def mount(
     gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest that the robot withstands
     in MuJoCo.
     """
-    from cmg_mj.features.mounting.mount_files import mount_and_write
     from cmg_mj.features.mounting.push import LONGEST_S, TimeLimit
     from cmg_mj.features.mounting.report import mount_report_lines
     from cmg_mj.features.mounting.request import MountRequest
+    from cmg_mj.features.mounting.write import mount_and_write
 
     if with_tuning and with_plugin:
         raise InputError("--tune: not with --plugin, which would keep the old parameters; use cmg-mj plugin afterwards")
@@ -187,7 +185,7 @@ class TuningOutcome(NamedTuple):
 
 def _tune(result: MountResult) -> TuningOutcome:
     """Tune the observer of a robot that is mounted; a Ctrl-C ends the search, and a second one leaves all as it was."""
-    from cmg_mj.features.mounting.mount_tuning import tune_mounted
+    from cmg_mj.features.mounting.write import tune_mounted
 
     with CtrlC() as ctrl_c, progress(f"tuning {result.observer}", 1.0) as on_progress:
         try:

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.loop import ControlLoop
-from cmg_mj.features.mounting.largest_push import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS
-from cmg_mj.features.mounting.prospects import Prospects
+from cmg_mj.features.mounting.limits import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS, Prospects
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
 from cmg_mj.plant.physics import ManyWorlds
 from cmg_mj.runs.batch_values import batch_values

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from cmg_mj.features.mounting.largest_push import PUSH_S, WORLDS
-from cmg_mj.features.mounting.mount_files import MountResult
-from cmg_mj.features.mounting.prospects import LOW_LIMIT_DEG
+from cmg_mj.features.mounting.limits import LOW_LIMIT_DEG, PUSH_S, WORLDS
 from cmg_mj.features.mounting.push import LEAST, LONGEST_S, OTHER_WORLDS, UNPUSHED_S, SimulatedPush
+from cmg_mj.features.mounting.write import MountResult
 from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, loop_words, measured_words, sliding_words
 from cmg_mj.plant.tilt_line import HingeLine
 

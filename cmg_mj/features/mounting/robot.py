@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.features.mounting.held_joints import joint_held, unused_name
+from cmg_mj.features.mounting.hold import joint_held, unused_name
 from cmg_mj.inputs.files import expanded, require_file
+from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.checks import STEPS_S
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, axes_in, axes_of, missing_parts
 from cmg_mj.plant.mjcf import compile_model, parse
+from cmg_mj.plant.tilt_line import HingeLine
 
 BAD_CONNECTIONS = {int(mujoco.mjtEq.mjEQ_CONNECT): "connect", int(mujoco.mjtEq.mjEQ_WELD): "weld"}
 UNNAMED = "MuJoCo Model"
@@ -254,3 +258,58 @@ def pose_of(model: mujoco.MjModel, keyframe: str | None, path: Path) -> np.ndarr
     if keyframe not in names:
         raise InputError(f"--keyframe {keyframe}: {path} has no such keyframe; {nearest(keyframe, names, 'it has')}")
     return model.key_qpos[names.index(keyframe)].copy()
+
+
+class ExistingAxes(NamedTuple):
+    """Axes that a robot has already."""
+
+    lines: Sequence[str]
+    """The hinges that it tilts about."""
+    drives: Sequence[str]
+    """The gimbal and flywheel joints of the modules."""
+    speeds: Mapping[str, float]
+    """Flywheel joint -> speed [rad/s]."""
+    controls: Mapping[str, float]
+    """Flywheel motor -> control [rad/s]."""
+
+
+def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, path: Path) -> ExistingAxes:
+    """Find the axes that a robot has already.
+
+    Args:
+        spec: The robot.
+        model: The same, compiled.
+        name: Name of the new axis.
+        path: The file, for messages.
+
+    Returns:
+        The hinges, joints and speeds of these axes.
+
+    Raises:
+        InputError: It has an axis and the new one has no name; it has half of an axis; or its keyframe of that name
+            does not fit.
+    """
+    elements = [element.name for kind in (spec.joints, spec.sites, spec.sensors) for element in kind]
+    names = axes_in(elements)
+    if not names or not any(key.name == EQUILIBRIUM_KEY for key in spec.keys):
+        conflicts = [element for element in elements if names and axes_in([element])]
+        conflicts += [f"keyframe {key.name}" for key in spec.keys if key.name == EQUILIBRIUM_KEY]
+        if conflicts:
+            raise InputError(f"{path}: has an element {conflicts[0]!r} already, which a mounted pair brings: rename it")
+        return ExistingAxes((), (), {}, {})
+    missing = missing_parts(spec)
+    if missing:
+        raise InputError(f"{path}: has an axis already, and yet {missing[0]}")
+    if not name:
+        known = f" {', '.join(filter(None, names))}" if any(names) else ""
+        raise InputError(f"{path}: has an axis{known} already: give the new one a name, such as --name pitch")
+    key, names_of = model.key(EQUILIBRIUM_KEY).id, axes_of(model)
+    axes = [find_axis(model, key, axis, names_of[axis]) for axis in names]
+    modules = [module for axis in axes for module in axis.modules]
+    lines = [model.joint(axis.line.joint).name for axis in axes if isinstance(axis.line, HingeLine)]
+    return ExistingAxes(
+        lines,
+        [f"{module.name}/{joint}" for module in modules for joint in ("gimbal", "flywheel")],
+        {f"{module.name}/flywheel": module.speed for module in modules},
+        {f"{module.name}/flywheel_motor": module.speed for module in modules},
+    )

@@ -175,7 +175,7 @@ def tune_log(
     from cmg_mj.features.replay.noise import noise_numbers
     from cmg_mj.features.replay.reading import check_distinct_logs, read_log
     from cmg_mj.features.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
-    from cmg_mj.features.tuning.closed_loop import loop_scenario
+    from cmg_mj.features.tuning.logs import loop_scenario
     from cmg_mj.observers.parameter_options import parameters_of
     from cmg_mj.runs.save import file_name
     from cmg_mj.scenario.differences import safe_name

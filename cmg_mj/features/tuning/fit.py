@@ -10,8 +10,14 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.tuning.parameters import ParameterValues, TunedScalar, replaced
-from cmg_mj.features.tuning.search import StopSearch, insensitive_numbers, search
+from cmg_mj.features.tuning.search import (
+    ParameterValues,
+    StopSearch,
+    TunedScalar,
+    insensitive_numbers,
+    replaced,
+    search,
+)
 from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.results.intervals import Interval, PairedVerdict, paired_verdict, ratio_interval
 

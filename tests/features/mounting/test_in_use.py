@@ -10,7 +10,7 @@ import pytest
 
 from cmg_mj.features.gymnasium import ScissoredPairEnv
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.mount_files import write_scenario
+from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.features.sweeps import sweep
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario

@@ -12,10 +12,9 @@ import pytest
 
 from cmg_mj.features.mounting import mount
 from cmg_mj.features.mounting import push as simulated_push
-from cmg_mj.features.mounting.largest_push import PUSH_S, WORLDS
-from cmg_mj.features.mounting.mount_files import write_scenario
-from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, prospects
 from cmg_mj.features.mounting.push import TimeLimit
+from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.linear.verdict import hints
 from cmg_mj.results.summary_keys import section
 from cmg_mj.runs.experiment import Experiment

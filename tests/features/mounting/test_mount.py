@@ -11,8 +11,8 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.mount_files import write_scenario
-from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.features.mounting.limits import prospects
+from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.elements import axes_of
 from cmg_mj.plant.plant import load_plant

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.mounting import mount_tuning
-from cmg_mj.features.mounting.largest_push import PushMargin
-from cmg_mj.features.mounting.mount_tuning import TUNED_COMMENT, tune_mounted
+from cmg_mj.features.mounting import write
+from cmg_mj.features.mounting.limits import PushMargin
+from cmg_mj.features.mounting.write import TUNED_COMMENT, tune_mounted
 from cmg_mj.features.tuning import NoiseLevelResult, TuningResult
 from cmg_mj.results.folder import is_signed, signed
 from cmg_mj.scenario.loading import load_scenario
@@ -44,8 +44,8 @@ def stubs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Stubs:
     def use(level: NoiseLevelResult, before: float, after: float) -> None:
         study = TuningResult(load_scenario(str(path)), "linear", {"tau": 0.04}, [], [], 8, (2.0, 3.0), [level])
         margins = iter([PushMargin(before, before), PushMargin(after, after)])
-        monkeypatch.setattr(mount_tuning, "tune", lambda *_, **__: study)
-        monkeypatch.setattr(mount_tuning, "push_margin", lambda *_: next(margins))
+        monkeypatch.setattr(write, "tune", lambda *_, **__: study)
+        monkeypatch.setattr(write, "push_margin", lambda *_: next(margins))
 
     return Stubs(path, use)
 
@@ -105,7 +105,7 @@ def test_what_is_mounted_stays(
     def fail(*_: object, **__: object) -> None:
         raise failure
 
-    monkeypatch.setattr(mount_tuning, "tune_mounted", fail)
+    monkeypatch.setattr(write, "tune_mounted", fail)
     outcome = cmg_mj(*TORSO, "--tune")
     assert (outcome.status, outcome.err.splitlines()[-1]) == (status, f"cmg-mj: {message}")
     assert "inertia 8.135 kg m^2" in outcome.out
@@ -115,8 +115,8 @@ def test_what_is_mounted_stays(
 @pytest.mark.slow
 def test_the_command(elsewhere: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever comes out, within its time, the scenario runs and its first line is right."""
-    monkeypatch.setattr(mount_tuning, "WORLDS", 2)
-    monkeypatch.setattr(mount_tuning, "LONGEST_S", 1.0)
+    monkeypatch.setattr(write, "TUNED_WORLDS", 2)
+    monkeypatch.setattr(write, "MAX_TUNING_S", 1.0)
     outcome = cmg_mj(*TORSO, "--observer", "linear", "--tune")
     assert outcome.status == 0
     assert "linear tuned" in outcome.out

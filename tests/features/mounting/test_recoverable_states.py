@@ -12,9 +12,8 @@ from scipy.integrate import quad
 
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.largest_push import PUSH_S, push_margin
-from cmg_mj.features.mounting.mount_files import write_scenario
-from cmg_mj.features.mounting.recoverable_states import ceiling
+from cmg_mj.features.mounting.limits import PUSH_S, ceiling, push_margin
+from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.laws import TABLE_2_GAINS, scaled_gains
 from cmg_mj.laws.state_feedback import closed_loop_poles
 from cmg_mj.plant.plant import load_plant
@@ -118,9 +117,9 @@ def fast(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
 )
 def test_no_controller_bears_more(fast: Experiment, feedback: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor does the one that is fed the true rate; it bears more than any blow that can be recovered from."""
-    monkeypatch.setattr("cmg_mj.features.mounting.largest_push.WORLDS", 4)
-    monkeypatch.setattr("cmg_mj.features.mounting.largest_push.LEVELS", 16)
-    monkeypatch.setattr("cmg_mj.features.mounting.largest_push.BEFORE_S", 0.3)
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.WORLDS", 4)
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.LEVELS", 16)
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.BEFORE_S", 0.3)
     experiment = fast.with_settings(feedback)
     top = ceiling(experiment.plant.reduced, experiment.law.rate_limit)
     assert top.pole == pytest.approx(7.85, rel=0.01)

@@ -11,11 +11,16 @@ import numpy as np
 import pytest
 
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.fall_check import simulated_pole
-from cmg_mj.features.mounting.largest_push import PUSH_S
-from cmg_mj.features.mounting.mount_files import PUSHED_AT_S, write_scenario
-from cmg_mj.features.mounting.prospects import Prospects, prospects, smallest_sufficient_scale
-from cmg_mj.features.mounting.recoverable_states import RecoverableLimit, ceiling
+from cmg_mj.features.mounting.limits import (
+    PUSH_S,
+    Prospects,
+    RecoverableLimit,
+    ceiling,
+    prospects,
+    smallest_sufficient_scale,
+)
+from cmg_mj.features.mounting.stance import simulated_pole
+from cmg_mj.features.mounting.write import PUSHED_AT_S, write_scenario
 from cmg_mj.plant.tilt_line import HingeLine, SupportLine
 from cmg_mj.runs.experiment import Experiment, prepare
 from tests.features.mounting.robots import ROBOTS

@@ -10,7 +10,7 @@ import mujoco
 import pytest
 
 from cmg_mj import mount
-from cmg_mj.features.mounting.mount_files import (
+from cmg_mj.features.mounting.write import (
     SCALED_COMMENT,
     AxesParameters,
     RigSettings,

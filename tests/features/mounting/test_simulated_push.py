@@ -14,14 +14,11 @@ import pytest
 
 from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.features.mounting import mount, mount_files
+from cmg_mj.features.mounting import mount, write
 from cmg_mj.features.mounting import push as simulated_push
-from cmg_mj.features.mounting.largest_push import PUSH_S, WORLDS, PushMargin
-from cmg_mj.features.mounting.mount_files import PUSH_SHARE, write_scenario
-from cmg_mj.features.mounting.pair_demands import pair_demands
-from cmg_mj.features.mounting.prospects import Prospects, prospects
+from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, Prospects, PushMargin, ceiling, pair_demands, prospects
 from cmg_mj.features.mounting.push import MARGIN, RESOLUTION, SimulatedPush, TimeLimit
-from cmg_mj.features.mounting.recoverable_states import ceiling
+from cmg_mj.features.mounting.write import PUSH_SHARE, write_scenario
 from cmg_mj.plant.physics import OneWorld
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -187,7 +184,7 @@ def test_a_robot_that_does_not_stand_is_told_a_scale_that_was_tried(monkeypatch:
 def pendulum(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     """A command that mounts a pair, with a push margin that takes no time to find."""
     Path("pendulum.xml").write_text(PENDULUM, encoding="utf-8")
-    monkeypatch.setattr("cmg_mj.features.mounting.prospects.push_margin", lambda *_: PushMargin(0.4, 0.3))
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.push_margin", lambda *_: PushMargin(0.4, 0.3))
     return ("mount", "pendulum.xml", "--body", "pole", "-o", "rig.xml")
 
 
@@ -225,8 +222,8 @@ def pendulum(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
 def test_it_says_what_the_robot_itself_stands(
     pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, simulated: SimulatedPush, text: str
 ) -> None:
-    monkeypatch.setattr(mount_files, "simulated_push", lambda *_: simulated)
-    monkeypatch.setattr(mount_files, "_sufficient_scale", lambda *_: None)
+    monkeypatch.setattr(write, "simulated_push", lambda *_: simulated)
+    monkeypatch.setattr(write, "_sufficient_scale", lambda *_: None)
     done = cmg_mj(*pendulum)
     assert done.status == 0, done.err
     assert text in done.out
@@ -241,8 +238,8 @@ def test_it_says_what_the_robot_itself_stands(
 def test_a_robot_that_falls_gets_no_hint_on_the_push_it_stands(
     pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, standing: int
 ) -> None:
-    monkeypatch.setattr(mount_files, "simulated_push", lambda *_: SimulatedPush(standing, 0.3 * (standing == WORLDS)))
-    monkeypatch.setattr(mount_files, "_sufficient_scale", lambda *_: None)
+    monkeypatch.setattr(write, "simulated_push", lambda *_: SimulatedPush(standing, 0.3 * (standing == WORLDS)))
+    monkeypatch.setattr(write, "_sufficient_scale", lambda *_: None)
     monkeypatch.setattr(Prospects, "noisy", True)
     done = cmg_mj(*pendulum)
     assert ("with other noise it may fall of smaller pushes than it stands here" in done.err) == (standing == WORLDS)
@@ -250,8 +247,8 @@ def test_a_robot_that_falls_gets_no_hint_on_the_push_it_stands(
 
 
 def test_a_scale_is_named_only_if_it_was_tried(pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mount_files, "simulated_push", lambda *_: SimulatedPush(3))
-    monkeypatch.setattr(mount_files, "standing_unpushed", lambda experiment, *_: WORLDS if heavy(experiment) else 9)
+    monkeypatch.setattr(write, "simulated_push", lambda *_: SimulatedPush(3))
+    monkeypatch.setattr(write, "standing_unpushed", lambda experiment, *_: WORLDS if heavy(experiment) else 9)
 
     def heavy(experiment: Experiment) -> bool:
         return experiment.plant.model.body_mass.sum() > 15.0
@@ -265,7 +262,7 @@ def test_quick_says_that_it_is_the_reduced_models(pendulum: tuple[str, ...], mon
     def fails(*_: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(mount_files, "simulated_push", fails)
+    monkeypatch.setattr(write, "simulated_push", fails)
     out = cmg_mj(*pendulum, "--quick").out
     assert "gyro_free: not tried in MuJoCo; by its reduced model E = 0.4 N m s, a push of 4 N m, " in out
     figures = json.loads(cmg_mj(*pendulum, "--quick", "--json", "--overwrite").out)

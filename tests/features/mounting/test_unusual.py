@@ -11,7 +11,7 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting import MountedRobot, mount
-from cmg_mj.features.mounting.fall_check import simulated_pole
+from cmg_mj.features.mounting.stance import simulated_pole
 from cmg_mj.plant.plant import Plant, load_plant
 from tests.features.mounting.push_robots import CART_POLE, RAIL, bicycle
 from tests.tiers import slow_but

@@ -11,7 +11,7 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.prospects import smallest_sufficient_scale
+from cmg_mj.features.mounting.limits import smallest_sufficient_scale
 from cmg_mj.results.folder import signed
 from tests.command import cmg_mj
 from tests.features.mounting.robots import EXAMPLES, ROBOTS
@@ -63,7 +63,7 @@ def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.Monke
     def fail(*_: object, **__: object) -> None:
         raise InputError(f"{next(Path().glob('.a.*.partial.xml'))}: fails")
 
-    monkeypatch.setattr("cmg_mj.features.mounting.mount_files.prospects", fail)
+    monkeypatch.setattr("cmg_mj.features.mounting.write.prospects", fail)
     assert "a.xml: fails" in cmg_mj(*MOUNT, "-o", "a.xml", "--overwrite").complaint
     assert files() == ["a.toml", "a.xml"]
     assert [Path(name).read_bytes() for name in files()] == before
@@ -112,7 +112,7 @@ def test_what_mujoco_cannot_do_is_one_line(monkeypatch: pytest.MonkeyPatch) -> N
     def fail(*_: object, **__: object) -> None:
         raise ValueError("Error: repeated name 'x'\nin frame")
 
-    monkeypatch.setattr("cmg_mj.features.mounting.mount_files.mount_on_request", fail)
+    monkeypatch.setattr("cmg_mj.features.mounting.write.mount_on_request", fail)
     message = cmg_mj(*MOUNT, "-o", "a.xml").complaint
     assert f"{TORSO}: MuJoCo cannot put a pair on it: repeated name 'x' in frame" in message
     assert files() == []
@@ -126,10 +126,10 @@ def test_the_document_has_the_commands_of_its_robots() -> None:
 
 def test_a_command_of_the_document(monkeypatch: pytest.MonkeyPatch) -> None:
     """In two worlds of eight pushes: how large a push they recover from is of no account here."""
-    monkeypatch.setattr("cmg_mj.features.mounting.largest_push.WORLDS", 2)
-    monkeypatch.setattr("cmg_mj.features.mounting.largest_push.LEVELS", 8)
-    monkeypatch.setattr("cmg_mj.features.mounting.largest_push.BEFORE_S", 0.1)
-    monkeypatch.setattr("cmg_mj.features.mounting.largest_push.AFTER_TIME_CONSTANTS", 3.0)
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.WORLDS", 2)
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.LEVELS", 8)
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.BEFORE_S", 0.1)
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.AFTER_TIME_CONSTANTS", 3.0)
     words = shlex.split(ROBOTS["bicycle"].command)
     assert cmg_mj("mount", str(ROBOTS["bicycle"].path), *words[3:], "-o", "a.xml", "--quick").status == 0
     result = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options).save("b.xml")
@@ -143,7 +143,7 @@ def test_the_loop_is_closed_with_gyro_free_unless_told(monkeypatch: pytest.Monke
         observers.append(observer)
         raise InputError("noted")
 
-    monkeypatch.setattr("cmg_mj.features.mounting.mount_files.mount_and_write", note)
+    monkeypatch.setattr("cmg_mj.features.mounting.write.mount_and_write", note)
     for options in ((), ("--observer", "homogeneous")):
         assert "noted" in cmg_mj(*MOUNT, *options).complaint
     assert observers == ["gyro_free", "homogeneous"]

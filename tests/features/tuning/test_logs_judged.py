@@ -14,8 +14,7 @@ from cmg_mj import load_scenario
 from cmg_mj.features.replay.log import Log, ReadOptions
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.features.tuning import figures_of_logs, logs_table, tune_on_logs
-from cmg_mj.features.tuning.closed_loop import LoopComparison, compare_in_loop, judged, loop_scenario
-from cmg_mj.features.tuning.on_logs import LogStudy
+from cmg_mj.features.tuning.logs import LogStudy, LoopComparison, compare_in_loop, judged, loop_scenario
 from cmg_mj.results.intervals import Interval
 from tests.features.replay.motion import COLUMNS, sine, write_csv
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.features.tuning.parameters import TunedScalar, numbers_of, parameters_of, replaced
-from cmg_mj.features.tuning.search import crossing, search
+from cmg_mj.features.tuning.search import TunedScalar, crossing, numbers_of, parameters_of, replaced, search
 from cmg_mj.observers import make_observer
 from tests.features.tuning.user_observer import USER_OBSERVER
 from tests.observers.reference import DT, PAPER

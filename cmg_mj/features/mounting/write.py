@@ -1,10 +1,14 @@
-"""A robot with a pair mounted on it, written as a model and a scenario to run."""
+"""A robot with a pair mounted on it, written as a model and a scenario to run, with a plugin, tuned."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection, Mapping
+import os
+import re
+import time
+import tomllib
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -14,19 +18,21 @@ import mujoco
 import tomli_w
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.features.export.names import LONGEST, RESERVED
 from cmg_mj.features.mounting import MountedRobot
-from cmg_mj.features.mounting.largest_push import PUSH_S, WORLDS
-from cmg_mj.features.mounting.mount import mount_on_request
-from cmg_mj.features.mounting.mount_plugin import check_plugin, check_plugin_folder, write_mounted_plugin
-from cmg_mj.features.mounting.mounted import check_replaceable, check_target, with_scenario
-from cmg_mj.features.mounting.pair_demands import PairDemands, pair_demands
-from cmg_mj.features.mounting.prospects import (
+from cmg_mj.features.mounting.limits import (
     LOW_LIMIT_DEG,
     NOISE_HINT,
+    PUSH_S,
+    WORLDS,
+    PairDemands,
     Prospects,
+    pair_demands,
     prospects,
+    push_margin,
     smallest_sufficient_scale,
 )
+from cmg_mj.features.mounting.mount import check_replaceable, check_target, mount_on_request, with_scenario
 from cmg_mj.features.mounting.push import (
     OutOfTimeError,
     SimulatedPush,
@@ -35,13 +41,17 @@ from cmg_mj.features.mounting.push import (
     standing_unpushed,
 )
 from cmg_mj.features.mounting.request import MountRequest
-from cmg_mj.features.plugin.make import Plugin, require_tools
-from cmg_mj.inputs.files import expanded
+from cmg_mj.features.plugin.make import Plugin, make_plugin, require_tools, write_plugin
+from cmg_mj.features.plugin.tables import NAMES_IN_USE
+from cmg_mj.features.tuning import NoiseLevelResult, TuningResult, tune, tuned_scenario
+from cmg_mj.features.tuning.search import plain
+from cmg_mj.inputs.files import expanded, model_files
 from cmg_mj.observers import OBSERVER_CLASSES
+from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.observers.scaling import Number, scaled_names, scaled_parameters
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.files import whole_file
-from cmg_mj.results.folder import signed
+from cmg_mj.results.folder import RunFolder, is_own, is_signed, signed
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
@@ -331,3 +341,171 @@ def observer_parameters(kind: str, experiment: Experiment) -> AxesParameters:
 
 def _round(value: Number) -> Number:
     return tuple(map(_round, value)) if isinstance(value, tuple) else float(f"{value:.{DIGITS}g}")
+
+
+def plugin_folder(target: Path) -> Path:
+    """Return the folder of the plugin that belongs to a mounted model."""
+    return target.with_name(f"{target.stem}_plugin")
+
+
+def plugin_name(target: Path) -> str:
+    """Name a plugin after a model's file, in letters, digits and _: `my robot.xml` has my_robot."""
+    words = re.sub(r"[^A-Za-z0-9]+", "_", target.stem, flags=re.ASCII).strip("_")
+    name = words if words[:1].isalpha() else f"robot_{words}".rstrip("_")
+    taken = {name, name.lower()} & (RESERVED | NAMES_IN_USE)
+    return f"{name}_robot" if taken else name[:LONGEST]
+
+
+def check_plugin_folder(target: Path, robot: Path, *, overwrite: bool) -> None:
+    """Check that the folder of a plugin may be written, by the rules that hold for the mounted model.
+
+    Args:
+        target: The model's file.
+        robot: The robot's own file.
+        overwrite: Whether the plugin of an earlier mount is replaced.
+
+    Raises:
+        InputError: The folder holds a file of the robot's, or anything that may not be replaced.
+    """
+    folder = plugin_folder(target)
+    originals = model_files(robot) if robot.is_file() else []
+    if any(folder.resolve() in file.resolve().parents for file in originals):
+        raise InputError(f"-o {target}: {folder} holds the robot's own file, or one that it names; give another name")
+    if os.path.lexists(folder) and not is_own(folder):
+        raise InputError(f"-o {target}: {folder} holds files that cmg-mj did not write; give another name")
+    if folder.exists() and not overwrite:
+        raise InputError(f"-o {target}: {folder} exists; give another name, or --overwrite")
+
+
+def check_plugin(experiment: Experiment, target: Path) -> None:
+    """Generate a plugin as `write_mounted_plugin` does, before what takes a minute.
+
+    Raises:
+        InputError: Something in use cannot be exported.
+    """
+    make_plugin(experiment, plugin_name(target), start="spinning")
+
+
+def write_mounted_plugin(experiment: Experiment, target: Path) -> Plugin:
+    """Write the plugin of a mounted robot, whole or not at all.
+
+    Args:
+        experiment: The robot's scenario, prepared.
+        target: The mounted model's file, after which the plugin is named.
+
+    Returns:
+        The plugin. It sets the flywheels going itself, since a robot's own programs do not.
+
+    Raises:
+        InputError: Something in use cannot be exported, or the folder cannot be written.
+    """
+    made = make_plugin(experiment, plugin_name(target), start="spinning")
+    with RunFolder(plugin_folder(target), overwrite=True) as folder:
+        return write_plugin(made, folder)
+
+
+MAX_TUNING_S = 120.0
+"""The search ends after so long, with the best parameters so far [s]."""
+TUNED_WORLDS = 8
+"""Worlds that are fitted; as many others are scored."""
+TUNED_COMMENT = "# The observer's parameters, tuned on this robot by cmg-mj mount --tune"
+
+
+class MountTuning(NamedTuple):
+    """The observer of a mounted robot with its parameters tuned, beside those that it was mounted with."""
+
+    study: TuningResult
+    margin: float
+    """E of the reduced model, as mounted [N m s]."""
+    tuned_margin: float
+    """E of the reduced model with the tuned parameters [N m s]."""
+    in_use: bool
+    """True if the scenario has the tuned parameters now."""
+    whole: bool
+    """True if the search came to its end."""
+
+    @property
+    def level(self) -> NoiseLevelResult:
+        """The parameters and their scores."""
+        return self.study.levels[0]
+
+    def figures(self) -> dict[str, ParameterValue]:
+        """Return the figures that `cmg-mj mount --tune --json` prints beside the mount's."""
+        return {
+            "tuned_held_out_fit": self.level.fit,
+            "tuned_given_held_out_fit": self.level.given_fit,
+            "tuned_push_margin_impulse_n_m_s": self.tuned_margin,
+            "tuned_in_use": self.in_use,
+            "tuned_whole": self.whole,
+        }
+
+    def line(self) -> str:
+        """Describe the result in a line."""
+        numbers = ", ".join(f"{name} {size:.4g}" for name, size in self.level.sizes.items())
+        began = "tuned" if self.whole else "tuned as far as there was time"
+        if self.in_use:
+            verdict = "the scenario has the tuned ones"
+        elif self.level.verdict != "better":
+            verdict = "the scenario keeps the others, because tuned ones are not better beyond chance"
+        else:
+            verdict = "the scenario keeps the others, because with tuned ones it stands less"
+        return (
+            f"  {self.study.kind} {began} on {TUNED_WORLDS} worlds: {numbers}; on {TUNED_WORLDS} others its fit is "
+            f"{self.level.fit:.2f} (before {self.level.given_fit:.2f}), and by the reduced model E = "
+            f"{self.tuned_margin:.3g} N m s (before {self.margin:.3g}): {verdict}"
+        )
+
+
+def tune_mounted(
+    path: Path,
+    *,
+    stop: Callable[[], bool] = lambda: False,
+    on_share: Callable[[float], None] | None = None,
+) -> MountTuning:
+    """Tune the observer of a mounted robot, and write its parameters if they are better in both ways.
+
+    The loop is closed on the gyro, as in `cmg-mj tune`, so that the smallest error may be that of an estimate near
+    zero, with which nothing stands: the tuned parameters must not have a smaller E either.
+
+    Args:
+        path: The scenario that the mount has written.
+        stop: Whether to end the search now.
+        on_share: Called now and then with the completed share.
+
+    Returns:
+        The result.
+
+    Raises:
+        InputError: There is nothing to tune, the robot falls without its observer, or the file cannot be written.
+    """
+    experiment = prepare(load_scenario(str(path)))
+    experiment.require_single_axis("mount --tune")
+    end, stopped = time.monotonic() + MAX_TUNING_S, False
+
+    def over() -> bool:
+        nonlocal stopped
+        stopped = stopped or stop() or time.monotonic() > end
+        return stopped
+
+    study = tune(experiment.scenario, worlds=TUNED_WORLDS, starts=1, on_share=on_share, stop=over)
+    level = study.levels[0]
+    tuned = prepare(tuned_scenario(study, level), experiment.plant)
+    margins = [push_margin(loop.scenario, loop.design).median_impulse for loop in (experiment, tuned)]
+    better = level.verdict == "better" and margins[1] >= margins[0]
+    if better:
+        _write(path, level)
+    return MountTuning(study, margins[0], margins[1], better, not stopped)
+
+
+def _write(path: Path, level: NoiseLevelResult) -> None:
+    """Replace the parameters in a mounted robot's scenario.
+
+    Raises:
+        InputError: No mount has written it.
+    """
+    if not is_signed(path):
+        raise InputError(f"{path}: is not a file of cmg-mj mount; the tuned parameters are not written")
+    fields = tomllib.loads(path.read_text(encoding="utf-8"))
+    fields["observer"] |= plain(level.parameters)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(signed(with_comment(tomli_w.dumps(fields), TUNED_COMMENT, "[observer]"), ".toml"))

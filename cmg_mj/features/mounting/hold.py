@@ -1,8 +1,8 @@
-"""Equality constraints that hold a robot's joints where they stand."""
+"""What holds a robot where it stands: constraints on its joints, its own servos, the keyframe of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -10,7 +10,57 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.features.mounting.servos import holds
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, ON_A_JOINT, joint_sizes
+from cmg_mj.plant.mujoco_state import posed
+
+_LINEAR = int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE)
+_INTEGRATOR = int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
+_FILTERS = int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
+
+
+def holds(actuator: mujoco.MjsActuator) -> bool:
+    """Return whether an actuator is a position servo of a joint: its force depends on the joint's position."""
+    return int(actuator.trntype) in ON_A_JOINT and _pulls_back(int(actuator.biastype), actuator.biasprm)
+
+
+def rest_controls(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """Return the controls and filter states with which position servos exert no force where they are.
+
+    The force of a servo of gain k is k a + b0 + b1 l. Its length l is the gear times the joint's position, and a is its
+    control, or the state of its filter or integrator.
+
+    Args:
+        model: The robot.
+        data: The same where it is to be held, after a forward pass.
+
+    Returns:
+        act (na,) and ctrl (nu,); 0 for other actuators.
+    """
+    act, ctrl = np.zeros(model.na), np.zeros(model.nu)
+    for i in range(model.nu):
+        bias, kind = model.actuator_biasprm[i], int(model.actuator_gaintype[i])
+        if not _pulls_back(int(model.actuator_biastype[i]), bias) or kind not in _LINEAR:
+            continue
+        length = float(data.actuator_length[i])
+        gain = float(model.actuator_gainprm[i, 0])
+        if kind == int(mujoco.mjtGain.mjGAIN_AFFINE):
+            gain += float(model.actuator_gainprm[i, 1]) * length
+        if gain == 0.0:
+            continue
+        target, dynamics = -(float(bias[0]) + float(bias[1]) * length) / gain, int(model.actuator_dyntype[i])
+        state = int(model.actuator_actadr[i])
+        if dynamics == _INTEGRATOR:
+            act[state] = target
+        elif dynamics in _FILTERS:
+            act[state] = ctrl[i] = target
+        elif state < 0:
+            ctrl[i] = target
+    return act, ctrl
+
+
+def _pulls_back(kind: int, bias: np.ndarray) -> bool:
+    return kind == int(mujoco.mjtBias.mjBIAS_AFFINE) and bool(bias[1] != 0.0)
+
 
 Hold = Literal["constraints", "servos"]
 IMPEDANCE = 0.9999
@@ -153,3 +203,61 @@ def _fix_joint(
     tie.data[:] = 0.0
     tie.data[0] = data.qpos[address] - model.qpos0[address]
     return tie
+
+
+Poses = Mapping[str, np.ndarray]
+"""Joint -> its position in qpos."""
+
+
+def poses_of(model: mujoco.MjModel, qpos: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the position of each joint of a compiled model, by its name."""
+    poses = {}
+    for i in range(model.njnt):
+        address = int(model.jnt_qposadr[i])
+        poses[model.joint(i).name] = qpos[address : address + joint_sizes(int(model.jnt_type[i]))[0]].copy()
+    return poses
+
+
+def as_qpos(model: mujoco.MjModel, poses: Poses) -> np.ndarray:
+    """Return poses as a vector qpos, with the model's reference for joints that have none."""
+    qpos = model.qpos0.copy()
+    for name, values in poses.items():
+        address = int(model.joint(name).qposadr[0])
+        qpos[address : address + len(values)] = values
+    return qpos
+
+
+def write_keyframe(
+    spec: mujoco.MjSpec,
+    model: mujoco.MjModel,
+    name: str,
+    qpos: np.ndarray,
+    speeds: Mapping[str, float],
+    ctrl: Mapping[str, float],
+) -> None:
+    """Write a keyframe in which the robot stands and its flywheels turn.
+
+    Args:
+        spec: The model, which gets the keyframe.
+        model: The same, compiled.
+        name: Name of the keyframe.
+        qpos: Joint positions, (nq,).
+        speeds: Joint -> speed, for those that turn [rad/s].
+        ctrl: Actuator -> control. Other position servos hold their joints in place.
+    """
+    qvel, (act, controls) = np.zeros(model.nv), rest_controls(model, posed(model, qpos))
+    for joint, speed in speeds.items():
+        qvel[int(model.joint(joint).dofadr[0])] = speed
+    for i in range(model.nu):
+        controls[i] = ctrl.get(model.actuator(i).name, controls[i])
+    spec.add_key(name=name, qpos=qpos, qvel=qvel, act=act, ctrl=controls)
+
+
+def pop_keyframes(spec: mujoco.MjSpec, model: mujoco.MjModel) -> list[tuple[str, dict[str, np.ndarray]]]:
+    """Remove a robot's own keyframes before it gets more joints, and return their names and poses."""
+    keyframes = [(model.key(i).name, poses_of(model, model.key_qpos[i])) for i in range(model.nkey)]
+    # The equilibrium of an axis mounted earlier is written anew.
+    keyframes = [(name, poses) for name, poses in keyframes if name != EQUILIBRIUM_KEY]
+    for key in list(spec.keys):
+        spec.delete(key)
+    return keyframes
