@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import binomtest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
@@ -18,17 +20,8 @@ from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.log_replay import NO_MODEL, misfit_of, replay_log
 from cmg_mj.features.replay.noise import noise_figures, noise_remarks
 from cmg_mj.features.replay.reference import Alignment, alignment_of, model_remark, remarks_on
-from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, level_of
-from cmg_mj.features.tuning.search import (
-    MakeObserver,
-    ParameterValues,
-    TunedScalar,
-    evaluations,
-    narrowed,
-    numbers_of,
-    parameters_of,
-    plain,
-)
+from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit
+from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, plain
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, paired_verdict, ratio_interval
@@ -40,15 +33,19 @@ from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.stages.push import push_windows
 
-SCENARIO = "push_recovery"
-"""The scenario by default."""
-NO_LOOP = "none"
-"""Name of no scenario: nothing is simulated."""
-WORLDS = 16
-USUAL_S = 5.0
-"""The loop runs for so long, or until the scenario ends [s]; longer only if the second after a push ends later."""
+BLOCKS = 10
+"""Stretches of each log's part that are scored one by one, for an interval."""
+MIN_STRETCH_S = 0.5
+"""Shortest stretches with an interval [s]; shorter ones are not independent."""
 RELEVANT = 1.01
 """A smaller ratio of two errors is no difference."""
+SCENARIO = "push_recovery"
+"""The scenario of the closed loop by default."""
+NO_LOOP = "none"
+"""Name of no scenario: nothing is simulated."""
+LOOP_WORLDS = 16
+USUAL_S = 5.0
+"""The loop runs for so long, or until the scenario ends [s]; longer only if the second after a push ends later."""
 
 
 def judged(ratio: Interval) -> PairedVerdict:
@@ -70,18 +67,22 @@ class LoopComparison:
         scenario: Its title.
         duration_s: Simulated time [s].
         worlds: Number of worlds, the same noise in both loops.
-        stood: Number of worlds that stood to the end, with the given and with the tuned parameters.
-        stood_alone: Number of those that fell with the other parameters.
-        ratio: RMS of the tilt, given by tuned, over the worlds that stood with both; None of fewer than two.
+        given_stood: Number of worlds that stood to the end with the given parameters.
+        tuned_stood: Number of worlds that stood to the end with the tuned parameters.
+        given_stood_alone: Number of those that fell with the tuned parameters.
+        tuned_stood_alone: Number of those that fell with the given parameters.
+        tilt_rms_ratio: RMS of the tilt, given by tuned, over the worlds that stood with both; None of fewer than two.
         refused: Why an observer could not be in this loop; empty if it could.
     """
 
     scenario: str
     duration_s: float
     worlds: int
-    stood: tuple[int, int] = (0, 0)
-    stood_alone: tuple[int, int] = (0, 0)
-    ratio: Interval | None = None
+    given_stood: int = 0
+    tuned_stood: int = 0
+    given_stood_alone: int = 0
+    tuned_stood_alone: int = 0
+    tilt_rms_ratio: Interval | None = None
     refused: str = ""
 
     @property
@@ -89,10 +90,15 @@ class LoopComparison:
         """Compare the tuned parameters with the given ones: by falls if these are beyond chance, else by the tilt."""
         if self.refused:
             return None
-        given, tuned = self.stood_alone
-        if _beyond_chance(given, tuned):
+        given, tuned = self.given_stood_alone, self.tuned_stood_alone
+        if given + tuned and binomtest(given, given + tuned).pvalue < 1.0 - CONFIDENCE:  # the sign test
             return "better" if tuned > given else "worse"
-        return "tie" if self.ratio is None else judged(self.ratio)
+        return "tie" if self.tilt_rms_ratio is None else judged(self.tilt_rms_ratio)
+
+    def figures(self) -> dict[str, SummaryValue]:
+        """Return the figures that `--json` prints."""
+        ratio = self.tilt_rms_ratio and list(self.tilt_rms_ratio)
+        return {**asdict(self), "tilt_rms_ratio": ratio, "verdict": self.verdict, "refused": self.refused or None}
 
     @property
     def remark(self) -> str:
@@ -101,20 +107,14 @@ class LoopComparison:
         loop += " and control rate)"
         if self.refused:
             return f"{loop} the parameters cannot be compared: {self.refused}."
-        given, tuned = self.stood
-        given_alone, tuned_alone = self.stood_alone
-        line = f"{loop} the tuned parameters stand {tuned} times ({tuned_alone} where the given ones fall), "
-        line += f"the given ones {given} ({given_alone} where the tuned ones fall)"
-        if self.ratio is not None:
-            line += "; RMS of the tilt, given / tuned, {:.3f} ({:.3f} to {:.3f})".format(*self.ratio)
+        line = (
+            f"{loop} the tuned parameters stand {self.tuned_stood} times ({self.tuned_stood_alone} where the given "
+            f"ones fall), the given ones {self.given_stood} ({self.given_stood_alone} where the tuned ones fall)"
+        )
+        if self.tilt_rms_ratio is not None:
+            line += "; RMS of the tilt, given / tuned, {:.3f} ({:.3f} to {:.3f})".format(*self.tilt_rms_ratio)
         words = {"better": "better there", "worse": "WORSE there", "tie": "not different there beyond chance"}
         return f"{line}: the tuned ones are {words[self.verdict or 'tie']}."
-
-
-def _beyond_chance(one: int, other: int) -> bool:
-    """Return whether worlds that stood with one set alone and with the other alone differ by the sign test, 5 %."""
-    n, fewer = one + other, min(one, other)
-    return 2.0 * sum(math.comb(n, k) for k in range(fewer + 1)) / 2.0**n < 1.0 - CONFIDENCE
 
 
 def loop_scenario(name: str | None, log: Log) -> Scenario | None:
@@ -141,7 +141,7 @@ def loop_scenario(name: str | None, log: Log) -> Scenario | None:
 
 
 def compare_in_loop(
-    scenario: Scenario, kind: str, given: ParameterValues, tuned: ParameterValues, *, worlds: int = WORLDS
+    scenario: Scenario, kind: str, given: ParameterValues, tuned: ParameterValues, *, worlds: int = LOOP_WORLDS
 ) -> LoopComparison:
     """Close the loop of a scenario on an observer with two sets of parameters, on the same worlds.
 
@@ -167,8 +167,8 @@ def compare_in_loop(
     title = scenario.title or "the scenario"
     try:
         experiments = [
-            prepare(loop.model_copy(update={"observer": ObserverSettings(kind=kind, **parameters)}))
-            for parameters in (plain(given), plain(tuned))
+            prepare(loop.model_copy(update={"observer": ObserverSettings(kind=kind, **plain(parameters))}))
+            for parameters in (given, tuned)
         ]
         for experiment in experiments:
             experiment.require_single_axis("tune-log")
@@ -178,57 +178,41 @@ def compare_in_loop(
     if any(outcome.kind == "interrupted" for result in results for outcome in result.outcomes):
         raise KeyboardInterrupt
     tilts = [result.values("tilt_rms_deg") for result in results]
-    both = np.isfinite(tilts[0]) & np.isfinite(tilts[1])
+    both = np.isfinite(tilts).all(axis=0)
     ratio = ratio_interval(tilts[0][both], tilts[1][both]) if both.sum() >= 2 else None
-    given_stood, tuned_stood = (result.stood for result in results)
-    stood = int(given_stood.sum()), int(tuned_stood.sum())
-    alone = int((given_stood & ~tuned_stood).sum()), int((tuned_stood & ~given_stood).sum())
-    return LoopComparison(title, duration, worlds, stood, alone, ratio)
+    stood = [result.stood for result in results]
+    counts = [int(which.sum()) for which in (*stood, stood[0] & ~stood[1], stood[1] & ~stood[0])]
+    return LoopComparison(title, duration, worlds, *counts, tilt_rms_ratio=ratio)
 
 
-BLOCKS = 10
-"""Stretches of each log's part that are scored one by one, for an interval."""
-SHORTEST_S = 0.5
-"""Shortest stretches with an interval [s]; shorter ones are not independent."""
-
-
-@dataclass(frozen=True)
 class LogSegments:
     """Parts of logs that are fitted or scored, in stretches of equal length.
 
-    Attributes:
+    Args:
         logs: The parts.
         settle_s: Time from every start of an observer that is not scored [s].
-        fell: 0: no log falls.
+
+    Attributes:
+        shortest_s: Length of the shortest stretch [s].
+        worlds: Number of stretches.
+        zero_rms: Error of an estimate of zero: RMS of the reference, mean of the stretches [rad/s].
+        largest_acceleration: Largest acceleration of the tilt, by differences of the reference [rad/s^2].
     """
 
-    logs: Sequence[Log]
-    settle_s: float
-    fell: int = 0
+    fell = 0
 
-    @property
-    def worlds(self) -> int:
-        """Number of stretches."""
-        return sum(len(self._stretches(log)) for log in self.logs)
-
-    @property
-    def shortest_s(self) -> float:
-        """Length of the shortest stretch [s]."""
-        return min(len(rows) * log.dt for log in self.logs for rows in self._stretches(log))
-
-    @property
-    def zero_rms(self) -> float:
-        """Error of an estimate of zero: RMS of the reference, mean of the stretches [rad/s]."""
-        return float(np.mean([_rms(log[REFERENCE][rows]) for log in self.logs for rows in self._stretches(log)]))
-
-    @property
-    def largest_acceleration(self) -> float:
-        """Largest acceleration of the tilt, by differences of the reference [rad/s^2]."""
-        return max(float(np.nanmax(np.abs(np.diff(log[REFERENCE]) / log.dt))) for log in self.logs)
-
-    def _stretches(self, log: Log) -> list[np.ndarray]:
-        scored = np.flatnonzero(log.scored(self.settle_s) & np.isfinite(log[REFERENCE]))
-        return [rows for rows in np.array_split(scored, BLOCKS) if len(rows)]
+    def __init__(self, logs: Sequence[Log], settle_s: float) -> None:
+        self.logs = logs
+        self._stretches = []
+        for log in logs:
+            scored = np.flatnonzero(log.scored(settle_s) & np.isfinite(log[REFERENCE]))
+            self._stretches.append([rows for rows in np.array_split(scored, BLOCKS) if len(rows)])
+        self.shortest_s = min(
+            len(rows) * log.dt for log, stretches in zip(logs, self._stretches, strict=True) for rows in stretches
+        )
+        zero = self._rms([-log[REFERENCE] for log in logs])
+        self.worlds, self.zero_rms = len(zero), float(zero.mean())
+        self.largest_acceleration = max(float(np.nanmax(np.abs(np.diff(log[REFERENCE]) / log.dt))) for log in logs)
 
     def errors(self, observers: Sequence[Observer], /) -> np.ndarray:
         """Return the RMS of the estimated rate less the reference in every stretch, (n_stretches,) [rad/s].
@@ -242,13 +226,32 @@ class LogSegments:
             for part in log.parts:
                 with np.errstate(all="ignore"):
                     rate[part] = replay(observer, log.trajectory(part)).x2
-            errors += [_rms((rate - log[REFERENCE])[rows]) for rows in self._stretches(log)]
-        return np.array(errors)
+            errors.append(rate - log[REFERENCE])
+        return self._rms(errors)
+
+    def _rms(self, errors: Sequence[np.ndarray]) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            return np.array(
+                [
+                    math.sqrt(float(np.mean(error[rows] ** 2)))
+                    for error, stretches in zip(errors, self._stretches, strict=True)
+                    for rows in stretches
+                ]
+            )
 
 
-def _rms(values: np.ndarray) -> float:
-    with np.errstate(all="ignore"):
-        return math.sqrt(float(np.mean(values**2)))
+class LogEvidence(NamedTuple):
+    """Evidence of a log beside its errors."""
+
+    name: str
+    noise: TiltNoise
+    """Sensor noise that the observer assumed."""
+    noise_by_the_log: Mapping[str, SummaryValue]
+    """White noise that the log shows, as `--json` prints it."""
+    alignment: Alignment | None
+    """Lag, scale and offset of the reference."""
+    remarks: Sequence[str]
+    """Remarks as in a replay."""
 
 
 @dataclass(frozen=True)
@@ -260,13 +263,9 @@ class LogStudy:
         start_parameters: Its parameters before.
         numbers: The tuned numbers.
         insensitive_parameters: Names of numbers that are not tuned, since the estimated rate does not depend on them.
-        names: The logs.
+        logs: The logs.
         split: The share of each log that was fitted; the rest is scored.
         level: Tuned parameters and their scores.
-        noises: Sensor noise that the observer assumed, log by log.
-        noises_by_the_logs: White noise that the logs show, as `--json` prints it, log by log.
-        alignments: Lag, scale and offset of the reference, log by log.
-        remarks: Remarks as in a replay, log by log.
         stretch_s: The shortest of the scored stretches [s].
         loop: Given and tuned parameters in a scenario's closed loop; None if none was asked for.
     """
@@ -275,13 +274,9 @@ class LogStudy:
     start_parameters: ParameterValues
     numbers: Sequence[TunedScalar]
     insensitive_parameters: Sequence[str]
-    names: Sequence[str]
+    logs: Sequence[LogEvidence]
     split: float
     level: NoiseLevelResult
-    noises: Sequence[TiltNoise]
-    noises_by_the_logs: Sequence[Mapping[str, SummaryValue]]
-    alignments: Sequence[Alignment | None]
-    remarks: Sequence[Sequence[str]]
     stretch_s: float
     loop: LoopComparison | None = None
 
@@ -297,25 +292,42 @@ class LogStudy:
         return judged(self.level.ratio) if np.isfinite(self.level.given_rms).all() else "better"
 
     @property
-    def limits(self) -> list[str]:
-        """Name the tuned numbers that ended at a limit of their range, with the limit."""
-        ends = []
-        for number in self.numbers:
-            if number.name in self.level.edges:
-                size = self.level.sizes[number.name]
-                lowest = size / number.low < number.high / size
-                ends.append(f"{number.name} ({'lowest' if lowest else 'highest'}, {size:.4g})")
-        return ends
-
-    @property
     def has_interval(self) -> bool:
         """Return whether the stretches are long enough for an interval."""
-        return self.stretch_s >= SHORTEST_S
+        return self.stretch_s >= MIN_STRETCH_S
 
     def settings(self) -> list[str]:
         """Return the tuned parameters as `--set` of a replay takes them."""
         tuned = plain({number.parameter: self.level.parameters[number.parameter] for number in self.numbers})
         return [f"{self.kind}.{name}={json.dumps(value)}" for name, value in tuned.items()]
+
+    def figures(self) -> dict[str, SummaryValue]:
+        """Return the figures that `cmg-mj tune-log --json` prints."""
+        return {
+            "logs": [log.name for log in self.logs],
+            "observer": self.kind,
+            "split": self.split,
+            "given_parameters": plain(self.start_parameters),
+            "tuned": [number.name for number in self.numbers],
+            "idle": list(self.insensitive_parameters),
+            "noise": [
+                {
+                    "tilt_rad": log.noise.tilt,
+                    "acceleration_rad_s2": log.noise.acceleration,
+                    "correlation": log.noise.correlation,
+                    **log.noise_by_the_log,
+                }
+                for log in self.logs
+            ],
+            "notes": [list(log.remarks) for log in self.logs],
+            "reference": [log.alignment and log.alignment._asdict() for log in self.logs],
+            "held_out_stretches": len(self.level.rms),
+            "held_out_stretch_s": self.stretch_s,
+            **self.level.figures(),
+            **({} if self.has_interval else {"held_out_ratio": None}),
+            "verdict": self.verdict,
+            **({"closed_loop": self.loop.figures()} if self.loop else {}),
+        }
 
 
 def tune_on_logs(
@@ -361,46 +373,39 @@ def tune_on_logs(
     inputs = [
         observer_inputs(log, model=model, noises=noises, parameters={kind: start_parameters or {}}) for log in logs
     ]
-    start_parameters = _common_parameters(kind, logs, inputs)
-    ends = [round(split * len(log)) for log in logs]
-    fit = LogSegments([log.cut(slice(0, end)) for log, end in zip(logs, ends, strict=True)], settle_s)
-    held_out = LogSegments([log.cut(slice(end, None)) for log, end in zip(logs, ends, strict=True)], settle_s)
-    for part, log_inputs in zip((*fit.logs, *held_out.logs), (*inputs, *inputs), strict=True):
-        # An observer that cannot take part is refused, with the reason.
-        replay_log(part, [kind], **log_inputs._asdict(), settle_s=settle_s)
-    makers: list[MakeObserver] = [partial(make_observer, kind, dt, log.model or NO_MODEL, log.noise) for log in inputs]
-    values = parameters_of(kind, makers[0](**start_parameters), start_parameters)
-    numbers = narrowed(numbers_of(kind, values, makers[0], parameters), ranges or {}, "--range")
+    given = _common_parameters(kind, logs, inputs)
+    halves = [[log.cut(slice(0, end)), log.cut(slice(end, None))] for log in logs for end in [round(split * len(log))]]
+    for log_halves, log_inputs in zip(halves, inputs, strict=True):
+        for half in log_halves:  # an observer that cannot take part is refused, with the reason
+            replay_log(half, [kind], **log_inputs._asdict(), settle_s=settle_s)
+    fitted, held_out = (LogSegments(segments, settle_s) for segments in zip(*halves, strict=True))
+    makers = [partial(make_observer, kind, dt, own.model or NO_MODEL, own.noise) for own in inputs]
 
     def one_per_log(**candidate: ParameterValue) -> list[Observer]:
         return [make(**candidate) for make in makers]
 
-    fitter = ParameterFit(kind, one_per_log, values, fit, on_share or (lambda share: None))
-    numbers, insensitive = fitter.sensitive_parameters(numbers)
-    fitter.expected = evaluations(len(numbers))
-    level = level_of(0.0, fitter, numbers, held_out, starts)
-    alignments = [alignment_of(log) for log in logs]
+    fit = ParameterFit(kind, makers[0], given, parameters, ranges, starts)
+    level = fit.level(one_per_log, fitted, held_out, on_share)
+    evidence = [_evidence(*log_and_inputs) for log_and_inputs in zip(logs, inputs, strict=True)]
     return LogStudy(
         kind,
-        values,
-        numbers,
-        [number.name for number in insensitive],
-        [log.name for log in logs],
+        fit.start_parameters,
+        fit.numbers,
+        fit.insensitive_parameters or (),
+        evidence,
         split,
         level,
-        [log_inputs.noise for log_inputs in inputs],
-        [noise_figures(log, log_inputs.noise) for log, log_inputs in zip(logs, inputs, strict=True)],
-        alignments,
-        [
-            [
-                *remarks_on(log, aligned),
-                *noise_remarks(log, of_log.noise),
-                *filter(None, [model_remark(misfit_of(log, of_log.model))]),
-            ]
-            for log, aligned, of_log in zip(logs, alignments, inputs, strict=True)
-        ],
         held_out.shortest_s,
-        closed_loop and compare_in_loop(closed_loop, kind, values, level.parameters),
+        closed_loop and compare_in_loop(closed_loop, kind, fit.start_parameters, level.parameters),
+    )
+
+
+def _evidence(log: Log, inputs: ObserverInputs) -> LogEvidence:
+    alignment = alignment_of(log)
+    remarks = [*remarks_on(log, alignment), *noise_remarks(log, inputs.noise)]
+    doubt = model_remark(misfit_of(log, inputs.model))
+    return LogEvidence(
+        log.name, inputs.noise, noise_figures(log, inputs.noise), alignment, [*remarks, *([doubt] if doubt else [])]
     )
 
 

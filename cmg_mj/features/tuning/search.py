@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
@@ -31,23 +33,21 @@ class TunedScalar:
     """One number that can be tuned.
 
     Attributes:
-        parameter: The observer's parameter that contains the number.
-        place: Indices in the parameter: `(1,)` for the second element, `()` for the parameter itself.
+        name: Name as the user writes it: `tau`, `Q[1]`.
         start: Its value before the tuning, not zero. Its sign is kept.
         low: Smallest size.
         high: Largest size.
     """
 
-    parameter: str
-    place: tuple[int, ...]
+    name: str
     start: float
-    low: float
-    high: float
+    low: float = 0.0
+    high: float = math.inf
 
     @property
-    def name(self) -> str:
-        """Name as the user writes it: `tau`, `Q[1]`."""
-        return self.parameter + "".join(f"[{i}]" for i in self.place)
+    def parameter(self) -> str:
+        """The observer's parameter that contains the number."""
+        return self.name.partition("[")[0]
 
 
 def parameters_of(kind: str, observer: Observer, arguments: ParameterValues) -> dict[str, ParameterValue]:
@@ -74,25 +74,24 @@ def _as_tuples(value: ParameterValue | np.ndarray) -> ParameterValue:
     return tuple(_as_tuples(item) for item in value) if isinstance(value, (list, tuple)) else value
 
 
-def replaced(
-    values: ParameterValues, numbers: Sequence[TunedScalar], sizes: Sequence[float]
-) -> dict[str, ParameterValue]:
-    """Return the parameters with other sizes for some numbers."""
-    changed = dict(values)
-    for number, size in zip(numbers, sizes, strict=True):
-        changed[number.parameter] = _put(
-            changed[number.parameter], number.place, math.copysign(float(size), number.start)
-        )
-    return changed
+def replaced(values: ParameterValues, sizes: Mapping[str, float]) -> dict[str, ParameterValue]:
+    """Return the parameters with other sizes for some numbers, whose signs stay."""
+    return {name: _replaced(value, name, sizes) for name, value in values.items()}
 
 
-def _put(value: ParameterValue, place: tuple[int, ...], new: float) -> ParameterValue:
-    if not place or not isinstance(value, Sequence):
-        return new
-    return tuple(_put(item, place[1:], new) if i == place[0] else item for i, item in enumerate(value))
+def _replaced(value: Any, name: str, sizes: Mapping[str, float]) -> ParameterValue:
+    if isinstance(value, tuple):
+        return tuple(_replaced(item, f"{name}[{i}]", sizes) for i, item in enumerate(value))
+    return math.copysign(float(sizes[name]), value) if name in sizes else value
 
 
-def numbers_of(kind: str, values: ParameterValues, make: MakeObserver, chosen: Sequence[str] = ()) -> list[TunedScalar]:
+def numbers_of(
+    kind: str,
+    values: ParameterValues,
+    make: MakeObserver,
+    chosen: Sequence[str] = (),
+    ranges: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> list[TunedScalar]:
     """Return the numbers to tune: every real number that is not zero, also inside tuples.
 
     Args:
@@ -100,19 +99,18 @@ def numbers_of(kind: str, values: ParameterValues, make: MakeObserver, chosen: S
         values: Its parameters.
         make: Makes the observer; the values that it refuses bound the search.
         chosen: Names of parameters, or of elements such as `Q[1]`; by default all.
+        ranges: Number -> smallest and largest size, in place of the observer's own bounds.
 
     Returns:
         The numbers.
 
     Raises:
-        InputError: A chosen name does not exist, or there is nothing to tune.
+        InputError: A chosen name does not exist, there is nothing to tune, or a range belongs to no tuned number or is
+            empty.
     """
     integers = {p.name for p in OBSERVER_CLASSES.takes(kind).values() if p.annotation in (int, bool, "int", "bool")}
     candidates = [
-        TunedScalar(name, place, number, 0.0, math.inf)
-        for name, value in values.items()
-        if name not in integers
-        for place, number in _leaves(value, ())
+        TunedScalar(*leaf) for name, value in values.items() if name not in integers for leaf in _leaves(value, name)
     ]
     if not candidates:
         raise InputError(f"observer {kind} has no number to tune")
@@ -120,28 +118,32 @@ def numbers_of(kind: str, values: ParameterValues, make: MakeObserver, chosen: S
     for name in chosen:
         if name not in allowed:
             raise InputError(f"--parameters {name}: {kind} has no such number to tune; {nearest(name, allowed)}")
-    return [
-        _bounded(number, values, make)
-        for number in candidates
-        if not chosen or number.parameter in chosen or number.name in chosen
-    ]
+    numbers = [n for n in candidates if not chosen or n.parameter in chosen or n.name in chosen]
+    names = [number.name for number in numbers]
+    for name, (low, high) in ranges.items():
+        if name not in names:
+            raise InputError(f"--range {name}: not tuned; {nearest(name, names, 'tuned')}")
+        if not 0.0 < low < high < math.inf:
+            raise InputError(f"--range {name}={low:g}:{high:g}: must be two positive numbers, the smaller first")
+    ends = [ranges[n.name] if n.name in ranges else _accepted_range(n, values, make) for n in numbers]
+    return [replace(number, low=low, high=high) for number, (low, high) in zip(numbers, ends, strict=True)]
 
 
-def _leaves(value: ParameterValue, place: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...], float]]:
+def _leaves(value: ParameterValue, name: str) -> Iterator[tuple[str, float]]:
     if isinstance(value, tuple):
         for i, item in enumerate(value):
-            yield from _leaves(item, (*place, i))
+            yield from _leaves(item, f"{name}[{i}]")
     elif isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0.0 and math.isfinite(value):
-        yield place, float(value)
+        yield name, float(value)
 
 
-def _bounded(number: TunedScalar, values: ParameterValues, make: MakeObserver) -> TunedScalar:
+def _accepted_range(number: TunedScalar, values: ParameterValues, make: MakeObserver) -> tuple[float, float]:
     """Find by bisection the range of a number that the observer accepts while the others stay."""
     size = abs(number.start)
 
     def accepted(candidate: float) -> bool:
         try:
-            make(**replaced(values, [number], [candidate]))
+            make(**replaced(values, {number.name: candidate}))
         except InputError:
             return False
         return True
@@ -155,49 +157,13 @@ def _bounded(number: TunedScalar, values: ParameterValues, make: MakeObserver) -
             inside, outside = (middle, outside) if accepted(middle) else (inside, middle)
         return inside
 
-    return replace(number, low=farthest(size / SPAN), high=farthest(size * SPAN))
-
-
-def narrowed(
-    numbers: Sequence[TunedScalar], ranges: Mapping[str, tuple[float, float]], option: str
-) -> list[TunedScalar]:
-    """Narrow numbers to the user's ranges.
-
-    Args:
-        numbers: The tuned numbers.
-        ranges: Number -> smallest and largest size.
-        option: The option's name, for messages.
-
-    Returns:
-        The numbers.
-
-    Raises:
-        InputError: A range belongs to no tuned number, or is empty.
-    """
-    names = [number.name for number in numbers]
-    for name in ranges:
-        if name not in names:
-            raise InputError(f"{option} {name}: not tuned; {nearest(name, names, 'tuned')}")
-    bounded = []
-    for number in numbers:
-        low, high = ranges.get(number.name, (number.low, number.high))
-        if not 0.0 < low < high < math.inf:
-            limits = f"{number.name}={low:g}:{high:g}"
-            raise InputError(f"{option} {limits}: must be two positive numbers, the smaller first")
-        bounded.append(replace(number, low=low, high=high))
-    return bounded
+    return farthest(size / SPAN), farthest(size * SPAN)
 
 
 def plain(parameters: ParameterValues) -> dict[str, ParameterValue]:
     """Return parameters as JSON and TOML can hold them."""
-    return {name: _listed(value) for name, value in parameters.items() if value is not None}
-
-
-def _listed(value: ParameterValue) -> ParameterValue:
-    """Convert tuples to lists, and what JSON or TOML cannot hold to text."""
-    if isinstance(value, tuple):
-        return [_listed(item) for item in value]
-    return value if isinstance(value, (bool, int, float, str)) else str(value)
+    known = (bool, int, float, str, tuple)
+    return {k: v if isinstance(v, known) else str(v) for k, v in parameters.items() if v is not None}
 
 
 GRID = 13
@@ -222,25 +188,13 @@ Height = Callable[[np.ndarray], float]
 """Logarithms of sizes -> logarithm of the loss."""
 
 
-def insensitive_numbers(
-    loss: Loss, numbers: Sequence[TunedScalar], start_loss: float, factor: float = 10.0
-) -> list[TunedScalar]:
-    """Return the numbers that the loss does not depend on: it is the same to six digits if they change tenfold.
-
-    Args:
-        loss: The loss.
-        numbers: The candidates.
-        start_loss: The loss of the given sizes.
-        factor: Factor by which each is changed.
-
-    Returns:
-        The numbers that need no tuning.
-    """
+def insensitive_numbers(loss: Loss, numbers: Sequence[TunedScalar], start_loss: float) -> list[TunedScalar]:
+    """Return the numbers that the loss does not depend on: it is the same to six digits if they change tenfold."""
     insensitive = []
     for i, number in enumerate(numbers):
         sizes = [abs(other.start) for other in numbers]
         changes = []
-        for moved in (max(sizes[i] / factor, number.low), min(sizes[i] * factor, number.high)):
+        for moved in (max(sizes[i] / 10.0, number.low), min(sizes[i] * 10.0, number.high)):
             value = loss([*sizes[:i], moved, *sizes[i + 1 :]])
             changes.append(abs(value - start_loss) if math.isfinite(value) else math.inf)
         if math.isfinite(start_loss) and max(changes) <= 1e-6 * start_loss:
@@ -331,6 +285,6 @@ def crossing(x: Sequence[float], y: Sequence[float]) -> float | None:
     for (x0, y0), (x1, y1) in pairwise(zip(x, y, strict=True)):
         if y0 == 0.0:
             return x0
-        if y0 * y1 < 0.0:
+        if y0 * y1 <= 0.0:
             return x0 - y0 * (x1 - x0) / (y1 - y0)
-    return x[-1] if y[-1] == 0.0 else None
+    return None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Literal, NamedTuple
 
@@ -12,20 +12,12 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import law_needs
-from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, Stop, level_of
-from cmg_mj.features.tuning.search import (
-    MakeObserver,
-    ParameterValues,
-    TunedScalar,
-    crossing,
-    evaluations,
-    narrowed,
-    numbers_of,
-    parameters_of,
-)
+from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, Stop
+from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, crossing, plain
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.results.result import Result
+from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.runs.open_loop import replay
@@ -61,15 +53,18 @@ class Recorded:
 
     Attributes:
         trajectory: Trajectory from the warm-up to the window's end.
-        window: Start and end of the scored time [s].
+        windows: Times that are scored [s].
         fell: Number of worlds that fell and are discarded.
-        windows: Parts of the window that are scored, if not all of it is [s].
     """
 
     trajectory: Trajectory
-    window: Window
+    windows: Sequence[Window]
     fell: int = 0
-    windows: Sequence[Window] = ()
+
+    @property
+    def window(self) -> Window:
+        """Start and end of the scored times [s]."""
+        return self.windows[0][0], self.windows[-1][1]
 
     @property
     def worlds(self) -> int:
@@ -84,20 +79,18 @@ class Recorded:
 
     @property
     def zero_rms(self) -> float:
-        """Error of an estimate of zero: RMS of the gyro's rate over the window, mean of the worlds [rad/s]."""
-        return float(np.sqrt(np.mean(self.trajectory["fog_rad_s"][self._scored] ** 2, axis=0)).mean())
-
-    @property
-    def _scored(self) -> np.ndarray:
-        """Mask of the scored rows, (n_ticks,)."""
-        return inside(self.trajectory["time_s"], self.windows or [self.window])
+        """Error of an estimate of zero: RMS of the gyro's rate over the windows, mean of the worlds [rad/s]."""
+        return float(self._rms(np.zeros(())).mean())
 
     def errors(self, observer: Observer) -> np.ndarray:
-        """Return the RMS over the window of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN on failure."""
-        scored = self._scored
+        """Return the RMS of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN on failure."""
         with np.errstate(all="ignore"):
-            difference = replay(observer, self.trajectory).x2[scored] - self.trajectory["fog_rad_s"][scored]
-            return np.sqrt(np.mean(difference**2, axis=0))
+            return self._rms(replay(observer, self.trajectory).x2)
+
+    def _rms(self, rate: np.ndarray) -> np.ndarray:
+        difference = rate - self.trajectory["fog_rad_s"]
+        scored = inside(self.trajectory["time_s"], self.windows)
+        return np.sqrt(np.mean(difference[scored] ** 2, axis=0))
 
 
 def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> Scenario:
@@ -136,81 +129,58 @@ RecordingRequest = tuple[Scenario, Sequence[int], float | None]
 """A scenario, the worlds' numbers, and another noise density of the accelerometers [ug/sqrt(Hz)]."""
 
 
-def record_all(
-    requests: Sequence[RecordingRequest],
-    *,
-    warm_up_s: float = WARM_UP_S,
-    on_share: Callable[[float], None] | None = None,
-) -> list[Recorded]:
-    """Run tuning experiments, in one batch where possible.
+def recorder(requests: Sequence[RecordingRequest], *, warm_up_s: float = WARM_UP_S) -> Callable[..., Recorded]:
+    """Make the recordings of one call of `tune` or of several at once, in one batch where possible.
 
     Args:
-        requests: The recordings; `tuning_scenario` changes their scenarios.
+        requests: The recordings; `tuning_scenario` changes their scenarios, and the observer takes no part.
         warm_up_s: Time before the window that is kept [s].
-        on_share: Called now and then with the completed share.
 
     Returns:
-        The worlds that stood, request by request.
+        A function of a request that returns its worlds that stood, the `recorded` of `tune`.
 
     Raises:
         InputError: Fewer than two worlds of a request stood.
         KeyboardInterrupt: The user interrupted.
     """
-    experiments = [prepare(tuning_scenario(scenario, noise)) for scenario, _, noise in requests]
-    runs = [
-        BatchJob([experiment] * len(worlds), worlds)
-        for experiment, (_, worlds, _) in zip(experiments, requests, strict=True)
-    ]
-    duration = max(experiment.scenario.duration_s for experiment in experiments)
-    results = run_side_by_side(runs, on_progress=on_share and (lambda time: on_share(min(time / duration, 1.0))))
-    return [_recorded(*run, warm_up_s) for run in zip(requests, experiments, results, strict=True)]
-
-
-def _recorded(request: RecordingRequest, experiment: Experiment, result: Result, warm_up_s: float) -> Recorded:
-    scenario, duration = request[0], experiment.scenario.duration_s
-    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
-        raise KeyboardInterrupt
-    stood = np.array([outcome.kind == "done" for outcome in result.outcomes])
-    if stood.sum() < 2:
-        raise InputError(
-            f"{scenario.title or 'the scenario'}: with the law fed by the {experiment.scenario.controller.feedback}, "
-            f"{len(stood) - stood.sum()} of {len(stood)} worlds fell before {duration:g} s: there is nothing to tune on"
-        )
-    window = window_of(scenario)
-    assert result.trajectory is not None
-    trajectory = result.trajectory.of_worlds(stood).between(window[0] - warm_up_s, window[1])
-    return Recorded(trajectory, window, int((~stood).sum()), windows_of(scenario))
-
-
-def record(
-    scenario: Scenario,
-    worlds: Sequence[int],
-    *,
-    noise_ug_rthz: float | None = None,
-    warm_up_s: float = WARM_UP_S,
-    on_share: Callable[[float], None] | None = None,
-) -> Recorded:
-    """Run one tuning experiment; see `record_all`."""
-    return record_all([(scenario, worlds, noise_ug_rthz)], warm_up_s=warm_up_s, on_share=on_share)[0]
-
-
-def recorder(requests: Sequence[RecordingRequest], *, warm_up_s: float = WARM_UP_S) -> Callable[..., Recorded]:
-    """Make the recordings of several calls of `tune` at once.
-
-    Args:
-        requests: The recordings; the observer takes no part in them.
-        warm_up_s: Time before the window that is kept [s].
-
-    Returns:
-        A function that returns them, the `recorded` of `tune`.
-    """
     distinct = {_key(*request): request for request in requests}
-    recordings = dict(zip(distinct, record_all(list(distinct.values()), warm_up_s=warm_up_s), strict=True))
+    jobs = [
+        BatchJob([prepare(tuning_scenario(scenario, noise))] * len(worlds), worlds)
+        for scenario, worlds, noise in distinct.values()
+    ]
+    recordings = {
+        key: _recorded(request[0], job.experiments[0], result, warm_up_s)
+        for (key, request), job, result in zip(distinct.items(), jobs, run_side_by_side(jobs), strict=True)
+    }
 
-    def recorded(scenario: Scenario, worlds: Sequence[int], *, noise_ug_rthz: float, warm_up_s: float) -> Recorded:
+    def recorded(scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None = None) -> Recorded:
         return recordings[_key(scenario, worlds, noise_ug_rthz)]
 
     return recorded
+
+
+def record(
+    scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None = None, warm_up_s: float = WARM_UP_S
+) -> Recorded:
+    """Run one tuning experiment; see `recorder`."""
+    return recorder([(scenario, worlds, noise_ug_rthz)], warm_up_s=warm_up_s)(scenario, worlds, noise_ug_rthz)
+
+
+def _recorded(scenario: Scenario, experiment: Experiment, result: Result, warm_up_s: float) -> Recorded:
+    loop = experiment.scenario
+    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        raise KeyboardInterrupt
+    stood = result.stood
+    if stood.sum() < 2:
+        raise InputError(
+            f"{scenario.title or 'the scenario'}: with the law fed by the {loop.controller.feedback}, "
+            f"{len(stood) - stood.sum()} of {len(stood)} worlds fell before {loop.duration_s:g} s: there is nothing "
+            "to tune on"
+        )
+    start, end = window_of(scenario)
+    assert result.trajectory is not None
+    trajectory = result.trajectory.of_worlds(stood).between(start - warm_up_s, end)
+    return Recorded(trajectory, windows_of(scenario), int((~stood).sum()))
 
 
 def halves(scenario: Scenario, worlds: int, noise_ug_rthz: Sequence[float]) -> list[RecordingRequest]:
@@ -248,6 +218,33 @@ class TuningResult:
     window: Window
     levels: Sequence[NoiseLevelResult]
 
+    def figures(self) -> dict[str, SummaryValue]:
+        """Return the figures that `cmg-mj tune --json` prints."""
+        best = best_noise(self)
+        levels = [
+            {
+                "noise_density_ug_rthz": level.noise_ug_rthz,
+                **level.figures(),
+                "held_out_worlds": len(level.rms),
+                "worlds_that_fell": level.fell,
+            }
+            for level in self.levels
+        ]
+        return {
+            "scenario": self.scenario.title,
+            "observer": self.kind,
+            "seed": self.scenario.seed,
+            "worlds_fitted": self.worlds,
+            "window_s": list(self.window),
+            "scored_s": [list(window) for window in windows_of(self.scenario)],
+            "given_parameters": plain(self.start_parameters),
+            "tuned": [number.name for number in self.numbers],
+            "idle": list(self.insensitive_parameters),
+            "levels": levels,
+            "given_best_at_noise_density_ug_rthz": best.noise_ug_rthz,
+            **({"given_best_noise_is": best.where} if len(levels) > 1 else {}),
+        }
+
 
 def tune(
     scenario: Scenario,
@@ -274,7 +271,7 @@ def tune(
         noise_ug_rthz: Noise densities of the accelerometers; by default the scenario's [ug/sqrt(Hz)].
         warm_up_s: Time replayed before the window [s].
         starts: Starts of a search in several dimensions.
-        recorded: Returns recordings made before; by default they are made here, all at once.
+        recorded: Returns recordings made before, as `recorder` does; by default they are made here, all at once.
         on_share: Called now and then with the completed share.
         stop: Whether to end the search early, with the best parameters so far.
 
@@ -287,52 +284,35 @@ def tune(
     """
     if worlds < 2:
         raise InputError(f"--worlds {worlds}: at least 2, for an interval")
-    accelerometer = scenario.sensors.accelerometer
-    densities = sorted(dict.fromkeys(noise_ug_rthz or [accelerometer.noise_density_ug_rthz]))
-    kind = scenario.observer.kind
+    sensors, kind = scenario.sensors, scenario.observer.kind
+    densities = sorted(dict.fromkeys(noise_ug_rthz or [sensors.accelerometer.noise_density_ug_rthz]))
     experiment = prepare(scenario)
     experiment.require_single_axis("tuning")
-    start_parameters = parameters_of(kind, experiment.design.observer(), scenario.observer.parameters)
-    numbers = numbers_of(kind, start_parameters, _maker(experiment), parameters)
-    numbers = narrowed(numbers, ranges or {}, "--range")
+    dt, model, noise = experiment.design.constructor_arguments
+    make = partial(make_observer, kind, dt, model, noise)
+    fit = ParameterFit(kind, make, scenario.observer.parameters, parameters, ranges, starts, stop)
     recorded = recorded or recorder(halves(scenario, worlds, densities), warm_up_s=warm_up_s)
-    spans = range(worlds), range(worlds, 2 * worlds)
 
     levels: list[NoiseLevelResult] = []
-    insensitive: list[TunedScalar] = []
     window: Window = (0.0, 0.0)
     for i, density in enumerate(densities):
 
         def share(done: float, i: int = i) -> None:
             if on_share:
-                on_share((i + min(done, 1.0)) / len(densities))
+                on_share((i + done) / len(densities))
 
-        fit, held_out = (recorded(scenario, span, noise_ug_rthz=density, warm_up_s=warm_up_s) for span in spans)
-        fitter = ParameterFit(kind, _maker(experiment, density), start_parameters, fit, share, stop)
-        if not levels:
-            window = fit.window
-            numbers, insensitive = fitter.sensitive_parameters(numbers)
-        fitter.expected = evaluations(len(numbers))
-        start = numbers
-        if levels:  # the best values at the level before are near the best at this one
-            start = [replace(n, start=math.copysign(levels[-1].sizes[n.name], n.start)) for n in numbers]
+        fitted, held_out = (recorded(*half) for half in halves(scenario, worlds, [density]))
+        window = fitted.window
+        noise = experiment.plant.parameters.noise(sensors.with_noise_density(density))
         try:
-            levels.append(level_of(density, fitter, start, held_out, starts))
+            levels.append(fit.level(partial(make_observer, kind, dt, model, noise), fitted, held_out, share, density))
             share(1.0)
         except KeyboardInterrupt:
             if not levels:
                 raise
             break
-    names = [number.name for number in insensitive]
-    return TuningResult(scenario, kind, start_parameters, numbers, names, worlds, window, levels)
-
-
-def _maker(experiment: Experiment, noise_ug_rthz: float | None = None) -> MakeObserver:
-    """Return what makes the scenario's observer from its parameters, for the sensor noise of the tuning."""
-    dt, model, noise = experiment.design.constructor_arguments
-    if noise_ug_rthz is not None:
-        noise = experiment.plant.parameters.noise(experiment.scenario.sensors.with_noise_density(noise_ug_rthz))
-    return partial(make_observer, experiment.scenario.observer.kind, dt, model, noise)
+    insensitive = fit.insensitive_parameters or ()
+    return TuningResult(scenario, kind, fit.start_parameters, fit.numbers, insensitive, worlds, window, levels)
 
 
 class BestNoise(NamedTuple):
@@ -372,10 +352,8 @@ def best_noise(study: TuningResult) -> BestNoise:
     if not np.isfinite(lost).all():
         return BestNoise("not bracketed", None)
     least = int(np.argmin(lost))
-    if least == 0:
-        return BestNoise("below", None)
-    if least == len(levels) - 1:
-        return BestNoise("above", None)
+    if least in (0, len(levels) - 1):
+        return BestNoise("above" if least else "below", None)
     if len(study.numbers) > 1:
         return BestNoise("found", levels[least].noise_ug_rthz)
     return BestNoise("not bracketed", None)

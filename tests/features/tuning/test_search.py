@@ -42,12 +42,11 @@ def test_the_observer_takes_each_number_at_its_limits(kind: str) -> None:
     parameters = parameters_of(kind, make_observer(kind, DT, PAPER), {})
     for number in numbers(kind):
         for size in (number.low, number.high):
-            make_observer(kind, DT, PAPER, **replaced(parameters, [number], [size]))
+            make_observer(kind, DT, PAPER, **replaced(parameters, {number.name: size}))
 
 
 def test_a_sign_stays() -> None:
-    number = TunedScalar("L", (0, 1), -3.0, 0.1, 10.0)
-    assert replaced({"L": ((1.0, -3.0), (0.0, 2.0))}, [number], [5.0]) == {"L": ((1.0, -5.0), (0.0, 2.0))}
+    assert replaced({"L": ((1.0, -3.0), (0.0, 2.0))}, {"L[0][1]": 5.0}) == {"L": ((1.0, -5.0), (0.0, 2.0))}
 
 
 def test_a_users_own_observer_is_read_as_well() -> None:
@@ -58,7 +57,7 @@ def test_a_users_own_observer_is_read_as_well() -> None:
 
 
 def number(name: str, start: float, low: float = 1e-3, high: float = 1e3) -> TunedScalar:
-    return TunedScalar(name, (), start, low, high)
+    return TunedScalar(name, start, low, high)
 
 
 @pytest.mark.parametrize("best", [0.0021, 0.3, 4.0, 700.0])
