@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -12,6 +11,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.files import folder
 from cmg_mj.plant.elements import SENSORS, TILT_ELEMENT
 from cmg_mj.plant.mjcf import parse
+from cmg_mj.plant.tilt_line import UP
 
 EDGE_M = 0.19
 """Edge of the module in `models/cube.xml` [m]."""
@@ -143,9 +143,7 @@ TOUCH_M = 1e-3
 HALF = "/half"
 
 
-def check_room(
-    model: mujoco.MjModel, data: mujoco.MjData, modules: Sequence[str], floor: float | None, path: Path
-) -> None:
+def check_room(model: mujoco.MjModel, data: mujoco.MjData, modules: Sequence[str], floor: float | None) -> None:
     """Check that modules reach neither below the floor nor into other modules; they may overlap the robot itself.
 
     Args:
@@ -153,44 +151,35 @@ def check_room(
         data: The same where it stands, after a forward pass.
         modules: Names of the new modules.
         floor: Height of the floor that the robot stands on [m]; None for a robot on a hinge.
-        path: The file, for messages.
 
     Raises:
         InputError: A module has no room.
     """
-    names = [model.body(i).name for i in range(model.nbody)]
-    new = [f"{module}{HALF}" for module in modules]
-    lowest = min(
-        float(data.body(name).xpos[2] - _half(model, name) * np.abs(_axes(data, name)[2]).sum()) for name in new
-    )
+
+    def half(body: int) -> float:
+        """Half of a module's edge [m]: its frame's edges lie so far out."""
+        first = model.body_geomadr[body]
+        return np.abs(model.geom_pos[first : first + model.body_geomnum[body]]).max()
+
+    def reach(body: int, normal: np.ndarray) -> float:
+        return half(body) * np.abs(normal @ data.xmat[body].reshape(3, 3)).sum()
+
+    new = [model.body(f"{module}{HALF}").id for module in modules]
+    lowest = min(data.xpos[body][2] - reach(body, UP) for body in new)
     if floor is not None and lowest < floor - TOUCH_M:
         raise InputError(
-            f"{path}: no room: the modules reach {floor - lowest:.3g} m below its support; use a smaller "
-            "--scale, or a higher --position"
+            f"no room: the modules reach {floor - lowest:.3g} m below its support; use a smaller --scale, or a higher "
+            "--position"
         )
-    for other in names:
-        if other.endswith(HALF) and other not in new and any(_overlap(model, data, name, other) for name in new):
-            raise InputError(
-                f"{path}: no room: the modules overlap {other.removesuffix(HALF)!r}, which is there already; "
-                "choose another --position"
-            )
-
-
-def _half(model: mujoco.MjModel, name: str) -> float:
-    """Half of a module's edge [m]: its frame's edges lie so far out."""
-    body = model.body(name)
-    return float(np.abs(model.geom_pos[int(body.geomadr[0]) :][: int(body.geomnum[0])]).max())
-
-
-def _axes(data: mujoco.MjData, name: str) -> np.ndarray:
-    return data.body(name).xmat.reshape(3, 3)
-
-
-def _overlap(model: mujoco.MjModel, data: mujoco.MjData, one: str, other: str) -> bool:
-    """Return whether two modules overlap: no face of either separates them."""
-    apart = data.body(other).xpos - data.body(one).xpos
-    for normal in np.hstack([_axes(data, one), _axes(data, other)]).T:
-        reach = sum(_half(model, name) * np.abs(normal @ _axes(data, name)).sum() for name in (one, other))
-        if abs(float(normal @ apart)) > reach - TOUCH_M:
-            return False
-    return True
+    for other in range(model.nbody):
+        name = model.body(other).name
+        if not name.endswith(HALF) or other in new:
+            continue
+        for body in new:
+            apart = data.xpos[other] - data.xpos[body]
+            normals = np.hstack([data.xmat[body].reshape(3, 3), data.xmat[other].reshape(3, 3)]).T
+            if all(abs(normal @ apart) <= reach(body, normal) + reach(other, normal) - TOUCH_M for normal in normals):
+                raise InputError(
+                    f"no room: the modules overlap {name.removesuffix(HALF)!r}, which is there already; choose another "
+                    "--position"
+                )

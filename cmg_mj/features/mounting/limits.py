@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,25 +12,21 @@ import numpy as np
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.controller import PlantInterface
-from cmg_mj.core.errors import InputError
 from cmg_mj.core.loop import ControlLoop, Joints
-from cmg_mj.core.outside import Outside
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.core.types import IdealReading
-from cmg_mj.features.mounting.request import SCALES
 from cmg_mj.features.mounting.stance import overlap, simulated_pole
 from cmg_mj.linear.verdict import SlidingPoles, sliding_poles
 from cmg_mj.plant.mujoco_state import quiet, set_control_callback
 from cmg_mj.plant.plant import Plant
+from cmg_mj.runs.batch_values import batch_values
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.plant_parameters import PlantParameters
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import common_period
-
-TRAVEL = math.pi / 2.0
-"""Beyond a quarter turn from upright a gimbal pushes the other way [rad]."""
+from cmg_mj.stages.push import Push, Pushes
 
 
 class RecoverableLimit(NamedTuple):
@@ -73,22 +69,22 @@ class RecoverableLimit(NamedTuple):
         return self.impulse * (x / -math.expm1(-x) if x > 0.0 else 1.0)
 
 
-def ceiling(model: ReducedModel, rate_limit: float, travel: float = TRAVEL) -> RecoverableLimit:
+def ceiling(model: ReducedModel, rate_limit: float, travel: float = math.pi / 2.0) -> RecoverableLimit:
     """Compute the limits for any controller on a rig.
 
     Args:
         model: Its reduced model.
         rate_limit: u, the gimbals' largest rate [rad/s].
-        travel: theta, how far they turn from upright, at most a quarter turn [rad].
+        travel: theta, how far they turn from upright; beyond a quarter turn a gimbal pushes the other way [rad].
 
     Returns:
         The ceiling.
     """
-    theta, u = min(travel, TRAVEL), rate_limit
+    u = rate_limit
     pole = math.sqrt(model.gravity_torque / model.J1)
     momentum = model.J_d * model.omega_d
-    left = math.exp(-pole * theta / u)
-    S = u / (pole**2 + u**2) * (1.0 + left * (u / pole * math.sin(theta) - math.cos(theta)))
+    left = math.exp(-pole * travel / u)
+    S = u / (pole**2 + u**2) * (1.0 + left * (u / pole * math.sin(travel) - math.cos(travel)))
     tilt = momentum / model.J1 * S
     return RecoverableLimit(tilt, model.gimbals * model.J1 * pole * tilt, pole)
 
@@ -125,8 +121,8 @@ def push_margin(scenario: Scenario, design: Design) -> PushMargin:
     Returns:
         The largest pushes.
     """
-    low, high = 0.0, 1.5 * ceiling(design.rig.reduced, design.law.rate_limit).push_impulse(PUSH_S)
-    coarse = _largest_push(scenario, design, np.linspace(low, high, LEVELS))
+    high = 1.5 * ceiling(design.rig.reduced, design.law.rate_limit).push_impulse(PUSH_S)
+    coarse = _largest_push(scenario, design, np.linspace(0.0, high, LEVELS))
     if coarse is None:
         return PushMargin(0.0, 0.0)
     step = high / (LEVELS - 1)
@@ -156,29 +152,17 @@ def _stands(scenario: Scenario, design: Design, impulses: np.ndarray) -> np.ndar
     physics = ReducedPhysics(plant, len(numbers), h)
     after = AFTER_TIME_CONSTANTS / ceiling(model, design.law.rate_limit).pole
     steps = math.ceil((BEFORE_S + PUSH_S + after) / h)
-    pushed = range(round(BEFORE_S / h), round((BEFORE_S + PUSH_S) / h))
-    push, none = (np.tile(impulses / PUSH_S, WORLDS),), (np.zeros(len(numbers)),)
     end = -(-steps // controller.steps_per_sample) * controller.steps_per_sample
+    start, duration = round(BEFORE_S / h) * h, round(PUSH_S / h) * h
+    push = batch_values([Push(start, duration, torque) for torque in (impulses / PUSH_S).tolist()] * WORLDS)
     fall_angle = math.radians(scenario.metrics.fall_angle_deg)
-    loop = ControlLoop(physics, controller, end, [_Held(push, none, pushed)], fall_angle)
+    loop = ControlLoop(physics, controller, end, [Pushes([push], h, [""])], fall_angle)
     with np.errstate(all="ignore"):
         for _ in loop.ticks():
             loop.decide()
             loop.advance()
         physics.stop_fallen(physics.x[0], fall_angle)
     return ~physics.fallen.reshape(WORLDS, len(impulses))
-
-
-class _Held:
-    """Torques that are held from one step to another: a `Disturbance`."""
-
-    edges = ()
-
-    def __init__(self, push: Sequence[Scalar], none: Sequence[Scalar], pushed: range) -> None:
-        self._push, self._none, self._pushed = push, none, pushed
-
-    def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
-        return Outside(self._push if step in self._pushed else self._none)
 
 
 class ReducedPhysics:
@@ -216,13 +200,8 @@ class ReducedPhysics:
         """Compute what perfect sensors show on a rigid body that tilts about a line, which may slide."""
         (x1, x2, x3), tilt, gravity = self.x, self._plant.tilt, self._plant.gravity
         alpha = self._slope(self.x)[1]
-        forces = np.stack(
-            [
-                part
-                for r in tilt.radii
-                for part in (r * alpha - gravity * np.sin(x1), gravity * np.cos(x1) - r * x2 * x2)
-            ]
-        )
+        tangential, radial = gravity * np.sin(x1), gravity * np.cos(x1)
+        forces = np.stack([part for r in tilt.radii for part in (r * alpha - tangential, radial - r * x2 * x2)])
         if self._plant.reduced.pivot_arm:
             sliding = self._plant.reduced.pivot_acceleration(x1, x2, alpha)
             forces = forces + np.stack([sliding * np.cos(x1), sliding * np.sin(x1)] * 2)
@@ -385,25 +364,6 @@ def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = Tru
     return Prospects(plant.reduced, limit, margin, pole, touching, poles)
 
 
-def smallest_sufficient_scale(suffices: Callable[[float], bool], scale: float) -> float | None:
-    """Return a scale of the modules that suffices for a robot, in steps of a tenth.
-
-    Args:
-        suffices: Tries a scale.
-        scale: A scale that does not suffice.
-
-    Returns:
-        The scale; None if none suffices up to the largest, or to the largest that can be mounted.
-    """
-    while (scale := round(1.1 * scale, 2)) <= SCALES[1]:
-        try:
-            if suffices(scale):
-                return scale
-        except InputError:  # no room for it, say
-            return None
-    return None
-
-
 SPIN_UP_S = 60.0
 """Time in which the wheels come up to speed [s]."""
 BEARINGS = 2
@@ -419,38 +379,23 @@ times the bore and s^2 times the rating."""
 
 
 class PairDemands(NamedTuple):
-    """Demands of a pair on its robot."""
+    """Demands of a pair on its robot, by the names that `cmg-mj mount --json` prints."""
 
-    mass_kg: float
+    pair_mass_kg: float
     """Mass of the modules."""
     robot_mass_kg: float
     """Mass of the robot without them."""
-    servo_torque_n_m: float
+    servo_limit_torque_n_m: float
     """Largest torque that a gimbal servo has."""
-    servo_rate_rad_s: float
+    servo_limit_rate_rad_s: float
     """Largest rate that the gimbals are commanded."""
-    spin_up_energy_j: float
+    wheels_energy_j: float
     """Energy of the wheels at their speed, J w^2/2 each."""
-    holding_power_w: float
+    wheels_spin_up_power_w: float
+    """Mean power of a spin-up in a minute, against inertia alone."""
+    wheels_holding_power_assumed_w: float
     """Power that keeps the wheels turning: assumed friction of their bearings, since the model's have none; no drag of
     the air."""
-
-    @property
-    def spin_up_power_w(self) -> float:
-        """Mean power of a spin-up in a minute, against inertia alone."""
-        return self.spin_up_energy_j / SPIN_UP_S
-
-    def figures(self) -> dict[str, float]:
-        """Return the figures by name."""
-        return {
-            "pair_mass_kg": self.mass_kg,
-            "robot_mass_kg": self.robot_mass_kg,
-            "servo_limit_torque_n_m": self.servo_torque_n_m,
-            "servo_limit_rate_rad_s": self.servo_rate_rad_s,
-            "wheels_energy_j": self.spin_up_energy_j,
-            "wheels_spin_up_power_w": self.spin_up_power_w,
-            "wheels_holding_power_assumed_w": self.holding_power_w,
-        }
 
 
 def pair_demands(plant: Plant, rate_limit: float, scale: float) -> PairDemands:
@@ -467,13 +412,8 @@ def pair_demands(plant: Plant, rate_limit: float, scale: float) -> PairDemands:
     model, modules = plant.model, plant.axis.modules
     mass = sum(float(model.body_subtreemass[model.body(f"{module.name}/half").id]) for module in modules)
     robot = float(model.body_subtreemass[model.body_rootid[plant.axis.frame]]) - mass
-    speeds = [abs(module.speed) for module in modules]
+    torque = min(float(model.actuator_forcerange[module.servo, 1]) for module in modules)
+    energy = sum(0.5 * plant.axis.reduced.J_d * module.speed**2 for module in modules)
     moment = BEARINGS * 0.5 * FRICTION * 0.1 * RATING_N * BORE_M * scale**3
-    return PairDemands(
-        mass,
-        robot,
-        min(float(model.actuator_forcerange[module.servo, 1]) for module in modules),
-        rate_limit,
-        sum(0.5 * plant.axis.reduced.J_d * speed**2 for speed in speeds),
-        sum(moment * speed for speed in speeds),
-    )
+    power = sum(moment * abs(module.speed) for module in modules)
+    return PairDemands(mass, robot, torque, rate_limit, energy, energy / SPIN_UP_S, power)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,10 +14,9 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting.attach import add_sensors, attach_modules, check_room, module_names, site_names
-from cmg_mj.features.mounting.hold import Hold, Poses, as_qpos, hold_joints, pop_keyframes, poses_of, write_keyframe
-from cmg_mj.features.mounting.request import AxisLike, Base, MountRequest
+from cmg_mj.features.mounting.hold import as_qpos, hold_joints, pop_keyframes, poses_of, write_keyframe
+from cmg_mj.features.mounting.request import AxisLike, Base, Hold, MountRequest
 from cmg_mj.features.mounting.robot import (
-    ExistingAxes,
     body_of,
     check_chains,
     check_names,
@@ -28,13 +27,10 @@ from cmg_mj.features.mounting.robot import (
     set_physics_options,
 )
 from cmg_mj.features.mounting.stance import (
-    SLOWEST,
-    TRIED_DEG,
     axes_along,
+    check_falls,
     check_unturned,
     find_place,
-    overlap,
-    simulated_pole,
     stand_upright,
     under_and_height,
 )
@@ -79,15 +75,13 @@ class MountedRobot:
                 one that no mount wrote.
         """
         target = expanded(path, "-o")
-        check_target(target, self.path)
+        check_target(target, self.path, (".xml",))
         spec = self.spec.copy()
         folder = Path(os.path.abspath(target.parent))
         for field in ("meshdir", "texturedir"):
             setattr(spec, field, _relative_assets(folder, spec.modelfiledir, getattr(spec, field)))
         spec.modelfiledir = f"{folder}{os.sep}"  # MuJoCo opens the meshes to write them
         try:
-            if os.path.lexists(target):
-                require_signed(target)
             with whole_file(target, ".xml") as temporary:
                 temporary.write_bytes(signed(as_mjcf(spec, self.path), ".xml"))
                 check_rig(temporary, target)
@@ -96,16 +90,19 @@ class MountedRobot:
         return target
 
 
-def check_target(target: Path, robot: Path) -> None:
+def check_target(
+    target: Path, robot: Path, endings: Sequence[str] = (".xml", ".toml"), *, overwrite: bool = True
+) -> None:
     """Check that a mounted robot may be written to a file.
 
     Args:
         target: The file to write.
         robot: The robot's own file, if there is one.
+        endings: Endings of the files that are written.
+        overwrite: Whether files that a mount has written may be replaced. Others never may.
 
     Raises:
-        InputError: The target is no .xml file, has no folder, or would replace a file of the robot's; or the scenario
-            beside it would.
+        InputError: The target is no .xml file, has no folder, or would replace what may not be replaced.
     """
     if target.suffix != ".xml":
         raise InputError(
@@ -114,35 +111,15 @@ def check_target(target: Path, robot: Path) -> None:
     if not target.parent.is_dir():
         raise InputError(f"-o {target}: cannot be written: there is no folder {target.parent}")
     originals = model_files(robot) if robot.is_file() else []
-    for path in (target, target.with_suffix(".toml")):
+    for path in map(target.with_suffix, endings):
         if path.is_dir():
             raise InputError(f"-o {target}: {path} is a folder")
-        if path.exists() and any(file.exists() and path.samefile(file) for file in originals):
+        if path.exists() and any(path.samefile(file) for file in originals):
             raise InputError(f"-o {target}: {path} is the robot's own file, or one that it names; give another name")
-
-
-def check_replaceable(target: Path, *, overwrite: bool) -> None:
-    """Refuse to replace what no mount has written, or anything without being asked to.
-
-    Args:
-        target: The model's file.
-        overwrite: Whether it and the scenario beside it may be replaced, if a mount has written them.
-
-    Raises:
-        InputError: One of the files is there and may not be replaced.
-        OSError: It cannot be read.
-    """
-    for file in (target, target.with_suffix(".toml")):
-        if os.path.lexists(file):
-            require_signed(file)
-            if not overwrite:
-                raise InputError(f"-o {target}: {file} exists; give another name, or --overwrite")
-
-
-def require_signed(file: Path) -> None:
-    """Refuse to replace a file that no mount has written."""
-    if not is_signed(file):
-        raise InputError(f"-o = {file}: is not a file of cmg-mj mount, and would be lost; give another name")
+        if os.path.lexists(path) and not is_signed(path):
+            raise InputError(f"-o {target}: {path} is not a file of cmg-mj mount, and would be lost; give another name")
+        if path.exists() and not overwrite:
+            raise InputError(f"-o {target}: {path} exists; give another name, or --overwrite")
 
 
 @contextmanager
@@ -158,20 +135,21 @@ def with_scenario(target: Path) -> Iterator[Path]:
     Raises:
         InputError: As raised while writing, with the final file names; or the files cannot be renamed.
     """
-    temporary = target.with_name(f".{target.stem}.{os.getpid()}.partial.xml")
-    files = [(temporary.with_suffix(suffix), target.with_suffix(suffix)) for suffix in (".xml", ".toml")]
+    prefix = f".{os.getpid()}.partial."
+    files = [target.with_suffix(suffix) for suffix in (".xml", ".toml")]
+    model, scenario = written = [file.with_name(prefix + file.name) for file in files]
     try:
-        yield temporary
-        for written, file in files:
-            written.replace(file)
+        yield model
+        scenario.write_bytes(scenario.read_bytes().replace(prefix.encode(), b""))  # which names the model
+        for temporary, file in zip(written, files, strict=True):
+            temporary.replace(file)
     except InputError as error:
-        raise InputError(str(error).replace(temporary.stem, target.stem)) from error
+        raise InputError(str(error).replace(prefix, "")) from error
     except OSError as error:
         raise InputError(f"-o {target}: cannot be written: {error.strerror}") from error
     finally:
-        for written, _ in files:
-            with suppress(OSError):
-                written.unlink()
+        for temporary in written:
+            temporary.unlink(missing_ok=True)
 
 
 def _relative_assets(folder: Path, model_folder: str, assets: str) -> str:
@@ -229,38 +207,36 @@ def mount(
 def mount_on_request(robot: str | Path | mujoco.MjSpec, request: MountRequest) -> MountedRobot:
     """Mount control moment gyroscopes on a robot; see `mount`."""
     with set_control_callback(None):
-        return _mount_on_spec(*read_robot(robot), request)
+        spec, path = read_robot(robot)
+        try:
+            return _mount_on_spec(spec, path, request)
+        except InputError:
+            raise
+        except (ValueError, KeyError, mujoco.FatalError) as error:  # unforeseen errors of MuJoCo's model editing
+            message = " ".join(str(error.args[0] if error.args else error).split()).removeprefix("Error: ")
+            raise InputError(f"{path}: MuJoCo cannot put a pair on it: {message}") from error
 
 
 def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> MountedRobot:
     """Mount a pair on a model, which is changed."""
-    body = body_of(spec, request.body, path)
-    check_chains(spec, path)
+    body = body_of(spec, request.body)
+    check_chains(spec)
     if request.base == "free":
         free_base(spec, body, path)
     names = module_names(request.prefix, request.modules)
     model = compile_model(spec, path)
-    existing = find_existing_axes(spec, model, request.name, path)
+    existing = find_existing_axes(spec, model, request.name)
     check_names(
-        spec,
-        [
-            *site_names(request.prefix).values(),
-            *(f"{module}/half" for module in names),
-            *(f"{module}_mount" for module in names),
-        ],
-        path,
+        spec, [*site_names(request.prefix).values(), *(f"{name}{end}" for name in names for end in ("/half", "_mount"))]
     )
 
     # The robot as it is to stand.
-    keyframe = request.keyframe or (EQUILIBRIUM_KEY if existing.drives else None)
-    pose = pose_of(model, keyframe, path)
-    place = find_place(model, pose, request, path)
+    pose = pose_of(model, request.keyframe or (EQUILIBRIUM_KEY if existing.drives else None))
+    place = find_place(model, pose, request)
     if place.joint in existing.lines:
-        raise InputError(f"{path}: the hinge {place.joint!r} has an axis already: another one needs another hinge")
+        raise InputError(f"the hinge {place.joint!r} has an axis already: another one needs another hinge")
     keyframes = pop_keyframes(spec, model)
-    held = hold_joints(
-        spec, model, pose, request.hold, {place.joint, *existing.lines, *existing.drives}, request.release, path
-    )
+    held = hold_joints(spec, model, pose, request, {place.joint, *existing.lines, *existing.drives})
 
     # With the modules on it.
     mounts = attach_modules(spec, body, names, request.scale)
@@ -271,47 +247,24 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     model, (qpos, point, direction) = stand_upright(spec, poses, place, mounts, others, request, path)
 
     # With sensors, and a keyframe to start from.
-    check_unturned(model, poses, qpos, [*others, place.joint] if others else [], path)
+    check_unturned(model, poses, qpos, [*others, place.joint] if others else [])
     data = posed(model, qpos)
-    check_room(model, data, names, float(point[2]) if place.free else None, path)
+    check_room(model, data, names, float(point[2]) if place.free else None)
     under, height = under_and_height(model, data, model.joint(place.joint).id, point, direction)
     frame = model.body(request.body).id
     turn, origin = data.xmat[frame].reshape(3, 3), data.xpos[frame]
     add_sensors(spec, body, request.prefix, turn.T @ (under - origin), turn.T @ axes_along(direction), height)
-    model = _with_keyframes(spec, names, qpos, [(name, poses | gimbals) for name, poses in keyframes], existing, path)
-    key = model.key(EQUILIBRIUM_KEY).id
-    line = find_axis(model, key, request.name, axes_of(model)[request.name]).line
-    pole = simulated_pole(model, key, line)
-    if pole < SLOWEST:
-        touching = overlap(model, key, line, pole)
-        if pole and not touching:
-            raise InputError(
-                f"{path}: falls too slowly, with {pole:.2g} 1/s; a pair is for robots that fall with {SLOWEST:.2g} "
-                "1/s or faster (--position is in metres; a mass far up falls slowly)"
-            )
-        reason = f"{touching}; let them not collide (<exclude>)" if touching else "it stands by itself"
-        raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: {reason}")
-    return MountedRobot(spec, path, tuple(held), tuple(notes))
-
-
-def _with_keyframes(
-    spec: mujoco.MjSpec,
-    names: Sequence[str],
-    qpos: np.ndarray,
-    keyframes: Sequence[tuple[str, Poses]],
-    existing: ExistingAxes,
-    path: Path,
-) -> mujoco.MjModel:
-    """Compile the model with the equilibrium, in which all flywheels turn, and the robot's own keyframes."""
     model = compile_model(spec, path)
     speed = nominal_speed()
     speeds = {f"{module}/flywheel": speed * (-1.0) ** i for i, module in enumerate(names)}
-    controls = {f"{wheel}_motor": speed for wheel, speed in speeds.items()}
-    speeds, controls = {**existing.speeds, **speeds}, {**existing.controls, **controls}
-    write_keyframe(spec, model, EQUILIBRIUM_KEY, qpos, speeds, controls)
-    for name, poses in keyframes:
-        write_keyframe(spec, model, name, as_qpos(model, poses), speeds, controls)
-    return compile_model(spec, path)
+    speeds |= existing.speeds
+    write_keyframe(spec, model, EQUILIBRIUM_KEY, qpos, speeds)
+    for name, own in keyframes:
+        write_keyframe(spec, model, name, as_qpos(model, own | gimbals), speeds)
+    model = compile_model(spec, path)
+    key = model.key(EQUILIBRIUM_KEY).id
+    check_falls(model, key, find_axis(model, key, request.name, axes_of(model)[request.name]).line)
+    return MountedRobot(spec, path, tuple(held), tuple(notes))
 
 
 def nominal_speed() -> float:

@@ -207,9 +207,8 @@ def test_joints_without_a_name_get_one_that_is_free() -> None:
             {},
             "does not start to fall from a tilt of 0.05 deg: it stands by itself",
         ),
-        ({}, {"position": ("a", 0, 0)}, "must be three numbers, a point in the body's frame"),
+        ({}, {"position": ("a", 0, 0)}, "must be three numbers"),
         ({"option": 'gravity="0 0 9.81"'}, {}, 'gravity="0 0 9.81"/> does not pull down: there is nothing to balance'),
-        ({"option": 'gravity="0 0 0"'}, {}, 'gravity="0 0 0"/> does not pull down'),
     ],
 )
 def test_refused_in_one_line(changes: dict[str, str], options: dict[str, Any], message: str) -> None:
