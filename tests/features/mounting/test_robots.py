@@ -53,14 +53,6 @@ def surviving_worlds(
 
 
 @pytest.mark.slow
-def test_it_stands_thirty_seconds(mounting: tuple[Experiment, Prospects, str]) -> None:
-    """Ten seeds, default sensors, `gyro_free`, from the smaller of a degree and a quarter of the ceiling."""
-    experiment, outlook, _ = mounting
-    tilt = min(1.0, 0.25 * math.degrees(outlook.limit.tilt))
-    assert surviving_worlds(experiment, 0.0, 30.0, tilt).all()
-
-
-@pytest.mark.slow
 def test_it_stands_thirty_seconds_with_a_push(mounting: tuple[Experiment, Prospects, str]) -> None:
     """The same with 0.6 E, once the gimbals have come back from the start: E is borne by gimbals that are upright."""
     experiment, outlook, _ = mounting

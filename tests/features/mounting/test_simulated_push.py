@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -16,12 +15,11 @@ from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.mounting import mount, write
 from cmg_mj.features.mounting import push as simulated_push
-from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, Prospects, PushMargin, ceiling, pair_demands, prospects
+from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, Prospects, PushMargin, ceiling, prospects
 from cmg_mj.features.mounting.push import MARGIN, RESOLUTION, SimulatedPush, TimeLimit
 from cmg_mj.features.mounting.write import PUSH_SHARE, write_scenario
 from cmg_mj.plant.physics import OneWorld
-from cmg_mj.plant.plant import load_plant
-from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.stages.push import Pushes
@@ -78,12 +76,6 @@ def test_the_largest_that_all_stand_less_a_tenth(monkeypatch: pytest.MonkeyPatch
     assert found >= share * top - max(1.1 * RESOLUTION * share, simulated_push.MIN_SHARE) * top
 
 
-def test_few_pushes_are_tried_where_the_reduced_model_is_right(monkeypatch: pytest.MonkeyPatch) -> None:
-    stub = Stub(monkeypatch, right=0.9 * limits().push_margin.median_impulse, left=1.0)
-    assert stub.search().impulse > 0.0
-    assert len(stub.tried) <= 7
-
-
 def test_what_other_worlds_do_not_stand_is_reduced_again(monkeypatch: pytest.MonkeyPatch) -> None:
     top = limits().push_margin.median_impulse
     stub = Stub(monkeypatch, right=top, left=top)
@@ -123,18 +115,6 @@ def test_it_ends_after_a_minute_with_what_it_has(monkeypatch: pytest.MonkeyPatch
     result = Stub(monkeypatch, right=0.95 * top, left=top, seconds=25.0).search()
     assert result == SimulatedPush(WORLDS, (1.0 - MARGIN) * simulated_push.FIRST_SHARE * top, complete=False)
     assert Stub(monkeypatch, right=top, left=top, seconds=61.0).search() == SimulatedPush(None, complete=False)
-
-
-def test_time_that_ends_among_other_worlds_takes_no_second_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
-    top = limits().push_margin.median_impulse
-    whole = Stub(monkeypatch, right=top, left=top)
-    alone = whole.search()
-    seconds = 60.0 / (len(whole.tried) - 0.5)  # the last attempt, with other worlds, is cut off
-    result = Stub(monkeypatch, right=top, left=top, seconds=seconds).search()
-    assert result == SimulatedPush(WORLDS, alone.impulse, complete=False)
-    again = Stub(monkeypatch, right=top, left=top, seconds=60.0 / (len(whole.tried) + 0.5))
-    again.others = 0.8
-    assert again.search() == SimulatedPush(WORLDS, (1.0 - MARGIN) * alone.impulse, complete=False, others_fell=True)
 
 
 def pushed(scenario: Scenario, torque: float, seed: int) -> int:
@@ -212,28 +192,6 @@ def test_it_says_what_the_robot_itself_stands(
     assert [push.torque_n_m for push in pushes] == pytest.approx(torques)
 
 
-def test_a_scale_is_named_only_if_it_was_tried(pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(write, "simulated_push", lambda *_: SimulatedPush(3))
-    monkeypatch.setattr(write, "standing_unpushed", lambda experiment, *_: WORLDS if heavy(experiment) else 9)
-
-    def heavy(experiment: Experiment) -> bool:
-        return experiment.plant.model.body_mass.sum() > 15.0
-
-    out = cmg_mj(*pendulum, "--scale", "1.2").out
-    assert "it does not stand; with --scale 1.45, tried in MuJoCo, it stands" in out
-    assert sorted(path.name for path in Path().iterdir()) == ["pendulum.xml", "rig.toml", "rig.xml"]
-
-
-def test_quick_says_that_it_is_the_reduced_models(pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> None:
-        raise AssertionError
-
-    monkeypatch.setattr(write, "simulated_push", fails)
-    figures = json.loads(cmg_mj(*pendulum, "--quick", "--json").out)
-    assert figures["stand_unpushed"] is figures["stands_push_torque_n_m"] is figures["scale_that_suffices"] is None
-    assert load_scenario("rig.toml").push[0].torque_n_m == pytest.approx(PUSH_SHARE * 4.0)
-
-
 def test_the_demands_of_a_pair(pendulum: tuple[str, ...]) -> None:
     """Closed forms of the papers' numbers: 2.62 kg and 1.1e-3 kg m^2 a module, 314 rad/s, scaled."""
     figures = json.loads(cmg_mj(*pendulum, "--quick", "--json", "--scale", "1.5").out)
@@ -246,25 +204,6 @@ def test_the_demands_of_a_pair(pendulum: tuple[str, ...]) -> None:
     assert figures["servo_limit_rate_rad_s"] == 4.7
     moment = 0.5 * 0.0015 * 330.0 * 0.008  # of a 608 at a tenth of its rating
     assert figures["wheels_holding_power_assumed_w"] == pytest.approx(2 * 2 * moment * 314.0 * 1.5**3)
-
-
-def test_a_spin_up_in_a_minute_takes_that_energy() -> None:
-    """MuJoCo's own: a wheel driven by J w/60 s has J w^2/2 after a minute, whatever the step."""
-    plant = load_plant(model=str(mount(mujoco.MjSpec.from_string(PENDULUM), "pole").save("rig.xml")))
-    model = copy.copy(plant.model)
-    wheel = model.body("cube1/flywheel")
-    inertia = float(wheel.inertia[np.argmax(wheel.inertia)])
-    data = mujoco.MjData(model)
-    model.opt.gravity[:], model.opt.timestep = 0.0, 0.05
-    dof = model.joint("cube1/flywheel").dofadr[0]
-    data.qfrc_applied[dof] = inertia * 314.0 / 60.0
-    model.actuator_gainprm[:], model.actuator_biasprm[:] = 0.0, 0.0
-    work = 0.0
-    while data.time < 60.0:
-        before = float(data.qvel[dof])
-        mujoco.mj_step(model, data)
-        work += float(data.qfrc_applied[dof]) * 0.5 * (before + float(data.qvel[dof])) * model.opt.timestep
-    assert 2.0 * work == pytest.approx(pair_demands(plant, 4.7, 1.0).wheels_energy_j, rel=2e-3)
 
 
 @pytest.mark.slow

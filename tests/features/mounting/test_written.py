@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 import sys
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting import mount
 from cmg_mj.results.folder import signed
 from tests.command import cmg_mj
-from tests.features.mounting.robots import EXAMPLES, ROBOTS
+from tests.features.mounting.robots import EXAMPLES
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -116,15 +115,3 @@ def test_what_mujoco_cannot_do_is_one_line(monkeypatch: pytest.MonkeyPatch) -> N
     message = cmg_mj(*MOUNT, "-o", "a.xml").complaint
     assert f"{TORSO}: MuJoCo cannot put a pair on it: repeated name 'x' in frame" in message
     assert files() == []
-
-
-def test_a_command_of_the_document(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In two worlds of eight pushes: how large a push they recover from is of no account here."""
-    monkeypatch.setattr("cmg_mj.features.mounting.limits.WORLDS", 2)
-    monkeypatch.setattr("cmg_mj.features.mounting.limits.LEVELS", 8)
-    monkeypatch.setattr("cmg_mj.features.mounting.limits.BEFORE_S", 0.1)
-    monkeypatch.setattr("cmg_mj.features.mounting.limits.AFTER_TIME_CONSTANTS", 3.0)
-    words = shlex.split(ROBOTS["bicycle"].command)
-    assert cmg_mj("mount", str(ROBOTS["bicycle"].path), *words[3:], "-o", "a.xml", "--quick").status == 0
-    result = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options).save("b.xml")
-    assert result.read_bytes() == Path("a.xml").read_bytes()

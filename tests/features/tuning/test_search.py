@@ -67,12 +67,6 @@ def test_one_number_is_found_wherever_it_is(best: float) -> None:
     assert loss == pytest.approx(1.0, abs=1e-4)
 
 
-def test_the_given_size_on_a_point_of_the_grid_does_not_narrow_the_search() -> None:
-    """The minimum lies beyond the neighbour at which a rounded twin of the given size once ended the search."""
-    sizes, _ = search(lambda s: 1.0 + math.log(s[0] / 0.0266) ** 2, [number("tau", 0.02, 0.02 / 1000.0, 20.0)])
-    assert sizes == pytest.approx([0.0266], rel=5e-3)
-
-
 def test_the_deeper_of_two_valleys_is_taken() -> None:
     def loss(s: Any) -> float:
         x = math.log(s[0])

@@ -69,14 +69,6 @@ def test_wrong_tuning(sine_log: None, arguments: tuple, message: str) -> None:
     assert message in cmg_mj("tune-log", *arguments).complaint
 
 
-@pytest.mark.slow
-def test_what_was_tuned_can_be_replayed(sine_log: None) -> None:
-    arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
-    output = " ".join(cmg_mj("tune-log", *arguments, "--out", "it").err.split())
-    assert "Replay it tuned: --set 'linear.tau=0.004'" in output
-    assert cmg_mj("replay", "sine.csv", "--columns", PLAIN, "--set", "linear.tau=0.004").status == 0
-
-
 def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
     """Its rig (no --model), its sensors' noise and its observer's parameters: the given error is that of a replay."""
     run_log = read_log(run)
