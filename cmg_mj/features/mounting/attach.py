@@ -59,11 +59,6 @@ def module_names(prefix: str, modules: int) -> list[str]:
     return [f"{prefix}cube{i + 1}" for i in range(modules)]
 
 
-def site_names(prefix: str) -> dict[str, str]:
-    """Return the names of the sites of an axis: the line's, and one for each sensor."""
-    return {name: prefix + name for name in (TILT_ELEMENT, *SENSORS)}
-
-
 def attach_modules(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, names: Sequence[str], scale: float
 ) -> list[mujoco.MjsFrame]:
@@ -98,13 +93,18 @@ def place_modules(mounts: Sequence[mujoco.MjsFrame], middle: np.ndarray, axes: n
     Returns:
         Whether the modules had this orientation before.
     """
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    quaternion = _quaternion(axes)
     unchanged = all(abs(abs(float(np.asarray(mount.quat) @ quaternion)) - 1.0) < SAME_WAY for mount in mounts)
     for i, mount in enumerate(mounts):
         place = (len(mounts) - 1) / 2.0 - i
         mount.pos, mount.quat = middle + axes[:, 1] * place * EDGE_M * scale, quaternion
     return unchanged
+
+
+def _quaternion(axes: np.ndarray) -> np.ndarray:
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    return quaternion
 
 
 def add_sensors(
@@ -120,21 +120,19 @@ def add_sensors(
         axes: The line's axes in the body's frame, by columns, (3, 3): y along it, z upward.
         height: Height of the robot above the line [m].
     """
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
-    names = site_names(prefix)
+    quaternion = _quaternion(axes)
     places = {TILT_ELEMENT: 0.0, "accelerometer_inner": INNER, "accelerometer_outer": OUTER, "fog": OUTER}
     for name, share in places.items():
-        size = 0.01 * height
-        spot = {"size": [size, size, size], "rgba": [0.8, 0.1, 0.5, 1.0] if "acc" in name else [0.1, 0.6, 0.6, 1.0]}
-        site = body.add_site(name=names[name], pos=point + axes[:, 2] * share * height, quat=quaternion, **spot)
+        site = body.add_site(name=prefix + name, pos=point + axes[:, 2] * share * height, quat=quaternion)
+        site.size = np.full(3, 0.01 * height)
+        site.rgba = [0.8, 0.1, 0.5, 1.0] if "acc" in name else [0.1, 0.6, 0.6, 1.0]
         site.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT  # a default of the robot's may turn sites otherwise
     for name, kind in SENSORS.items():
         spec.add_sensor(
-            name=names[name],
+            name=prefix + name,
             type=getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"),
             objtype=mujoco.mjtObj.mjOBJ_SITE,
-            objname=names[name],
+            objname=prefix + name,
         )
 
 

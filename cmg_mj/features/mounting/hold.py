@@ -74,14 +74,15 @@ def joint_held(spec: mujoco.MjSpec, tie: mujoco.MjsEquality) -> str:
 
     Such a constraint is active, and is of one joint alone, or welds a ball joint's body to its parent.
     """
-    if tie.active and tie.type == mujoco.mjtEq.mjEQ_JOINT:
-        return "" if tie.name2 else tie.name1
-    body = spec.body(tie.name2) if tie.name2 else None
-    if not tie.active or tie.type != mujoco.mjtEq.mjEQ_WELD or body is None or body.parent is None:
+    if not tie.active:
         return ""
-    balls = [joint.name for joint in body.joints if joint.type == mujoco.mjtJoint.mjJNT_BALL]
-    of_bodies = tie.objtype == mujoco.mjtObj.mjOBJ_BODY and tie.name1 == body.parent.name
-    return balls[0] if of_bodies and len(balls) == len(body.joints) == 1 else ""
+    if tie.type == mujoco.mjtEq.mjEQ_JOINT:
+        return "" if tie.name2 else tie.name1
+    body = spec.body(tie.name2) if tie.name2 and tie.type == mujoco.mjtEq.mjEQ_WELD else None
+    if body is None or body.parent is None or tie.objtype != mujoco.mjtObj.mjOBJ_BODY or tie.name1 != body.parent.name:
+        return ""
+    is_ball = [joint.type for joint in body.joints] == [mujoco.mjtJoint.mjJNT_BALL]
+    return body.joints[0].name if is_ball else ""
 
 
 def hold_joints(
@@ -121,12 +122,17 @@ def hold_joints(
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
     for name in held:
-        kind = int(model.joint(name).type[0])
+        kind = model.joint(name).type[0]
         if kind == int(mujoco.mjtJoint.mjJNT_FREE):
-            body = model.body(int(model.joint(name).bodyid[0])).name
+            body = model.body(model.joint(name).bodyid[0]).name
             raise InputError(f"body {body!r} is free and carries no pair: give --release {name} if it is to move")
-        add = _weld_ball if kind == int(mujoco.mjtJoint.mjJNT_BALL) else _fix_joint
-        tie = add(spec, model, data, name)
+        if kind == mujoco.mjtJoint.mjJNT_BALL:
+            tie = _weld_ball(spec, model, data, name)
+        else:
+            tie = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=name)
+            address = model.joint(name).qposadr[0]
+            tie.data[:] = 0.0
+            tie.data[0] = pose[address] - model.qpos0[address]
         tie.name, tie.active = unused_name(f"{name}_held", tie_names), True
         tie.solimp[:2] = IMPEDANCE
     return held
@@ -134,7 +140,7 @@ def hold_joints(
 
 def _check_stands(model: mujoco.MjModel, pose: np.ndarray, name: str, tie: mujoco.MjsEquality) -> None:
     """Check that a constraint of the file holds a joint where the robot is to stand."""
-    address = int(model.joint(name).qposadr[0])
+    address = model.joint(name).qposadr[0]
     target, stands = float(model.qpos0[address] + tie.data[0]), float(pose[address])
     if tie.type == mujoco.mjtEq.mjEQ_JOINT and abs(target - stands) > SAME_PLACE:
         raise InputError(
@@ -145,8 +151,8 @@ def _check_stands(model: mujoco.MjModel, pose: np.ndarray, name: str, tie: mujoc
 
 def _weld_ball(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, joint: str) -> mujoco.MjsEquality:
     """Weld a ball joint's body to its parent, as they stand."""
-    body = int(model.joint(joint).bodyid[0])
-    parent = int(model.body_parentid[body])
+    body = model.joint(joint).bodyid[0]
+    parent = model.body_parentid[body]
     back_pos, back_quat, place, turn = np.empty(3), np.empty(4), np.empty(3), np.empty(4)
     mujoco.mju_negPose(back_pos, back_quat, data.xpos[parent], data.xquat[parent])
     mujoco.mju_mulPose(place, turn, back_pos, back_quat, data.xpos[body], data.xquat[body])
@@ -160,20 +166,11 @@ def _weld_ball(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, 
     return tie
 
 
-def _fix_joint(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, joint: str) -> mujoco.MjsEquality:
-    """Fix a hinge or a slide where it stands."""
-    tie = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=joint)
-    address = int(model.joint(joint).qposadr[0])
-    tie.data[:] = 0.0
-    tie.data[0] = data.qpos[address] - model.qpos0[address]
-    return tie
-
-
 def poses_of(model: mujoco.MjModel, qpos: np.ndarray) -> dict[str, np.ndarray]:
     """Return the position of each joint of a compiled model, by its name."""
     poses = {}
     for i in range(model.njnt):
-        address = int(model.jnt_qposadr[i])
+        address = model.jnt_qposadr[i]
         poses[model.joint(i).name] = qpos[address : address + joint_sizes(int(model.jnt_type[i]))[0]].copy()
     return poses
 
@@ -182,7 +179,7 @@ def as_qpos(model: mujoco.MjModel, poses: Mapping[str, np.ndarray]) -> np.ndarra
     """Return poses as a vector qpos, with the model's reference for joints that have none."""
     qpos = model.qpos0.copy()
     for name, values in poses.items():
-        address = int(model.joint(name).qposadr[0])
+        address = model.joint(name).qposadr[0]
         qpos[address : address + len(values)] = values
     return qpos
 
@@ -201,7 +198,7 @@ def write_keyframe(
     """
     qvel, (act, controls) = np.zeros(model.nv), rest_controls(model, posed(model, qpos))
     for joint, speed in speeds.items():
-        qvel[int(model.joint(joint).dofadr[0])] = controls[model.actuator(f"{joint}_motor").id] = speed
+        qvel[model.joint(joint).dofadr[0]] = controls[model.actuator(f"{joint}_motor").id] = speed
     spec.add_key(name=name, qpos=qpos, qvel=qvel, act=act, ctrl=controls)
 
 

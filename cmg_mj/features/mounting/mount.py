@@ -13,9 +13,9 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.mounting.attach import add_sensors, attach_modules, check_room, module_names, site_names
+from cmg_mj.features.mounting.attach import add_sensors, attach_modules, check_room, module_names
 from cmg_mj.features.mounting.hold import as_qpos, hold_joints, pop_keyframes, poses_of, write_keyframe
-from cmg_mj.features.mounting.request import AxisLike, Base, Hold, MountRequest
+from cmg_mj.features.mounting.request import AxisLike, Base, Hold, MountRequest, find_place
 from cmg_mj.features.mounting.robot import (
     body_of,
     check_chains,
@@ -30,13 +30,12 @@ from cmg_mj.features.mounting.stance import (
     axes_along,
     check_falls,
     check_unturned,
-    find_place,
     stand_upright,
     under_and_height,
 )
 from cmg_mj.inputs.files import expanded, folder, model_files
 from cmg_mj.plant.axis import find_axis
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, axes_of
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, axes_of
 from cmg_mj.plant.mjcf import as_mjcf, check_rig, compile_model, parse
 from cmg_mj.plant.mujoco_state import posed, quiet, set_control_callback
 from cmg_mj.results.files import whole_file
@@ -162,6 +161,7 @@ def _relative_assets(folder: Path, model_folder: str, assets: str) -> str:
     return relative if relative == os.path.relpath(os.path.realpath(path), os.path.realpath(folder)) else path
 
 
+@quiet()
 def mount(
     robot: str | Path | mujoco.MjSpec,
     body: str,
@@ -198,14 +198,7 @@ def mount(
     Raises:
         InputError: The robot or an argument does not allow it; the message says why.
     """
-    return mount_on_request(
-        robot, MountRequest(body, axis, position, modules, scale, name, keyframe, hold, release, base)
-    )
-
-
-@quiet()
-def mount_on_request(robot: str | Path | mujoco.MjSpec, request: MountRequest) -> MountedRobot:
-    """Mount control moment gyroscopes on a robot; see `mount`."""
+    request = MountRequest(body, axis, position, modules, scale, name, keyframe, hold, release, base)
     with set_control_callback(None):
         spec, path = read_robot(robot)
         try:
@@ -226,9 +219,8 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     names = module_names(request.prefix, request.modules)
     model = compile_model(spec, path)
     existing = find_existing_axes(spec, model, request.name)
-    check_names(
-        spec, [*site_names(request.prefix).values(), *(f"{name}{end}" for name in names for end in ("/half", "_mount"))]
-    )
+    sites = [request.prefix + name for name in (TILT_ELEMENT, *SENSORS)]
+    check_names(spec, [*sites, *(f"{name}{end}" for name in names for end in ("/half", "_mount"))])
 
     # The robot as it is to stand.
     pose = pose_of(model, request.keyframe or (EQUILIBRIUM_KEY if existing.drives else None))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.plant.mujoco_state import posed
 from cmg_mj.plant.tilt_line import UP
 
 SCALES = 0.05, 20.0
@@ -58,11 +59,6 @@ class MountRequest:
         """The first part of the names of the axis' elements, such as `roll/`."""
         return f"{self.name}/" if self.name else ""
 
-    @property
-    def point(self) -> np.ndarray | None:
-        """The position as a vector, (3,) [m]."""
-        return None if self.position is None else _three_numbers(self.position)
-
 
 def _three_numbers(value: AxisLike) -> np.ndarray | None:
     parts = value.replace(",", " ").split() if isinstance(value, str) else value
@@ -73,32 +69,45 @@ def _three_numbers(value: AxisLike) -> np.ndarray | None:
     return vector if vector.shape == (3,) and np.isfinite(vector).all() else None
 
 
-def hinge_or_direction(
-    model: mujoco.MjModel, data: mujoco.MjData, body: int, axis: AxisLike
-) -> tuple[int | None, np.ndarray]:
-    """Find the hinge or the direction that an axis names.
+class Place(NamedTuple):
+    """The place of the modules on a robot, and the line that it tilts about."""
+
+    joint: str
+    """The hinge that the robot tilts about, or its free joint."""
+    free: bool
+    direction: np.ndarray
+    """Approximate direction of the line in the world, (3,)."""
+    middle: np.ndarray
+    """Middle of the row of modules in the body frame, (3,) [m]."""
+
+
+def find_place(model: mujoco.MjModel, pose: np.ndarray, request: MountRequest) -> Place:
+    """Find the requested axis and position on a robot.
 
     Args:
         model: The robot.
-        data: The robot as it is to stand, after a forward pass.
-        body: The body that is to carry the pair.
-        axis: The name of a hinge, or a direction in the body frame: `x`, `y`, or three numbers.
+        pose: Joint positions, (nq,).
+        request: The body, the axis, the position of the modules.
 
     Returns:
-        The hinge, or None for a body that is free; and the axis' direction in the world, (3,), horizontal.
+        The place of the modules. Of a body that is free, a direction names no hinge.
 
     Raises:
-        InputError: There is no such hinge, or the axis is not horizontal.
+        InputError: The body has no mass, there is no such hinge, or the axis is not horizontal.
     """
+    axis, body, data = request.axis, model.body(request.body).id, posed(model, pose)
+    if not model.body_subtreemass[body] > 0.0:
+        raise InputError(f"--body {request.body}: has no mass, nor has anything on it")
+    point = None if request.position is None else _three_numbers(request.position)
+    middle = model.body_ipos[body].copy() if point is None else point
     chain, ancestor = [], body  # the joints between the body and the world, the nearest first
     while ancestor:
-        first = int(model.body_jntadr[ancestor])
-        chain += reversed(range(first, first + int(model.body_jntnum[ancestor])))
-        ancestor = int(model.body_parentid[ancestor])
-    hinges = {model.joint(j).name: j for j in chain if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE}
-    is_free = any(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE for j in chain)
+        first = model.body_jntadr[ancestor]
+        chain += [model.joint(j) for j in reversed(range(first, first + model.body_jntnum[ancestor]))]
+        ancestor = model.body_parentid[ancestor]
+    hinges = {joint.name: joint.id for joint in chain if joint.type[0] == mujoco.mjtJoint.mjJNT_HINGE}
     if isinstance(axis, str) and axis in hinges:
-        return hinges[axis], _level(data.xaxis[hinges[axis]], f"hinge {axis!r}")
+        return Place(axis, False, _level(data.xaxis[hinges[axis]], f"hinge {axis!r}"), middle)
     vector = _three_numbers(NAMED.get(axis, axis) if isinstance(axis, str) else axis)
     if vector is None or not np.linalg.norm(vector) > 1e-9:
         raise InputError(
@@ -107,15 +116,16 @@ def hinge_or_direction(
         )
     vector /= np.linalg.norm(vector)
     direction = _level(data.xmat[body].reshape(3, 3) @ vector, f"--axis {axis}")
-    if is_free:
-        return None, direction
-    joint = next((j for j in hinges.values() if abs(float(data.xaxis[j] @ direction)) > PARALLEL), None)
-    if joint is None:
-        raise InputError(
-            f"--axis {axis}: body {model.body(body).name!r} has no hinge along it, and the body is not free; "
-            f"its hinges: {', '.join(hinges) or 'none'} (--free-base lets it stand on the floor)"
-        )
-    return joint, _level(data.xaxis[joint] * np.sign(data.xaxis[joint] @ direction), f"--axis {axis}")
+    if chain and chain[-1].type[0] == mujoco.mjtJoint.mjJNT_FREE:  # only a child of the world is free
+        return Place(chain[-1].name, True, direction, middle)
+    for name, joint in hinges.items():
+        along = float(data.xaxis[joint] @ direction)
+        if abs(along) > PARALLEL:
+            return Place(name, False, _level(data.xaxis[joint] * np.sign(along), f"--axis {axis}"), middle)
+    raise InputError(
+        f"--axis {axis}: body {request.body!r} has no hinge along it, and the body is not free; its hinges: "
+        f"{', '.join(hinges) or 'none'} (--free-base lets it stand on the floor)"
+    )
 
 
 def _level(direction: np.ndarray, what: str) -> np.ndarray:

@@ -259,13 +259,11 @@ def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str) ->
         InputError: It has an axis and the new one has no name; it has half of an axis; or its keyframe of that name
             does not fit.
     """
-    elements = [element.name for kind in (spec.joints, spec.sites, spec.sensors) for element in kind]
-    names, is_key = axes_in(elements), any(key.name == EQUILIBRIUM_KEY for key in spec.keys)
+    names = axes_in(element.name for kind in (spec.joints, spec.sites, spec.sensors) for element in kind)
+    is_key = any(key.name == EQUILIBRIUM_KEY for key in spec.keys)
     if not (names and is_key):
-        conflicts = [element for element in elements if axes_in([element])]
-        conflicts += [f"keyframe {EQUILIBRIUM_KEY}"] if is_key else []
-        if conflicts:
-            raise InputError(f"has an element {conflicts[0]!r} already, which a mounted pair brings: rename it")
+        if is_key:
+            raise InputError(f"has a keyframe {EQUILIBRIUM_KEY!r} already, which a mounted pair brings: rename it")
         return ExistingAxes()
     missing = missing_parts(spec)
     if missing:

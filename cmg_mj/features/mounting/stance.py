@@ -14,7 +14,7 @@ import numpy as np
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting.attach import place_modules
 from cmg_mj.features.mounting.hold import as_qpos, rest_controls
-from cmg_mj.features.mounting.request import MountRequest, hinge_or_direction
+from cmg_mj.features.mounting.request import MountRequest, Place
 from cmg_mj.plant.checks import TRUE_DEG
 from cmg_mj.plant.mjcf import compile_model
 from cmg_mj.plant.mujoco_state import at_keyframe, posed
@@ -202,41 +202,6 @@ MIN_HEIGHT_M = 1e-3
 """Smallest height of a robot's mass above the line [m]."""
 MAX_TRIES = 5
 """Most rounds of settling on the floor and turning the modules along the contact line."""
-
-
-class Place(NamedTuple):
-    """The place of the modules on a robot, and the line that it tilts about."""
-
-    joint: str
-    """The hinge that the robot tilts about, or its free joint."""
-    free: bool
-    direction: np.ndarray
-    """Approximate direction of the line in the world, (3,)."""
-    middle: np.ndarray
-    """Middle of the row of modules in the body frame, (3,) [m]."""
-
-
-def find_place(model: mujoco.MjModel, pose: np.ndarray, request: MountRequest) -> Place:
-    """Find the requested axis and position on a robot.
-
-    Args:
-        model: The robot.
-        pose: Joint positions, (nq,).
-        request: The body, the axis, the position of the modules.
-
-    Returns:
-        The place of the modules.
-
-    Raises:
-        InputError: The body has no mass, or there is no such axis.
-    """
-    body = model.body(request.body).id
-    if not model.body_subtreemass[body] > 0.0:
-        raise InputError(f"--body {request.body}: has no mass, nor has anything on it")
-    hinge, direction = hinge_or_direction(model, posed(model, pose), body, request.axis)
-    joint = model.body_jntadr[model.body_rootid[body]] if hinge is None else hinge  # the free one
-    middle = model.body_ipos[body].copy() if request.point is None else request.point
-    return Place(model.joint(joint).name, hinge is None, direction, middle)
 
 
 def stand_upright(

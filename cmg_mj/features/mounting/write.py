@@ -28,7 +28,7 @@ from cmg_mj.features.mounting.limits import (
     prospects,
     push_margin,
 )
-from cmg_mj.features.mounting.mount import MountedRobot, check_target, mount_on_request, with_scenario
+from cmg_mj.features.mounting.mount import MountedRobot, check_target, mount, with_scenario
 from cmg_mj.features.mounting.push import OutOfTimeError, SimulatedPush, TimeLimit, simulated_push, standing_unpushed
 from cmg_mj.features.mounting.request import SCALES, MountRequest
 from cmg_mj.features.plugin.make import Plugin, make_plugin, require_tools, write_plugin
@@ -155,7 +155,7 @@ def mount_and_write(
     if with_plugin:
         require_tools()
         _check_plugin_folder(file, expanded(robot, "ROBOT"), overwrite=overwrite)
-    mounted = mount_on_request(robot, request)
+    mounted = mount(robot, **vars(request))
     simulated = sufficient = plugin = None
     with with_scenario(file) as model:
         experiment = write_scenario(mounted.save(model), mounted.path, observer, axis=axis)
@@ -184,7 +184,7 @@ def _sufficient_scale(
     try:
         while (scale := round(1.1 * scale, 2)) <= SCALES[1]:
             time_limit.check(f"--scale {scale:g}")
-            mount_on_request(robot, replace(request, scale=scale)).save(trial)
+            mount(robot, **vars(replace(request, scale=scale))).save(trial)
             experiment = write_scenario(trial, Path(robot), observer, axis=request.name)
             limits = prospects(experiment, request.name, with_margin=False)
             enough = math.degrees(limits.limit.tilt) >= LOW_LIMIT_DEG

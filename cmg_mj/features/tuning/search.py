@@ -190,16 +190,19 @@ Height = Callable[[np.ndarray], float]
 
 def insensitive_numbers(loss: Loss, numbers: Sequence[TunedScalar], start_loss: float) -> list[TunedScalar]:
     """Return the numbers that the loss does not depend on: it is the same to six digits if they change tenfold."""
-    insensitive = []
-    for i, number in enumerate(numbers):
-        sizes = [abs(other.start) for other in numbers]
-        changes = []
-        for moved in (max(sizes[i] / 10.0, number.low), min(sizes[i] * 10.0, number.high)):
-            value = loss([*sizes[:i], moved, *sizes[i + 1 :]])
-            changes.append(abs(value - start_loss) if math.isfinite(value) else math.inf)
-        if math.isfinite(start_loss) and max(changes) <= 1e-6 * start_loss:
-            insensitive.append(number)
-    return insensitive
+    given = [abs(number.start) for number in numbers]
+
+    def change(i: int, size: float) -> float:
+        value = loss([*given[:i], size, *given[i + 1 :]])
+        return abs(value - start_loss) if math.isfinite(value) else math.inf
+
+    return [
+        number
+        for i, number in enumerate(numbers)
+        if max(change(i, max(given[i] / 10.0, number.low)), change(i, min(given[i] * 10.0, number.high)))
+        <= 1e-6 * start_loss
+        < math.inf
+    ]
 
 
 def evaluations(dimension: int) -> int:

@@ -93,7 +93,7 @@ REFUSALS: dict[str, tuple[mujoco.MjSpec, dict[str, Any], str]] = {
     "a keyframe of that name": (
         pole(after='<keyframe><key name="equilibrium" qpos="0 0 0"/></keyframe>'),
         {},
-        "has an element 'keyframe equilibrium' already",
+        "has a keyframe 'equilibrium' already",
     ),
     "beyond its range": (
         pole(axis="0 1 0", limits='range="50 90"'),
