@@ -352,8 +352,7 @@ def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = Tru
     Returns:
         The limits.
     """
-    matches = [part for part in experiment.axes if part.plant.axis.name == axis]
-    experiment = matches[0] if matches else experiment
+    experiment = next((part for part in experiment.axes if part.plant.axis.name == axis), experiment)
     plant = experiment.plant
     limit = ceiling(plant.reduced, experiment.law.rate_limit)
     with set_control_callback(None), quiet():

@@ -34,8 +34,12 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
         yield f"  held where they stand: {', '.join(mounted.held)}"
     for note in mounted.notes:
         yield f"  {note}"
-    if result.plugin:
-        yield from _plugin_step(mounted.spec.option.timestep, plant.timestep)
+    file, runner = mounted.spec.option.timestep, plant.timestep
+    if result.plugin and not math.isclose(file, runner):
+        yield (
+            f"  its physics steps of {1e3 * file:.4g} ms are {1e3 * runner:.4g} ms in the plugin's model, as in runs: "
+            "whole steps fit between two samples"
+        )
     yield (
         f"  inertia {figures['inertia_kg_m2']:.4g} kg m^2, gravity {figures['gravity_torque_n_m']:.4g} N m, momentum "
         f"{figures['momentum_n_m_s']:.4g} N m s, falls with {figures['pole_1_s']:.3g} 1/s"
@@ -69,15 +73,6 @@ def _pivot(result: MountResult) -> Iterator[str]:
         if result.observer != "free_pivot":
             yield "    if what it slides on rubs, --observer free_pivot stands more of that"
         yield f"    in the reduced model: {IN_THE_MODEL}; not: {NOT_IN_THE_MODEL}"
-
-
-def _plugin_step(file: float, runner: float) -> Iterator[str]:
-    """Say that the plugin's model takes the runner's physics steps, where these are not the mounted model's [s]."""
-    if not math.isclose(file, runner):
-        yield (
-            f"  its physics steps of {1e3 * file:.4g} ms are {1e3 * runner:.4g} ms in the plugin's model, as in runs: "
-            "whole steps fit between two samples"
-        )
 
 
 def _simulated(simulated: SimulatedPush | None) -> str:

@@ -202,16 +202,13 @@ class LogSegments:
     fell = 0
 
     def __init__(self, logs: Sequence[Log], settle_s: float) -> None:
-        self.logs = logs
-        self._stretches = []
-        for log in logs:
+        self.logs, self._stretches = logs, []
+        for i, log in enumerate(logs):
             scored = np.flatnonzero(log.scored(settle_s) & np.isfinite(log[REFERENCE]))
-            self._stretches.append([rows for rows in np.array_split(scored, BLOCKS) if len(rows)])
-        self.shortest_s = min(
-            len(rows) * log.dt for log, stretches in zip(logs, self._stretches, strict=True) for rows in stretches
-        )
-        zero = self._rms([-log[REFERENCE] for log in logs])
-        self.worlds, self.zero_rms = len(zero), float(zero.mean())
+            self._stretches += [(i, rows) for rows in np.array_split(scored, BLOCKS) if len(rows)]
+        self.worlds = len(self._stretches)
+        self.shortest_s = min(len(rows) * logs[i].dt for i, rows in self._stretches)
+        self.zero_rms = float(self._rms([-log[REFERENCE] for log in logs]).mean())
         self.largest_acceleration = max(float(np.nanmax(np.abs(np.diff(log[REFERENCE]) / log.dt))) for log in logs)
 
     def errors(self, observers: Sequence[Observer], /) -> np.ndarray:
@@ -231,13 +228,7 @@ class LogSegments:
 
     def _rms(self, errors: Sequence[np.ndarray]) -> np.ndarray:
         with np.errstate(all="ignore"):
-            return np.array(
-                [
-                    math.sqrt(float(np.mean(error[rows] ** 2)))
-                    for error, stretches in zip(errors, self._stretches, strict=True)
-                    for rows in stretches
-                ]
-            )
+            return np.array([math.sqrt(float(np.mean(errors[i][rows] ** 2))) for i, rows in self._stretches])
 
 
 class LogEvidence(NamedTuple):

@@ -245,35 +245,33 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
 
 
 def _search_line(height: Height, low: float, high: float) -> None:
-    points = np.linspace(low, high, GRID).tolist()
-    heights = [height(np.array([point])) for point in points]
+    points = np.linspace(low, high, GRID)
+    heights = [height(point[None]) for point in points]
     lowest = int(np.argmin(heights))
-    around = points[max(lowest - 1, 0)], points[min(lowest + 1, len(points) - 1)]
     # The search fits parabolas: where there is no loss it is told a number.
-    top = max((value for value in heights if math.isfinite(value)), default=0.0) + 1.0
+    top = max(filter(math.isfinite, heights), default=0.0) + 1.0
     minimize_scalar(
         lambda point: min(height(np.array([point])), top),
-        bounds=around,
+        bounds=(points[max(lowest - 1, 0)], points[min(lowest + 1, GRID - 1)]),
         method="bounded",
         options={"xatol": TOLERANCE / 2.0},
     )
 
 
-def _search_simplex(height: Height, low: np.ndarray, high: np.ndarray, log_sizes: np.ndarray, starts: int) -> None:
-    n = len(log_sizes)
-    first = [log_sizes]
+def _search_simplex(height: Height, low: np.ndarray, high: np.ndarray, given: np.ndarray, starts: int) -> None:
+    n = len(given)
+    first = [given]
     if starts > 1:
         reach = math.log(SCATTER_FACTOR)
-        floor, ceiling = np.maximum(low, log_sizes - reach), np.minimum(high, log_sizes + reach)
+        floor, ceiling = np.maximum(low, given - reach), np.minimum(high, given + reach)
         # `seed` is what every scipy takes; the name `rng` is known from 1.15 on.
         cube = qmc.LatinHypercube(n, seed=np.random.default_rng(0))  # pyright: ignore[reportCallIssue]
-        unit = cube.random(SCATTER * n)
-        scattered = floor + unit * (ceiling - floor)
+        scattered = floor + cube.random(SCATTER * n) * (ceiling - floor)
         order = np.argsort([height(point) for point in scattered], kind="stable")
         first += [scattered[i] for i in order[: starts - 1]]
     for start in first:
         steps = np.where(start + FIRST_STEP <= high, FIRST_STEP, -np.minimum(FIRST_STEP, start - low))
-        corners = np.vstack([start, *(start + step * axis for step, axis in zip(steps, np.eye(n), strict=True))])
+        corners = np.vstack([start, start + np.diag(steps)])
         minimize(
             height,
             start,
