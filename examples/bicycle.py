@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 import cmg_mj
-from cmg_mj.features.mounting.mount_files import write_scenario
+from cmg_mj.features.mounting.write import write_scenario
 
 ROBOT = Path(__file__).parent / "robots" / "bicycle.xml"
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import gymnasium
 
 import cmg_mj
-from cmg_mj.features.mounting.mount_files import write_scenario
-from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.features.mounting.limits import prospects
+from cmg_mj.features.mounting.write import write_scenario
 
 ROBOT = Path(gymnasium.__path__[0]) / "envs" / "mujoco" / "assets" / "inverted_pendulum.xml"
 

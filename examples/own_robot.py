@@ -9,8 +9,8 @@ from pathlib import Path
 import mujoco
 
 import cmg_mj
-from cmg_mj.features.mounting.mount_files import write_scenario
-from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.features.mounting.limits import prospects
+from cmg_mj.features.mounting.write import write_scenario
 
 LEG = """
       <body pos="{0} 0 -0.16">

@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import mujoco
 
 from cmg_mj import mount
-from cmg_mj.features.mounting.mount_files import write_scenario
-from cmg_mj.features.mounting.prospects import Prospects, prospects
+from cmg_mj.features.mounting.limits import Prospects, prospects
+from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from tests.features.mounting.push_robots import cart_pole

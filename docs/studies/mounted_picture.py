@@ -17,8 +17,8 @@ mpl.use("agg")
 import matplotlib.pyplot as plt
 
 from cmg_mj import mount
-from cmg_mj.features.mounting.mount_files import PUSHED_AT_S, write_scenario
-from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.features.mounting.limits import prospects
+from cmg_mj.features.mounting.write import PUSHED_AT_S, write_scenario
 from cmg_mj.view.plots.style import colour, hexadecimal
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "torso.xml"

@@ -20,10 +20,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj import mount
-from cmg_mj.features.mounting.largest_push import PUSH_S
-from cmg_mj.features.mounting.mount_files import write_scenario
-from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.features.mounting.limits import PUSH_S, prospects
 from cmg_mj.features.mounting.push import TimeLimit, simulated_push
+from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.schema import ObserverSettings

@@ -23,13 +23,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+
 from cmg_mj import mount
 from cmg_mj.core.reduced_model import hold_matrices
-from cmg_mj.features.mounting.largest_push import push_margin
-from cmg_mj.features.mounting.mount_files import write_scenario
-from cmg_mj.features.mounting.prospects import prospects
+from cmg_mj.features.mounting.limits import prospects, push_margin
+from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.features.tuning import Recorded, halves, recorder, tune
-from cmg_mj.features.tuning.simulations import WARM_UP_S
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.observers.scaling import scaled_names, scaled_parameters, scales_of
 from cmg_mj.results.floors import FLOOR_Y1, TiltFloor, acceleration_floor
@@ -175,7 +174,7 @@ class OnRobot:
         """Worlds that nothing is tuned on."""
         scenario, worlds = self.experiment.scenario, range(WORLDS, 2 * WORLDS)
         density = scenario.sensors.accelerometer.noise_density_ug_rthz
-        return self.recorded(scenario, worlds, noise_ug_rthz=density, warm_up_s=WARM_UP_S)
+        return self.recorded(scenario, worlds, density)
 
     def row(self, kind: str, part: str) -> dict:
         """Compute a row."""

@@ -16,7 +16,7 @@ import pytest
 from scipy.linalg import expm
 
 from cmg_mj import Experiment, InputError, Measurement, Scenario, load_scenario, mount, parse_scenario, prepare
-from cmg_mj.features.mounting.mount_files import write_scenario
+from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.linear.loop import INPUTS, WITH_A_SLOPE
 from cmg_mj.linear.plant import linearise
 from cmg_mj.linear.slopes import observer_slopes

@@ -13,7 +13,7 @@ import pytest
 from cmg_mj import mount
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.bend import Bend, BendBeyond
-from cmg_mj.features.mounting.largest_push import ReducedPhysics
+from cmg_mj.features.mounting.limits import ReducedPhysics
 from cmg_mj.linear.plant import linearise
 from cmg_mj.plant.elements import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant

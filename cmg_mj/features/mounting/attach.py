@@ -1,4 +1,4 @@
-"""The elements that mounting adds to a body: the modules, sites and sensors of one axis."""
+"""The elements that mounting adds to a body: the modules, sites and sensors of one axis, and their room."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.files import folder
 from cmg_mj.plant.elements import SENSORS, TILT_ELEMENT
 from cmg_mj.plant.mjcf import parse
+from cmg_mj.plant.tilt_line import UP
 
 EDGE_M = 0.19
 """Edge of the module in `models/cube.xml` [m]."""
@@ -57,11 +59,6 @@ def module_names(prefix: str, modules: int) -> list[str]:
     return [f"{prefix}cube{i + 1}" for i in range(modules)]
 
 
-def site_names(prefix: str) -> dict[str, str]:
-    """Return the names of the sites of an axis: the line's, and one for each sensor."""
-    return {name: prefix + name for name in (TILT_ELEMENT, *SENSORS)}
-
-
 def attach_modules(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, names: Sequence[str], scale: float
 ) -> list[mujoco.MjsFrame]:
@@ -96,13 +93,18 @@ def place_modules(mounts: Sequence[mujoco.MjsFrame], middle: np.ndarray, axes: n
     Returns:
         Whether the modules had this orientation before.
     """
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    quaternion = _quaternion(axes)
     unchanged = all(abs(abs(float(np.asarray(mount.quat) @ quaternion)) - 1.0) < SAME_WAY for mount in mounts)
     for i, mount in enumerate(mounts):
         place = (len(mounts) - 1) / 2.0 - i
         mount.pos, mount.quat = middle + axes[:, 1] * place * EDGE_M * scale, quaternion
     return unchanged
+
+
+def _quaternion(axes: np.ndarray) -> np.ndarray:
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    return quaternion
 
 
 def add_sensors(
@@ -118,19 +120,64 @@ def add_sensors(
         axes: The line's axes in the body's frame, by columns, (3, 3): y along it, z upward.
         height: Height of the robot above the line [m].
     """
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
-    names = site_names(prefix)
+    quaternion = _quaternion(axes)
     places = {TILT_ELEMENT: 0.0, "accelerometer_inner": INNER, "accelerometer_outer": OUTER, "fog": OUTER}
     for name, share in places.items():
-        size = 0.01 * height
-        spot = {"size": [size, size, size], "rgba": [0.8, 0.1, 0.5, 1.0] if "acc" in name else [0.1, 0.6, 0.6, 1.0]}
-        site = body.add_site(name=names[name], pos=point + axes[:, 2] * share * height, quat=quaternion, **spot)
+        site = body.add_site(name=prefix + name, pos=point + axes[:, 2] * share * height, quat=quaternion)
+        site.size = np.full(3, 0.01 * height)
+        site.rgba = [0.8, 0.1, 0.5, 1.0] if "acc" in name else [0.1, 0.6, 0.6, 1.0]
         site.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT  # a default of the robot's may turn sites otherwise
     for name, kind in SENSORS.items():
         spec.add_sensor(
-            name=names[name],
+            name=prefix + name,
             type=getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"),
             objtype=mujoco.mjtObj.mjOBJ_SITE,
-            objname=names[name],
+            objname=prefix + name,
         )
+
+
+TOUCH_M = 1e-3
+"""Modules may overlap by so much: they stand side by side [m]."""
+HALF = "/half"
+
+
+def check_room(model: mujoco.MjModel, data: mujoco.MjData, modules: Sequence[str], floor: float | None) -> None:
+    """Check that modules reach neither below the floor nor into other modules; they may overlap the robot itself.
+
+    Args:
+        model: The robot with all its modules.
+        data: The same where it stands, after a forward pass.
+        modules: Names of the new modules.
+        floor: Height of the floor that the robot stands on [m]; None for a robot on a hinge.
+
+    Raises:
+        InputError: A module has no room.
+    """
+
+    def half(body: int) -> float:
+        """Half of a module's edge [m]: its frame's edges lie so far out."""
+        first = model.body_geomadr[body]
+        return np.abs(model.geom_pos[first : first + model.body_geomnum[body]]).max()
+
+    def reach(body: int, normal: np.ndarray) -> float:
+        return half(body) * np.abs(normal @ data.xmat[body].reshape(3, 3)).sum()
+
+    new = [model.body(f"{module}{HALF}").id for module in modules]
+    lowest = min(data.xpos[body][2] - reach(body, UP) for body in new)
+    if floor is not None and lowest < floor - TOUCH_M:
+        raise InputError(
+            f"no room: the modules reach {floor - lowest:.3g} m below its support; use a smaller --scale, or a higher "
+            "--position"
+        )
+    for other in range(model.nbody):
+        name = model.body(other).name
+        if not name.endswith(HALF) or other in new:
+            continue
+        for body in new:
+            apart = data.xpos[other] - data.xpos[body]
+            normals = np.hstack([data.xmat[body].reshape(3, 3), data.xmat[other].reshape(3, 3)]).T
+            if all(abs(normal @ apart) <= reach(body, normal) + reach(other, normal) - TOUCH_M for normal in normals):
+                raise InputError(
+                    f"no room: the modules overlap {name.removesuffix(HALF)!r}, which is there already; choose another "
+                    "--position"
+                )

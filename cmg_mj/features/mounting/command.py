@@ -3,57 +3,13 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack
+from typing import Any
 
 import click
 
 from cmg_mj.cli.arguments import json_option, observer_option
 from cmg_mj.cli.terminal import CtrlC, end_interrupted, note, note_hints, progress, shell_command, show, users_code
 from cmg_mj.core.errors import InputError
-
-if TYPE_CHECKING:
-    from cmg_mj.features.mounting.axes import AxisLike
-    from cmg_mj.features.mounting.held_joints import Hold
-    from cmg_mj.features.mounting.mount_files import MountResult
-    from cmg_mj.features.mounting.mount_tuning import MountTuning
-    from cmg_mj.features.mounting.request import Base
-
-
-class MountOptions(TypedDict):
-    """The options that go to `MountRequest`, by click's names."""
-
-    body: str
-    axis: AxisLike
-    position: list[float] | None
-    modules: int
-    scale: float
-    name: str
-    keyframe: str | None
-    hold: Hold
-    release: tuple[str, ...]
-    base: Base
-
-
-def _hinge_or_direction(context: click.Context, option: click.Parameter, axis: str) -> AxisLike:
-    parts = axis.split()
-    if len(parts) != 3:
-        return axis
-    try:
-        return [float(part) for part in parts]
-    except ValueError:
-        return axis
-
-
-def _point(context: click.Context, option: click.Parameter, position: str | None) -> list[float] | None:
-    if position is None:
-        return None
-    try:
-        point = [float(part) for part in position.replace(",", " ").split()]
-    except ValueError:
-        point = []
-    if len(point) != 3:
-        raise InputError(f"--position {position}: must be three numbers, such as '0 0 0.1' [m]")
-    return point
 
 
 @click.command(short_help="Mount a scissored pair on your own robot, with a scenario.")
@@ -64,7 +20,6 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
     default="y",
     show_default=True,
     metavar="HINGE|DIRECTION",
-    callback=_hinge_or_direction,
     help="Tilt axis: a hinge name, or a direction in the body frame (x, y, or '0.1 1 0'). A direction selects the "
     "hinge parallel to it, or, for a free body, the contact line.",
 )
@@ -79,7 +34,6 @@ def _point(context: click.Context, option: click.Parameter, position: str | None
 @click.option(
     "--position",
     metavar="'X Y Z'",
-    callback=_point,
     help="Middle of the row of modules in the body frame [m].  [default: the body's centre of mass]",
 )
 @click.option("--modules", default=2, show_default=True, metavar="N", help="Number of modules.")
@@ -133,7 +87,7 @@ def mount(
     with_tuning: bool,
     as_json: bool,
     overwrite: bool,
-    **options: Unpack[MountOptions],
+    **request: Any,
 ) -> None:
     """Mount control moment gyroscopes on a robot, and print the largest push it withstands.
 
@@ -141,29 +95,37 @@ def mount(
     gains of the papers' Table 2, scaled to the robot, and a push of 0.6 times the largest that the robot withstands
     in MuJoCo.
     """
-    from cmg_mj.features.mounting.mount_files import mount_and_write
-    from cmg_mj.features.mounting.push import LONGEST_S, TimeLimit
+    from cmg_mj.features.mounting.push import MAX_SEARCH_S, TimeLimit
     from cmg_mj.features.mounting.report import mount_report_lines
     from cmg_mj.features.mounting.request import MountRequest
+    from cmg_mj.features.mounting.write import mount_and_write, tune_mounted
 
     if with_tuning and with_plugin:
         raise InputError("--tune: not with --plugin, which would keep the old parameters; use cmg-mj plugin afterwards")
-    with CtrlC() as ctrl_c, nullcontext() if quick else progress("no push", LONGEST_S, ctrl_c) as on_progress:
+    with CtrlC() as ctrl_c, nullcontext() if quick else progress("no push", MAX_SEARCH_S, ctrl_c) as on_progress:
         time_limit = None if quick else TimeLimit(on_progress=on_progress)
         result = mount_and_write(
             robot,
-            MountRequest(**options),
+            MountRequest(**request),
             out,
             observer,
             overwrite=overwrite,
             time_limit=time_limit,
             with_plugin=with_plugin,
         )
-    lines = list(mount_report_lines(result))
-    outcome = _tune(result) if with_tuning else TuningOutcome()
-    if outcome.tuning:
-        lines.append(outcome.tuning.line())
-    show(result.figures() | (outcome.tuning.figures() if outcome.tuning else {}), "\n".join(lines), as_json)
+    lines, figures, error, interrupted = [*mount_report_lines(result)], result.figures(), None, False
+    if with_tuning:  # a Ctrl-C ends the search, and a second one leaves all as it was
+        with CtrlC() as ctrl_c, progress(f"tuning {observer}", 1.0) as on_progress:
+            try:
+                tuning = tune_mounted(result.scenario_path, stop=lambda: ctrl_c.noted, on_share=on_progress)
+                lines.append(tuning.line())
+                figures |= tuning.figures()
+            except InputError as wrong:
+                error = InputError(f"mounted, but --tune: {wrong}")
+            except KeyboardInterrupt:
+                interrupted = True
+        interrupted = interrupted or ctrl_c.noted
+    show(figures, "\n".join(lines), as_json)
     if not as_json:
         note_hints(result.hints)
         run_it = shell_command("cmg-mj", "run", result.scenario_path)
@@ -171,29 +133,7 @@ def mount(
         if result.plugin:
             example = result.plugin.model.with_name(f"{result.plugin.model.stem}_example.py")
             note(f"wrote {result.plugin.model.parent}; try: {shell_command('python', example)}")
-    if outcome.error:
-        raise outcome.error
-    if outcome.interrupted:
+    if error:
+        raise error
+    if interrupted:
         end_interrupted(f"interrupted; {result.path} and {result.scenario_path} are whole")
-
-
-class TuningOutcome(NamedTuple):
-    """The tuning, or what ended it."""
-
-    tuning: MountTuning | None = None
-    error: InputError | None = None
-    interrupted: bool = False
-
-
-def _tune(result: MountResult) -> TuningOutcome:
-    """Tune the observer of a robot that is mounted; a Ctrl-C ends the search, and a second one leaves all as it was."""
-    from cmg_mj.features.mounting.mount_tuning import tune_mounted
-
-    with CtrlC() as ctrl_c, progress(f"tuning {result.observer}", 1.0) as on_progress:
-        try:
-            tuning = tune_mounted(result.scenario_path, stop=lambda: ctrl_c.noted, on_share=on_progress)
-        except InputError as error:
-            return TuningOutcome(error=InputError(f"mounted, but --tune: {error}"))
-        except KeyboardInterrupt:
-            return TuningOutcome(interrupted=True)
-    return TuningOutcome(tuning, interrupted=ctrl_c.noted)

@@ -3,38 +3,164 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.mounting.attach import add_sensors, attach_modules, module_names, site_names
-from cmg_mj.features.mounting.axes import AxisLike
-from cmg_mj.features.mounting.clearance import check_room
-from cmg_mj.features.mounting.existing_axes import ExistingAxes, find_existing_axes
-from cmg_mj.features.mounting.fall_check import SLOWEST, TRIED_DEG, overlap, simulated_pole
-from cmg_mj.features.mounting.held_joints import Hold, hold_joints
-from cmg_mj.features.mounting.keyframes import Poses, as_qpos, pop_keyframes, poses_of, write_keyframe
-from cmg_mj.features.mounting.mounted import MountedRobot
-from cmg_mj.features.mounting.request import Base, MountRequest
+from cmg_mj.features.mounting.attach import add_sensors, attach_modules, check_room, module_names
+from cmg_mj.features.mounting.hold import as_qpos, hold_joints, pop_keyframes, poses_of, write_keyframe
+from cmg_mj.features.mounting.request import AxisLike, Base, Hold, MountRequest, find_place
 from cmg_mj.features.mounting.robot import (
     body_of,
     check_chains,
     check_names,
+    find_existing_axes,
     free_base,
     pose_of,
     read_robot,
     set_physics_options,
 )
-from cmg_mj.features.mounting.stance import axes_along, check_unturned, find_place, stand_upright, under_and_height
-from cmg_mj.inputs.files import folder
+from cmg_mj.features.mounting.stance import (
+    axes_along,
+    check_falls,
+    check_unturned,
+    stand_upright,
+    under_and_height,
+)
+from cmg_mj.inputs.files import expanded, folder, model_files
 from cmg_mj.plant.axis import find_axis
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, axes_of
-from cmg_mj.plant.mjcf import compile_model, parse, posed, quiet, set_control_callback
+from cmg_mj.plant.build import check_rig
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, axes_of
+from cmg_mj.plant.mjcf import as_mjcf, compile_model, parse, posed, quiet, set_control_callback
+from cmg_mj.results.folder import is_signed, signed, whole_file
 
 
+@dataclass(frozen=True)
+class MountedRobot:
+    """A robot with a pair on it.
+
+    Attributes:
+        spec: The model, which can be edited further.
+        path: File of the robot, or a name for messages.
+        held: Joints that an equality constraint holds where they stand.
+        notes: Other changes to the robot, in clauses.
+    """
+
+    spec: mujoco.MjSpec
+    path: Path
+    held: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def save(self, path: str | Path) -> Path:
+        """Write the robot as MJCF, which plain MuJoCo loads and `plant.model` takes; whole or not at all.
+
+        A file that a mount has written is replaced. No other file ever is.
+
+        Args:
+            path: The file, in any folder. It refers to meshes and textures by relative paths; they are not copied.
+
+        Returns:
+            The file.
+
+        Raises:
+            InputError: The file cannot be written, is no .xml, or would replace the robot, a file that it names, or
+                one that no mount wrote.
+        """
+        target = expanded(path, "-o")
+        check_target(target, self.path, (".xml",))
+        spec = self.spec.copy()
+        folder = Path(os.path.abspath(target.parent))
+        for field in ("meshdir", "texturedir"):
+            setattr(spec, field, _relative_assets(folder, spec.modelfiledir, getattr(spec, field)))
+        spec.modelfiledir = f"{folder}{os.sep}"  # MuJoCo opens the meshes to write them
+        try:
+            with whole_file(target, ".xml") as temporary:
+                temporary.write_bytes(signed(as_mjcf(spec, self.path), ".xml"))
+                check_rig(temporary, target)
+        except OSError as error:
+            raise InputError(f"-o {path}: cannot be written: {error.strerror}") from error
+        return target
+
+
+def check_target(
+    target: Path, robot: Path, endings: Sequence[str] = (".xml", ".toml"), *, overwrite: bool = True
+) -> None:
+    """Check that a mounted robot may be written to a file.
+
+    Args:
+        target: The file to write.
+        robot: The robot's own file, if there is one.
+        endings: Endings of the files that are written.
+        overwrite: Whether files that a mount has written may be replaced. Others never may.
+
+    Raises:
+        InputError: The target is no .xml file, has no folder, or would replace what may not be replaced.
+    """
+    if target.suffix != ".xml":
+        raise InputError(
+            f"-o {target}: must be a file that ends in .xml, such as balanced.xml; a .toml comes beside it"
+        )
+    if not target.parent.is_dir():
+        raise InputError(f"-o {target}: cannot be written: there is no folder {target.parent}")
+    originals = model_files(robot) if robot.is_file() else []
+    for path in map(target.with_suffix, endings):
+        if path.is_dir():
+            raise InputError(f"-o {target}: {path} is a folder")
+        if path.exists() and any(path.samefile(file) for file in originals):
+            raise InputError(f"-o {target}: {path} is the robot's own file, or one that it names; give another name")
+        if os.path.lexists(path) and not is_signed(path):
+            raise InputError(f"-o {target}: {path} is not a file of cmg-mj mount, and would be lost; give another name")
+        if path.exists() and not overwrite:
+            raise InputError(f"-o {target}: {path} exists; give another name, or --overwrite")
+
+
+@contextmanager
+def with_scenario(target: Path) -> Iterator[Path]:
+    """Write a model and the scenario beside it, both whole or neither.
+
+    Args:
+        target: The model's file.
+
+    Yields:
+        A temporary name for the model; both files are renamed at the end, or removed if something failed.
+
+    Raises:
+        InputError: As raised while writing, with the final file names; or the files cannot be renamed.
+    """
+    prefix = f".{os.getpid()}.partial."
+    files = [target.with_suffix(suffix) for suffix in (".xml", ".toml")]
+    model, scenario = written = [file.with_name(prefix + file.name) for file in files]
+    try:
+        yield model
+        scenario.write_bytes(scenario.read_bytes().replace(prefix.encode(), b""))  # which names the model
+        for temporary, file in zip(written, files, strict=True):
+            temporary.replace(file)
+    except InputError as error:
+        raise InputError(str(error).replace(prefix, "")) from error
+    except OSError as error:
+        raise InputError(f"-o {target}: cannot be written: {error.strerror}") from error
+    finally:
+        for temporary in written:
+            temporary.unlink(missing_ok=True)
+
+
+def _relative_assets(folder: Path, model_folder: str, assets: str) -> str:
+    """Return the path of a robot's folder of assets, relative to another folder.
+
+    It is absolute where a symbolic link makes the relative path depend on how the model is opened.
+    """
+    path = os.path.abspath(os.path.join(model_folder, assets))
+    relative = os.path.relpath(path, folder)
+    return relative if relative == os.path.relpath(os.path.realpath(path), os.path.realpath(folder)) else path
+
+
+@quiet()
 def mount(
     robot: str | Path | mujoco.MjSpec,
     body: str,
@@ -71,47 +197,37 @@ def mount(
     Raises:
         InputError: The robot or an argument does not allow it; the message says why.
     """
-    return mount_on_request(
-        robot, MountRequest(body, axis, position, modules, scale, name, keyframe, hold, release, base)
-    )
-
-
-@quiet()
-def mount_on_request(robot: str | Path | mujoco.MjSpec, request: MountRequest) -> MountedRobot:
-    """Mount control moment gyroscopes on a robot; see `mount`."""
+    request = MountRequest(body, axis, position, modules, scale, name, keyframe, hold, release, base)
     with set_control_callback(None):
-        return _mount_on_spec(*read_robot(robot), request)
+        spec, path = read_robot(robot)
+        try:
+            return _mount_on_spec(spec, path, request)
+        except InputError:
+            raise
+        except (ValueError, KeyError, mujoco.FatalError) as error:  # unforeseen errors of MuJoCo's model editing
+            message = " ".join(str(error.args[0] if error.args else error).split()).removeprefix("Error: ")
+            raise InputError(f"{path}: MuJoCo cannot put a pair on it: {message}") from error
 
 
 def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> MountedRobot:
     """Mount a pair on a model, which is changed."""
-    body = body_of(spec, request.body, path)
-    check_chains(spec, path)
+    body = body_of(spec, request.body)
+    check_chains(spec)
     if request.base == "free":
         free_base(spec, body, path)
     names = module_names(request.prefix, request.modules)
     model = compile_model(spec, path)
-    existing = find_existing_axes(spec, model, request.name, path)
-    check_names(
-        spec,
-        [
-            *site_names(request.prefix).values(),
-            *(f"{module}/half" for module in names),
-            *(f"{module}_mount" for module in names),
-        ],
-        path,
-    )
+    existing = find_existing_axes(spec, model, request.name)
+    sites = [request.prefix + name for name in (TILT_ELEMENT, *SENSORS)]
+    check_names(spec, [*sites, *(f"{name}{end}" for name in names for end in ("/half", "_mount"))])
 
     # The robot as it is to stand.
-    keyframe = request.keyframe or (EQUILIBRIUM_KEY if existing.drives else None)
-    pose = pose_of(model, keyframe, path)
-    place = find_place(model, pose, request, path)
+    pose = pose_of(model, request.keyframe or (EQUILIBRIUM_KEY if existing.drives else None))
+    place = find_place(model, pose, request)
     if place.joint in existing.lines:
-        raise InputError(f"{path}: the hinge {place.joint!r} has an axis already: another one needs another hinge")
+        raise InputError(f"the hinge {place.joint!r} has an axis already: another one needs another hinge")
     keyframes = pop_keyframes(spec, model)
-    held = hold_joints(
-        spec, model, pose, request.hold, {place.joint, *existing.lines, *existing.drives}, request.release, path
-    )
+    held = hold_joints(spec, model, pose, request, {place.joint, *existing.lines, *existing.drives})
 
     # With the modules on it.
     mounts = attach_modules(spec, body, names, request.scale)
@@ -122,47 +238,24 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     model, (qpos, point, direction) = stand_upright(spec, poses, place, mounts, others, request, path)
 
     # With sensors, and a keyframe to start from.
-    check_unturned(model, poses, qpos, [*others, place.joint] if others else [], path)
+    check_unturned(model, poses, qpos, [*others, place.joint] if others else [])
     data = posed(model, qpos)
-    check_room(model, data, names, float(point[2]) if place.free else None, path)
+    check_room(model, data, names, float(point[2]) if place.free else None)
     under, height = under_and_height(model, data, model.joint(place.joint).id, point, direction)
     frame = model.body(request.body).id
     turn, origin = data.xmat[frame].reshape(3, 3), data.xpos[frame]
     add_sensors(spec, body, request.prefix, turn.T @ (under - origin), turn.T @ axes_along(direction), height)
-    model = _with_keyframes(spec, names, qpos, [(name, poses | gimbals) for name, poses in keyframes], existing, path)
-    key = model.key(EQUILIBRIUM_KEY).id
-    line = find_axis(model, key, request.name, axes_of(model)[request.name]).line
-    pole = simulated_pole(model, key, line)
-    if pole < SLOWEST:
-        touching = overlap(model, key, line, pole)
-        if pole and not touching:
-            raise InputError(
-                f"{path}: falls too slowly, with {pole:.2g} 1/s; a pair is for robots that fall with {SLOWEST:.2g} "
-                "1/s or faster (--position is in metres; a mass far up falls slowly)"
-            )
-        reason = f"{touching}; let them not collide (<exclude>)" if touching else "it stands by itself"
-        raise InputError(f"{path}: does not start to fall from a tilt of {TRIED_DEG:g} deg: {reason}")
-    return MountedRobot(spec, path, tuple(held), tuple(notes))
-
-
-def _with_keyframes(
-    spec: mujoco.MjSpec,
-    names: Sequence[str],
-    qpos: np.ndarray,
-    keyframes: Sequence[tuple[str, Poses]],
-    existing: ExistingAxes,
-    path: Path,
-) -> mujoco.MjModel:
-    """Compile the model with the equilibrium, in which all flywheels turn, and the robot's own keyframes."""
     model = compile_model(spec, path)
     speed = nominal_speed()
     speeds = {f"{module}/flywheel": speed * (-1.0) ** i for i, module in enumerate(names)}
-    controls = {f"{wheel}_motor": speed for wheel, speed in speeds.items()}
-    speeds, controls = {**existing.speeds, **speeds}, {**existing.controls, **controls}
-    write_keyframe(spec, model, EQUILIBRIUM_KEY, qpos, speeds, controls)
-    for name, poses in keyframes:
-        write_keyframe(spec, model, name, as_qpos(model, poses), speeds, controls)
-    return compile_model(spec, path)
+    speeds |= existing.speeds
+    write_keyframe(spec, model, EQUILIBRIUM_KEY, qpos, speeds)
+    for name, own in keyframes:
+        write_keyframe(spec, model, name, as_qpos(model, own | gimbals), speeds)
+    model = compile_model(spec, path)
+    key = model.key(EQUILIBRIUM_KEY).id
+    check_falls(model, key, find_axis(model, key, request.name, axes_of(model)[request.name]).line)
+    return MountedRobot(spec, path, tuple(held), tuple(notes))
 
 
 def nominal_speed() -> float:

@@ -10,21 +10,20 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.loop import ControlLoop
-from cmg_mj.features.mounting.largest_push import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS
-from cmg_mj.features.mounting.prospects import Prospects
+from cmg_mj.features.mounting.limits import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS, Prospects
 from cmg_mj.plant.mjcf import quiet, set_control_callback
 from cmg_mj.plant.physics import ManyWorlds
 from cmg_mj.runs.batch import batch_values
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.stages.push import Push, Pushes
 
-LONGEST_S = 60.0
+MAX_SEARCH_S = 60.0
 """The search ends after so long, with what it has found [s]."""
 UNPUSHED_S = 20.0
 """A robot stands if all worlds stand so long without a push [s]."""
 BEFORE_S = 2.0
 """The loop runs for so long before the push comes [s]."""
-LONGEST_AFTER_S = 12.0
+MAX_AFTER_S = 12.0
 """Longest time to wait for a pushed robot to recover or fall [s]."""
 OTHER_WORLDS = 20
 AFTER_LONGER = 3.0
@@ -32,11 +31,11 @@ AFTER_LONGER = 3.0
 worlds stand the push and fall of the noise while the gimbals come back."""
 RESOLUTION = 0.05
 """The search ends where a push that all worlds stand and one that not all stand differ by such a share."""
-LEAST = 0.02
+MIN_SHARE = 0.02
 """Smallest push that is tried, in shares of the ceiling."""
 FIRST_SHARE, GROWTH = 0.85, 1.4
 """Share of E that is tried first; where E too is stood, as with damping, each push is so many times the last."""
-MOST_CEILINGS = 8.0
+MAX_CEILINGS = 8.0
 """Largest push that is tried, in shares of the ceiling, which springs and damping let a robot exceed."""
 MARGIN = 0.1
 """The largest push found is reduced by this share, and again until the other worlds stand it."""
@@ -59,7 +58,7 @@ class TimeLimit:
 
     def __init__(
         self,
-        longest_s: float = LONGEST_S,
+        longest_s: float = MAX_SEARCH_S,
         on_progress: SearchProgress | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -120,25 +119,20 @@ def simulated_push(
         The push.
     """
     time_limit = time_limit or TimeLimit()
+    worlds = WORLDS
     try:
         standing = standing_unpushed(experiment, limits, axis, time_limit)
+        if standing == WORLDS and limits.noisy:
+            worlds += OTHER_WORLDS
+            standing += standing_unpushed(experiment, limits, axis, time_limit, range(WORLDS, worlds))
     except OutOfTimeError:
         return SimulatedPush(None, complete=False)
-    if standing < WORLDS:
-        return SimulatedPush(standing)
-    worlds = WORLDS
-    if limits.noisy:
-        worlds += OTHER_WORLDS
-        try:
-            standing += standing_unpushed(experiment, limits, axis, time_limit, range(WORLDS, worlds))
-        except OutOfTimeError:
-            return SimulatedPush(None, complete=False)
-        if standing < worlds:
-            return SimulatedPush(standing, worlds=worlds)
+    if standing < worlds:
+        return SimulatedPush(standing, worlds=worlds)
     upright = _tilted(experiment, 0.0, axis)
     poles = [pole for pole in (limits.pole, limits.limit.pole) if pole > 0.0]
-    after = min(AFTER_TIME_CONSTANTS / min(poles), LONGEST_AFTER_S)
-    least = LEAST * limits.limit_push_impulse
+    after = min(AFTER_TIME_CONSTANTS / min(poles), MAX_AFTER_S)
+    least = MIN_SHARE * limits.limit_push_impulse
     expected = limits.push_margin.median_impulse or 0.5 * limits.limit_push_impulse
     low, high = 0.0, FIRST_SHARE * expected
 
@@ -154,13 +148,13 @@ def simulated_push(
     try:
         if all_stand(high):
             low, high = high, expected
-            while high < MOST_CEILINGS * limits.limit_push_impulse and all_stand(high):
+            while high < MAX_CEILINGS * limits.limit_push_impulse and all_stand(high):
                 low, high = high, GROWTH * high
         while high - low > max(RESOLUTION * high, least):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if all_stand(middle) else (low, middle)
         while (found := (1.0 - MARGIN) * (found or low)) > least:
-            longer = min(AFTER_LONGER * after, LONGEST_AFTER_S)
+            longer = min(AFTER_LONGER * after, MAX_AFTER_S)
             result = attempt(found, range(WORLDS, WORLDS + OTHER_WORLDS), longer)
             if result.all_stand:
                 return SimulatedPush(standing, found, True, result.servo_torque, result.servo_rate, worlds=worlds)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from cmg_mj.features.mounting.largest_push import PUSH_S, WORLDS
-from cmg_mj.features.mounting.mount_files import MountResult
-from cmg_mj.features.mounting.prospects import LOW_LIMIT_DEG
-from cmg_mj.features.mounting.push import LEAST, LONGEST_S, OTHER_WORLDS, UNPUSHED_S, SimulatedPush
+from cmg_mj.features.mounting.limits import LOW_LIMIT_DEG, PUSH_S, WORLDS
+from cmg_mj.features.mounting.push import MAX_SEARCH_S, MIN_SHARE, OTHER_WORLDS, UNPUSHED_S, SimulatedPush
+from cmg_mj.features.mounting.write import MountResult
 from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, loop_words, measured_words, sliding_words
 from cmg_mj.plant.tilt_line import HingeLine
 
@@ -35,8 +34,12 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
         yield f"  held where they stand: {', '.join(mounted.held)}"
     for note in mounted.notes:
         yield f"  {note}"
-    if result.plugin:
-        yield from _plugin_step(mounted.spec.option.timestep, plant.timestep)
+    file, runner = mounted.spec.option.timestep, plant.timestep
+    if result.plugin and not math.isclose(file, runner):
+        yield (
+            f"  its physics steps of {1e3 * file:.4g} ms are {1e3 * runner:.4g} ms in the plugin's model, as in runs: "
+            "whole steps fit between two samples"
+        )
     yield (
         f"  inertia {figures['inertia_kg_m2']:.4g} kg m^2, gravity {figures['gravity_torque_n_m']:.4g} N m, momentum "
         f"{figures['momentum_n_m_s']:.4g} N m s, falls with {figures['pole_1_s']:.3g} 1/s"
@@ -72,38 +75,29 @@ def _pivot(result: MountResult) -> Iterator[str]:
         yield f"    in the reduced model: {IN_THE_MODEL}; not: {NOT_IN_THE_MODEL}"
 
 
-def _plugin_step(file: float, runner: float) -> Iterator[str]:
-    """Say that the plugin's model takes the runner's physics steps, where these are not the mounted model's [s]."""
-    if not math.isclose(file, runner):
-        yield (
-            f"  its physics steps of {1e3 * file:.4g} ms are {1e3 * runner:.4g} ms in the plugin's model, as in runs: "
-            "whole steps fit between two samples"
-        )
-
-
 def _simulated(simulated: SimulatedPush | None) -> str:
     """Describe what the robot stands in MuJoCo, up to the words on the reduced model."""
     if simulated is None:
         return "not tried in MuJoCo; "
     if simulated.standing is None:
-        return f"in MuJoCo nothing found within {LONGEST_S:g} s{BUSY}; "
+        return f"in MuJoCo nothing found within {MAX_SEARCH_S:g} s{BUSY}; "
     if simulated.falls:
         fallen = simulated.worlds - simulated.standing
         return (
             f"does not stand: in MuJoCo {fallen} of {simulated.worlds} worlds fall within {UNPUSHED_S:g} s, unpushed; "
         )
     if not simulated.impulse:
-        reason = f"none found within {LONGEST_S:g} s{BUSY}"
+        reason = f"none found within {MAX_SEARCH_S:g} s{BUSY}"
         if simulated.complete:
-            reason = f"not even {LEAST:.0%} of any controller's push"
+            reason = f"not even {MIN_SHARE:.0%} of any controller's push"
         return f"stands in MuJoCo only unpushed ({reason}); "
     if simulated.complete:
         more = f"and all of {OTHER_WORLDS} others"
     elif simulated.others_fell:
-        more = f"some of {OTHER_WORLDS} others fell with a larger one, and {LONGEST_S:g} s did not suffice to try "
+        more = f"some of {OTHER_WORLDS} others fell with a larger one, and {MAX_SEARCH_S:g} s did not suffice to try "
         more += "this one"
     else:
-        more = f"{LONGEST_S:g} s did not suffice for others"
+        more = f"{MAX_SEARCH_S:g} s did not suffice for others"
     return (
         f"stands a push of {simulated.impulse / PUSH_S:.3g} N m for {PUSH_S:g} s either way (MuJoCo, all of {WORLDS} "
         f"worlds, less a tenth; {more}); "
@@ -132,11 +126,12 @@ def _demands(result: MountResult) -> Iterator[str]:
     if simulated is not None and simulated.servo_torque is not None and simulated.servo_rate is not None:
         taken = f"; the push takes up to {simulated.servo_torque:.2g} N m and {simulated.servo_rate:.2g} rad/s"
     yield (
-        f"  the pair weighs {demands.mass_kg:.3g} kg, {demands.mass_kg / demands.robot_mass_kg:.0%} of the robot's "
-        f"{demands.robot_mass_kg:.3g} kg; its servos have {demands.servo_torque_n_m:.3g} N m and "
-        f"{demands.servo_rate_rad_s:.3g} rad/s{taken}"
+        f"  the pair weighs {demands.pair_mass_kg:.3g} kg, {demands.pair_mass_kg / demands.robot_mass_kg:.0%} of the "
+        f"robot's {demands.robot_mass_kg:.3g} kg; its servos have {demands.servo_limit_torque_n_m:.3g} N m and "
+        f"{demands.servo_limit_rate_rad_s:.3g} rad/s{taken}"
     )
     yield (
-        f"  its wheels hold {demands.spin_up_energy_j:.3g} J, {demands.spin_up_power_w:.2g} W for a minute to spin up, "
-        f"and take {demands.holding_power_w:.2g} W to keep turning (assumed: two 608 bearings each, by SKF's friction)"
+        f"  its wheels hold {demands.wheels_energy_j:.3g} J, {demands.wheels_spin_up_power_w:.2g} W for a minute to "
+        f"spin up, and take {demands.wheels_holding_power_assumed_w:.2g} W to keep turning (assumed: two 608 bearings "
+        "each, by SKF's friction)"
     )

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.features.mounting.held_joints import joint_held, unused_name
+from cmg_mj.features.mounting.hold import joint_held, unused_name
 from cmg_mj.inputs.files import expanded, require_file
+from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.checks import STEPS_S
-from cmg_mj.plant.mjcf import compile_model, parse
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, axes_in, axes_of, missing_parts
+from cmg_mj.plant.mjcf import compile_model, parse, posed
+from cmg_mj.plant.tilt_line import HingeLine
 
-BAD_CONNECTIONS = {int(mujoco.mjtEq.mjEQ_CONNECT): "connect", int(mujoco.mjtEq.mjEQ_WELD): "weld"}
+BAD_CONNECTIONS = {mujoco.mjtEq.mjEQ_CONNECT: "connect", mujoco.mjtEq.mjEQ_WELD: "weld"}
 UNNAMED = "MuJoCo Model"
 """The name that MuJoCo gives to a model without one."""
-NEEDED = {
-    "mjDSBL_CONSTRAINT": "constraint",
-    "mjDSBL_EQUALITY": "equality",
-    "mjDSBL_GRAVITY": "gravity",
-    "mjDSBL_ACTUATION": "actuation",
-    "mjDSBL_SENSOR": "sensor",
-}
-"""Flags that must not be switched off: MuJoCo's name -> the name in MJCF's <flag>."""
-LARGEST_STEP_S = 0.005
+NEEDED = ("constraint", "equality", "gravity", "actuation", "sensor")
+"""Names in MJCF's <flag> of flags that must not be switched off."""
+MAX_STEP_S = 0.005
 """Largest physics step; the gimbals' servos need it [s]."""
 ITERATIONS, TOLERANCE = 100, 1e-8
 """MuJoCo's defaults for the solver; with less, held joints creep."""
@@ -50,36 +48,32 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
         spec = parse(path)
     else:
         spec, path = robot.copy(), Path("robot" if robot.modelname in ("", UNNAMED) else robot.modelname)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of what is deprecated in the user's file
-        compile_model(spec, path)
     # Neither may take the modules' frames away, nor fuse them with what they hang on.
     spec.compiler.discardvisual = spec.compiler.fusestatic = False
-    compile_model(spec, path)
+    model = compile_model(spec, path)
     if not spec.option.timestep >= STEPS_S[0]:
         raise InputError(f'{path}: <option timestep="{spec.option.timestep:g}"/>: must be at least {STEPS_S[0]:g} s')
-    off = [flag for name, flag in NEEDED.items() if spec.option.disableflags & int(getattr(mujoco.mjtDisableBit, name))]
-    if off:
-        raise InputError(
-            f'{path}: <flag {off[0]}="disable"/> switches off what a mounted pair needs; take it out of the file'
-        )
+    for flag in NEEDED:
+        if spec.option.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}"):
+            raise InputError(
+                f'{path}: <flag {flag}="disable"/> switches off what a mounted pair needs; take it out of the file'
+            )
     if not spec.option.gravity[2] < 0.0:
         gravity = " ".join(f"{part:g}" for part in spec.option.gravity)
         raise InputError(f'{path}: <option gravity="{gravity}"/> does not pull down: there is nothing to balance')
-    _bake_masses(spec, path)
-    name_all(spec)
+    _bake_masses(spec, model)
+    _name_all(spec)
     return spec, path
 
 
-def _bake_masses(spec: mujoco.MjSpec, path: Path) -> None:
+def _bake_masses(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     """Write masses and inertias out that the compiler would change: it is not to change the modules' with them.
 
     It scales to a total (settotalmass), or raises to a bound (boundmass, boundinertia).
     """
     compiler = spec.compiler
-    if not (compiler.settotalmass > 0.0 or compiler.boundmass > 0.0 or compiler.boundinertia > 0.0):
+    if max(compiler.settotalmass, compiler.boundmass, compiler.boundinertia) <= 0.0:
         return
-    model = compile_model(spec, path)
     compiler.settotalmass, compiler.boundmass, compiler.boundinertia = -1.0, 0.0, 0.0
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
     for body in spec.bodies:
@@ -91,12 +85,8 @@ def _bake_masses(spec: mujoco.MjSpec, path: Path) -> None:
             body.explicitinertial = True
 
 
-def name_all(spec: mujoco.MjSpec) -> None:
-    """Name every body and every joint; a constraint that holds a ball joint needs the names of its bodies.
-
-    Args:
-        spec: The compiled model, which is changed.
-    """
+def _name_all(spec: mujoco.MjSpec) -> None:
+    """Name every body and every joint; a constraint that holds a ball joint needs the names of its bodies."""
     bodies, joints = ({element.name for element in kind} for kind in (spec.bodies, spec.joints))
     for body in spec.bodies:
         if not body.name:
@@ -120,20 +110,20 @@ def set_physics_options(spec: mujoco.MjSpec) -> list[str]:
     if gravity.tolist() != down and gravity[2] < 0.0 and np.linalg.norm(gravity[:2]) < 1e-3 * -gravity[2]:
         notes.append(f"its gravity of {' '.join(f'{part:g}' for part in gravity)} is now straight down")
         option.gravity = down
-    if int(option.integrator) != int(mujoco.mjtIntegrator.mjINT_RK4):
+    if option.integrator != mujoco.mjtIntegrator.mjINT_RK4:
         option.integrator = mujoco.mjtIntegrator.mjINT_RK4
         notes.append("its integrator is now RK4, which fast flywheels need")
-    if int(option.solver) != int(mujoco.mjtSolver.mjSOL_NEWTON):
+    if option.solver != mujoco.mjtSolver.mjSOL_NEWTON:
         option.solver = mujoco.mjtSolver.mjSOL_NEWTON
         notes.append("its solver is now Newton: another does not hold joints stiffly")
     option.iterations, option.tolerance = max(option.iterations, ITERATIONS), min(option.tolerance, TOLERANCE)
-    if option.timestep > LARGEST_STEP_S:
-        notes.append(f"its physics steps of {option.timestep * 1e3:g} ms are now {LARGEST_STEP_S * 1e3:g} ms")
-        option.timestep = LARGEST_STEP_S
+    if option.timestep > MAX_STEP_S:
+        notes.append(f"its physics steps of {option.timestep * 1e3:g} ms are now {MAX_STEP_S * 1e3:g} ms")
+        option.timestep = MAX_STEP_S
     return notes
 
 
-def body_of(spec: mujoco.MjSpec, name: str, path: Path) -> mujoco.MjsBody:
+def body_of(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody:
     """Return the body that carries the modules.
 
     Raises:
@@ -141,12 +131,12 @@ def body_of(spec: mujoco.MjSpec, name: str, path: Path) -> mujoco.MjsBody:
     """
     body = spec.body(name) if name != "world" else None
     if body is None:
-        names = [body.name for body in spec.bodies if body.name and body.name != "world"]
-        raise InputError(f"--body {name}: {path} has no such body; {nearest(name, names, 'its bodies')}")
+        names = [body.name for body in spec.bodies if body.name != "world"]
+        raise InputError(f"--body {name}: no such body; {nearest(name, names, 'its bodies')}")
     return body
 
 
-def check_names(spec: mujoco.MjSpec, names: Sequence[str], path: Path) -> None:
+def check_names(spec: mujoco.MjSpec, names: Sequence[str]) -> None:
     """Check that no new element has a name that is taken.
 
     Raises:
@@ -159,34 +149,31 @@ def check_names(spec: mujoco.MjSpec, names: Sequence[str], path: Path) -> None:
     }
     for name in names:
         if name in existing_names:
-            raise InputError(f"{path}: has an element {name!r} already, which a mounted pair brings: rename it")
+            raise InputError(f"has an element {name!r} already, which a mounted pair brings: rename it")
 
 
-def check_chains(spec: mujoco.MjSpec, path: Path) -> None:
+def check_chains(spec: mujoco.MjSpec) -> None:
     """Check that the robot is a tree: the joints of a closed chain cannot be held one by one.
 
     Raises:
         InputError: Two bodies are tied together by a constraint.
     """
     for equality in spec.equalities:
-        kind = BAD_CONNECTIONS.get(int(equality.type))
+        kind = BAD_CONNECTIONS.get(equality.type)
         if kind and not joint_held(spec, equality):
             raise InputError(
-                f"{path}: <{kind}> ties {equality.name1!r} and {equality.name2 or 'the world'!r} together: a closed "
+                f"<{kind}> ties {equality.name1!r} and {equality.name2 or 'the world'!r} together: a closed "
                 "chain, whose joints cannot be held one by one"
             )
 
 
-def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> str:
+def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> None:
     """Let the tree that a body belongs to move freely: its root gets a free joint instead of its own.
 
     Args:
         spec: The model, which is changed.
         body: The body.
         path: The file, for messages.
-
-    Returns:
-        The free joint's name.
 
     Raises:
         InputError: Another element of the file refers to a joint that is removed.
@@ -195,8 +182,8 @@ def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> str:
     while root.parent.name != "world":
         root = root.parent
     joints = list(root.joints)
-    if len(joints) == 1 and int(joints[0].type) == int(mujoco.mjtJoint.mjJNT_FREE):
-        return joints[0].name
+    if len(joints) == 1 and joints[0].type == mujoco.mjtJoint.mjJNT_FREE:
+        return
     names = {joint.name for joint in joints}
     for kind, elements, field in (
         ("actuator", spec.actuators, "target"),
@@ -206,41 +193,30 @@ def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> str:
         for element in elements:
             if getattr(element, field) in names:
                 raise InputError(
-                    f"{path}: {kind} {element.name!r} refers to the joint {getattr(element, field)!r}, which a free "
-                    "base replaces: take it out of the file"
+                    f"{kind} {element.name!r} refers to the joint {getattr(element, field)!r}, which a free base "
+                    "replaces: take it out of the file"
                 )
     model = compile_model(spec, path)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    place = data.xpos[model.body(root.name).id].copy(), data.xquat[model.body(root.name).id].copy()
-    for joint in joints:
-        spec.delete(joint)
-    name = unused_name(f"{root.name}_free", {joint.name for joint in spec.joints})
-    root.add_freejoint(name=name)
-    _place(spec, root, *place, path)
-    return name
-
-
-def _place(spec: mujoco.MjSpec, root: mujoco.MjsBody, pos: np.ndarray, quat: np.ndarray, path: Path) -> None:
-    """Place a child of the world in world coordinates, whatever <frame> it is in."""
-    for key in list(spec.keys):  # they have the joints that are gone
-        spec.delete(key)
+    data = posed(model, model.qpos0)
+    place = data.body(root.name).xpos, data.body(root.name).xquat
+    for element in (*joints, *spec.keys):  # keyframes have the joints that are gone
+        spec.delete(element)
+    root.add_freejoint(name=unused_name(f"{root.name}_free", {joint.name for joint in spec.joints}))
+    # A child of the world is placed in world coordinates, whatever <frame> it is in.
     root.pos, root.quat, root.alt.type = np.zeros(3), [1.0, 0.0, 0.0, 0.0], mujoco.mjtOrientation.mjORIENTATION_QUAT
-    model = compile_model(spec, path)
-    frame = model.body(root.name)
+    frame = compile_model(spec, path).body(root.name)
     back_pos, back_quat, inner_pos, inner_quat = np.empty(3), np.empty(4), np.empty(3), np.empty(4)
     mujoco.mju_negPose(back_pos, back_quat, frame.pos, frame.quat)
-    mujoco.mju_mulPose(inner_pos, inner_quat, back_pos, back_quat, pos, quat)
+    mujoco.mju_mulPose(inner_pos, inner_quat, back_pos, back_quat, *place)
     root.pos, root.quat = inner_pos, inner_quat
 
 
-def pose_of(model: mujoco.MjModel, keyframe: str | None, path: Path) -> np.ndarray:
+def pose_of(model: mujoco.MjModel, keyframe: str | None) -> np.ndarray:
     """Return the joint positions in which a robot stands.
 
     Args:
         model: The robot.
         keyframe: The name or number of one of its keyframes; None for its reference pose.
-        path: The file, for messages.
 
     Returns:
         (nq,).
@@ -252,5 +228,53 @@ def pose_of(model: mujoco.MjModel, keyframe: str | None, path: Path) -> np.ndarr
         return model.qpos0.copy()
     names = [model.key(i).name or str(i) for i in range(model.nkey)]
     if keyframe not in names:
-        raise InputError(f"--keyframe {keyframe}: {path} has no such keyframe; {nearest(keyframe, names, 'it has')}")
+        raise InputError(f"--keyframe {keyframe}: no such keyframe; {nearest(keyframe, names, 'it has')}")
     return model.key_qpos[names.index(keyframe)].copy()
+
+
+class ExistingAxes(NamedTuple):
+    """Axes that a robot has already."""
+
+    lines: Sequence[str] = ()
+    """The hinges that it tilts about."""
+    drives: Sequence[str] = ()
+    """The gimbal and flywheel joints of the modules."""
+    speeds: Mapping[str, float] = MappingProxyType({})
+    """Flywheel joint -> speed [rad/s]."""
+
+
+def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str) -> ExistingAxes:
+    """Find the axes that a robot has already.
+
+    Args:
+        spec: The robot.
+        model: The same, compiled.
+        name: Name of the new axis.
+
+    Returns:
+        The hinges, joints and speeds of these axes.
+
+    Raises:
+        InputError: It has an axis and the new one has no name; it has half of an axis; or its keyframe of that name
+            does not fit.
+    """
+    names = axes_in(element.name for kind in (spec.joints, spec.sites, spec.sensors) for element in kind)
+    is_key = any(key.name == EQUILIBRIUM_KEY for key in spec.keys)
+    if not (names and is_key):
+        if is_key:
+            raise InputError(f"has a keyframe {EQUILIBRIUM_KEY!r} already, which a mounted pair brings: rename it")
+        return ExistingAxes()
+    missing = missing_parts(spec)
+    if missing:
+        raise InputError(f"the robot has an axis already, and yet {missing[0]}")
+    if not name:
+        known = f" {', '.join(filter(None, names))}" if any(names) else ""
+        raise InputError(f"the robot has an axis{known} already: give the new one a name, such as --name pitch")
+    key, names_of = model.key(EQUILIBRIUM_KEY).id, axes_of(model)
+    axes = [find_axis(model, key, axis, names_of[axis]) for axis in names]
+    modules = [module for axis in axes for module in axis.modules]
+    return ExistingAxes(
+        [model.joint(axis.line.joint).name for axis in axes if isinstance(axis.line, HingeLine)],
+        [f"{module.name}/{joint}" for module in modules for joint in ("gimbal", "flywheel")],
+        {f"{module.name}/flywheel": module.speed for module in modules},
+    )

@@ -1,7 +1,8 @@
-"""The upright stance of a robot: its mass above the hinge, or above its contacts."""
+"""The upright stance of a robot, its mass above the hinge or above its contacts, and how it falls from there."""
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,54 +13,194 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting.attach import place_modules
-from cmg_mj.features.mounting.axes import hinge_or_direction
-from cmg_mj.features.mounting.keyframes import as_qpos
-from cmg_mj.features.mounting.request import MountRequest
-from cmg_mj.features.mounting.settling import Support, stand
+from cmg_mj.features.mounting.hold import as_qpos, rest_controls
+from cmg_mj.features.mounting.request import MountRequest, Place
 from cmg_mj.plant.checks import TRUE_DEG
-from cmg_mj.plant.mjcf import compile_model, posed
-from cmg_mj.plant.tilt_line import UP
+from cmg_mj.plant.mjcf import at_keyframe, compile_model, posed
+from cmg_mj.plant.tilt_line import UP, HingeLine, Line
 
-SMALLEST_HEIGHT_M = 1e-3
-"""Smallest height of a robot's mass above the line [m]."""
-MOST_TRIES = 5
-"""Most rounds of settling on the floor and turning the modules along the contact line."""
+MAX_SETTLE_S = 10.0
+"""Longest time for a robot to come to rest [s]."""
+AT_REST = 1e-4
+"""Rates below which a robot rests [m/s, rad/s]."""
+UPRIGHT_DEG = 0.005
+"""Largest lean of the mass from above the line [deg]."""
+MAX_ROUNDS = 40
+"""Most rounds of resting and leaning; on flat tyres each takes an eighth off the lean."""
+MAX_LEAN_DEG = 20.0
+"""A robot whose mass lies farther from its line of support has fallen, whatever holds it [deg]."""
+STANDS_DEG = 2.0
+"""A robot that must lean so far before it falls stands by itself [deg]."""
+LONG_M = 0.02
+"""Contacts farther apart than this along the axis determine its direction [m]."""
 
 
-class Place(NamedTuple):
-    """The place of the modules on a robot, and the line that it tilts about."""
+class Support(NamedTuple):
+    """The stance of a robot and the line that it stands on."""
 
-    joint: str
-    """The hinge that the robot tilts about, or its free joint."""
-    free: bool
+    pose: np.ndarray
+    """Joint positions, (nq,)."""
+    point: np.ndarray
+    """A point of the line, in the world (3,) [m]."""
     direction: np.ndarray
-    """Approximate direction of the line in the world, (3,)."""
-    middle: np.ndarray
-    """Middle of the row of modules in the body frame, (3,) [m]."""
+    """Direction of the line, horizontal, in the world (3,)."""
 
 
-def find_place(model: mujoco.MjModel, pose: np.ndarray, request: MountRequest, path: Path) -> Place:
-    """Find the requested axis and position on a robot.
+def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.ndarray) -> Support:
+    """Let a free robot settle on the floor, its mass above a line through its contacts.
 
     Args:
-        model: The robot.
-        pose: Joint positions, (nq,).
-        request: The body, the axis, the position of the modules.
-        path: The file, for messages.
+        model: The robot with its modules, all joints held that are to be.
+        pose: Joint positions at first, (nq,).
+        joint: The robot's free joint.
+        direction: Approximate direction of the line, horizontal, in the world. Contacts far apart determine the line
+            better.
 
     Returns:
-        The place of the modules.
+        The stance and the line.
 
     Raises:
-        InputError: The body has no mass, or there is no such axis.
+        InputError: The robot has nothing to stand on, falls over, or stands by itself.
     """
-    body = model.body(request.body).id
-    if not model.body_subtreemass[body] > 0.0:
-        raise InputError(f"--body {request.body}: {path}: has no mass, nor has anything on it")
-    hinge, direction = hinge_or_direction(model, posed(model, pose), body, request.axis, path)
-    joint = int(model.body_jntadr[int(model.body_rootid[body])]) if hinge is None else hinge  # the free one
-    middle = model.body_ipos[body].copy() if request.position is None else np.array(request.position, dtype=float)
-    return Place(model.joint(joint).name, hinge is None, direction, middle)
+    data = posed(model, pose)
+    data.act[:], data.ctrl[:] = rest_controls(model, data)  # servos keep the joints where they are
+    mujoco.mj_forward(model, data)
+    _touch_down(model, data, joint)
+    leaned = 0.0
+    for _ in range(MAX_ROUNDS):
+        _rest(model, data, joint, direction)
+        point, direction = _support(model, data, joint, direction)
+        body = int(model.jnt_bodyid[joint])
+        arm = data.subtree_com[body] - point
+        lean = math.atan2(float(arm @ np.cross(direction, UP)), float(arm[2]))
+        leaned += lean
+        if abs(math.degrees(leaned)) > MAX_LEAN_DEG:
+            raise InputError(
+                f"the robot falls over: where it stands its mass lies {abs(math.degrees(leaned)):.3g} deg beside the "
+                "line that it tilts about; give a keyframe in which it stands"
+            )
+        if abs(math.degrees(lean)) < UPRIGHT_DEG:
+            return Support(data.qpos.copy(), point, direction)
+        _turn(model, data, joint, point, direction, lean)
+    raise InputError("the robot does not come to stand upright; give a keyframe in which it stands")
+
+
+def _bodies_on(model: mujoco.MjModel, joint: int) -> np.ndarray:
+    """Return which bodies hang on a free joint, (nbody,)."""
+    return model.body_rootid == model.body_rootid[model.jnt_bodyid[joint]]
+
+
+def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> None:
+    """Lower or lift the robot until it touches the fixed world."""
+    tree = _bodies_on(model, joint)
+    robot = [geom for geom in range(model.ngeom) if tree[model.geom_bodyid[geom]]]
+    floor = [geom for geom in range(model.ngeom) if model.body_weldid[model.geom_bodyid[geom]] == 0]
+    gaps = [
+        mujoco.mj_geomDistance(model, data, here, there, 100.0, None)
+        for here in robot
+        for there in floor
+        if model.geom_contype[here] & model.geom_conaffinity[there]
+        or model.geom_contype[there] & model.geom_conaffinity[here]
+    ]
+    if not gaps or model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
+        raise InputError(
+            "the robot has nothing to stand on: no geom of the robot's collides with one of the world's; give it a "
+            'floor (<geom type="plane" size="5 5 0.1"/> in the worldbody), and let contacts be on'
+        )
+    height = model.jnt_qposadr[joint] + 2
+    data.qpos[height] -= min(gaps)
+    mujoco.mj_forward(model, data)
+    # A contact with a margin already pushes at a distance: a robot let down farther is thrown up.
+    depths = [
+        contact.includemargin - contact.dist
+        for contact in data.contact[: data.ncon]
+        if tree[model.geom_bodyid[contact.geom1]] != tree[model.geom_bodyid[contact.geom2]] and contact.includemargin
+    ]
+    data.qpos[height] += max(depths, default=0.0)
+    mujoco.mj_forward(model, data)
+
+
+def _rest(model: mujoco.MjModel, data: mujoco.MjData, joint: int, direction: np.ndarray) -> None:
+    """Let the robot come to rest, kept from tilting by a torque that vanishes where its mass is above the line."""
+    body, dof = model.jnt_bodyid[joint], model.jnt_dofadr[joint]
+    mass = float(model.body_subtreemass[body])
+    height = max(float(data.subtree_com[body][2] - data.xipos[body][2] + 1.0), 0.1)
+    stiffness = 20.0 * mass * float(np.linalg.norm(model.opt.gravity)) * height
+    damping = 2.0 * math.sqrt(stiffness * mass * height**2)
+    drag = mass * 2.0
+    start, off = data.xquat[body].copy(), np.empty(3)
+    for step in range(math.ceil(MAX_SETTLE_S / model.opt.timestep)):
+        mujoco.mju_subQuat(off, start, data.xquat[body])  # in the body's axes
+        along = data.xmat[body].reshape(3, 3).T @ direction
+        torque = along * (stiffness * (off @ along) - damping * (data.qvel[dof + 3 : dof + 6] @ along))
+        data.qfrc_applied[dof : dof + 3] = -drag * data.qvel[dof : dof + 3]
+        data.qfrc_applied[dof + 3 : dof + 6] = torque
+        mujoco.mj_step(model, data)
+        if not np.isfinite(data.qpos).all():
+            raise InputError("the robot's physics fails while it settles on the floor")
+        if step * model.opt.timestep > 0.3 and np.abs(data.qvel).max() < AT_REST:
+            break
+    mujoco.mj_forward(model, data)
+    mujoco.mju_subQuat(off, data.xquat[body], start)
+    turned = math.degrees(float(np.linalg.norm(off)))
+    if turned > MAX_LEAN_DEG:
+        raise InputError(
+            f"the robot falls over while it settles, by {turned:.3g} deg, about another line than the one that is "
+            "balanced; give a keyframe in which it stands"
+        )
+
+
+def _support(
+    model: mujoco.MjModel, data: mujoco.MjData, joint: int, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middle of the contacts, (3,) [m], and the direction of their line, (3,)."""
+    tree, force = _bodies_on(model, joint), np.zeros(6)
+    points, loads = [], []
+    for i, contact in enumerate(data.contact[: data.ncon]):
+        mujoco.mj_contactForce(model, data, i, force)
+        one, other = tree[model.geom_bodyid[[contact.geom1, contact.geom2]]]
+        if one != other and force[0] > 0.0:
+            points.append(contact.pos.copy())
+            loads.append(force[0])
+    if not points:
+        raise InputError("the robot does not come to rest on anything")
+    places = np.array(points)
+    middle = np.average(places, axis=0, weights=loads)
+    # The principal axis of the loads: a line through the two contacts farthest apart would go through opposite corners
+    # of flat tyres.
+    level = (places - middle)[:, :2]
+    along = np.append(np.linalg.eigh(level.T @ (np.array(loads)[:, None] * level))[1][:, 1], 0.0)
+    along *= math.copysign(1.0, float(along @ direction))
+    if float(np.ptp(places @ along)) > LONG_M and float(along @ direction) > math.cos(math.radians(MAX_LEAN_DEG)):
+        direction = along
+    width = float(np.ptp(places @ np.cross(direction, UP)))
+    height = float(data.subtree_com[model.jnt_bodyid[joint]][2] - middle[2])
+    if math.degrees(math.atan2(0.5 * width, max(height, 1e-9))) > STANDS_DEG:
+        raise InputError(
+            f"the robot stands by itself: its support is {width:.3g} m wide across the axis; a pair balances a robot "
+            "that stands on a line or a point (another --axis?)"
+        )
+    return middle, direction
+
+
+def _turn(
+    model: mujoco.MjModel, data: mujoco.MjData, joint: int, point: np.ndarray, direction: np.ndarray, lean: float
+) -> None:
+    """Turn the robot back about the line by the angle that its mass leans, and stop it."""
+    pose = data.qpos[model.jnt_qposadr[joint] :]  # a view
+    quaternion, moved, turned = np.empty(4), np.empty(3), np.empty(4)
+    mujoco.mju_axisAngle2Quat(quaternion, direction, -lean)
+    mujoco.mju_rotVecQuat(moved, pose[:3] - point, quaternion)
+    mujoco.mju_mulQuat(turned, quaternion, pose[3:7])
+    pose[:3], pose[3:7] = point + moved, turned
+    data.qvel[:] = 0.0
+    mujoco.mj_forward(model, data)
+
+
+MIN_HEIGHT_M = 1e-3
+"""Smallest height of a robot's mass above the line [m]."""
+MAX_TRIES = 5
+"""Most rounds of settling on the floor and turning the modules along the contact line."""
 
 
 def stand_upright(
@@ -93,32 +234,32 @@ def stand_upright(
     """
     model = compile_model(spec, path)
     support, settled = Support(as_qpos(model, poses), np.zeros(3), place.direction), False
-    for tries_left in reversed(range(MOST_TRIES + 1)):
+    for tries_left in reversed(range(MAX_TRIES + 1)):
         turn = posed(model, support.pose).xmat[model.body(request.body).id].reshape(3, 3)
         unchanged = place_modules(mounts, place.middle, turn.T @ axes_along(support.direction), request.scale)
         if unchanged and settled:
             break
         model = compile_model(spec, path)
         if not place.free:
-            return model, _all_balanced(model, support, place.joint, others, path)
+            return model, _all_balanced(model, support, place.joint, others)
         if tries_left:
             joint = model.joint(place.joint).id
-            support, settled = stand(model, support.pose, joint, support.direction, path), True
+            support, settled = stand(model, support.pose, joint, support.direction), True
     return model, support
 
 
-def _all_balanced(model: mujoco.MjModel, start: Support, hinge: str, others: Sequence[str], path: Path) -> Support:
+def _all_balanced(model: mujoco.MjModel, start: Support, hinge: str, others: Sequence[str]) -> Support:
     """Turn the hinges of all axes so that the mass on each hinge is above it."""
     line = model.joint(hinge).id
     pose = start.pose
     for joint in [*(model.joint(other).id for other in others), line] * (2 if others else 0):
         direction = start.direction if joint == line else posed(model, pose).xaxis[joint].copy()
-        pose = _balanced(model, pose, joint, direction, path).pose  # which moves what another carries
-    return _balanced(model, pose, line, start.direction, path)
+        pose = _balanced(model, pose, joint, direction).pose  # which moves what another carries
+    return _balanced(model, pose, line, start.direction)
 
 
 def check_unturned(
-    model: mujoco.MjModel, poses: Mapping[str, np.ndarray], qpos: np.ndarray, hinges: Sequence[str], path: Path
+    model: mujoco.MjModel, poses: Mapping[str, np.ndarray], qpos: np.ndarray, hinges: Sequence[str]
 ) -> None:
     """Check that no hinge turned: the modules of one axis are square to its hinge only while the other hinges rest.
 
@@ -126,10 +267,10 @@ def check_unturned(
         InputError: A hinge has to turn for the robot to stand upright.
     """
     for name in hinges:
-        turned = math.degrees(float(qpos[int(model.joint(name).qposadr[0])] - poses[name][0]))
+        turned = math.degrees(qpos[model.joint(name).qposadr[0]] - poses[name][0])
         if abs(turned) > TRUE_DEG:
             raise InputError(
-                f"{path}: to stand upright on all axes the hinge {name!r} has to turn by {turned:.3g} deg, and the "
+                f"to stand upright on all axes the hinge {name!r} has to turn by {turned:.3g} deg, and the "
                 "modules of another axis would stand crooked: place the modules above both hinges (--position), or "
                 "mount the first axis in a keyframe in which its mass is above both"
             )
@@ -139,9 +280,18 @@ def under_and_height(
     model: mujoco.MjModel, data: mujoco.MjData, joint: int, point: np.ndarray, direction: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Return the line's point under a robot's mass, in the world (3,) [m], and the robot's height above it [m]."""
-    root = int(model.jnt_bodyid[joint])
+    root = model.jnt_bodyid[joint]
     under = point + ((data.subtree_com[root] - point) @ direction) * direction
-    return under, _top(model, data, root) - float(point[2])
+    carried = {root}
+    for body in range(root + 1, model.nbody):  # a body comes after its parent
+        if model.body_parentid[body] in carried:
+            carried.add(body)
+    tops = []
+    for geom in range(model.ngeom):
+        if model.geom_bodyid[geom] in carried:
+            turn, aabb = data.geom_xmat[geom].reshape(3, 3), model.geom_aabb[geom]
+            tops.append((data.geom_xpos[geom] + turn @ aabb[:3])[2] + np.abs(turn[2]) @ aabb[3:])
+    return under, float(max(tops) - point[2])
 
 
 def axes_along(direction: np.ndarray) -> np.ndarray:
@@ -149,41 +299,112 @@ def axes_along(direction: np.ndarray) -> np.ndarray:
     return np.stack([np.cross(direction, UP), direction, UP], axis=1)
 
 
-def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np.ndarray, path: Path) -> Support:
+def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np.ndarray) -> Support:
     """Turn a hinge so that the mass it carries is above it."""
-    data = posed(model, qpos)
+    data, name = posed(model, qpos), model.joint(joint).name
     point = data.xanchor[joint].copy()
-    arm = data.subtree_com[int(model.jnt_bodyid[joint])] - point
+    arm = data.subtree_com[model.jnt_bodyid[joint]] - point
     radial = arm - (arm @ direction) * direction
-    if float(np.linalg.norm(radial)) < SMALLEST_HEIGHT_M:
-        raise InputError(
-            f"{path}: the mass on the hinge {model.joint(joint).name!r} lies on its axis: there is nothing to balance"
-        )
+    if float(np.linalg.norm(radial)) < MIN_HEIGHT_M:
+        raise InputError(f"the mass on the hinge {name!r} lies on its axis: there is nothing to balance")
     lean = math.atan2(float(radial @ np.cross(direction, UP)), float(radial @ UP))
     sign = math.copysign(1.0, float(data.xaxis[joint] @ direction))
-    address = int(model.jnt_qposadr[joint])
+    address = model.jnt_qposadr[joint]
     upright = float(qpos[address]) - sign * lean
     low, high = model.jnt_range[joint]
     if model.jnt_limited[joint] and not low <= upright <= high:
         raise InputError(
-            f"{path}: the hinge {model.joint(joint).name!r} would stand upright at {upright:.4g} rad, beyond its range "
-            f"of {low:.4g} to {high:.4g}"
+            f"the hinge {name!r} would stand upright at {upright:.4g} rad, beyond its range of {low:.4g} to {high:.4g}"
         )
     qpos = qpos.copy()
     qpos[address] = upright
     return Support(qpos, point, direction)
 
 
-def _top(model: mujoco.MjModel, data: mujoco.MjData, root: int) -> float:
-    """Return the highest point of everything that a body carries [m]."""
-    highest = -math.inf
-    for geom in range(model.ngeom):
-        body = int(model.geom_bodyid[geom])
-        while body not in (0, root):
-            body = int(model.body_parentid[body])
-        if body == root:
-            centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
-            turn = data.geom_xmat[geom].reshape(3, 3)
-            middle = data.geom_xpos[geom] + turn @ centre
-            highest = max(highest, float(middle[2] + np.abs(turn[2]) @ half))
-    return highest
+TRIED_DEG = 0.05
+"""Tilt at which a robot is released [deg]."""
+UNTIL = 4.0
+"""Growth of the tilt at which the simulation ends."""
+OVERLAP_M = 1e-4
+"""Smallest depth of an overlap [m]."""
+ALIKE = 0.01
+"""Relative difference of poles up to which a robot falls alike."""
+MAX_FALL_S = 3.0
+"""Longest simulation; a robot whose tilt has not grown so much by then falls too slowly to judge, or stands [s]."""
+SLOWEST = math.acosh(UNTIL) / MAX_FALL_S
+"""Slowest fall of a robot that a pair is mounted on [1/s]."""
+
+
+def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.0) -> float:
+    """Simulate a small tilt's growth cosh(lambda t), flywheels at rest and gimbals held, and return its pole lambda.
+
+    Args:
+        model: The plant's model.
+        key: The keyframe in which the plant stands.
+        line: The tilt line.
+        bias: Equilibrium bias e: tilt of the equilibrium, less that of the keyframe [rad].
+
+    Returns:
+        lambda [1/s]; 0 if the tilt does not grow, and less than `SLOWEST` if it has not grown enough in time.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, key)
+    spinning = data.qvel != 0.0
+    data.qvel[spinning] = 0.0
+    for motor in range(model.nu):  # whatever drives a joint that turned
+        joint = model.actuator_trnid[motor, 0]
+        if model.actuator_trntype[motor] == mujoco.mjtTrn.mjTRN_JOINT and spinning[model.jnt_dofadr[joint]]:
+            data.ctrl[motor] = 0.0
+    start = math.radians(TRIED_DEG)
+    line.tilt(data, start - bias)
+    growth = 1.0
+    while growth < UNTIL and data.time < MAX_FALL_S:
+        mujoco.mj_step(model, data)
+        growth = (float(line.lean(data.qpos)) + bias) / start
+    return math.acosh(growth) / float(data.time) if growth > 1.0 else 0.0
+
+
+def overlap(model: mujoco.MjModel, key: int, line: Line, pole: float) -> str:
+    """Describe the deepest overlap of geoms on a robot that a hinge carries, if contacts change how it falls.
+
+    Args:
+        model: The plant's model.
+        key: The keyframe in which the plant stands.
+        line: The tilt line.
+        pole: Its simulated pole [1/s].
+
+    Returns:
+        A clause; "" for a robot on the floor, where nothing overlaps, and where the robot falls alike without contacts.
+    """
+    data = at_keyframe(model, key)
+    deepest = min(data.contact[: data.ncon], key=lambda contact: contact.dist, default=None)
+    if not isinstance(line, HingeLine) or deepest is None or deepest.dist > -OVERLAP_M:
+        return ""
+    untouched = copy.copy(model)
+    untouched.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    if abs(simulated_pole(untouched, key, line) - pole) <= ALIKE * pole:
+        return ""
+    names = [
+        repr(model.geom(geom).name) if model.geom(geom).name else f"one of {model.body(model.geom_bodyid[geom]).name!r}"
+        for geom in (deepest.geom1, deepest.geom2)
+    ]
+    return f"its geoms {' and '.join(names)} overlap by {-1e3 * deepest.dist:.3g} mm, and contact holds it"
+
+
+def check_falls(model: mujoco.MjModel, key: int, line: Line) -> None:
+    """Check that a robot falls, fast enough for a pair.
+
+    Raises:
+        InputError: It stands by itself, or falls too slowly.
+    """
+    pole = simulated_pole(model, key, line)
+    if pole >= SLOWEST:
+        return
+    touching = overlap(model, key, line, pole)
+    if pole and not touching:
+        raise InputError(
+            f"the robot falls too slowly, with {pole:.2g} 1/s; a pair is for robots that fall with {SLOWEST:.2g} 1/s "
+            "or faster (--position is in metres; a mass far up falls slowly)"
+        )
+    reason = f"{touching}; let them not collide (<exclude>)" if touching else "it stands by itself"
+    raise InputError(f"the robot does not start to fall from a tilt of {TRIED_DEG:g} deg: {reason}")

@@ -5,11 +5,18 @@ fitted on one set of worlds and scored on another.
 """
 
 from cmg_mj.features.tuning.fit import NoiseLevelResult
-from cmg_mj.features.tuning.on_logs import LogStudy, tune_on_logs
-from cmg_mj.features.tuning.save import figures_of, files_of_study, save_study, tuning_table
-from cmg_mj.features.tuning.save_on_logs import figures_of_logs, logs_table, save_log_study
-from cmg_mj.features.tuning.simulations import Recorded, halves, record, recorder
-from cmg_mj.features.tuning.study import BestNoise, TuningResult, best_noise, tune, tuned_scenario
+from cmg_mj.features.tuning.logs import LogStudy, tune_on_logs
+from cmg_mj.features.tuning.simulations import (
+    BestNoise,
+    Recorded,
+    TuningResult,
+    best_noise,
+    halves,
+    record,
+    recorder,
+    tune,
+    tuned_scenario,
+)
 
 __all__ = [
     "BestNoise",
@@ -18,17 +25,10 @@ __all__ = [
     "Recorded",
     "TuningResult",
     "best_noise",
-    "figures_of",
-    "figures_of_logs",
-    "files_of_study",
     "halves",
-    "logs_table",
     "record",
     "recorder",
-    "save_log_study",
-    "save_study",
     "tune",
     "tune_on_logs",
     "tuned_scenario",
-    "tuning_table",
 ]

@@ -85,8 +85,8 @@ def tune(
 
     Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
     """
-    from cmg_mj.features.tuning import figures_of, save_study, tuning_table
     from cmg_mj.features.tuning import tune as fit
+    from cmg_mj.features.tuning.save import figures_of, save_study, study_table
     from cmg_mj.runs.save import file_name
 
     scenario = arguments.scenario(observer)
@@ -103,7 +103,7 @@ def tune(
                 noise_ug_rthz=densities,
                 on_share=on_progress,
             )
-        show(figures_of(study), tuning_table(study), arguments.as_json)
+        show(figures_of(study), study_table(study), arguments.as_json)
         total = len(densities) or 1
         files = save_study(folder, study, complete=len(study.levels) == total)
     place = files[0].parent
@@ -174,8 +174,8 @@ def tune_log(
     from cmg_mj.features.replay.log_replay import model_of
     from cmg_mj.features.replay.noise import noise_numbers
     from cmg_mj.features.replay.reading import check_distinct_logs, read_log
-    from cmg_mj.features.tuning import figures_of_logs, logs_table, save_log_study, tune_on_logs
-    from cmg_mj.features.tuning.closed_loop import loop_scenario
+    from cmg_mj.features.tuning.logs import loop_scenario, tune_on_logs
+    from cmg_mj.features.tuning.save import figures_of, save_study, study_table
     from cmg_mj.observers.parameter_options import parameters_of
     from cmg_mj.runs.save import file_name
     from cmg_mj.scenario.resolve import safe_name
@@ -205,10 +205,10 @@ def tune_log(
                 closed_loop=loop,
                 on_share=on_progress,
             )
-        show(figures_of_logs(study), logs_table(study), as_json)
-        place = save_log_study(folder, study)
+        show(figures_of(study), study_table(study), as_json)
+        (file,) = save_study(folder, study)
     tuned = " ".join(f"--set '{setting}'" for setting in study.settings())
-    say_written(folder, place, f"Replay it tuned: {tuned}", as_json)
+    say_written(folder, file.parent, f"Replay it tuned: {tuned}", as_json)
 
 
 def _ranges(texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
@@ -226,15 +226,10 @@ def _ranges(texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
 
 def _densities(text: str) -> list[float]:
     """Parse noise densities separated by commas; a repeated one counts once."""
-    densities: list[float] = []
-    for part in names_in(text):
-        try:
-            density = float(part)
-        except ValueError:
-            density = -1.0
-        if not 0.0 <= density < math.inf:
-            raise InputError(f"--noise-levels {part!r}: must be numbers not below 0, separated by commas")
-        densities.append(density)
-    if text and not densities:
-        raise InputError(f"--noise-levels {text!r}: give numbers separated by commas")
+    try:
+        densities = [float(part) for part in names_in(text)]
+    except ValueError:
+        densities = []
+    if (text and not densities) or not all(0.0 <= density < math.inf for density in densities):
+        raise InputError(f"--noise-levels {text!r}: must be numbers not below 0, separated by commas")
     return list(dict.fromkeys(densities))

@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.tuning.parameters import ParameterValues, TunedScalar, replaced
-from cmg_mj.features.tuning.search import StopSearch, insensitive_numbers, search
-from cmg_mj.observers.parameter_options import ParameterValue
+from cmg_mj.features.tuning.search import (
+    MakeObserver,
+    ParameterValues,
+    StopSearch,
+    TunedScalar,
+    evaluations,
+    insensitive_numbers,
+    numbers_of,
+    parameters_of,
+    plain,
+    replaced,
+    search,
+)
 from cmg_mj.results.intervals import Interval, PairedVerdict, paired_verdict, ratio_interval
+from cmg_mj.results.summary_keys import SummaryValue
 
 DIGITS = 4
 """Significant digits of the tuned parameters: what is written is what was scored."""
@@ -23,11 +34,9 @@ AT_A_LIMIT = 1.02
 OnShare = Callable[[float], None]
 Stop = Callable[[], bool]
 """Asked before every evaluation: from the first yes on none is made, and the best so far counts."""
-M = TypeVar("M")
-M_contra = TypeVar("M_contra", contravariant=True)
 
 
-class ScoringData(Protocol[M_contra]):
+class ScoringData(Protocol):
     """Data on which parameters are scored: recorded worlds, or stretches of logs."""
 
     @property
@@ -50,8 +59,8 @@ class ScoringData(Protocol[M_contra]):
         """Largest acceleration of the tilt [rad/s^2]."""
         ...
 
-    def errors(self, observers: M_contra, /) -> np.ndarray:
-        """Return the RMS errors of what `ParameterFit.make` makes, (n,) [rad/s]; NaN where an observer fails."""
+    def errors(self, observers: Any, /) -> np.ndarray:
+        """Return the RMS errors of an observer, or of one for each log, (n,) [rad/s]; NaN where an observer fails."""
         ...
 
 
@@ -113,135 +122,151 @@ class NoiseLevelResult:
             return "better"
         return paired_verdict(Interval(*(value - 1.0 for value in self.ratio)))
 
+    def limits(self, numbers: Sequence[TunedScalar]) -> list[str]:
+        """Name the tuned numbers that ended at a limit of their range, with the limit."""
+        ends = [(number, self.sizes[number.name]) for number in numbers if number.name in self.edges]
+        return [f"{n.name} ({'lowest' if size / n.low < n.high / size else 'highest'}, {size:.4g})" for n, size in ends]
 
-class ParameterFit(Generic[M]):
-    """Scores parameters on the fitted worlds, and counts the evaluations.
+    def figures(self) -> dict[str, SummaryValue]:
+        """Return the figures of a simulation and of a log, by the names that `--json` prints."""
+        return {
+            "parameters": plain(self.parameters),
+            "at_a_limit": list(self.edges),
+            "fit_rms_error_rad_s": self.fit_rms,
+            "fit_given_rms_error_rad_s": self.fit_given_rms,
+            "held_out_rms_error_rad_s": float(self.rms.mean()),
+            "held_out_given_rms_error_rad_s": float(self.given_rms.mean()),
+            "held_out_fit": self.fit,
+            "held_out_given_fit": self.given_fit,
+            "held_out_ratio": list(self.ratio),
+            "verdict": self.verdict,
+            "zero_estimate_rms_error_rad_s": self.zero_rms,
+            "largest_tilt_acceleration_rad_s2": self.largest_acceleration,
+        }
+
+
+class ParameterFit:
+    """Fits an observer's numbers on some data and scores them on other, at one sensor noise after another.
 
     Args:
         kind: The observer's name.
-        make: Makes what is scored from parameters: an observer, or one for each log.
-        start_parameters: The given parameters.
-        data: The fitted worlds, or stretches of logs.
-        on_share: Called with the completed share of the evaluations.
+        make: Makes the observer from its parameters.
+        given: Parameters to start from and to compare with, where not the defaults.
+        chosen: Names of the numbers to tune; by default all.
+        ranges: Number -> smallest and largest size.
+        starts: Starts of a search in several dimensions.
         stop: Whether to end the search early.
 
     Attributes:
-        stopped: Whether it was ended early.
-        expected: Expected number of evaluations.
-        given_loss: Loss of the given parameters [rad/s].
+        start_parameters: All given parameters.
+        numbers: The tuned numbers; after the first fit those that the estimated rate depends on.
+        insensitive_parameters: Names of the others.
     """
 
     def __init__(
         self,
         kind: str,
-        make: Callable[..., M],
-        start_parameters: ParameterValues,
-        data: ScoringData[M],
-        on_share: OnShare,
+        make: MakeObserver,
+        given: ParameterValues,
+        chosen: Sequence[str],
+        ranges: Mapping[str, tuple[float, float]] | None,
+        starts: int,
         stop: Stop = lambda: False,
     ) -> None:
-        self.kind, self.make, self.start_parameters, self.data = kind, make, start_parameters, data
-        self.on_share, self._stop, self.stopped = on_share, stop, False
-        self.expected = 1
-        self.count = 0
-        self.given_loss = self.mean_error(start_parameters)
+        self.kind, self._starts, self._stop, self._stopped = kind, starts, stop, False
+        self.start_parameters = parameters_of(kind, make(**given), given)
+        self.numbers = numbers_of(kind, self.start_parameters, make, chosen, ranges or {})
+        self.insensitive_parameters: list[str] | None = None
+        self._best: Mapping[str, float] = {}
 
-    def errors(self, parameters: ParameterValues, data: ScoringData[M]) -> np.ndarray:
-        """Return velocity RMS errors, (n_worlds,) [rad/s]; NaN where the observer refuses or fails."""
-        try:
-            return data.errors(self.make(**parameters))
-        except KeyboardInterrupt:
-            raise
-        except Exception:  # a user's observer may fail in any way, at parameters nobody has tried
-            return np.full(data.worlds, math.nan)
+    def level(
+        self,
+        make: Callable[..., Any],
+        fitted: ScoringData,
+        held_out: ScoringData,
+        on_share: OnShare | None = None,
+        noise: float = 0.0,
+    ) -> NoiseLevelResult:
+        """Search for the best parameters, and score them on held-out data.
 
-    def mean_error(self, parameters: ParameterValues) -> float:
-        """Return the mean velocity RMS error of the fitted worlds [rad/s]; infinite if one of them fails."""
-        errors = self.errors(parameters, self.data)
-        return float(errors.mean()) if np.isfinite(errors).all() else math.inf
+        Args:
+            make: Makes what the data score from parameters: an observer, or one for each log.
+            fitted: The fitted data.
+            held_out: The held-out data.
+            on_share: Called with the completed share of the evaluations.
+            noise: Noise density of the accelerometers, for the result [ug/sqrt(Hz)].
 
-    def loss(self, numbers: Sequence[TunedScalar], sizes: Sequence[float]) -> float:
-        """Return the mean error of parameters with some sizes [rad/s], and report the progress.
-
-        Raises:
-            StopSearch: The search is to end.
-        """
-        self.stopped = self.stopped or self._stop()
-        if self.stopped:
-            raise StopSearch
-        self.count += 1
-        self.on_share(self.count / self.expected)
-        return self.mean_error(replaced(self.start_parameters, numbers, sizes))
-
-    def sensitive_parameters(self, numbers: Sequence[TunedScalar]) -> tuple[list[TunedScalar], list[TunedScalar]]:
-        """Divide numbers into those that the estimated rate depends on and the others.
+        Returns:
+            The parameters and their scores.
 
         Raises:
-            InputError: The rate depends on none of them.
+            InputError: The rate depends on no number, or no parameters give an estimate that stays finite.
         """
+        count, expected = 0, 1
+
+        def errors(parameters: ParameterValues, data: ScoringData) -> np.ndarray:
+            try:
+                return data.errors(make(**parameters))
+            except Exception:  # a user's observer may fail in any way, at parameters nobody has tried
+                return np.full(data.worlds, math.nan)
+
+        def mean_error(parameters: ParameterValues) -> float:
+            """Return the mean error of the fitted data [rad/s]; infinite if an observer fails."""
+            rms = errors(parameters, fitted)
+            return float(rms.mean()) if np.isfinite(rms).all() else math.inf
+
+        def loss(sizes: Sequence[float]) -> float:
+            nonlocal count
+            self._stopped = self._stopped or self._stop()
+            if self._stopped:
+                raise StopSearch
+            count += 1
+            if on_share:
+                on_share(min(count / expected, 1.0))
+            return mean_error(replaced(self.start_parameters, self._named(sizes)))
+
+        given_loss = mean_error(self.start_parameters)
+        if self.insensitive_parameters is None:
+            self._discard_insensitive(loss, given_loss)
+        count, expected = 0, evaluations(len(self.numbers))
+        # The best values at the noise before are near the best at this one.
+        near = [replace(n, start=self._best.get(n.name, n.start)) for n in self.numbers]
+        found, best_loss = search(loss, near, starts=self._starts)
+        if not math.isfinite(best_loss) and not self._stopped:
+            raise InputError(f"{self.kind}: no parameters give an estimate that stays finite")
+        rounded = self._named([float(f"{size:.{DIGITS}g}") for size in found])
+        if given_loss <= best_loss and all(n.low <= abs(n.start) <= n.high for n in self.numbers):
+            self._best = {n.name: abs(n.start) for n in self.numbers}  # a search stops within its tolerance
+        elif math.isfinite(mean_error(replaced(self.start_parameters, rounded))):
+            self._best = rounded
+        else:  # beyond an open limit
+            self._best = self._named(found)
+        tuned = replaced(self.start_parameters, self._best)
+        return NoiseLevelResult(
+            noise_ug_rthz=noise,
+            parameters=tuned,
+            sizes=self._best,
+            edges=[n.name for n in self.numbers if not n.low * AT_A_LIMIT < self._best[n.name] < n.high / AT_A_LIMIT],
+            fit_rms=mean_error(tuned),
+            fit_given_rms=given_loss,
+            rms=errors(tuned, held_out),
+            given_rms=errors(self.start_parameters, held_out),
+            zero_rms=held_out.zero_rms,
+            largest_acceleration=fitted.largest_acceleration,
+            fell=fitted.fell + held_out.fell,
+        )
+
+    def _discard_insensitive(self, loss: Callable[[Sequence[float]], float], given_loss: float) -> None:
+        """Discard the numbers that the estimated rate does not depend on."""
         try:
-            insensitive = insensitive_numbers(lambda sizes: self.loss(numbers, sizes), numbers, self.given_loss)
+            insensitive = insensitive_numbers(loss, self.numbers, given_loss)
         except StopSearch:
-            return list(numbers), []
-        if len(insensitive) == len(numbers):
-            names = ", ".join(number.name for number in numbers)
+            insensitive = []
+        self.insensitive_parameters = [number.name for number in insensitive]
+        if len(insensitive) == len(self.numbers):
+            names = ", ".join(self.insensitive_parameters)
             raise InputError(f"the rate that {self.kind} estimates does not depend on {names}")
-        return [number for number in numbers if number not in insensitive], insensitive
+        self.numbers = [number for number in self.numbers if number not in insensitive]
 
-
-def level_of(
-    noise: float, fitter: ParameterFit[M], numbers: Sequence[TunedScalar], held_out: ScoringData[M], starts: int
-) -> NoiseLevelResult:
-    """Search for the best parameters, and score them on held-out data.
-
-    Args:
-        noise: Noise density of the accelerometers, for the result [ug/sqrt(Hz)].
-        fitter: Scores on the fitted data.
-        numbers: The tuned numbers.
-        held_out: The held-out data.
-        starts: Starts of a search in several dimensions.
-
-    Returns:
-        The parameters and their scores.
-
-    Raises:
-        InputError: No parameters give an estimate that stays finite.
-    """
-    fitter.count = 0
-    sizes, loss = search(lambda sizes: fitter.loss(numbers, sizes), numbers, starts=starts)
-    if not math.isfinite(loss) and not fitter.stopped:
-        raise InputError(f"{fitter.kind}: no parameters give an estimate that stays finite")
-    given_sizes = [abs(_get(fitter.start_parameters[number.parameter], number.place)) for number in numbers]
-    inside = all(number.low <= size <= number.high for number, size in zip(numbers, given_sizes, strict=True))
-    if inside and fitter.given_loss <= loss:  # a search stops within its tolerance
-        sizes = given_sizes
-    else:
-        rounded = [float(f"{size:.{DIGITS}g}") for size in sizes]
-        if math.isfinite(fitter.mean_error(replaced(fitter.start_parameters, numbers, rounded))):  # no open limit
-            sizes = rounded
-    tuned = replaced(fitter.start_parameters, numbers, sizes)
-    return NoiseLevelResult(
-        noise_ug_rthz=noise,
-        parameters=tuned,
-        sizes={n.name: size for n, size in zip(numbers, sizes, strict=True)},
-        edges=[n.name for n, size in zip(numbers, sizes, strict=True) if _at_a_limit(n, size)],
-        fit_rms=fitter.mean_error(tuned),
-        fit_given_rms=fitter.given_loss,
-        rms=fitter.errors(tuned, held_out),
-        given_rms=fitter.errors(fitter.start_parameters, held_out),
-        zero_rms=held_out.zero_rms,
-        largest_acceleration=fitter.data.largest_acceleration,
-        fell=fitter.data.fell + held_out.fell,
-    )
-
-
-def _at_a_limit(number: TunedScalar, size: float) -> bool:
-    return not number.low * AT_A_LIMIT < size < number.high / AT_A_LIMIT
-
-
-def _get(value: ParameterValue, place: tuple[int, ...]) -> float:
-    for i in place:
-        assert isinstance(value, Sequence)
-        value = value[i]
-    assert isinstance(value, (int, float))
-    return float(value)
+    def _named(self, sizes: Sequence[float]) -> dict[str, float]:
+        return {number.name: size for number, size in zip(self.numbers, sizes, strict=True)}

@@ -1,17 +1,170 @@
-"""The search for the best sizes of some positive numbers: over their logarithms, without derivatives."""
+"""The numbers of an observer that can be tuned, their ranges, and the search for the best of them."""
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 from scipy.stats import qmc
 
-from cmg_mj.features.tuning.parameters import TunedScalar
+from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.observers import OBSERVER_CLASSES, Observer
+from cmg_mj.observers.parameter_options import ParameterValue
+
+SPAN = 1000.0
+"""Range of the search: from the given value divided by this to the given value times this."""
+
+MakeObserver = Callable[..., Observer]
+"""Makes an observer from its parameters; raises InputError for those that it refuses."""
+ParameterValues = Mapping[str, ParameterValue]
+"""Parameter -> value."""
+
+
+@dataclass(frozen=True)
+class TunedScalar:
+    """One number that can be tuned.
+
+    Attributes:
+        name: Name as the user writes it: `tau`, `Q[1]`.
+        start: Its value before the tuning, not zero. Its sign is kept.
+        low: Smallest size.
+        high: Largest size.
+    """
+
+    name: str
+    start: float
+    low: float = 0.0
+    high: float = math.inf
+
+    @property
+    def parameter(self) -> str:
+        """The observer's parameter that contains the number."""
+        return self.name.partition("[")[0]
+
+
+def parameters_of(kind: str, observer: Observer, arguments: ParameterValues) -> dict[str, ParameterValue]:
+    """Return an observer's parameters with their values.
+
+    Args:
+        kind: The observer's name.
+        observer: The observer.
+        arguments: Parameters that it was constructed from.
+
+    Returns:
+        Name -> value, without those that cannot be read off the observer.
+    """
+    signature = OBSERVER_CLASSES.takes(kind).values()
+    defaults = {p.name: p.default for p in signature if p.name not in OBSERVER_CLASSES.bench_parameters}
+    values = {name: getattr(observer, name, default) for name, default in {**defaults, **arguments}.items()}
+    return {name: _as_tuples(value) for name, value in values.items() if value is not inspect.Parameter.empty}
+
+
+def _as_tuples(value: ParameterValue | np.ndarray) -> ParameterValue:
+    """Convert arrays and lists to tuples."""
+    if isinstance(value, np.ndarray):
+        return _as_tuples(value.tolist())
+    return tuple(_as_tuples(item) for item in value) if isinstance(value, (list, tuple)) else value
+
+
+def replaced(values: ParameterValues, sizes: Mapping[str, float]) -> dict[str, ParameterValue]:
+    """Return the parameters with other sizes for some numbers, whose signs stay."""
+    return {name: _replaced(value, name, sizes) for name, value in values.items()}
+
+
+def _replaced(value: Any, name: str, sizes: Mapping[str, float]) -> ParameterValue:
+    if isinstance(value, tuple):
+        return tuple(_replaced(item, f"{name}[{i}]", sizes) for i, item in enumerate(value))
+    return math.copysign(float(sizes[name]), value) if name in sizes else value
+
+
+def numbers_of(
+    kind: str,
+    values: ParameterValues,
+    make: MakeObserver,
+    chosen: Sequence[str] = (),
+    ranges: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> list[TunedScalar]:
+    """Return the numbers to tune: every real number that is not zero, also inside tuples.
+
+    Args:
+        kind: The observer's name, for messages.
+        values: Its parameters.
+        make: Makes the observer; the values that it refuses bound the search.
+        chosen: Names of parameters, or of elements such as `Q[1]`; by default all.
+        ranges: Number -> smallest and largest size, in place of the observer's own bounds.
+
+    Returns:
+        The numbers.
+
+    Raises:
+        InputError: A chosen name does not exist, there is nothing to tune, or a range belongs to no tuned number or is
+            empty.
+    """
+    integers = {p.name for p in OBSERVER_CLASSES.takes(kind).values() if p.annotation in (int, bool, "int", "bool")}
+    candidates = [
+        TunedScalar(*leaf) for name, value in values.items() if name not in integers for leaf in _leaves(value, name)
+    ]
+    if not candidates:
+        raise InputError(f"observer {kind} has no number to tune")
+    allowed = {name for number in candidates for name in (number.parameter, number.name)}
+    for name in chosen:
+        if name not in allowed:
+            raise InputError(f"--parameters {name}: {kind} has no such number to tune; {nearest(name, allowed)}")
+    numbers = [n for n in candidates if not chosen or n.parameter in chosen or n.name in chosen]
+    names = [number.name for number in numbers]
+    for name, (low, high) in ranges.items():
+        if name not in names:
+            raise InputError(f"--range {name}: not tuned; {nearest(name, names, 'tuned')}")
+        if not 0.0 < low < high < math.inf:
+            raise InputError(f"--range {name}={low:g}:{high:g}: must be two positive numbers, the smaller first")
+    ends = [ranges[n.name] if n.name in ranges else _accepted_range(n, values, make) for n in numbers]
+    return [replace(number, low=low, high=high) for number, (low, high) in zip(numbers, ends, strict=True)]
+
+
+def _leaves(value: ParameterValue, name: str) -> Iterator[tuple[str, float]]:
+    if isinstance(value, tuple):
+        for i, item in enumerate(value):
+            yield from _leaves(item, f"{name}[{i}]")
+    elif isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0.0 and math.isfinite(value):
+        yield name, float(value)
+
+
+def _accepted_range(number: TunedScalar, values: ParameterValues, make: MakeObserver) -> tuple[float, float]:
+    """Find by bisection the range of a number that the observer accepts while the others stay."""
+    size = abs(number.start)
+
+    def accepted(candidate: float) -> bool:
+        try:
+            make(**replaced(values, {number.name: candidate}))
+        except InputError:
+            return False
+        return True
+
+    def farthest(end: float) -> float:
+        if accepted(end):
+            return end
+        inside, outside = size, end
+        for _ in range(60):
+            middle = math.sqrt(inside * outside)
+            inside, outside = (middle, outside) if accepted(middle) else (inside, middle)
+        return inside
+
+    return farthest(size / SPAN), farthest(size * SPAN)
+
+
+def plain(parameters: ParameterValues) -> dict[str, ParameterValue]:
+    """Return parameters as JSON and TOML can hold them."""
+    known = (bool, int, float, str, tuple)
+    return {k: v if isinstance(v, known) else str(v) for k, v in parameters.items() if v is not None}
+
 
 GRID = 13
 """Points over the range of a single number before the search narrows."""
@@ -35,30 +188,21 @@ Height = Callable[[np.ndarray], float]
 """Logarithms of sizes -> logarithm of the loss."""
 
 
-def insensitive_numbers(
-    loss: Loss, numbers: Sequence[TunedScalar], start_loss: float, factor: float = 10.0
-) -> list[TunedScalar]:
-    """Return the numbers that the loss does not depend on: it is the same to six digits if they change tenfold.
+def insensitive_numbers(loss: Loss, numbers: Sequence[TunedScalar], start_loss: float) -> list[TunedScalar]:
+    """Return the numbers that the loss does not depend on: it is the same to six digits if they change tenfold."""
+    given = [abs(number.start) for number in numbers]
 
-    Args:
-        loss: The loss.
-        numbers: The candidates.
-        start_loss: The loss of the given sizes.
-        factor: Factor by which each is changed.
+    def change(i: int, size: float) -> float:
+        value = loss([*given[:i], size, *given[i + 1 :]])
+        return abs(value - start_loss) if math.isfinite(value) else math.inf
 
-    Returns:
-        The numbers that need no tuning.
-    """
-    insensitive = []
-    for i, number in enumerate(numbers):
-        sizes = [abs(other.start) for other in numbers]
-        changes = []
-        for moved in (max(sizes[i] / factor, number.low), min(sizes[i] * factor, number.high)):
-            value = loss([*sizes[:i], moved, *sizes[i + 1 :]])
-            changes.append(abs(value - start_loss) if math.isfinite(value) else math.inf)
-        if math.isfinite(start_loss) and max(changes) <= 1e-6 * start_loss:
-            insensitive.append(number)
-    return insensitive
+    return [
+        number
+        for i, number in enumerate(numbers)
+        if max(change(i, max(given[i] / 10.0, number.low)), change(i, min(given[i] * 10.0, number.high)))
+        <= 1e-6 * start_loss
+        < math.inf
+    ]
 
 
 def evaluations(dimension: int) -> int:
@@ -101,35 +245,33 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
 
 
 def _search_line(height: Height, low: float, high: float) -> None:
-    points = np.linspace(low, high, GRID).tolist()
-    heights = [height(np.array([point])) for point in points]
+    points = np.linspace(low, high, GRID)
+    heights = [height(point[None]) for point in points]
     lowest = int(np.argmin(heights))
-    around = points[max(lowest - 1, 0)], points[min(lowest + 1, len(points) - 1)]
     # The search fits parabolas: where there is no loss it is told a number.
-    top = max((value for value in heights if math.isfinite(value)), default=0.0) + 1.0
+    top = max(filter(math.isfinite, heights), default=0.0) + 1.0
     minimize_scalar(
         lambda point: min(height(np.array([point])), top),
-        bounds=around,
+        bounds=(points[max(lowest - 1, 0)], points[min(lowest + 1, GRID - 1)]),
         method="bounded",
         options={"xatol": TOLERANCE / 2.0},
     )
 
 
-def _search_simplex(height: Height, low: np.ndarray, high: np.ndarray, log_sizes: np.ndarray, starts: int) -> None:
-    n = len(log_sizes)
-    first = [log_sizes]
+def _search_simplex(height: Height, low: np.ndarray, high: np.ndarray, given: np.ndarray, starts: int) -> None:
+    n = len(given)
+    first = [given]
     if starts > 1:
         reach = math.log(SCATTER_FACTOR)
-        floor, ceiling = np.maximum(low, log_sizes - reach), np.minimum(high, log_sizes + reach)
+        floor, ceiling = np.maximum(low, given - reach), np.minimum(high, given + reach)
         # `seed` is what every scipy takes; the name `rng` is known from 1.15 on.
         cube = qmc.LatinHypercube(n, seed=np.random.default_rng(0))  # pyright: ignore[reportCallIssue]
-        unit = cube.random(SCATTER * n)
-        scattered = floor + unit * (ceiling - floor)
+        scattered = floor + cube.random(SCATTER * n) * (ceiling - floor)
         order = np.argsort([height(point) for point in scattered], kind="stable")
         first += [scattered[i] for i in order[: starts - 1]]
     for start in first:
         steps = np.where(start + FIRST_STEP <= high, FIRST_STEP, -np.minimum(FIRST_STEP, start - low))
-        corners = np.vstack([start, *(start + step * axis for step, axis in zip(steps, np.eye(n), strict=True))])
+        corners = np.vstack([start, start + np.diag(steps)])
         minimize(
             height,
             start,
@@ -144,6 +286,6 @@ def crossing(x: Sequence[float], y: Sequence[float]) -> float | None:
     for (x0, y0), (x1, y1) in pairwise(zip(x, y, strict=True)):
         if y0 == 0.0:
             return x0
-        if y0 * y1 < 0.0:
+        if y0 * y1 <= 0.0:
             return x0 - y0 * (x1 - x0) / (y1 - y0)
-    return x[-1] if y[-1] == 0.0 else None
+    return None

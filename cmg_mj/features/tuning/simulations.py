@@ -1,18 +1,23 @@
-"""Recordings of the tuning experiment: the loop closed on the gyro, and the windows that are scored."""
+"""An observer tuned to the gyro of a scenario, on recordings of a loop that is closed on the gyro."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import law_needs
+from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, Stop
+from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, crossing, plain
 from cmg_mj.laws import LAW_CLASSES
-from cmg_mj.observers import Observer
+from cmg_mj.observers import Observer, make_observer
 from cmg_mj.results.result import Result
+from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.runs.open_loop import replay
@@ -48,15 +53,18 @@ class Recorded:
 
     Attributes:
         trajectory: Trajectory from the warm-up to the window's end.
-        window: Start and end of the scored time [s].
+        windows: Times that are scored [s].
         fell: Number of worlds that fell and are discarded.
-        windows: Parts of the window that are scored, if not all of it is [s].
     """
 
     trajectory: Trajectory
-    window: Window
+    windows: Sequence[Window]
     fell: int = 0
-    windows: Sequence[Window] = ()
+
+    @property
+    def window(self) -> Window:
+        """Start and end of the scored times [s]."""
+        return self.windows[0][0], self.windows[-1][1]
 
     @property
     def worlds(self) -> int:
@@ -71,20 +79,18 @@ class Recorded:
 
     @property
     def zero_rms(self) -> float:
-        """Error of an estimate of zero: RMS of the gyro's rate over the window, mean of the worlds [rad/s]."""
-        return float(np.sqrt(np.mean(self.trajectory["fog_rad_s"][self._scored] ** 2, axis=0)).mean())
-
-    @property
-    def _scored(self) -> np.ndarray:
-        """Mask of the scored rows, (n_ticks,)."""
-        return inside(self.trajectory["time_s"], self.windows or [self.window])
+        """Error of an estimate of zero: RMS of the gyro's rate over the windows, mean of the worlds [rad/s]."""
+        return float(self._rms(np.zeros(())).mean())
 
     def errors(self, observer: Observer) -> np.ndarray:
-        """Return the RMS over the window of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN on failure."""
-        scored = self._scored
+        """Return the RMS of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN on failure."""
         with np.errstate(all="ignore"):
-            difference = replay(observer, self.trajectory).x2[scored] - self.trajectory["fog_rad_s"][scored]
-            return np.sqrt(np.mean(difference**2, axis=0))
+            return self._rms(replay(observer, self.trajectory).x2)
+
+    def _rms(self, rate: np.ndarray) -> np.ndarray:
+        difference = rate - self.trajectory["fog_rad_s"]
+        scored = inside(self.trajectory["time_s"], self.windows)
+        return np.sqrt(np.mean(difference[scored] ** 2, axis=0))
 
 
 def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> Scenario:
@@ -123,81 +129,58 @@ RecordingRequest = tuple[Scenario, Sequence[int], float | None]
 """A scenario, the worlds' numbers, and another noise density of the accelerometers [ug/sqrt(Hz)]."""
 
 
-def record_all(
-    requests: Sequence[RecordingRequest],
-    *,
-    warm_up_s: float = WARM_UP_S,
-    on_share: Callable[[float], None] | None = None,
-) -> list[Recorded]:
-    """Run tuning experiments, in one batch where possible.
+def recorder(requests: Sequence[RecordingRequest], *, warm_up_s: float = WARM_UP_S) -> Callable[..., Recorded]:
+    """Make the recordings of one call of `tune` or of several at once, in one batch where possible.
 
     Args:
-        requests: The recordings; `tuning_scenario` changes their scenarios.
+        requests: The recordings; `tuning_scenario` changes their scenarios, and the observer takes no part.
         warm_up_s: Time before the window that is kept [s].
-        on_share: Called now and then with the completed share.
 
     Returns:
-        The worlds that stood, request by request.
+        A function of a request that returns its worlds that stood, the `recorded` of `tune`.
 
     Raises:
         InputError: Fewer than two worlds of a request stood.
         KeyboardInterrupt: The user interrupted.
     """
-    experiments = [prepare(tuning_scenario(scenario, noise)) for scenario, _, noise in requests]
-    runs = [
-        BatchJob([experiment] * len(worlds), worlds)
-        for experiment, (_, worlds, _) in zip(experiments, requests, strict=True)
-    ]
-    duration = max(experiment.scenario.duration_s for experiment in experiments)
-    results = run_side_by_side(runs, on_progress=on_share and (lambda time: on_share(min(time / duration, 1.0))))
-    return [_recorded(*run, warm_up_s) for run in zip(requests, experiments, results, strict=True)]
-
-
-def _recorded(request: RecordingRequest, experiment: Experiment, result: Result, warm_up_s: float) -> Recorded:
-    scenario, duration = request[0], experiment.scenario.duration_s
-    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
-        raise KeyboardInterrupt
-    stood = np.array([outcome.kind == "done" for outcome in result.outcomes])
-    if stood.sum() < 2:
-        raise InputError(
-            f"{scenario.title or 'the scenario'}: with the law fed by the {experiment.scenario.controller.feedback}, "
-            f"{len(stood) - stood.sum()} of {len(stood)} worlds fell before {duration:g} s: there is nothing to tune on"
-        )
-    window = window_of(scenario)
-    assert result.trajectory is not None
-    trajectory = result.trajectory.of_worlds(stood).between(window[0] - warm_up_s, window[1])
-    return Recorded(trajectory, window, int((~stood).sum()), windows_of(scenario))
-
-
-def record(
-    scenario: Scenario,
-    worlds: Sequence[int],
-    *,
-    noise_ug_rthz: float | None = None,
-    warm_up_s: float = WARM_UP_S,
-    on_share: Callable[[float], None] | None = None,
-) -> Recorded:
-    """Run one tuning experiment; see `record_all`."""
-    return record_all([(scenario, worlds, noise_ug_rthz)], warm_up_s=warm_up_s, on_share=on_share)[0]
-
-
-def recorder(requests: Sequence[RecordingRequest], *, warm_up_s: float = WARM_UP_S) -> Callable[..., Recorded]:
-    """Make the recordings of several calls of `tune` at once.
-
-    Args:
-        requests: The recordings; the observer takes no part in them.
-        warm_up_s: Time before the window that is kept [s].
-
-    Returns:
-        A function that returns them, the `recorded` of `tune`.
-    """
     distinct = {_key(*request): request for request in requests}
-    recordings = dict(zip(distinct, record_all(list(distinct.values()), warm_up_s=warm_up_s), strict=True))
+    jobs = [
+        BatchJob([prepare(tuning_scenario(scenario, noise))] * len(worlds), worlds)
+        for scenario, worlds, noise in distinct.values()
+    ]
+    recordings = {
+        key: _recorded(request[0], job.experiments[0], result, warm_up_s)
+        for (key, request), job, result in zip(distinct.items(), jobs, run_side_by_side(jobs), strict=True)
+    }
 
-    def recorded(scenario: Scenario, worlds: Sequence[int], *, noise_ug_rthz: float, warm_up_s: float) -> Recorded:
+    def recorded(scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None = None) -> Recorded:
         return recordings[_key(scenario, worlds, noise_ug_rthz)]
 
     return recorded
+
+
+def record(
+    scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None = None, warm_up_s: float = WARM_UP_S
+) -> Recorded:
+    """Run one tuning experiment; see `recorder`."""
+    return recorder([(scenario, worlds, noise_ug_rthz)], warm_up_s=warm_up_s)(scenario, worlds, noise_ug_rthz)
+
+
+def _recorded(scenario: Scenario, experiment: Experiment, result: Result, warm_up_s: float) -> Recorded:
+    loop = experiment.scenario
+    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        raise KeyboardInterrupt
+    stood = result.stood
+    if stood.sum() < 2:
+        raise InputError(
+            f"{scenario.title or 'the scenario'}: with the law fed by the {loop.controller.feedback}, "
+            f"{len(stood) - stood.sum()} of {len(stood)} worlds fell before {loop.duration_s:g} s: there is nothing "
+            "to tune on"
+        )
+    start, end = window_of(scenario)
+    assert result.trajectory is not None
+    trajectory = result.trajectory.of_worlds(stood).between(start - warm_up_s, end)
+    return Recorded(trajectory, windows_of(scenario), int((~stood).sum()))
 
 
 def halves(scenario: Scenario, worlds: int, noise_ug_rthz: Sequence[float]) -> list[RecordingRequest]:
@@ -209,3 +192,178 @@ def halves(scenario: Scenario, worlds: int, noise_ug_rthz: Sequence[float]) -> l
 def _key(scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None) -> tuple:
     """Return what a recording depends on: the whole recorded scenario, and the worlds."""
     return tuple(worlds), repr(tuning_scenario(scenario, noise_ug_rthz))
+
+
+@dataclass(frozen=True)
+class TuningResult:
+    """An observer tuned at one sensor noise or several.
+
+    Attributes:
+        scenario: The experiment.
+        kind: The observer.
+        start_parameters: Its parameters before.
+        numbers: The tuned numbers.
+        insensitive_parameters: Names of numbers that are not tuned, since the estimated rate does not depend on them.
+        worlds: Number of worlds to fit; as many are held out for scoring.
+        window: Start and end of the scored time [s].
+        levels: Results by sensor noise, in ascending order.
+    """
+
+    scenario: Scenario
+    kind: str
+    start_parameters: ParameterValues
+    numbers: Sequence[TunedScalar]
+    insensitive_parameters: Sequence[str]
+    worlds: int
+    window: Window
+    levels: Sequence[NoiseLevelResult]
+
+    def figures(self) -> dict[str, SummaryValue]:
+        """Return the figures that `cmg-mj tune --json` prints."""
+        best = best_noise(self)
+        levels = [
+            {
+                "noise_density_ug_rthz": level.noise_ug_rthz,
+                **level.figures(),
+                "held_out_worlds": len(level.rms),
+                "worlds_that_fell": level.fell,
+            }
+            for level in self.levels
+        ]
+        return {
+            "scenario": self.scenario.title,
+            "observer": self.kind,
+            "seed": self.scenario.seed,
+            "worlds_fitted": self.worlds,
+            "window_s": list(self.window),
+            "scored_s": [list(window) for window in windows_of(self.scenario)],
+            "given_parameters": plain(self.start_parameters),
+            "tuned": [number.name for number in self.numbers],
+            "idle": list(self.insensitive_parameters),
+            "levels": levels,
+            "given_best_at_noise_density_ug_rthz": best.noise_ug_rthz,
+            **({"given_best_noise_is": best.where} if len(levels) > 1 else {}),
+        }
+
+
+def tune(
+    scenario: Scenario,
+    *,
+    worlds: int = 20,
+    parameters: Sequence[str] = (),
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    noise_ug_rthz: Sequence[float] = (),
+    warm_up_s: float = WARM_UP_S,
+    starts: int = 2,
+    recorded: Callable[..., Recorded] | None = None,
+    on_share: OnShare | None = None,
+    stop: Stop = lambda: False,
+) -> TuningResult:
+    """Fit the parameters of the scenario's observer to the gyro.
+
+    Worlds 0 to n - 1 are fitted, worlds n to 2n - 1 scored.
+
+    Args:
+        scenario: The experiment, with the observer and the parameters to start from and to compare with.
+        worlds: Number of worlds to fit; as many are held out.
+        parameters: Names to tune; by default every number of the observer.
+        ranges: Number -> smallest and largest size, where the observer's own limits are not enough.
+        noise_ug_rthz: Noise densities of the accelerometers; by default the scenario's [ug/sqrt(Hz)].
+        warm_up_s: Time replayed before the window [s].
+        starts: Starts of a search in several dimensions.
+        recorded: Returns recordings made before, as `recorder` does; by default they are made here, all at once.
+        on_share: Called now and then with the completed share.
+        stop: Whether to end the search early, with the best parameters so far.
+
+    Returns:
+        The result. After an interrupt, it has the noise densities done until then.
+
+    Raises:
+        InputError: A name or a range does not fit, nothing can be tuned, or too many worlds fell.
+        KeyboardInterrupt: The user interrupted before the first was done.
+    """
+    if worlds < 2:
+        raise InputError(f"--worlds {worlds}: at least 2, for an interval")
+    sensors, kind = scenario.sensors, scenario.observer.kind
+    densities = sorted(dict.fromkeys(noise_ug_rthz or [sensors.accelerometer.noise_density_ug_rthz]))
+    experiment = prepare(scenario)
+    experiment.require_single_axis("tuning")
+    dt, model, noise = experiment.design.constructor_arguments
+    make = partial(make_observer, kind, dt, model, noise)
+    fit = ParameterFit(kind, make, scenario.observer.parameters, parameters, ranges, starts, stop)
+    recorded = recorded or recorder(halves(scenario, worlds, densities), warm_up_s=warm_up_s)
+
+    levels: list[NoiseLevelResult] = []
+    window: Window = (0.0, 0.0)
+    for i, density in enumerate(densities):
+
+        def share(done: float, i: int = i) -> None:
+            if on_share:
+                on_share((i + done) / len(densities))
+
+        fitted, held_out = (recorded(*half) for half in halves(scenario, worlds, [density]))
+        window = fitted.window
+        noise = experiment.plant.parameters.noise(sensors.with_noise_density(density))
+        try:
+            levels.append(fit.level(partial(make_observer, kind, dt, model, noise), fitted, held_out, share, density))
+            share(1.0)
+        except KeyboardInterrupt:
+            if not levels:
+                raise
+            break
+    insensitive = fit.insensitive_parameters or ()
+    return TuningResult(scenario, kind, fit.start_parameters, fit.numbers, insensitive, worlds, window, levels)
+
+
+class BestNoise(NamedTuple):
+    """The sensor noise at which the given parameters are the best ones."""
+
+    where: Literal["found", "below", "above", "not bracketed"]
+    """Place of that noise: found between the levels, below or above them, or not bracketed."""
+    noise_ug_rthz: float | None
+    """The noise density, if it was found [ug/sqrt(Hz)]."""
+
+
+def best_noise(study: TuningResult) -> BestNoise:
+    """Find the sensor noise at which the given parameters are the best ones.
+
+    With one tuned number, it is the noise at which the best value crosses the given one, on straight lines between the
+    levels, both in the logarithm. With more, it is the level at which the given parameters lose least, unless that is
+    the first or the last.
+
+    Args:
+        study: A result with several levels.
+
+    Returns:
+        The noise density, or the side of the levels on which it lies.
+    """
+    levels = [level for level in study.levels if level.noise_ug_rthz > 0.0 or len(study.numbers) > 1]
+    if len(levels) < 2:
+        return BestNoise("not bracketed", None)
+    if len(study.numbers) == 1:
+        (number,) = study.numbers
+        off = [math.log(level.sizes[number.name] / abs(number.start)) for level in levels]
+        crossed = crossing([math.log(level.noise_ug_rthz) for level in levels], off)
+        if crossed is not None:
+            return BestNoise("found", math.exp(crossed))
+        lost = [abs(value) for value in off]
+    else:
+        lost = [level.ratio.mean for level in levels]
+    if not np.isfinite(lost).all():
+        return BestNoise("not bracketed", None)
+    least = int(np.argmin(lost))
+    if least in (0, len(levels) - 1):
+        return BestNoise("above" if least else "below", None)
+    if len(study.numbers) > 1:
+        return BestNoise("found", levels[least].noise_ug_rthz)
+    return BestNoise("not bracketed", None)
+
+
+def tuned_scenario(study: TuningResult, level: NoiseLevelResult) -> Scenario:
+    """Return the scenario with the tuned observer in the loop, at the level's sensor noise."""
+    return study.scenario.model_copy(
+        update={
+            "observer": ObserverSettings.model_validate({"kind": study.kind, **level.parameters}),
+            "sensors": study.scenario.sensors.with_noise_density(level.noise_ug_rthz),
+        }
+    )

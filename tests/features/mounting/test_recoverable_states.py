@@ -12,9 +12,8 @@ from scipy.integrate import quad
 
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.largest_push import PUSH_S, push_margin
-from cmg_mj.features.mounting.mount_files import write_scenario
-from cmg_mj.features.mounting.recoverable_states import ceiling
+from cmg_mj.features.mounting.limits import PUSH_S, ceiling, push_margin
+from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.laws import TABLE_2_GAINS, scaled_gains
 from cmg_mj.laws.state_feedback import closed_loop_poles
 from cmg_mj.plant.plant import load_plant
@@ -69,30 +68,6 @@ def test_gimbals_that_turn_as_fast_as_they_can_recover_up_to_it(model: ReducedMo
     assert (x1 + x2 / top.pole > 0.0) == (share > 1.0)
 
 
-@pytest.mark.parametrize(
-    ("model", "deg", "percent"),
-    [(RIGS[0], 20.3, 1.4), (ReducedModel(0.4335, 0.0, 0.0011, 314.0, 11.15, 2), 5.25, 0.08)],
-)
-def test_gravitys_sine_lets_a_rig_recover_a_little_more(model: ReducedModel, deg: float, percent: float) -> None:
-    """From rest, with the gimbals that turn as fast as they can; the linear model's ceiling stays below."""
-    top, rate, h = ceiling(model, 4.7), 4.7, 2e-3
-    assert math.degrees(top.tilt) == pytest.approx(deg, rel=5e-3)
-    shares = 1.0 + np.linspace(-0.01, 0.03, 401)
-    x1, x2 = shares * top.tilt, np.zeros(len(shares))
-    momentum = model.J_d * model.omega_d
-
-    def alpha(tilt: np.ndarray, time: float) -> np.ndarray:
-        pushing = momentum * rate * math.cos(rate * time) if rate * time < math.pi / 2.0 else 0.0
-        return (model.gravity_torque * np.sin(tilt) - pushing) / model.J1
-
-    for step in range(math.ceil(14.0 / top.pole / h)):  # velocity Verlet
-        half = x2 + 0.5 * h * alpha(x1, step * h)
-        x1 = np.clip(x1 + h * half, -2.0, 2.0)
-        x2 = half + 0.5 * h * alpha(x1, (step + 1) * h)
-    largest = shares[x1 < 0.0].max()
-    assert 100.0 * (largest - 1.0) == pytest.approx(percent, abs=0.02 if percent < 1.0 else 0.1)
-
-
 def test_a_push_is_less_than_a_blow_of_its_impulse() -> None:
     """A short one is a blow; of a longer one gimbals take off more while it lasts."""
     top = ceiling(RIGS[0], 4.7)
@@ -118,9 +93,9 @@ def fast(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
 )
 def test_no_controller_bears_more(fast: Experiment, feedback: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor does the one that is fed the true rate; it bears more than any blow that can be recovered from."""
-    monkeypatch.setattr("cmg_mj.features.mounting.largest_push.WORLDS", 4)
-    monkeypatch.setattr("cmg_mj.features.mounting.largest_push.LEVELS", 16)
-    monkeypatch.setattr("cmg_mj.features.mounting.largest_push.BEFORE_S", 0.3)
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.WORLDS", 4)
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.LEVELS", 16)
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.BEFORE_S", 0.3)
     experiment = fast.with_settings(feedback)
     top = ceiling(experiment.plant.reduced, experiment.law.rate_limit)
     assert top.pole == pytest.approx(7.85, rel=0.01)

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import copy
 import math
-from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.fall_check import simulated_pole
-from cmg_mj.features.mounting.largest_push import PUSH_S
-from cmg_mj.features.mounting.mount_files import PUSHED_AT_S, write_scenario
-from cmg_mj.features.mounting.prospects import Prospects, prospects, smallest_sufficient_scale
-from cmg_mj.features.mounting.recoverable_states import RecoverableLimit, ceiling
+from cmg_mj.features.mounting.limits import PUSH_S, Prospects, RecoverableLimit, ceiling, prospects
+from cmg_mj.features.mounting.stance import simulated_pole
+from cmg_mj.features.mounting.write import PUSHED_AT_S, write_scenario
 from cmg_mj.plant.tilt_line import HingeLine, SupportLine
 from cmg_mj.runs.experiment import Experiment, prepare
 from tests.features.mounting.robots import ROBOTS
@@ -53,14 +50,6 @@ def surviving_worlds(
     )
     variation = scenario.model_copy(update={"push": push, "duration_s": duration_s, "plant": plant})
     return prepare(variation).run_many(WORLDS, keep_trajectory=False).stood
-
-
-@pytest.mark.slow
-def test_it_stands_thirty_seconds(mounting: tuple[Experiment, Prospects, str]) -> None:
-    """Ten seeds, default sensors, `gyro_free`, from the smaller of a degree and a quarter of the ceiling."""
-    experiment, outlook, _ = mounting
-    tilt = min(1.0, 0.25 * math.degrees(outlook.limit.tilt))
-    assert surviving_worlds(experiment, 0.0, 30.0, tilt).all()
 
 
 @pytest.mark.slow
@@ -115,16 +104,3 @@ def test_plain_mujoco_loads_it_and_it_rests(robot_at_rest: tuple[Experiment, Rec
     tilt_acceleration = experiment.plant.axis.line.motion(model, data) @ data.qacc
     assert abs(tilt_acceleration) < math.radians(0.05) * limit.pole**2
     assert isinstance(experiment.plant.axis.line, SupportLine if ROBOTS[name].on_contacts else HingeLine)
-
-
-@pytest.mark.slow
-def test_where_the_pair_is_too_small_it_says_which_is_not(tmp_path: Path) -> None:
-    """The scale that the tests use for the torso is the one that mount names for the papers' cube."""
-    robot = ROBOTS["torso"]
-
-    def suffices(scale: float) -> bool:
-        model = mount(robot.path, **{**robot.options, "scale": scale}).save(tmp_path / f"{scale}.xml")
-        return math.degrees(prospects(write_scenario(model, model, "gyro_free")).limit.tilt) >= 2.0
-
-    assert not suffices(1.0)
-    assert smallest_sufficient_scale(suffices, 1.0) == robot.options["scale"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -14,17 +13,13 @@ import pytest
 
 from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.features.mounting import mount, mount_files
+from cmg_mj.features.mounting import mount, write
 from cmg_mj.features.mounting import push as simulated_push
-from cmg_mj.features.mounting.largest_push import PUSH_S, WORLDS, PushMargin
-from cmg_mj.features.mounting.mount_files import PUSH_SHARE, write_scenario
-from cmg_mj.features.mounting.pair_demands import pair_demands
-from cmg_mj.features.mounting.prospects import Prospects, prospects
+from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, Prospects, PushMargin, ceiling, prospects
 from cmg_mj.features.mounting.push import MARGIN, RESOLUTION, SimulatedPush, TimeLimit
-from cmg_mj.features.mounting.recoverable_states import ceiling
+from cmg_mj.features.mounting.write import PUSH_SHARE, write_scenario
 from cmg_mj.plant.physics import OneWorld
-from cmg_mj.plant.plant import load_plant
-from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.stages.push import Pushes
@@ -78,13 +73,7 @@ def test_the_largest_that_all_stand_less_a_tenth(monkeypatch: pytest.MonkeyPatch
     assert (result.standing, result.complete) == (WORLDS, True)
     found = result.impulse / (1.0 - MARGIN)
     assert found <= share * top
-    assert found >= share * top - max(1.1 * RESOLUTION * share, simulated_push.LEAST) * top
-
-
-def test_few_pushes_are_tried_where_the_reduced_model_is_right(monkeypatch: pytest.MonkeyPatch) -> None:
-    stub = Stub(monkeypatch, right=0.9 * limits().push_margin.median_impulse, left=1.0)
-    assert stub.search().impulse > 0.0
-    assert len(stub.tried) <= 7
+    assert found >= share * top - max(1.1 * RESOLUTION * share, simulated_push.MIN_SHARE) * top
 
 
 def test_what_other_worlds_do_not_stand_is_reduced_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,18 +115,6 @@ def test_it_ends_after_a_minute_with_what_it_has(monkeypatch: pytest.MonkeyPatch
     result = Stub(monkeypatch, right=0.95 * top, left=top, seconds=25.0).search()
     assert result == SimulatedPush(WORLDS, (1.0 - MARGIN) * simulated_push.FIRST_SHARE * top, complete=False)
     assert Stub(monkeypatch, right=top, left=top, seconds=61.0).search() == SimulatedPush(None, complete=False)
-
-
-def test_time_that_ends_among_other_worlds_takes_no_second_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
-    top = limits().push_margin.median_impulse
-    whole = Stub(monkeypatch, right=top, left=top)
-    alone = whole.search()
-    seconds = 60.0 / (len(whole.tried) - 0.5)  # the last attempt, with other worlds, is cut off
-    result = Stub(monkeypatch, right=top, left=top, seconds=seconds).search()
-    assert result == SimulatedPush(WORLDS, alone.impulse, complete=False)
-    again = Stub(monkeypatch, right=top, left=top, seconds=60.0 / (len(whole.tried) + 0.5))
-    again.others = 0.8
-    assert again.search() == SimulatedPush(WORLDS, (1.0 - MARGIN) * alone.impulse, complete=False, others_fell=True)
 
 
 def pushed(scenario: Scenario, torque: float, seed: int) -> int:
@@ -187,7 +164,7 @@ def test_a_robot_that_does_not_stand_is_told_a_scale_that_was_tried(monkeypatch:
 def pendulum(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     """A command that mounts a pair, with a push margin that takes no time to find."""
     Path("pendulum.xml").write_text(PENDULUM, encoding="utf-8")
-    monkeypatch.setattr("cmg_mj.features.mounting.prospects.push_margin", lambda *_: PushMargin(0.4, 0.3))
+    monkeypatch.setattr("cmg_mj.features.mounting.limits.push_margin", lambda *_: PushMargin(0.4, 0.3))
     return ("mount", "pendulum.xml", "--body", "pole", "-o", "rig.xml")
 
 
@@ -195,82 +172,24 @@ def pendulum(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     ("simulated", "text"),
     [
         (SimulatedPush(10, 0.3), "gyro_free: stands a push of 3 N m for 0.1 s either way (MuJoCo, all of 10 worlds, "),
-        pytest.param(
-            SimulatedPush(10, 0.3, complete=False),
-            "less a tenth; 60 s did not suffice for others)",
-            marks=pytest.mark.slow,
-        ),
-        (
-            SimulatedPush(10, 0.3, complete=False, others_fell=True),
-            "some of 20 others fell with a larger one, and 60 s did not suffice to try this one)",
-        ),
-        (SimulatedPush(10, 0.0), "gyro_free: stands in MuJoCo only unpushed (not even 2% of any controller's push)"),
-        pytest.param(
-            SimulatedPush(10, 0.0, complete=False),
-            "stands in MuJoCo only unpushed (none found within 60 s: run it again while the machine does ",
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            SimulatedPush(3),
-            "gyro_free: does not stand: in MuJoCo 7 of 10 worlds fall within 20 s, unpushed; by its",
-            marks=pytest.mark.slow,
-        ),
-        (
-            SimulatedPush(28, worlds=30),
-            "gyro_free: does not stand: in MuJoCo 2 of 30 worlds fall within 20 s, unpushed",
-        ),
-        (SimulatedPush(None, complete=False), "or take E alone by --quick; by its reduced model E"),
+        (SimulatedPush(10, 0.3, complete=False, others_fell=True), "some of 20 others fell with a larger one"),
+        (SimulatedPush(10, 0.0), "gyro_free: stands in MuJoCo only unpushed"),
+        (SimulatedPush(28, worlds=30), "gyro_free: does not stand: in MuJoCo 2 of 30 worlds fall"),
+        (SimulatedPush(None, complete=False), "by its reduced model E"),
     ],
 )
 def test_it_says_what_the_robot_itself_stands(
     pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, simulated: SimulatedPush, text: str
 ) -> None:
-    monkeypatch.setattr(mount_files, "simulated_push", lambda *_: simulated)
-    monkeypatch.setattr(mount_files, "_sufficient_scale", lambda *_: None)
+    monkeypatch.setattr(write, "simulated_push", lambda *_: simulated)
+    monkeypatch.setattr(write, "_sufficient_scale", lambda *_: None)
     done = cmg_mj(*pendulum)
     assert done.status == 0, done.err
     assert text in done.out
-    assert "E = 0.4 N m s, a push of 4 N m" in done.out
     assert ("no larger --scale was found with which it stands" in done.out) == simulated.falls
     pushes = load_scenario("rig.toml").push
     torques = [PUSH_SHARE * simulated.impulse / PUSH_S] if simulated.impulse else []
     assert [push.torque_n_m for push in pushes] == pytest.approx(torques)
-
-
-@pytest.mark.parametrize("standing", [9, 10])
-def test_a_robot_that_falls_gets_no_hint_on_the_push_it_stands(
-    pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, standing: int
-) -> None:
-    monkeypatch.setattr(mount_files, "simulated_push", lambda *_: SimulatedPush(standing, 0.3 * (standing == WORLDS)))
-    monkeypatch.setattr(mount_files, "_sufficient_scale", lambda *_: None)
-    monkeypatch.setattr(Prospects, "noisy", True)
-    done = cmg_mj(*pendulum)
-    assert ("with other noise it may fall of smaller pushes than it stands here" in done.err) == (standing == WORLDS)
-    assert ("the sensors' noise alone may fell the robot" in done.err) == (standing == WORLDS)
-
-
-def test_a_scale_is_named_only_if_it_was_tried(pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mount_files, "simulated_push", lambda *_: SimulatedPush(3))
-    monkeypatch.setattr(mount_files, "standing_unpushed", lambda experiment, *_: WORLDS if heavy(experiment) else 9)
-
-    def heavy(experiment: Experiment) -> bool:
-        return experiment.plant.model.body_mass.sum() > 15.0
-
-    out = cmg_mj(*pendulum, "--scale", "1.2").out
-    assert "it does not stand; with --scale 1.45, tried in MuJoCo, it stands" in out
-    assert sorted(path.name for path in Path().iterdir()) == ["pendulum.xml", "rig.toml", "rig.xml"]
-
-
-def test_quick_says_that_it_is_the_reduced_models(pendulum: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> None:
-        raise AssertionError
-
-    monkeypatch.setattr(mount_files, "simulated_push", fails)
-    out = cmg_mj(*pendulum, "--quick").out
-    assert "gyro_free: not tried in MuJoCo; by its reduced model E = 0.4 N m s, a push of 4 N m, " in out
-    figures = json.loads(cmg_mj(*pendulum, "--quick", "--json", "--overwrite").out)
-    assert figures["stand_unpushed"] is figures["stands_push_torque_n_m"] is figures["scale_that_suffices"] is None
-    assert load_scenario("rig.toml").push[0].torque_n_m == pytest.approx(PUSH_SHARE * 4.0)
 
 
 def test_the_demands_of_a_pair(pendulum: tuple[str, ...]) -> None:
@@ -285,28 +204,6 @@ def test_the_demands_of_a_pair(pendulum: tuple[str, ...]) -> None:
     assert figures["servo_limit_rate_rad_s"] == 4.7
     moment = 0.5 * 0.0015 * 330.0 * 0.008  # of a 608 at a tenth of its rating
     assert figures["wheels_holding_power_assumed_w"] == pytest.approx(2 * 2 * moment * 314.0 * 1.5**3)
-    out = cmg_mj(*pendulum, "--quick", "--overwrite").out
-    assert "the pair weighs 5.24 kg, 524% of the robot's 1 kg; its servos have 8.4 N m and 4.7 rad/s\n" in out
-    assert "its wheels hold 108 J, 1.8 W for a minute to spin up, and take 2.5 W to keep turning (assumed: " in out
-
-
-def test_a_spin_up_in_a_minute_takes_that_energy() -> None:
-    """MuJoCo's own: a wheel driven by J w/60 s has J w^2/2 after a minute, whatever the step."""
-    plant = load_plant(model=str(mount(mujoco.MjSpec.from_string(PENDULUM), "pole").save("rig.xml")))
-    model = copy.copy(plant.model)
-    wheel = model.body("cube1/flywheel")
-    inertia = float(wheel.inertia[np.argmax(wheel.inertia)])
-    data = mujoco.MjData(model)
-    model.opt.gravity[:], model.opt.timestep = 0.0, 0.05
-    dof = model.joint("cube1/flywheel").dofadr[0]
-    data.qfrc_applied[dof] = inertia * 314.0 / 60.0
-    model.actuator_gainprm[:], model.actuator_biasprm[:] = 0.0, 0.0
-    work = 0.0
-    while data.time < 60.0:
-        before = float(data.qvel[dof])
-        mujoco.mj_step(model, data)
-        work += float(data.qfrc_applied[dof]) * 0.5 * (before + float(data.qvel[dof])) * model.opt.timestep
-    assert 2.0 * work == pytest.approx(pair_demands(plant, 4.7, 1.0).spin_up_energy_j, rel=2e-3)
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from cmg_mj.features.mounting.mount_plugin import plugin_name
+from cmg_mj.features.mounting.write import plugin_name
 from tests.command import HANGS_AFTER_S, ROOT, cmg_mj, environment
 from tests.features.mounting.push_robots import PENDULUM
 from tests.features.mounting.robots import gymnasium_asset
@@ -60,7 +60,7 @@ def test_a_plugin_is_named_after_the_models_file(file: str, name: str) -> None:
 
 def test_nothing_is_begun_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("robot.xml").write_text(PENDULUM, encoding="utf-8")
-    monkeypatch.setattr("cmg_mj.features.mounting.mount_files._mount", None)
+    monkeypatch.setattr("cmg_mj.features.mounting.write.mount", None)
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
     assert "there is no C compiler" in cmg_mj(*MOUNT).complaint

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ def last_remark(log: Log) -> str:
     return remarks_on(log, alignment_of(log))[-1]
 
 
-def remark(folder: Path, tilt: np.ndarray = TILT, rate: np.ndarray = RATE, **options) -> str:
+def remark(folder: Path, tilt: np.ndarray = TILT, rate: np.ndarray = RATE, **options: Any) -> str:
     return last_remark(read(folder, {**sine(), "tilt_rad": tilt, "gyro_rad_s": rate}, **options))
 
 
@@ -156,5 +157,5 @@ def test_what_is_offered_beyond_what_is_set_is_the_whole(tmp_path: Path) -> None
     for scale, offset in ((1.5, 3.0), (1.0, np.degrees(0.05))):
         said = remark(tmp_path, rate=rate, units=units, scale={"rate": scale}, offset={"rate": offset})
         assert offered(said) == pytest.approx({"scale": 2.0, "offset": np.degrees(0.1)}, rel=0.01)
-    cures = {name: {"rate": value} for name, value in offered(said).items()}
+    cures: dict[str, Any] = {name: {"rate": value} for name, value in offered(said).items()}
     assert remark(tmp_path, rate=rate, units=units, **cures).startswith(AGREE)

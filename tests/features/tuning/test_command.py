@@ -7,24 +7,20 @@ import json
 from pathlib import Path
 
 import pytest
-from pydantic import TypeAdapter
 
 from cmg_mj.features.tuning import tune
-from cmg_mj.features.tuning.command import tune as tune_command
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import CommandOutcome, cmg_mj
 from tests.features.tuning.user_observer import USER_OBSERVER
+
+QUICK = "title = 'Quick'\nduration_s = 0.6\n[[push]]\nstart_s = 0.2"
 
 
 @pytest.fixture
 def quick(elsewhere: None) -> str:
     """A short scenario with a push, in an empty folder."""
-    write_quick()
+    Path("quick.toml").write_text(QUICK)
     return "quick.toml"
-
-
-def write_quick() -> None:
-    Path("quick.toml").write_text("title = 'Quick'\nduration_s = 0.6\n[[push]]\nstart_s = 0.2")
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +28,7 @@ def two_levels(tmp_path_factory: pytest.TempPathFactory) -> tuple[CommandOutcome
     """What tuning at two levels of noise says, and the folder in which it ran."""
     folder = tmp_path_factory.mktemp("two-levels")
     with contextlib.chdir(folder):
-        write_quick()
+        Path("quick.toml").write_text(QUICK)
         arguments = ("--observer", "linear", "--worlds", 3, "--noise-levels", "200,400", "--json")
         return cmg_mj("tune", "quick.toml", *arguments), folder
 
@@ -41,7 +37,6 @@ def test_command_prints_a_table_and_writes_what_reruns(quick: str) -> None:
     outcome = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 3, "--out", "tuned")
     assert outcome.status == 0
     assert "Quick: linear, seed 0" in outcome.out
-    assert "given 0.02" in outcome.out
     assert outcome.err == "Written to tuned. Run with the tuned observer: cmg-mj run tuned/scenario.toml\n"
     figures = json.loads(Path("tuned/tuned.json").read_text())
     (level,) = figures["levels"]
@@ -93,52 +88,27 @@ def test_an_interruption_keeps_the_noises_that_are_done(quick: str) -> None:
         tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=stop_at_once)
 
 
-def test_without_a_push_it_says_what_the_window_is(quick: str) -> None:
-    outcome = cmg_mj("tune", quick, "--observer", "linear", "--worlds", 2, "--set", "push=[]")
-    assert "There is no push: the window is the whole run" in outcome.out
-
-
 def test_a_users_own_observer_by_its_path(quick: str) -> None:
     outcome = cmg_mj("tune", quick, "--observer", USER_OBSERVER, "--worlds", 2, "--json")
     assert json.loads(outcome.out)["tuned"] == ["gain"]
 
 
-def test_help_names_the_experiment() -> None:
-    assert "observer_tuning" in (tune_command.help or "")
-
-
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["--observer", "liner"], "--observer 'liner': no such observer; did you mean 'linear'?"),
         (["--observer", "linear", "--parameters", "tua"], "--parameters tua: linear has no such number to tune; did"),
         (["--observer", "finite_difference"], "observer finite_difference has no number to tune"),
         (
             ["--observer", "ltv", "--parameters", "H0[2],Q[2]", "--worlds", "2"],
             "the rate that ltv estimates does not depend on",
         ),
-        (["--observer", "linear", "--noise-levels", "100,loud"], "--noise-levels 'loud': must be numbers not below 0"),
-        (["--observer", "linear", "--noise-levels", ","], "--noise-levels ',': give numbers separated by commas"),
-        (["--observer", "linear", "--noise-levels=-1"], "--noise-levels '-1': must be numbers not below 0"),
+        (["--observer", "linear", "--noise-levels", "100,loud"], "--noise-levels '100,loud': must be numbers"),
+        (["--observer", "linear", "--noise-levels", ","], "--noise-levels ',': must be numbers"),
         (["--observer", "linear", "--range", "tau"], "--range 'tau': write NAME=LOW:HIGH"),
         (["--observer", "linear", "--range", "tau=3:1"], "--range tau=3:1: must be two positive numbers"),
         (["--observer", "linear", "--range", "L=1:3"], "--range L: not tuned; tuned: tau"),
-        (["--observer", "linear", "--out", ""], "--out '': name a folder"),
         (["--observer", "linear", "--worlds", "1"], "Invalid value for '--worlds'"),
-        (
-            ["--observer", "linear", "--set", "observer.tau=-1"],
-            "quick.toml with --observer linear --set observer.tau=-1",
-        ),
     ],
 )
 def test_wrong_input_is_one_line(quick: str, arguments: list[str], line: str) -> None:
     assert cmg_mj("tune", quick, *arguments).complaint.startswith(line)
-
-
-@pytest.mark.slow
-def test_figures_are_plain_json(quick: str) -> None:
-    """Nothing that JSON does not know, such as NaN."""
-    outcome = cmg_mj("tune", quick, "--observer", "homogeneous", "--parameters", "k1", "--worlds", 2, "--json")
-    assert TypeAdapter(dict).validate_json(outcome.out)
-    assert "NaN" not in outcome.out
-    assert "Infinity" not in outcome.out

@@ -69,20 +69,12 @@ def test_wrong_tuning(sine_log: None, arguments: tuple, message: str) -> None:
     assert message in cmg_mj("tune-log", *arguments).complaint
 
 
-@pytest.mark.slow
-def test_what_was_tuned_can_be_replayed(sine_log: None) -> None:
-    arguments = ("sine.csv", "--columns", PLAIN, "--observer", "linear", "--range", "tau=0.004:0.1")
-    output = " ".join(cmg_mj("tune-log", *arguments, "--out", "it").err.split())
-    assert "Replay it tuned: --set 'linear.tau=0.004'" in output
-    assert cmg_mj("replay", "sine.csv", "--columns", PLAIN, "--set", "linear.tau=0.004").status == 0
-
-
 def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
     """Its rig (no --model), its sensors' noise and its observer's parameters: the given error is that of a replay."""
     run_log = read_log(run)
     study = tune_on_logs([run_log], "homogeneous", parameters=["k1"], ranges={"k1": (22.0, 24.0)}, settle_s=0.3)
     assert study.start_parameters["k1"] == 23.0
-    assert study.noises == [prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]]
+    assert study.logs[0].noise == prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]
     half = run_log.cut(slice(len(run_log) // 2, None))
     study = tune_on_logs([run_log], "gyro_free", parameters=["jerk"], settle_s=0.3)
     error = half["reference_rad_s"] - replay_prepared(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
@@ -95,11 +87,11 @@ def test_every_log_is_tuned_with_its_own_noise(run: Path) -> None:
     run_log = read_log(run)
     plain = read_log(run, ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
     settings = {"settle_s": 0.2, "parameters": ["tau"], "ranges": {"tau": (0.01, 0.05)}}
-    run_noise, plain_noise = tune_on_logs([run_log, plain], "linear", **settings).noises
+    run_noise, plain_noise = (log.noise for log in tune_on_logs([run_log, plain], "linear", **settings).logs)
     assert run_noise == prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]
     assert plain_noise == noise_of(plain) != run_noise
-    for noise in tune_on_logs([run_log, plain], "linear", noises={"tilt": 0.7}, **settings).noises:
-        assert np.degrees(noise.tilt) == pytest.approx(0.7)
+    for log in tune_on_logs([run_log, plain], "linear", noises={"tilt": 0.7}, **settings).logs:
+        assert np.degrees(log.noise.tilt) == pytest.approx(0.7)
 
 
 def test_runs_with_other_parameters_are_not_tuned_together(run: Path) -> None:

@@ -1,12 +1,14 @@
-"""A user's own observer to tune."""
+"""A user's own observer to tune, and a table as it is printed."""
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from rich.console import Console, RenderableType
 
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import Estimate
@@ -40,3 +42,10 @@ class UserObserver:
 
 
 USER_OBSERVER = f"{__name__}:UserObserver"
+
+
+def printed(table: RenderableType) -> str:
+    """A table and its text, on lines that are not broken."""
+    console = Console(file=(text := io.StringIO()), width=400)
+    console.print(table)
+    return text.getvalue()

@@ -1,0 +1,211 @@
+"""What holds a robot where it stands: constraints on its joints, its own servos, the keyframe of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import mujoco
+import numpy as np
+
+from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.features.mounting.request import MountRequest
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, ON_A_JOINT, joint_sizes
+from cmg_mj.plant.mjcf import posed
+
+_INTEGRATOR = int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
+_FILTERS = int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
+
+
+def rest_controls(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """Return the controls and filter states with which position servos exert no force where they are.
+
+    The force of a servo of gain k is k a + b0 + b1 l. Its length l is the gear times the joint's position, and a is its
+    control, or the state of its filter or integrator.
+
+    Args:
+        model: The robot.
+        data: The same where it is to be held, after a forward pass.
+
+    Returns:
+        act (na,) and ctrl (nu,); 0 for other actuators.
+    """
+    act, ctrl = np.zeros(model.na), np.zeros(model.nu)
+    for i in range(model.nu):
+        bias, (gain, slope), kind = model.actuator_biasprm[i], model.actuator_gainprm[i, :2], model.actuator_gaintype[i]
+        length, state = data.actuator_length[i], model.actuator_actadr[i]
+        if kind == mujoco.mjtGain.mjGAIN_AFFINE:
+            gain += slope * length
+        elif kind != mujoco.mjtGain.mjGAIN_FIXED:
+            continue
+        if not _pulls_back(model.actuator_biastype[i], bias) or gain == 0.0:
+            continue
+        target, dynamics = -(bias[0] + bias[1] * length) / gain, int(model.actuator_dyntype[i])
+        if state < 0 or dynamics in _FILTERS:
+            ctrl[i] = target
+        if dynamics in (_INTEGRATOR, *_FILTERS):
+            act[state] = target
+    return act, ctrl
+
+
+def _pulls_back(kind: int, bias: np.ndarray) -> bool:
+    """Return whether an actuator is a position servo: its force depends on the joint's position."""
+    return kind == mujoco.mjtBias.mjBIAS_AFFINE and bool(bias[1] != 0.0)
+
+
+IMPEDANCE = 0.9999
+"""Impedance of a constraint that holds a joint, MuJoCo's largest. A held joint still follows the share 1 - IMPEDANCE
+of every acceleration. With MuJoCo's default of 0.9 to 0.95 a trunk on its waist jerks with every change of the command,
+and its accelerometers show that as tilt."""
+SAME_PLACE = 1e-3
+"""Largest distance of a joint from where a constraint of the file holds it [rad, m]; files have six digits."""
+
+
+def unused_name(name: str, names: Collection[str]) -> str:
+    """Return the name, or the first of `name_2`, `name_3`, ... that is not taken."""
+    number, candidate = 1, name
+    while candidate in names:
+        number += 1
+        candidate = f"{name}_{number}"
+    return candidate
+
+
+def joint_held(spec: mujoco.MjSpec, tie: mujoco.MjsEquality) -> str:
+    """Return the joint that an equality constraint holds, as an earlier mount's does; "" for any other constraint.
+
+    Such a constraint is active, and is of one joint alone, or welds a ball joint's body to its parent.
+    """
+    if not tie.active:
+        return ""
+    if tie.type == mujoco.mjtEq.mjEQ_JOINT:
+        return "" if tie.name2 else tie.name1
+    body = spec.body(tie.name2) if tie.name2 and tie.type == mujoco.mjtEq.mjEQ_WELD else None
+    if body is None or body.parent is None or tie.objtype != mujoco.mjtObj.mjOBJ_BODY or tie.name1 != body.parent.name:
+        return ""
+    is_ball = [joint.type for joint in body.joints] == [mujoco.mjtJoint.mjJNT_BALL]
+    return body.joints[0].name if is_ball else ""
+
+
+def hold_joints(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, pose: np.ndarray, request: MountRequest, moving: Collection[str]
+) -> list[str]:
+    """Hold every joint where it stands, by an equality constraint.
+
+    Args:
+        spec: The model, which is changed.
+        model: The same, compiled.
+        pose: Joint positions, (nq,).
+        request: Whether servos of the robot's hold their joints, and the joints that the user wants free.
+        moving: Joints that tilt the robot, and those of modules. They stay free, or are released if they were held.
+
+    Returns:
+        The joints that a new constraint holds.
+
+    Raises:
+        InputError: A joint to release does not exist, or the file holds a joint elsewhere.
+    """
+    names = [model.joint(i).name for i in range(model.njnt)]
+    for name in request.release:
+        if name not in names:
+            raise InputError(f"--release {name}: no such joint; {nearest(name, names, 'its joints')}")
+    servos = [a for a in spec.actuators if int(a.trntype) in ON_A_JOINT and _pulls_back(a.biastype, a.biasprm)]
+    on_servos = [servo.target for servo in servos if request.hold == "servos"]
+    ties = {joint: tie for tie in spec.equalities if (joint := joint_held(spec, tie))}
+    free = {*moving, *request.release}
+    for name, tie in ties.items():
+        if name not in free:
+            _check_stands(model, pose, name, tie)
+        elif tie.name.startswith(f"{name}_held"):  # the user's own is the user's
+            spec.delete(tie)
+    tie_names = {tie.name for tie in spec.equalities}
+    held = [name for name in names if name not in {*free, *on_servos, *ties}]
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    mujoco.mj_kinematics(model, data)
+    for name in held:
+        kind = model.joint(name).type[0]
+        if kind == int(mujoco.mjtJoint.mjJNT_FREE):
+            body = model.body(model.joint(name).bodyid[0]).name
+            raise InputError(f"body {body!r} is free and carries no pair: give --release {name} if it is to move")
+        if kind == mujoco.mjtJoint.mjJNT_BALL:
+            tie = _weld_ball(spec, model, data, name)
+        else:
+            tie = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=name)
+            address = model.joint(name).qposadr[0]
+            tie.data[:] = 0.0
+            tie.data[0] = pose[address] - model.qpos0[address]
+        tie.name, tie.active = unused_name(f"{name}_held", tie_names), True
+        tie.solimp[:2] = IMPEDANCE
+    return held
+
+
+def _check_stands(model: mujoco.MjModel, pose: np.ndarray, name: str, tie: mujoco.MjsEquality) -> None:
+    """Check that a constraint of the file holds a joint where the robot is to stand."""
+    address = model.joint(name).qposadr[0]
+    target, stands = float(model.qpos0[address] + tie.data[0]), float(pose[address])
+    if tie.type == mujoco.mjtEq.mjEQ_JOINT and abs(target - stands) > SAME_PLACE:
+        raise InputError(
+            f"equality {tie.name!r} holds the joint {name!r} at {target:.4g}, and the robot is to stand with it at "
+            f"{stands:.4g}: give a --keyframe that has it there, or take the equality out of the file"
+        )
+
+
+def _weld_ball(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, joint: str) -> mujoco.MjsEquality:
+    """Weld a ball joint's body to its parent, as they stand."""
+    body = model.joint(joint).bodyid[0]
+    parent = model.body_parentid[body]
+    back_pos, back_quat, place, turn = np.empty(3), np.empty(4), np.empty(3), np.empty(4)
+    mujoco.mju_negPose(back_pos, back_quat, data.xpos[parent], data.xquat[parent])
+    mujoco.mju_mulPose(place, turn, back_pos, back_quat, data.xpos[body], data.xquat[body])
+    tie = spec.add_equality(
+        type=mujoco.mjtEq.mjEQ_WELD,
+        objtype=mujoco.mjtObj.mjOBJ_BODY,
+        name1=model.body(parent).name,
+        name2=model.body(body).name,
+    )
+    tie.data[:11] = [0.0, 0.0, 0.0, *place, *turn, 1.0]
+    return tie
+
+
+def poses_of(model: mujoco.MjModel, qpos: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the position of each joint of a compiled model, by its name."""
+    poses = {}
+    for i in range(model.njnt):
+        address = model.jnt_qposadr[i]
+        poses[model.joint(i).name] = qpos[address : address + joint_sizes(int(model.jnt_type[i]))[0]].copy()
+    return poses
+
+
+def as_qpos(model: mujoco.MjModel, poses: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return poses as a vector qpos, with the model's reference for joints that have none."""
+    qpos = model.qpos0.copy()
+    for name, values in poses.items():
+        address = model.joint(name).qposadr[0]
+        qpos[address : address + len(values)] = values
+    return qpos
+
+
+def write_keyframe(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, qpos: np.ndarray, speeds: Mapping[str, float]
+) -> None:
+    """Write a keyframe in which the robot stands and its flywheels turn; other position servos hold their joints.
+
+    Args:
+        spec: The model, which gets the keyframe.
+        model: The same, compiled.
+        name: Name of the keyframe.
+        qpos: Joint positions, (nq,).
+        speeds: Flywheel joint -> speed, which its motor holds [rad/s].
+    """
+    qvel, (act, controls) = np.zeros(model.nv), rest_controls(model, posed(model, qpos))
+    for joint, speed in speeds.items():
+        qvel[model.joint(joint).dofadr[0]] = controls[model.actuator(f"{joint}_motor").id] = speed
+    spec.add_key(name=name, qpos=qpos, qvel=qvel, act=act, ctrl=controls)
+
+
+def pop_keyframes(spec: mujoco.MjSpec, model: mujoco.MjModel) -> list[tuple[str, dict[str, np.ndarray]]]:
+    """Remove a robot's own keyframes before it gets more joints, and return their names and poses."""
+    keyframes = [(model.key(i).name, poses_of(model, model.key_qpos[i])) for i in range(model.nkey)]
+    for key in list(spec.keys):
+        spec.delete(key)
+    # The equilibrium of an axis mounted earlier is written anew.
+    return [(name, poses) for name, poses in keyframes if name != EQUILIBRIUM_KEY]

@@ -1,0 +1,422 @@
+"""An observer tuned to one part of users' logs, scored on another, and compared in a closed loop."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import binomtest
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.features.replay.log import REFERENCE, Log
+from cmg_mj.features.replay.log_replay import NO_MODEL, ObserverInputs, misfit_of, observer_inputs, replay_log
+from cmg_mj.features.replay.noise import noise_figures, noise_remarks
+from cmg_mj.features.replay.reference import Alignment, alignment_of, model_remark, remarks_on
+from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit
+from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, plain
+from cmg_mj.observers import Observer, make_observer
+from cmg_mj.observers.parameter_options import ParameterValue
+from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, paired_verdict, ratio_interval
+from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.runs.experiment import prepare
+from cmg_mj.runs.open_loop import replay
+from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.scenario.loading import load_scenario, parse_scenario
+from cmg_mj.scenario.schema import ObserverSettings, Scenario
+from cmg_mj.stages.push import push_windows
+
+BLOCKS = 10
+"""Stretches of each log's part that are scored one by one, for an interval."""
+MIN_STRETCH_S = 0.5
+"""Shortest stretches with an interval [s]; shorter ones are not independent."""
+RELEVANT = 1.01
+"""A smaller ratio of two errors is no difference."""
+SCENARIO = "push_recovery"
+"""The scenario of the closed loop by default."""
+NO_LOOP = "none"
+"""Name of no scenario: nothing is simulated."""
+LOOP_WORLDS = 16
+USUAL_S = 5.0
+"""The loop runs for so long, or until the scenario ends [s]; longer only if the second after a push ends later."""
+
+
+def judged(ratio: Interval) -> PairedVerdict:
+    """Judge a ratio, above 1 for the better: it must differ by more than 1 %, and beyond chance.
+
+    Args:
+        ratio: With its 95 % interval.
+    """
+    if 1.0 / RELEVANT <= ratio.mean <= RELEVANT:
+        return "tie"
+    return paired_verdict(Interval(*(value - 1.0 for value in ratio)))
+
+
+@dataclass(frozen=True)
+class LoopComparison:
+    """A loop closed on the observer with the given parameters, and with the tuned ones.
+
+    Attributes:
+        scenario: Its title.
+        duration_s: Simulated time [s].
+        worlds: Number of worlds, the same noise in both loops.
+        given_stood: Number of worlds that stood to the end with the given parameters.
+        tuned_stood: Number of worlds that stood to the end with the tuned parameters.
+        given_stood_alone: Number of those that fell with the tuned parameters.
+        tuned_stood_alone: Number of those that fell with the given parameters.
+        tilt_rms_ratio: RMS of the tilt, given by tuned, over the worlds that stood with both; None of fewer than two.
+        refused: Why an observer could not be in this loop; empty if it could.
+    """
+
+    scenario: str
+    duration_s: float
+    worlds: int
+    given_stood: int = 0
+    tuned_stood: int = 0
+    given_stood_alone: int = 0
+    tuned_stood_alone: int = 0
+    tilt_rms_ratio: Interval | None = None
+    refused: str = ""
+
+    @property
+    def verdict(self) -> PairedVerdict | None:
+        """Compare the tuned parameters with the given ones: by falls if these are beyond chance, else by the tilt."""
+        if self.refused:
+            return None
+        given, tuned = self.given_stood_alone, self.tuned_stood_alone
+        if given + tuned and binomtest(given, given + tuned).pvalue < 1.0 - CONFIDENCE:  # the sign test
+            return "better" if tuned > given else "worse"
+        return "tie" if self.tilt_rms_ratio is None else judged(self.tilt_rms_ratio)
+
+    def figures(self) -> dict[str, SummaryValue]:
+        """Return the figures that `--json` prints."""
+        ratio = self.tilt_rms_ratio and list(self.tilt_rms_ratio)
+        return {**asdict(self), "tilt_rms_ratio": ratio, "verdict": self.verdict, "refused": self.refused or None}
+
+    @property
+    def remark(self) -> str:
+        """Describe the comparison in one line."""
+        loop = f"In the closed loop of {self.scenario} ({self.worlds} worlds of {self.duration_s:g} s, its rig, sensors"
+        loop += " and control rate)"
+        if self.refused:
+            return f"{loop} the parameters cannot be compared: {self.refused}."
+        line = (
+            f"{loop} the tuned parameters stand {self.tuned_stood} times ({self.tuned_stood_alone} where the given "
+            f"ones fall), the given ones {self.given_stood} ({self.given_stood_alone} where the tuned ones fall)"
+        )
+        if self.tilt_rms_ratio is not None:
+            line += "; RMS of the tilt, given / tuned, {:.3f} ({:.3f} to {:.3f})".format(*self.tilt_rms_ratio)
+        words = {"better": "better there", "worse": "WORSE there", "tie": "not different there beyond chance"}
+        return f"{line}: the tuned ones are {words[self.verdict or 'tie']}."
+
+
+def loop_scenario(name: str | None, log: Log) -> Scenario | None:
+    """Return the scenario whose loop is closed.
+
+    Args:
+        name: A bundled scenario or a file; None for the scenario of a run's own recording, else `SCENARIO`.
+        log: The log.
+
+    Returns:
+        The scenario; None if it is `NO_LOOP`.
+
+    Raises:
+        InputError: There is no such scenario, or it is wrong.
+    """
+    if name == NO_LOOP:
+        return None
+    if name is None and log.scenario is not None:
+        return parse_scenario(dict(log.scenario), log.name)
+    try:
+        return load_scenario(name or SCENARIO, [])
+    except InputError as error:
+        raise InputError(f"--closed-loop: {error}") from None
+
+
+def compare_in_loop(
+    scenario: Scenario, kind: str, given: ParameterValues, tuned: ParameterValues, *, worlds: int = LOOP_WORLDS
+) -> LoopComparison:
+    """Close the loop of a scenario on an observer with two sets of parameters, on the same worlds.
+
+    Args:
+        scenario: The scenario, which is cut short.
+        kind: The observer.
+        given: The parameters before.
+        tuned: The parameters after.
+        worlds: Number of worlds.
+
+    Returns:
+        The comparison.
+    """
+    calm = max((end for _, end in push_windows(scenario.push)), default=0.0)  # a second after the last push
+    duration = min(scenario.duration_s, max(USUAL_S, float(math.ceil(calm))))
+    loop = scenario.model_copy(
+        update={
+            "duration_s": duration,
+            "open_loop_observers": [],
+            "controller": scenario.controller.model_copy(update={"feedback": "observer", "bias_trim_s": 0.0}),
+        }
+    )
+    title = scenario.title or "the scenario"
+    try:
+        experiments = [
+            prepare(loop.model_copy(update={"observer": ObserverSettings(kind=kind, **plain(parameters))}))
+            for parameters in (given, tuned)
+        ]
+        for experiment in experiments:
+            experiment.require_single_axis("tune-log")
+    except InputError as error:
+        return LoopComparison(title, duration, worlds, refused=str(error))
+    results = run_side_by_side([run_of(experiment, worlds) for experiment in experiments], keep_trajectory=False)
+    if any(outcome.kind == "interrupted" for result in results for outcome in result.outcomes):
+        raise KeyboardInterrupt
+    tilts = [result.values("tilt_rms_deg") for result in results]
+    both = np.isfinite(tilts).all(axis=0)
+    ratio = ratio_interval(tilts[0][both], tilts[1][both]) if both.sum() >= 2 else None
+    stood = [result.stood for result in results]
+    counts = [int(which.sum()) for which in (*stood, stood[0] & ~stood[1], stood[1] & ~stood[0])]
+    return LoopComparison(title, duration, worlds, *counts, tilt_rms_ratio=ratio)
+
+
+class LogSegments:
+    """Parts of logs that are fitted or scored, in stretches of equal length.
+
+    Args:
+        logs: The parts.
+        settle_s: Time from every start of an observer that is not scored [s].
+
+    Attributes:
+        shortest_s: Length of the shortest stretch [s].
+        worlds: Number of stretches.
+        zero_rms: Error of an estimate of zero: RMS of the reference, mean of the stretches [rad/s].
+        largest_acceleration: Largest acceleration of the tilt, by differences of the reference [rad/s^2].
+    """
+
+    fell = 0
+
+    def __init__(self, logs: Sequence[Log], settle_s: float) -> None:
+        self.logs, self._stretches = logs, []
+        for i, log in enumerate(logs):
+            scored = np.flatnonzero(log.scored(settle_s) & np.isfinite(log[REFERENCE]))
+            self._stretches += [(i, rows) for rows in np.array_split(scored, BLOCKS) if len(rows)]
+        self.worlds = len(self._stretches)
+        self.shortest_s = min(len(rows) * logs[i].dt for i, rows in self._stretches)
+        self.zero_rms = float(self._rms([-log[REFERENCE] for log in logs]).mean())
+        self.largest_acceleration = max(float(np.nanmax(np.abs(np.diff(log[REFERENCE]) / log.dt))) for log in logs)
+
+    def errors(self, observers: Sequence[Observer], /) -> np.ndarray:
+        """Return the RMS of the estimated rate less the reference in every stretch, (n_stretches,) [rad/s].
+
+        Args:
+            observers: One observer for each log.
+        """
+        errors = []
+        for log, observer in zip(self.logs, observers, strict=True):
+            rate = np.full(len(log), math.nan)
+            for part in log.parts:
+                with np.errstate(all="ignore"):
+                    rate[part] = replay(observer, log.trajectory(part)).x2
+            errors.append(rate - log[REFERENCE])
+        return self._rms(errors)
+
+    def _rms(self, errors: Sequence[np.ndarray]) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            return np.array([math.sqrt(float(np.mean(errors[i][rows] ** 2))) for i, rows in self._stretches])
+
+
+class LogEvidence(NamedTuple):
+    """Evidence of a log beside its errors."""
+
+    name: str
+    noise: TiltNoise
+    """Sensor noise that the observer assumed."""
+    noise_by_the_log: Mapping[str, SummaryValue]
+    """White noise that the log shows, as `--json` prints it."""
+    alignment: Alignment | None
+    """Lag, scale and offset of the reference."""
+    remarks: Sequence[str]
+    """Remarks as in a replay."""
+
+
+@dataclass(frozen=True)
+class LogStudy:
+    """An observer tuned on logs.
+
+    Attributes:
+        kind: The observer.
+        start_parameters: Its parameters before.
+        numbers: The tuned numbers.
+        insensitive_parameters: Names of numbers that are not tuned, since the estimated rate does not depend on them.
+        logs: The logs.
+        split: The share of each log that was fitted; the rest is scored.
+        level: Tuned parameters and their scores.
+        stretch_s: The shortest of the scored stretches [s].
+        loop: Given and tuned parameters in a scenario's closed loop; None if none was asked for.
+    """
+
+    kind: str
+    start_parameters: ParameterValues
+    numbers: Sequence[TunedScalar]
+    insensitive_parameters: Sequence[str]
+    logs: Sequence[LogEvidence]
+    split: float
+    level: NoiseLevelResult
+    stretch_s: float
+    loop: LoopComparison | None = None
+
+    @property
+    def verdict(self) -> PairedVerdict | None:
+        """Compare the tuned parameters with the given ones; None if the stretches are too short for an interval.
+
+        Better is better by more than 1 % and beyond chance, over the held-out stretches. Given parameters with which
+        the observer fails are worse than any.
+        """
+        if not self.has_interval:
+            return None
+        return judged(self.level.ratio) if np.isfinite(self.level.given_rms).all() else "better"
+
+    @property
+    def has_interval(self) -> bool:
+        """Return whether the stretches are long enough for an interval."""
+        return self.stretch_s >= MIN_STRETCH_S
+
+    def settings(self) -> list[str]:
+        """Return the tuned parameters as `--set` of a replay takes them."""
+        tuned = plain({number.parameter: self.level.parameters[number.parameter] for number in self.numbers})
+        return [f"{self.kind}.{name}={json.dumps(value)}" for name, value in tuned.items()]
+
+    def figures(self) -> dict[str, SummaryValue]:
+        """Return the figures that `cmg-mj tune-log --json` prints."""
+        return {
+            "logs": [log.name for log in self.logs],
+            "observer": self.kind,
+            "split": self.split,
+            "given_parameters": plain(self.start_parameters),
+            "tuned": [number.name for number in self.numbers],
+            "idle": list(self.insensitive_parameters),
+            "noise": [
+                {
+                    "tilt_rad": log.noise.tilt,
+                    "acceleration_rad_s2": log.noise.acceleration,
+                    "correlation": log.noise.correlation,
+                    **log.noise_by_the_log,
+                }
+                for log in self.logs
+            ],
+            "notes": [list(log.remarks) for log in self.logs],
+            "reference": [log.alignment and log.alignment._asdict() for log in self.logs],
+            "held_out_stretches": len(self.level.rms),
+            "held_out_stretch_s": self.stretch_s,
+            **self.level.figures(),
+            **({} if self.has_interval else {"held_out_ratio": None}),
+            "verdict": self.verdict,
+            **({"closed_loop": self.loop.figures()} if self.loop else {}),
+        }
+
+
+def tune_on_logs(
+    logs: Sequence[Log],
+    kind: str,
+    *,
+    model: ReducedModel | None = None,
+    noises: Mapping[str, float] | None = None,
+    start_parameters: ParameterValues | None = None,
+    split: float = 0.5,
+    settle_s: float = 1.0,
+    parameters: Sequence[str] = (),
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    starts: int = 2,
+    closed_loop: Scenario | None = None,
+    on_share: OnShare | None = None,
+) -> LogStudy:
+    """Fit an observer's parameters to the reference of some logs.
+
+    Args:
+        logs: Logs with a reference and the same sample period.
+        kind: The observer.
+        model: The pendulum, for an observer that needs it; a run's recording brings its own.
+        noises: Noises from `noise_numbers`; by default each log's own, as in `replay_prepared`.
+        start_parameters: Parameters to start from and to compare with, instead of the defaults or a run's own.
+        split: The share of each log, from its start, that is fitted; the rest is scored.
+        settle_s: Time from every start of an observer that is not scored [s].
+        parameters: Names to tune; by default every number of the observer.
+        ranges: Number -> smallest and largest size.
+        starts: Starts of a search in several dimensions.
+        closed_loop: A scenario in whose loop the tuned parameters are compared with the given ones.
+        on_share: Called now and then with the completed share.
+
+    Returns:
+        The study.
+
+    Raises:
+        InputError: A log has no reference or is too short, the observer cannot take part, or nothing can be tuned.
+    """
+    if not 0.0 < split < 1.0:
+        raise InputError(f"--split {split:g}: must be between 0 and 1, the share that is fitted")
+    dt = _common_period(logs)
+    inputs = [
+        observer_inputs(log, model=model, noises=noises, parameters={kind: start_parameters or {}}) for log in logs
+    ]
+    given = _common_parameters(kind, logs, inputs)
+    halves = [[log.cut(slice(0, end)), log.cut(slice(end, None))] for log in logs for end in [round(split * len(log))]]
+    for log_halves, log_inputs in zip(halves, inputs, strict=True):
+        for half in log_halves:  # an observer that cannot take part is refused, with the reason
+            replay_log(half, [kind], **log_inputs._asdict(), settle_s=settle_s)
+    fitted, held_out = (LogSegments(segments, settle_s) for segments in zip(*halves, strict=True))
+    makers = [partial(make_observer, kind, dt, own.model or NO_MODEL, own.noise) for own in inputs]
+
+    def one_per_log(**candidate: ParameterValue) -> list[Observer]:
+        return [make(**candidate) for make in makers]
+
+    fit = ParameterFit(kind, makers[0], given, parameters, ranges, starts)
+    level = fit.level(one_per_log, fitted, held_out, on_share)
+    evidence = [_evidence(*log_and_inputs) for log_and_inputs in zip(logs, inputs, strict=True)]
+    return LogStudy(
+        kind,
+        fit.start_parameters,
+        fit.numbers,
+        fit.insensitive_parameters or (),
+        evidence,
+        split,
+        level,
+        held_out.shortest_s,
+        closed_loop and compare_in_loop(closed_loop, kind, fit.start_parameters, level.parameters),
+    )
+
+
+def _evidence(log: Log, inputs: ObserverInputs) -> LogEvidence:
+    alignment = alignment_of(log)
+    remarks = [*remarks_on(log, alignment), *noise_remarks(log, inputs.noise)]
+    doubt = model_remark(misfit_of(log, inputs.model))
+    return LogEvidence(
+        log.name, inputs.noise, noise_figures(log, inputs.noise), alignment, [*remarks, *([doubt] if doubt else [])]
+    )
+
+
+def _common_period(logs: Sequence[Log]) -> float:
+    """Return the sample period of logs that all have a reference [s]."""
+    dt = logs[0].dt
+    for log in logs:
+        if "reference" not in log.has:
+            raise InputError(f"{log.name}: no reference to tune to: name it, --columns rate=...")
+        if abs(log.dt / dt - 1.0) > 1e-3:
+            raise InputError(f"{log.name}: {1.0 / log.dt:g} Hz, {logs[0].name} {1.0 / dt:g} Hz: give --rate HZ")
+    return dt
+
+
+def _common_parameters(kind: str, logs: Sequence[Log], inputs: Sequence[ObserverInputs]) -> ParameterValues:
+    """Return the observer's parameters, which must be the same in all logs."""
+    parameters = dict(inputs[0].parameters[kind])
+    for log, log_inputs in zip(logs, inputs, strict=True):
+        if log_inputs.parameters[kind] != parameters:
+            raise InputError(
+                f"{logs[0].name} and {log.name} ran with different parameters of {kind}: say with which to begin, "
+                "--set observer.NAME=VALUE"
+            )
+    return parameters
