@@ -12,11 +12,11 @@ from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm, solve_discrete_are
 from scipy.stats import chi2
 
-from cmg_mj import load_scenario, prepare
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.kalman import COLUMNS, PAIRS, Covariance, Kalman, State
-from tests.observers.reference import DT, HEAVY, PAPER, observer, rough_signals
+from tests.observers.reference import DT, HEAVY, PAPER, observer, rough_signals, run
+from tests.recorded import push_recovery
 
 C = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 PAIR = dataclasses.replace(PAPER, gimbals=2)
@@ -83,10 +83,8 @@ def reference(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) 
     """The textbook's extended Kalman filter: estimates (n - 1, 4), and the last covariance (4, 4)."""
     R = measured_noise(estimator)
     Q = sample_noise(estimator, jacobian(estimator, np.zeros(4), 0.0))
-    x, P = (
-        np.array([y1[0], 0.0, y2[0], 0.0]),
-        np.diag([R[0, 0], estimator.rate_start**2, R[1, 1], estimator.torque_start**2]),
-    )
+    x = np.array([y1[0], 0.0, y2[0], 0.0])
+    P = np.diag([R[0, 0], estimator.rate_start**2, R[1, 1], estimator.torque_start**2])
     estimates = []
     for k in range(1, len(y1)):
         command = float(u[k - 1])
@@ -102,25 +100,16 @@ def reference(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) 
     return np.array(estimates), P
 
 
-def run_filter(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, State]:
-    """Estimates (n - 1, 4), and the last state."""
-    state, estimates = estimator.init(Measurement(float(y1[0]), float(y2[0]))), []
-    for k in range(1, len(y1)):
-        state, estimate = estimator.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
-        estimates.append(estimate)
-    return np.array(estimates), state
-
-
 @pytest.mark.parametrize("model", [PAIR, HEAVY], ids=["pair", "heavy"])
 def test_equals_the_textbooks_filter(model: ReducedModel) -> None:
     """But for the third order of a step with the command at its limit: 2 % of the estimate's own noise."""
     estimator = kalman(model)
     signals = rough_signals(200, seed=1)
     expected, P = reference(estimator, *signals)
-    estimates, state = run_filter(estimator, *signals)
+    estimates, states = run(estimator, *signals)
     off = np.abs(estimates - expected).max(axis=0)
     assert (off < [2e-6, 2e-4, 1e-9, 1e-4]).all(), off
-    np.testing.assert_allclose(matrix(state.P), P, rtol=2e-3, atol=1e-10)
+    np.testing.assert_allclose(matrix(states[-1].P), P, rtol=2e-3, atol=1e-10)
 
 
 def test_defaults() -> None:
@@ -139,17 +128,10 @@ def test_the_series_ends_where_it_says(pole_dt: float, most: float) -> None:
 def test_settles_at_the_linear_filter() -> None:
     """About the upright the gains become those of the algebraic Riccati equation."""
     estimator = kalman()
-    F, Q = (
-        expm(jacobian(estimator, np.zeros(4), 0.0) * DT),
-        sample_noise(estimator, jacobian(estimator, np.zeros(4), 0.0)),
-    )
-    R = measured_noise(estimator)
-    prediction_covariance = solve_discrete_are(F.T, C.T, Q, R)
-    covariance = prediction_covariance - prediction_covariance @ C.T @ np.linalg.solve(
-        C @ prediction_covariance @ C.T + R, C @ prediction_covariance
-    )
-    zeros = np.zeros(8000)
-    _, state = run_filter(estimator, zeros, zeros, zeros)
+    A, R = jacobian(estimator, np.zeros(4), 0.0), measured_noise(estimator)
+    P = solve_discrete_are(expm(A * DT).T, C.T, sample_noise(estimator, A), R)
+    covariance = P - P @ C.T @ np.linalg.solve(C @ P @ C.T + R, C @ P)
+    state = run(estimator, np.zeros(8000))[1][-1]
     np.testing.assert_allclose(matrix(state.P), covariance, rtol=1e-6, atol=1e-14)
     gain = covariance @ C.T @ np.linalg.inv(R)
     for column, y in ((0, Measurement(1e-9, 0.0)), (1, Measurement(0.0, 1e-9))):
@@ -162,14 +144,11 @@ def test_settles_at_the_linear_filter() -> None:
 def test_covariance_stays_a_covariance(dt: float) -> None:
     """Over 20,000 samples of signals that no rig makes, from a start that knows next to nothing."""
     estimator = kalman(dt=dt, rate_start=100.0, torque_start=100.0)
-    y1, y2, u = rough_signals(20_000, seed=2)
-    state = estimator.init(Measurement(float(y1[0]), float(y2[0])))
-    for k in range(1, len(y1)):
-        state, _ = estimator.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
-        if k % 100 == 0 or k < 100:
-            P = matrix(state.P)
-            scale = np.sqrt(np.diag(P))
-            assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > 1e-6, k
+    _, states = run(estimator, *rough_signals(20_000, seed=2))
+    for state in (*states[1:100], *states[100::100]):
+        P = matrix(state.P)
+        scale = np.sqrt(np.diag(P))
+        assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > 1e-6
 
 
 def simulate(
@@ -245,8 +224,7 @@ def test_a_bias_is_found_as_a_torque() -> None:
     """At rest at y1 = -e gravity pulls as if upright: the torque that e makes is n M sin e."""
     estimator = kalman()
     e = math.radians(1.0)
-    zeros = np.zeros(3000)
-    estimates, _ = run_filter(estimator, zeros - e, zeros, zeros)
+    estimates, _ = run(estimator, [-e] * 3000)
     expected = (0.0 - e, 0.0, 0.0, PAIR.gimbals * PAIR.gravity_torque * math.sin(e))
     np.testing.assert_allclose(estimates[-1], expected, atol=1e-4)
     assert "bias_rad" not in estimator.extra_signals
@@ -255,6 +233,5 @@ def test_a_bias_is_found_as_a_torque() -> None:
 @pytest.mark.parametrize("counts", [64, 4096])
 def test_it_uses_the_noise_of_the_scenarios_encoders(counts: int) -> None:
     """y2 is the mean of two, each rounded to whole counts."""
-    changes = [f"sensors.encoder.counts_per_revolution={counts}"]
-    setup: Any = prepare(load_scenario("push_recovery", changes, "kalman")).design.observer()
+    setup: Any = push_recovery(f"sensors.encoder.counts_per_revolution={counts}", observer="kalman").design.observer()
     assert setup.noise.gimbal**2 == pytest.approx((2.0 * math.pi / counts) ** 2 / 12.0 / 2.0)
