@@ -49,28 +49,6 @@ def random_motion(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.
 # --- the six bodies of aranovskiy2020 -----------------------------------------------------------------------
 
 
-def test_the_rig_is_six_bodies_in_a_chain_of_hinges(plant: Plant) -> None:
-    model = plant.model
-    bodies = [model.body(i).name for i in range(1, model.nbody)]
-    assert bodies == [
-        "thrust_bearing",
-        "frame",
-        "cube1/gimbal",
-        "cube1/flywheel",
-        "cube2/gimbal",
-        "cube2/flywheel",
-    ]
-    assert plant.joint_names == [
-        "yaw",
-        "tilt",
-        "cube1/gimbal",
-        "cube1/flywheel",
-        "cube2/gimbal",
-        "cube2/flywheel",
-    ]
-    assert model.nv == 6
-
-
 def test_mass_matrix_is_the_papers_but_for_its_missing_yaw_term(plant: Plant, rng: np.random.Generator) -> None:
     angles, _, _ = random_motion(rng)
     difference = mass_matrices(plant.model, angles)

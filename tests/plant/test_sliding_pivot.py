@@ -190,13 +190,6 @@ def test_a_pivot_at_rest_is_what_it_was(model: str) -> None:
         load_plant(model=model, pivot_slides=True)
 
 
-@pytest.mark.slow
-def test_a_held_cart_is_a_pivot_at_rest(tmp_path: Path) -> None:
-    spec = mujoco.MjSpec.from_string(cart_pole())
-    model = mount(spec, "pole", axis="hinge").save(tmp_path / "held.xml")
-    assert load_plant(model=str(model)).reduced.pivot_arm == 0.0
-
-
 TWO_JOINTS = """
 <mujoco><option timestep="0.005" integrator="RK4"/><worldbody>
   <body pos="0 0 1"><joint name="lower" type="{kind}" axis="{axis}"/><geom type="box" size="0.2 0.15 0.1" mass="1"/>
