@@ -189,14 +189,3 @@ def test_what_stood_averages_to_what_is_printed() -> None:
     assert all(0.5 < end < 2.2 for end in fell["end_time_s"].to_pylist())
     assert all(math.isfinite(value) for value in fell[ERROR].to_pylist())
     assert set(fell["settle_time_s"].to_pylist()) == {None}
-
-
-def test_a_world_is_that_of_a_run_of_its_own() -> None:
-    ltv = compare_two()[0]
-    table = worlds_table(compare_two())
-    alone = ltv.experiment.run(world=2, keep_trajectory=False)
-    (row,) = alone.rows()
-    (table_row,) = table.filter((pc.field("observer") == "ltv") & (pc.field("world") == 2)).to_pylist()
-    assert row["world"] == 2
-    for key, value in row.items():
-        assert table_row[key] == (pytest.approx(value, rel=1e-9) if isinstance(value, float) else value), key
