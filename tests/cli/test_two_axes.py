@@ -106,14 +106,6 @@ def test_the_observer_that_is_named_is_that_of_all_axes() -> None:
     assert tuned_axis.with_observer("homogeneous").of_axis("roll").observer.parameters == {"k1": 25}
 
 
-def test_an_observer_on_the_command_line_is_that_of_all_axes(tmp_path: Path) -> None:
-    file = tmp_path / "mixed.toml"
-    file.write_text('[plant]\nmodel = "two_axes"\n[axes.roll.observer]\nkind = "linear"\n', encoding="utf-8")
-    assert load_scenario(str(file), observer="kalman").of_axis("roll").observer.kind == "kalman"
-    assert load_scenario(str(file), observer="linear").of_axis("pitch").observer.kind == "linear"
-    assert load_scenario(str(file)).of_axis("roll").observer.kind == "linear"
-
-
 def test_another_law_does_without_the_files_gains() -> None:
     assert load_scenario("two_axes", ["controller.kind=lqg"]).controller.gains is None
     assert two_axes("controller.kind=lqg").run().outcomes[0].kind == "done"
@@ -124,22 +116,6 @@ def test_another_law_does_without_the_files_gains() -> None:
     )
     roll = lqg_scenario.with_law("lqg").of_axis("roll").controller
     assert (roll.kind, roll.gains, roll.rate_limit_rad_s) == ("lqg", None, 3.0)
-
-
-def test_sensors_of_an_axis_have_rates_of_their_own() -> None:
-    experiment = two_axes("axes.roll.sensors.accelerometer.rate_hz=1000")
-    assert experiment.plant.timestep == 0.001
-    assert experiment.run().outcomes[0].kind == "done"
-
-
-def test_the_true_rate_is_used_throughout_where_it_is_fed_back() -> None:
-    """The observer's estimate then changes nothing, the gimbals' turn against the other axis included."""
-    runs = [two_axes("controller.feedback=truth", f"observer.kind={kind}").run() for kind in ("homogeneous", "linear")]
-    first, second = (run.trajectory for run in runs)
-    assert first is not None
-    assert second is not None
-    for name in ("roll/u_rad_s", "pitch/u_rad_s", "angle/roll/cube1/gimbal_rad"):
-        np.testing.assert_array_equal(first[name], second[name], err_msg=name)
 
 
 def test_replay_of_several_axes_is_refused_for_what_it_is(run_folder: Path, run_outcome: CommandOutcome) -> None:
@@ -242,15 +218,6 @@ def test_what_takes_one_axis_says_so() -> None:
         complaint = cmg_mj(*arguments).complaint
         assert "tilts about several axes (roll, pitch)" in complaint
         assert "plant.locked_axes" in complaint
-
-
-def test_a_rig_of_two_axes_with_one_locked_is_a_rig_of_one() -> None:
-    experiment = two_axes('plant.locked_axes=["roll"]')
-    result = experiment.run()
-    assert result.trajectory is not None
-    assert result.trajectory.axes == ()
-    assert AXES not in result.summaries[0]
-    assert experiment.axes[0].scenario.plant.equilibrium_bias_deg == -0.3
 
 
 def test_in_a_loop_of_ones_own() -> None:
