@@ -84,19 +84,6 @@ def test_what_a_run_writes_reruns_and_has_every_axis(tmp_path: Path) -> None:
     assert {"plot-roll.png", "plot-pitch.png", "recording.rrd"} <= {path.name for path in place.iterdir()}
 
 
-def test_with_open_loop_observers_it_reruns_with_the_same_columns(tmp_path: Path) -> None:
-    """An axis' own observer is no open-loop observer of its own; of the other axis it may be."""
-    experiment = two_axes("axes.roll.observer.kind=linear", "open_loop_observers=['homogeneous', 'kalman']")
-    experiment.save(tmp_path / "scenario.toml")
-    first, rerun = (
-        run.run().trajectory for run in (experiment, prepare(load_scenario(str(tmp_path / "scenario.toml"))))
-    )
-    assert first is not None
-    assert rerun is not None
-    assert list(rerun.columns) == list(first.columns)
-    assert "roll/estimate/homogeneous/x2_rad_s" in first.columns
-
-
 def test_the_observer_that_is_named_is_that_of_all_axes() -> None:
     mixed_axes = load_scenario("two_axes", ["axes.roll.observer.kind=linear"])
     assert prepare(mixed_axes).observer_title == "roll linear, pitch homogeneous"

@@ -91,7 +91,6 @@ def test_finds_bias_and_sinusoid() -> None:
     assert np.abs(result[late, 1] - x2[1:][late]).max() < 2e-3
     blind = run(adaptive(), y1, y2, u)[0]
     rms = [float(np.sqrt(np.mean((rows[late, 1] - x2[1:][late]) ** 2))) for rows in (result, blind)]
-    print(f"velocity RMS error with a gait's torque: knowing of it {rms[0]:.1e}, not {rms[1]:.1e} rad/s")
     assert rms[0] < 0.1 * rms[1]
 
 
@@ -111,7 +110,6 @@ def test_noise_moves_the_bias_by_what_the_linear_filter_says() -> None:
     g = np.array([0.0, b, 0.0]) - correction  # gravity at the measured tilt, and the correction
     variance = solve_continuous_lyapunov(F, -np.outer(g, g) * sigma**2 * DT)[2, 2]
     result, expected = float(np.degrees(np.std(errors))), math.degrees(math.sqrt(variance))
-    print(f"bias error: mean {np.degrees(np.mean(errors)):.4f} deg, RMS {result:.4f}, expected {expected:.4f}")
     assert result == pytest.approx(expected, rel=0.1)
     assert abs(np.degrees(np.mean(errors))) < 0.02
 
@@ -123,7 +121,6 @@ def test_learning_rate_is_the_stiffness_that_a_quiet_rig_comes_to(hertz: float) 
     state = run(estimator, [0.0] * 601)[1][-1]
     weights = (estimator.Gamma[2],) * 2 if hertz else estimator.Gamma[:1]
     result = estimator.Sigma * sum(weight * T1**2 for weight, T1 in zip(weights, state.T1, strict=True))
-    print(f"learning rate {estimator.learning_rate:.4f} 1/s, found {result:.4f}")
     assert estimator.learning_rate == pytest.approx(result, rel=0.02)
 
 

@@ -76,20 +76,11 @@ def test_follows_the_printed_observer_at_200_hz(parameters: dict, model: Reduced
     estimates, states = run(high_gain(model=model, **parameters), y1, y2, u)
     gains = np.array([state.L for state in states[1:]])
     error = np.sqrt(np.mean((estimates[:, 1] - expected[:, 1]) ** 2)) / np.std(expected[:, 1])
-    print(f"{parameters}: relative error {error:.1e}, L up to {gains.max():.3f}")
     assert error < 1e-2
     # Omega is held over a sample, in which the gimbal turns by up to 0.02 rad.
     assert gains - 1.0 == pytest.approx(expected[:, 2] - 1.0, rel=0.02, abs=1e-5)
     if model is HEAVY:
         assert gains.max() > 1.1
-
-
-def test_omega_bounds_the_increments_exactly() -> None:
-    """(6) for f2, affine in x2: |f2(x2) - f2(x2_hat)| = |u damping| |x2 - x2_hat|."""
-    rng = np.random.default_rng(0)
-    for y1, y2, u, a, b in rng.normal(0.0, 1.0, (50, 5)):
-        increment = HEAVY.tilt_acceleration(y1, a, y2, u) - HEAVY.tilt_acceleration(y1, b, y2, u)
-        assert abs(increment) == pytest.approx(abs(u * HEAVY.terms(y1, y2)[2]) * abs(a - b), rel=1e-9, abs=1e-12)
 
 
 def test_largest_damping_is_the_largest() -> None:

@@ -71,7 +71,6 @@ def test_follows_the_continuous_observer_at_200_hz(parameters: dict, model: Redu
     expected = integrate(homogeneous_slope(model, **parameters), [y1[0], 0.0], y1, y2, u)
     estimates, _ = run(observer("homogeneous", model=model, **parameters), y1, y2, u)
     error = np.sqrt(np.mean((estimates[:, 1] - expected[:, 1]) ** 2))
-    print(f"{parameters}: rms rate {np.std(expected[:, 1]):.3f} rad/s, rms error of the step {error:.2e}")
     tolerance = 2e-2 if parameters.get("alpha") == 0.7 else 3e-3
     assert error < tolerance * np.std(expected[:, 1])
 
@@ -104,7 +103,6 @@ def test_converges_to_the_continuous_observer_with_the_square_of_the_period() ->
         error = np.abs(estimates[:, 1] - reference(t[1:])[1])
         errors.append(error[t[1:] > 0.3].max())
     orders = [math.log2(coarse / fine) for coarse, fine in itertools.pairwise(errors)]
-    print(f"largest error at 200 Hz {errors[0]:.2e} rad/s, orders {np.round(orders, 3)}")
     assert errors[0] < 1e-4
     assert min(orders) > 1.95
 
@@ -124,7 +122,6 @@ def test_converges_in_finite_time() -> None:
     dt = 1e-3
     ours, linear = (np.abs(free_errors(alpha, dt, 1500, 0.05, -1.0)[:, 1]) for alpha in (0.85, 1.0))
     end_time = dt * (1 + int(np.flatnonzero(ours > 1e-9)[-1]))
-    print(f"1e-9 rad/s after {end_time:.3f} s; alpha = 1 then has {linear[round(end_time / dt)]:.1e} rad/s")
     assert end_time < 1.2
     assert linear[round(end_time / dt)] > 1e-6
 

@@ -36,7 +36,6 @@ def test_in_a_closed_loop_it_is_the_reference_integration(duration_s: float) -> 
     reference = integrate(ltv_slope(), np.concatenate([[y1[0], 0.0, y2[0]], np.eye(3).ravel()]), y1, y2, u)
     estimates, states = run(observer("ltv"), y1, y2, u)
     H, expected = np.array([riccati_matrix(state) for state in states[1:]]), reference[:, 3:].reshape(-1, 3, 3)
-    print(f"relative error of H's entries {relative_errors(H, expected):.1e}; condition {np.linalg.cond(H).max():.3g}")
     assert relative_errors(H, expected) < 1e-6
     assert np.abs(expected[:, [0, 1, 2, 2], [2, 2, 0, 1]]).max() < 1e-9  # the third state decouples
     assert np.linalg.eigvalsh(H).min() > 0.5
@@ -66,7 +65,6 @@ def test_follows_the_continuous_observer(parameters: dict, model) -> None:
     estimates, states = run(observer("ltv", model=model, **parameters), y1, y2, u)
     error = relative_errors(np.array([riccati_matrix(s) for s in states[1:]]), reference[:, 3:].reshape(-1, 3, 3))
     relative_error = np.abs(estimates - reference[:, :3]).max(axis=0) / np.abs(reference[:, :3]).max(axis=0)
-    print(f"{parameters}: relative error of H {error:.1e}, of the estimate {relative_error}")
     assert error < (2e-4 if model is HEAVY else 1e-6)
     np.testing.assert_array_less(relative_error, 1e-4)
 
@@ -127,14 +125,3 @@ def test_riccati_matrix_is_exact_while_the_gimbal_stands(dt: float, weights: tup
     for state in states[1:]:
         H = (E[3:, :3] + E[3:, 3:] @ H) @ np.linalg.inv(E[:3, :3] + E[:3, 3:] @ H)
         assert relative_errors(riccati_matrix(state), H) < 1e-8
-
-
-@pytest.mark.daily_cases("0.1-weights2")
-@pytest.mark.parametrize(
-    ("dt", "weights"), [(0.005, (1e6, 5e6, 1.0)), (0.005, (1.0, 1e12, 1.0)), (0.1, (1.0, 5e6, 1.0))]
-)
-def test_estimate_is_stable_at_any_gain(dt: float, weights: tuple[float, float, float]) -> None:
-    """The continuous observer is, whatever Q: its estimate of a steady tilt is the tilt, but for the bias."""
-    n = 2000
-    estimates, _ = run(observer("ltv", dt, Q=weights), [0.01] * n)
-    assert estimates[-1, 0] == pytest.approx(0.01, abs=1e-2)

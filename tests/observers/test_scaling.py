@@ -97,15 +97,6 @@ def test_nothing_changes_on_the_papers_rig() -> None:
             np.testing.assert_allclose(value, default, rtol=2e-3)
 
 
-def test_a_slow_robot_gets_slow_gains() -> None:
-    humanoid = ReducedModel(J1=68.79, J2=-0.0098, J_d=0.0567, omega_d=314.0, gravity_torque=536.6, gimbals=2)
-    time, inertia = scales_of(humanoid)
-    assert (time, inertia) == pytest.approx((2.675, 1112.0), rel=2e-3)
-    assert scaled_parameters("homogeneous", humanoid) == pytest.approx({"k1": 20.0 / time, "k2": 150.0 / time**2})
-    assert scaled_parameters("linear", humanoid) == {"tau": pytest.approx(0.02 * time)}
-    assert scaled_parameters("kalman", humanoid)["torque_start"] == pytest.approx(0.2 * inertia / time**2)
-
-
 def test_the_sensors_observers_and_a_users_own_stay_as_they_are() -> None:
     for kind in ("gyro_free", "free_pivot", "finite_difference", "tests.features.tuning.user_observer:UserObserver"):
         assert scaled_parameters(kind, HEAVY) == {}

@@ -54,7 +54,6 @@ def test_a_ramp_is_met_in_finite_time_and_held_without_chattering() -> None:
     estimates, _ = run(observer("super_twisting", L=L), ramp)
     is_settled = np.abs(estimates[:, 1] - 0.9) < 1e-10
     first = int(np.argmax(is_settled))
-    print(f"slope 0.9 rad/s met to 1e-10 after {first * DT:.3f} s")
     assert 0 < first * DT < 0.5
     assert is_settled[first:].all()
     np.testing.assert_allclose(estimates[first:, 0], ramp[first + 1 :], rtol=0.0, atol=1e-12)

@@ -136,7 +136,6 @@ def test_free_motion_conserves_energy_and_momenta(
     rig: Rig, gravity: bool, momentum_bound: float, duration_s: float
 ) -> None:
     energy, *momenta = np.abs(rig.drifts(duration_s, 1e-3, gravity=gravity, seed=0)).max(axis=(1, 2))
-    print(f"{rig.model}, gravity {gravity}: energy {energy:.1e}, momenta", *(f"{drift:.1e}" for drift in momenta))
     assert energy < 1e-6
     assert max(momenta) < momentum_bound
 
@@ -153,7 +152,6 @@ def test_drifts_shrink_with_the_fourth_power_of_the_step(rig: Rig, gravity: bool
     runs = [rig.drifts(0.25, h, gravity=gravity, seed=1) for h in (1e-3, 5e-4, 2.5e-4)]
     sizes = np.array([np.sqrt(np.mean(run**2, axis=(1, 2))) for run in runs])
     orders = np.log2(sizes[:-1] / sizes[1:])
-    print(f"{rig.model}, gravity {gravity}: orders {np.round(orders, 2).tolist()}")
     assert np.all(orders > 3.9)
     assert rig is TWO_AXES or np.all(sizes[-1] > 5e-14)  # rounding is below 1e-14
 
@@ -253,7 +251,6 @@ def test_energy_changes_by_the_work_of_motors_and_friction(
     The balance is therefore only as good as the model of friction: its error is stated, not made small.
     """
     balance = work_balance(PAIR, duration_s, 1.5, **friction)
-    print(f"{friction}: {balance}")
     assert balance.torque_used < 1.0 or friction is DRY  # no kinks from saturation, and a quadrature of full order
     assert balance.lost_j > 0.1 * duration_s
     assert balance.residual < most
@@ -263,7 +260,6 @@ def test_energy_changes_by_the_work_of_motors_and_friction(
 def test_energy_of_two_axes_changes_by_the_work_of_servos_and_motors(duration_s: float) -> None:
     """Gimbals, flywheels and yaw are driven, the tilts have friction."""
     balance = work_balance(TWO_AXES, duration_s, 1.0, tilt_damping_n_m_s=0.05)
-    print(balance)
     assert balance.torque_used < 1.0
     assert balance.residual < 1e-6
     assert balance.yaw_w > 1.0

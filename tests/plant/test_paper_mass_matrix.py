@@ -115,7 +115,6 @@ def test_bias_changes_the_inertia_by_the_parallel_axis_theorem(
     np.testing.assert_allclose(change, expected, rtol=0.0, atol=1e-12)
 
     change_of_J1 = float(change[0, 1, 1]) / 2.0
-    print(f"e = {bias_deg:+} deg: J1 changes by {change_of_J1:.4e} kg m^2 ({change_of_J1 / paper.J1:.3%})")
     assert change_of_J1 == pytest.approx(1.874e-5, rel=1e-3)
     assert other_plant.reduced == plant.reduced  # the controller does not know
 

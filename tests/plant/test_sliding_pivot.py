@@ -14,10 +14,7 @@ from cmg_mj import mount
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting.largest_push import ReducedPhysics
 from cmg_mj.linear.plant import linearise
-from cmg_mj.plant.elements import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.scenario.plant_settings import BendBeyond
-from tests.features.bend.test_bend import frequency, ring
 from tests.features.mounting.push_robots import cart_pole
 
 SMALL = 1e-6
@@ -87,56 +84,6 @@ def test_the_linearisation_is_mujocos(plant: Plant) -> None:
     assert sliding[gimbals] @ both == pytest.approx(-model.pivot_arm * (tilting[gimbals] @ both), rel=1e-6)
     c1, d = model.measured_tilt(0.0, plant.gravity)
     assert (rig.C[3, hinge], rig.C[3, gimbals] @ both) == pytest.approx((c1, d), rel=1e-6)
-
-
-@pytest.mark.parametrize("slides", [True, pytest.param(False, marks=pytest.mark.slow)])
-@pytest.mark.parametrize(
-    ("beyond", "share"),
-    [
-        pytest.param("sensors", 0.02, marks=pytest.mark.slow),
-        pytest.param("modules", 0.98, marks=pytest.mark.slow),
-        ("both", 0.98),
-    ],
-)
-def test_y1_of_a_frame_that_bends_on_a_cart_is_mujocos(
-    plant: Plant, beyond: BendBeyond, share: float, slides: bool
-) -> None:
-    """The output matrix against differences of what perfect accelerometers show, state by state."""
-    settings = dataclasses.replace(plant.settings, pivot_slides=slides, tilt_damping_n_m_s=0.0)
-    bend = {"bend_frequency_hz": 20.0, "bend_beyond": beyond, "bend_share": share, "bend_damping_ratio": 0.0}
-    bending = load_plant(dataclasses.replace(settings, **bend))
-    model = bending.model
-    y1 = linearise(bending).C[3]
-
-    def y1_at(state: np.ndarray) -> float:
-        data = bending.new_data()
-        mujoco.mj_integratePos(model, data.qpos, state[: model.nv], 1.0)
-        data.qvel += state[model.nv : 2 * model.nv]
-        data.act += state[2 * model.nv :]
-        mujoco.mj_forward(model, data)
-        return bending.radial_tilt(*bending.axis.ideal(data.sensordata.tolist(), data.qvel).accelerations)
-
-    slopes = [(y1_at(SMALL * column) - y1_at(-SMALL * column)) / (2.0 * SMALL) for column in np.eye(len(y1))]
-    np.testing.assert_allclose(slopes, y1, rtol=1e-5, atol=1e-4)
-    # The words on sliding are those of a rigid frame.
-    dof = int(model.joint(BEND_JOINT).dofadr[0])
-    assert not linearise(bending, rigid=True).A[model.nv + dof].any()
-    assert frequency(ring(bending)[0], bending.timestep) == pytest.approx(20.0, rel=1e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("damping", [0.0, 1.0, 30.0])
-def test_damping_is_in_the_linearisation(tmp_path: Path, damping: float) -> None:
-    """The pole of [[J, m h], [m h, M]] (x2', v') = (m g h x1, -D v), wheels at rest; the reduced model has no D."""
-    damped = cart(tmp_path, damping=damping, wheel_speed=1e-3)
-    J, mh, M, weight = inertias(damped)
-    inverse = np.linalg.inv([[J, mh], [mh, M]])
-    right = np.array([[weight, 0.0, 0.0], [0.0, 0.0, -damping]])
-    A = np.vstack([[0.0, 1.0, 0.0], inverse @ right])
-    expected = max(np.linalg.eigvals(A).real)
-    assert max(np.linalg.eigvals(linearise(damped, rigid=True).A).real) == pytest.approx(expected, rel=1e-6)
-    reduced = math.sqrt(damped.reduced.A[1, 0])
-    assert expected < 0.97 * reduced if damping else expected == pytest.approx(reduced, rel=1e-6)
 
 
 def test_accelerometers_show_what_the_reduced_model_says(plant: Plant, known: Plant) -> None:

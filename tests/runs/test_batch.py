@@ -88,7 +88,6 @@ def test_worlds_that_fall_midway_leave_the_others_alone(kind: str, fall_angle_de
     setup = experiment(f"observer.kind={kind}", *settings)
     batch = setup.run_many(12)
     has_fallen = [outcome.fell for outcome in batch.outcomes]
-    print(f"{kind}: {sum(has_fallen)} of 12 fell, at {sorted({o.time_s for o in batch.outcomes if o.fell})}")
     assert 0 < sum(has_fallen) < 12
     assert_same(batch, [setup.run(world=i) for i in range(12)])
     for outcome, summary in zip(batch.outcomes, batch.summaries, strict=True):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import subprocess
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,7 +20,7 @@ from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs import comparison
 from cmg_mj.runs import save as runs
-from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, environment
+from tests.command import cmg_mj
 from tests.recorded import assert_same_bits
 from tests.run_folders import assert_whole, names, write
 
@@ -217,41 +215,7 @@ def test_a_comparisons_scenario_runs_to_the_same_comparison(scenario: str, obser
     assert fields["compare"] == {"observers": same, "worlds": 2}
 
 
-@pytest.mark.slow
-def test_options_come_before_what_the_scenario_says_to_compare() -> None:
-    file = write("duration_s = 0.2\n[compare]\nobservers = ['ltv', 'linear', 'ltv']\nworlds = 3")
-    plain = json.loads(cmg_mj("compare", file, "--json").out)
-    assert [(row["observer"], row["worlds"]) for row in plain[: -len(REFERENCES)]] == [("ltv", 3), ("linear", 3)]
-    rows = json.loads(cmg_mj("compare", file, "--json", "--observers", "homogeneous", "--worlds", 1).out)
-    assert [(row["observer"], row["worlds"]) for row in rows[: -len(REFERENCES)]] == [("homogeneous", 1)]
-    fewer = json.loads(cmg_mj("compare", file, "--json", "--set", "compare.worlds=2").out)
-    assert fewer[0]["worlds"] == 2
-
-
 def test_run_says_that_it_does_not_compare() -> None:
     outcome = cmg_mj("run", write("duration_s = 0.2\n[compare]\nworlds = 3"), "--json")
     assert (outcome.status, outcome.err) == (0, "cmg-mj: [compare] is for cmg-mj compare; this is one run\n")
     assert json.loads(outcome.out)["observer"] == "homogeneous"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("command", ["run", "compare", "tune", "sweep"])
-def test_a_folder_and_a_file_named_in_bytes_that_are_no_letters(command: str) -> None:
-    text = "title = 'Stoß – 1°'\nduration_s = 0.2\n[observer]\nkind = 'linear'"
-    Path(os.fsdecode(b"my\xff.toml")).write_text(text, encoding="utf-8")
-    options = {
-        "run": [],
-        "compare": ["--observers", "linear", "--worlds", "1"],
-        "tune": ["--worlds", "2"],
-        "sweep": ["--vary", "plant.equilibrium_bias_deg=0,1", "--worlds", "2"],
-    }[command]
-    for place in (["--out", b"it\xff"], []):
-        process = subprocess.run(
-            [*COMMAND, command, b"my\xff.toml", *options, *place],
-            env=environment(LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0"),
-            capture_output=True,
-            timeout=HANGS_AFTER_S,
-        )
-        assert process.returncode == 0, process.stderr
-    assert len(os.listdir(b"it\xff")) > 2
-    assert all(name.decode().isascii() for name in os.listdir(b"runs"))

@@ -56,7 +56,6 @@ def test_the_rms_is_the_same_at_any_sample_rate(band_hz: tuple[float, float], dt
     power = (f * (high - low)) ** 2 / ((low * high - f * f) ** 2 + (f * (high - low)) ** 2)
     expected = float((power * np.cos(2.0 * np.pi * f * dt)).sum() / power.sum())
     together = float((samples[10] * samples[11]).mean())
-    print(f"{band_hz} Hz, {dt:g} s: covariance {together:.3f}, {expected:.3f} expected")
     assert together == pytest.approx(expected, abs=0.02)
 
 
@@ -93,7 +92,6 @@ def test_a_low_pass_takes_off_what_lies_beyond_it() -> None:
     t = math.tan(math.pi * 44.0 / 1000.0)
     passed = 1.0 / (1.0 + (np.tan(math.pi * f / 1000.0) / t) ** 4)
     expected = math.sqrt(float((aliased * passed).sum() / aliased.sum()))
-    print(f"{share:.3f} of the RMS passes, {expected:.3f} expected")
     assert share == pytest.approx(expected, rel=0.06)
     assert expected < 0.4
 

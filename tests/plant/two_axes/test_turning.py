@@ -156,7 +156,6 @@ def test_a_slow_wheel_couples_the_axes_directly(tmp_path: Path) -> None:
     yaw, _, _ = gimbal_torques(plant, {}, [0.6, 0.0], [2.0, 0.0])
     assert abs(yaw) == pytest.approx(left * math.sin(0.6) * 2.0, rel=1e-9)
     rates = left / (2.0 * plant.axes[1].reduced.J1)
-    print(f"a wheel 10 % slow: each tilt rate of 1 rad/s accelerates the other axis by {rates:.3f} rad/s^2")
     assert rates == pytest.approx(0.101, abs=1e-3)
     assert plant.axes[0].reduced.J_d * plant.axes[0].reduced.omega_d == pytest.approx(0.95 * H, rel=1e-9)
     assert any("do not cancel" in hint for hint in plant.hints)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
 import math
 import statistics
 from collections.abc import Sequence
@@ -17,7 +16,6 @@ from scipy import stats
 
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.intervals import Interval, format_interval, in_line
-from cmg_mj.results.reports import comparison_markdown
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.runs.comparison import ComparedObserver, compare, prepare_comparison
 from cmg_mj.runs.experiment import Experiment
@@ -132,16 +130,6 @@ def test_a_reference_has_no_loop_of_its_own() -> None:
     for key in ("fell", "fell_fraction", "settle_time_s", "tilt_rms_deg"):
         assert zero[key] is None
     assert (zero["seed"], zero["worlds"]) == (7, 2)
-
-
-@pytest.mark.slow
-def test_one_world_has_no_intervals() -> None:
-    row = rows_by_name([entry("ltv", [0.1]), entry("linear", [0.3])])["linear"]
-    assert row["intervals"][ERROR] is None
-    assert row["minus_best"][ERROR]["interval"] is None
-    example = [dataclasses.replace(compare_two()[0], result=compare_two()[0].world_0)]
-    assert "Less the best" not in comparison_markdown(standings(example))
-    assert "±" not in comparison_markdown(standings(example)).split("\n\n")[0]
 
 
 def test_a_figure_that_is_missing_in_a_world() -> None:
