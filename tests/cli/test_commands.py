@@ -154,16 +154,6 @@ def test_a_person_reads_a_table_and_where_the_files_are(quick: str) -> None:
     assert (Path(folder) / "recording.rrd").exists()
 
 
-@pytest.mark.slow
-def test_the_default_folder_tells_runs_apart(quick: str) -> None:
-    Path("mine.py").write_text(
-        "from cmg_mj.observers.finite_difference import FiniteDifference\nclass Mine(FiniteDifference): pass\n"
-    )
-    for options in (["--seed", 3], ["--observer", "ltv"], ["--observer", "mine:Mine"]):
-        assert cmg_mj("run", quick, *options).status == 0
-    assert sorted(os.listdir("runs")) == ["quick-Mine-0", "quick-homogeneous-3", "quick-ltv-0"]
-
-
 def test_another_world_is_named_wherever_a_run_is(quick: str) -> None:
     outcome = cmg_mj("run", quick, "--world", 2)
     assert outcome.out.startswith("Quick: homogeneous, seed 0, world 2\n")

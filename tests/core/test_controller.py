@@ -235,15 +235,6 @@ def test_measurements_are_tilt_and_half_the_difference_of_the_gimbals() -> None:
     assert ticks(controller(Script(ESTIMATES.__getitem__)), [lopsided])[0].y2 == pytest.approx(0.2)
 
 
-def test_first_estimate_is_at_rest_at_the_measurement() -> None:
-    """For every observer; and the law acts on it at once."""
-    for kind in ("linear", "ltv", "homogeneous", "luenberger", "finite_difference", "super_twisting"):
-        tick = ticks(controller(make_observer(kind, DT, PAPER)), [reading(0.01, 0.2, 0.5)])[0]
-        assert tick.estimates == [(tick.y1, 0.0, tick.y2)]
-        assert tick.u == pytest.approx(-(35.0 * 0.01 - 0.2), rel=1e-9)
-        assert tick.x_e == 0.0
-
-
 def test_observer_gets_the_sample_and_the_command_held_since_the_last() -> None:
     observer = Script(ESTIMATES.__getitem__)
     result = ticks(controller(observer))

@@ -77,25 +77,6 @@ def test_accelerometers_show_it_in_mg() -> None:
     assert float(samples.std()) == pytest.approx(4.0 * MG, rel=0.02)
 
 
-def test_a_low_pass_takes_off_what_lies_beyond_it() -> None:
-    """The low-pass works on the part's samples of 1 kHz, with what they alias: 44 Hz leave so much of 100 to 450 Hz."""
-    fields = {"vibration_mg": 10.0, "vibration_band_hz": (100.0, 450.0)}
-    filtered = readings(600, range(100), h=0.001, bandwidth_hz=44.0, **fields)[::5]
-    bare = readings(100, range(100), **fields)
-    share = float(filtered.std() / bare.std())
-    f, fold = np.arange(0.0, 500.0, 0.5), range(-40, 41)
-
-    def power(f: np.ndarray) -> np.ndarray:
-        return (f * 350.0) ** 2 / ((45000.0 - f * f) ** 2 + (f * 350.0) ** 2)
-
-    aliased = np.sum([power(np.abs(f + 1000.0 * k)) for k in fold], axis=0)
-    t = math.tan(math.pi * 44.0 / 1000.0)
-    passed = 1.0 / (1.0 + (np.tan(math.pi * f / 1000.0) / t) ** 4)
-    expected = math.sqrt(float((aliased * passed).sum() / aliased.sum()))
-    assert share == pytest.approx(expected, rel=0.06)
-    assert expected < 0.4
-
-
 def test_one_world_of_many_vibrates_as_alone() -> None:
     fields = {"vibration_mg": 4.0, "wheel_harmonics_mg": (5.0, 0.0, 2.0)}
     alone = readings(40, 3, (314.0, -313.0), **fields)

@@ -14,9 +14,11 @@ import pyarrow.compute as pc
 import pytest
 from scipy import stats
 
+from cmg_mj.core.errors import InputError
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.intervals import Interval, format_interval, in_line
 from cmg_mj.results.result import Outcome, Result
+from cmg_mj.runs import api
 from cmg_mj.runs.comparison import ComparedObserver, compare, prepare_comparison
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.runs.statistics import best_observer, comparison_rows, standings, worlds_table
@@ -177,3 +179,28 @@ def test_what_stood_averages_to_what_is_printed() -> None:
     assert all(0.5 < end < 2.2 for end in fell["end_time_s"].to_pylist())
     assert all(math.isfinite(value) for value in fell[ERROR].to_pylist())
     assert set(fell["settle_time_s"].to_pylist()) == {None}
+
+
+def test_a_comparison_as_a_mapping_and_a_frame() -> None:
+    pytest.importorskip("pandas")
+    scenario = load_scenario("push_recovery", ["duration_s=0.4", "push=[]"])
+    compared = api.compare(scenario, ["linear", "gyro_free"], 2)
+    assert list(dict(compared)) == list(compared) == ["linear", "gyro_free"]
+    means: Any = compared.to_pandas().groupby("observer")["velocity_rms_error_rad_s"].mean()
+    for summary in compared.summaries[:2]:
+        assert means[summary["observer"]] == pytest.approx(summary["velocity_rms_error_rad_s"], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("observers", "worlds", "message"),
+    [
+        (["linear", "linear"], 2, "different names"),
+        ("linear", 2, "different names"),
+        ([], 2, "different names"),
+        (["linear"], 0, "worlds = 0"),
+        (["liner"], 1, "did you mean 'linear'"),
+    ],
+)
+def test_a_comparison_that_cannot_be_is_refused(observers: Any, worlds: int, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        api.compare(load_scenario("push_recovery"), observers, worlds)
