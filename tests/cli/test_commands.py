@@ -71,13 +71,6 @@ def test_help_of_a_command(command: str) -> None:
     assert max(map(len, outcome.out.splitlines())) <= 100
 
 
-def test_without_a_command_it_helps() -> None:
-    outcome = cmg_mj()
-    assert outcome.status == 2
-    assert outcome.out == ""
-    assert outcome.err.startswith("Usage: cmg-mj [OPTIONS] COMMAND")
-
-
 def test_version() -> None:
     assert cmg_mj("--version").out == f"cmg-mj, version {version('cmg_mj')}\n"
 

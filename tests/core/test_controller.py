@@ -325,17 +325,6 @@ def test_nothing_is_due_between_ticks() -> None:
     assert len(observer.calls) == 3
 
 
-def test_steps_per_sample_is_where_anything_may_be_due() -> None:
-    sensors = Sensors(Accelerometer(rate_hz=1000.0), Encoder(rate_hz=100.0), Fog(rate_hz=500.0))
-    loop = Controller(
-        Script(ESTIMATES.__getitem__),
-        StateFeedback(0.01),
-        sensors,
-        PlantInterface(RadialTilt(0.1, 0.3), GimbalAngle((1.0,), (0.0,)), 0.0005),
-    )
-    assert (loop.period, loop.steps_per_sample) == (20, 2)
-
-
 @pytest.mark.parametrize(("name", "angles"), [("x2", "measured"), ("x1", "estimated"), ("x3", "estimated")])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_an_estimate_that_is_no_number_stops_the_run(value: float, name: str, angles: Any) -> None:

@@ -144,7 +144,8 @@ def test_a_law_without_an_integrator_is_recorded_and_plotted(elsewhere: None) ->
 
 
 class NoMemory:
-    def __init__(self, dt: float, rate_limit: float) -> None: ...
+    def __init__(self, dt: float, rate_limit: float) -> None:
+        self.dt, self.rate_limit = dt, rate_limit
 
     def init(self, y: Measurement) -> int:
         return 0

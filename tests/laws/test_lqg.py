@@ -203,3 +203,23 @@ def test_the_gimbals_come_back_whatever_the_bias(e: float) -> None:
     angles = np.degrees(recorded(result)["y2_rad"])
     assert np.abs(angles[-2000:].mean(axis=0)).max() < 2.0
     assert np.abs(angles).max() > 5.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("missing_part", ["torque", "integrator"])
+def test_either_integral_action_alone_falls_at_a_large_bias(missing_part: str) -> None:
+    """Why it is there twice."""
+    experiment = push_recovery("controller.kind=lqg", "plant.equilibrium_bias_deg=2.0")
+    assert experiment.run_many(4).stood.all()
+    control_law: Any = experiment.law
+    if missing_part == "integrator":
+        (A, B), dt = rig(), control_law.dt
+        F, G = discretise(A[:3, :3], B[:3], dt)
+        Q, R = dt * np.diag(control_law.state_cost[:3]), np.array([[dt * control_law.input_cost]])
+        S = solve_discrete_are(F, G, Q, R)
+        K = np.linalg.solve(G.T @ S @ G + R, G.T @ S @ F)
+        control_law.__dict__["gains"] = (*K.ravel().tolist(), 0.0)
+    else:
+        control_law.__dict__["innovation_gain"] = np.vstack([control_law.innovation_gain[:3], [[0.0, 0.0]]])
+    control_law.__dict__.pop("_numbers", None)
+    assert not experiment.run_many(4).stood.any()

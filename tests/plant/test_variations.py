@@ -195,12 +195,6 @@ def test_misplaced_they_feel_what_is_there_and_the_estimate_knows_the_old_places
     assert math.dist(*drawn.values()) == pytest.approx(span, rel=1e-12)
 
 
-def test_there_is_no_floor_of_misplaced_accelerometers_with_their_acceleration() -> None:
-    rig = push_recovery("duration_s=0.1", "push=[]")
-    result = rig.run_many(2, vary={"accelerometer_inner_misplaced_mm": [0.0, 2.0]})
-    assert np.isnan(result.values("velocity_rms_error_rad_s", "floor_accel")).tolist() == [False, True]
-
-
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [

@@ -72,12 +72,6 @@ def test_turned_the_wrong_way_the_gimbals_make_the_rig_fall_at_one_radian_a_seco
 
 
 @pytest.mark.slow
-def test_on_a_base_that_stands_on_the_floor_too() -> None:
-    result = two_axes("plant.model=two_axes_free_base").run_many(5, keep_trajectory=False)
-    assert result.stood.all()
-
-
-@pytest.mark.slow
 def test_a_gaits_torque_is_found_by_its_frequency() -> None:
     swings = ",".join(
         f"{{frequency_hz=2.0, amplitude_n_m=1.0, phase_deg={phase}, axis='{axis}'}}"
