@@ -83,6 +83,10 @@ def test_follows_the_printed_observer_at_200_hz(parameters: dict, model: Reduced
         assert gains.max() > 1.1
 
 
+def test_defaults() -> None:
+    assert high_gain() == high_gain(**DEFAULTS)
+
+
 def test_largest_damping_is_the_largest() -> None:
     for model in (PAPER, HEAVY):
         over_angles = np.abs(model.terms(0.0, np.linspace(0.0, np.pi, 100_001))[2]).max()
