@@ -33,11 +33,3 @@ def assert_whole(place: str) -> Trajectory:
     tomllib.loads((Path(place) / "scenario.toml").read_text())
     assert list(RrdReader(Path(place) / "recording.rrd").stream().to_chunks())
     return Trajectory.load(Path(place) / "trajectory.parquet")
-
-
-def recorded_scenario(place: Path) -> str:
-    """The scenario, as TOML, that a recording shows."""
-    stream = RrdReader(place / "recording.rrd").stream()
-    (chunk,) = list(stream.filter(content="/scenario", components="TextDocument:text", is_static=True))
-    ((page,),) = chunk.to_record_batch().column("TextDocument:text").to_pylist()
-    return page.partition("```toml\n")[2].removesuffix("```\n")

@@ -3,7 +3,7 @@
     python docs/studies/gyro_free_against.py [--worlds 20] [--jobs 2] [--only pivot]
 
 About 12 minutes on two busy cores (11 minutes of processor time); a bar shows the progress. The table of
-docs/which_observer_evidence.md. The study changes one thing at a time in push_recovery: 400 ug/rtHz of noise, an
+docs/which_observer.md, with more rows. The study changes one thing at a time in push_recovery: 400 ug/rtHz of noise, an
 equilibrium bias of 0.5 degrees, a push of 1 N m for 0.1 s. Each observer is in a loop of its own, with the same noise
 for all. A cell is the velocity RMS error over the run [1e-3 rad/s], the mean over the worlds that stood, and the number
 of worlds that fell. `zero` and `mems_fused` close no loop: their motion is that of a loop with the true rate.

@@ -7,26 +7,18 @@ import os
 import pty
 import re
 import subprocess
-import sys
 from importlib.metadata import version
 from pathlib import Path
 
 import click
 import pytest
 import tomli_w
-from click.testing import CliRunner
-from rich.table import Table
 
-from cmg_mj import load_scenario
 from cmg_mj.cli import cli
 from cmg_mj.inputs.files import bundled
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.baselines import REFERENCES
-from cmg_mj.results.reports import compared_keys, comparison_table
-from cmg_mj.runs import comparison
-from cmg_mj.runs.comparison import standings
-from tests.command import COMMAND, cmg_mj, cmg_mj_process, environment
-from tests.run_folders import assert_whole
+from tests.command import COMMAND, cmg_mj, environment
 
 SUMMARY = [
     "observer",
@@ -79,28 +71,8 @@ def test_help_of_a_command(command: str) -> None:
     assert max(map(len, outcome.out.splitlines())) <= 100
 
 
-def test_without_a_command_it_helps() -> None:
-    outcome = cmg_mj()
-    assert outcome.status == 2
-    assert outcome.out == ""
-    assert outcome.err.startswith("Usage: cmg-mj [OPTIONS] COMMAND")
-
-
 def test_version() -> None:
     assert cmg_mj("--version").out == f"cmg-mj, version {version('cmg_mj')}\n"
-
-
-def test_help_does_not_wait_for_physics() -> None:
-    """Imports that take a second are made by the commands that need them."""
-    program = "import sys\nfrom cmg_mj import cli\nprint([m for m in ('mujoco', 'numpy', 'rich') if m in sys.modules])"
-    process = subprocess.run(
-        [sys.executable, "-c", program], env=environment(), capture_output=True, text=True, check=True
-    )
-    assert process.stdout == "[]\n"
-
-
-def test_the_group_is_an_ordinary_one_of_clicks() -> None:
-    assert CliRunner().invoke(cli, ["--help"]).exit_code == 0
 
 
 # --- list and check ------------------------------------------------------------------------------------------
@@ -141,11 +113,6 @@ def test_check_says_what_a_scenario_amounts_to(quick: str) -> None:
     assert not Path("runs").exists()
 
 
-def test_check_warns_of_gains_that_cannot_hold_the_rig() -> None:
-    Path("my.toml").write_text("[controller]\ngains = [-35, 4, -1, 0.3]")
-    assert "UNSTABLE" in cmg_mj("check", "my.toml").out
-
-
 # --- run -----------------------------------------------------------------------------------------------------
 
 
@@ -180,26 +147,6 @@ def test_a_person_reads_a_table_and_where_the_files_are(quick: str) -> None:
     assert (Path(folder) / "recording.rrd").exists()
 
 
-@pytest.mark.slow
-def test_a_plot_and_a_title_that_looks_like_markup() -> None:
-    title = r"[/red] [bold]5[/bold] {x} %s $\no$"
-    Path("my.toml").write_text(f"title = '{title}'\nduration_s = 0.3\nopen_loop_observers = ['ltv', 'linear']")
-    outcome = cmg_mj("run", "my.toml", "--plot", "--out", "it")
-    assert outcome.status == 0
-    assert outcome.out.startswith(f"{title}: homogeneous, seed 0\n")
-    assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.slow
-def test_the_default_folder_tells_runs_apart(quick: str) -> None:
-    Path("mine.py").write_text(
-        "from cmg_mj.observers.linear import FiniteDifference\nclass Mine(FiniteDifference): pass\n"
-    )
-    for options in (["--seed", 3], ["--observer", "ltv"], ["--observer", "mine:Mine"]):
-        assert cmg_mj("run", quick, *options).status == 0
-    assert sorted(os.listdir("runs")) == ["quick-Mine-0", "quick-homogeneous-3", "quick-ltv-0"]
-
-
 def test_another_world_is_named_wherever_a_run_is(quick: str) -> None:
     outcome = cmg_mj("run", quick, "--world", 2)
     assert outcome.out.startswith("Quick: homogeneous, seed 0, world 2\n")
@@ -215,15 +162,6 @@ def test_another_world_is_named_wherever_a_run_is(quick: str) -> None:
     assert "world" not in world_0
     assert world_0["velocity_rms_error_rad_s"] != summary["velocity_rms_error_rad_s"]
     assert "--world" in cmg_mj("run", quick, "--world", -1).complaint
-
-
-def test_an_observer_and_its_parameters_from_the_command_line(quick: str) -> None:
-    outputs = [
-        cmg_mj("run", quick, "--json", "--observer", "linear", *settings).out
-        for settings in ([], ["--set", "observer.tau=0.02"], ["--set", "observer.tau=0.04"])
-    ]
-    assert json.loads(outputs[0])["observer"] == "linear"
-    assert outputs[0] == outputs[1] != outputs[2]
 
 
 # --- compare -------------------------------------------------------------------------------------------------
@@ -253,13 +191,6 @@ def test_compare_prints_a_table(quick: str) -> None:
     assert outcome.err.startswith("Written to runs/quick-compare-0. ")
 
 
-def test_two_observers_of_the_bias_fit_too() -> None:
-    Path("bias.toml").write_text("duration_s = 0.3\n[metrics]\nbias_from_s = 0.1")
-    outcome = cmg_mj("compare", "bias.toml", "--worlds", 1, "--observers", "adaptive,homogeneous_adaptive")
-    assert max(map(len, outcome.out.splitlines())) <= 100
-    assert cmg_mj("run", "bias.toml", "--observer", "adaptive").out.count("Bias ") == 2
-
-
 def test_compare_prints_markdown(quick: str) -> None:
     outcome = cmg_mj("compare", quick, "--worlds", 1, "--observers", "linear", "--markdown")
     header, line, row, zero, *_ = outcome.out.splitlines()
@@ -278,16 +209,6 @@ def test_numbers_that_there_are_not() -> None:
     assert "zero" not in outcome.out.splitlines()  # nothing stood, on whose motion it could run open loop
     (summary,) = json.loads(Path("it/summary.json").read_text())
     assert (summary["fell"], summary["tilt_rms_deg"]) == (True, None)
-
-
-def test_every_column_is_of_a_key_there_is(quick: str) -> None:
-    observers = comparison.compare(comparison.prepare_comparison(load_scenario(quick), ["linear"]), 1)
-    summaries = standings(observers)
-    columns = compared_keys(summaries)
-    assert {"velocity_rms_error_rad_s", "velocity_fit", "tilt_rms_deg", "fell_fraction"} <= set(columns)
-    table = comparison_table(summaries, "").renderables[0]
-    assert isinstance(table, Table)
-    assert (len(table.columns), table.row_count) == (1 + len(columns), 1 + len(REFERENCES))
 
 
 # --- terminals, pipes ----------------------------------------------------------------------------------------
@@ -325,34 +246,3 @@ def test_progress_is_shown_on_a_terminal_and_nowhere_else() -> None:
     silent = cmg_mj("run", "long.toml", "--json")
     assert (silent.status, silent.err) == (0, "")
     assert silent.out == process.stdout
-
-
-@pytest.mark.slow
-def test_a_reader_that_has_had_enough_is_no_error(quick: str) -> None:
-    """Everything is written before the summary is printed."""
-    reader, writer = os.pipe()
-    os.close(reader)
-    process = subprocess.run(
-        [*COMMAND, "run", quick, "--out", "it"], env=environment(), stdout=writer, stderr=subprocess.PIPE, text=True
-    )
-    os.close(writer)
-    assert "Traceback" not in process.stderr
-    assert "Error" not in process.stderr
-    assert_whole("it")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_standard_output_that_cannot_be_written() -> None:
-    with open("/dev/full", "w") as full:
-        process = subprocess.run([*COMMAND, "list"], env=environment(), stdout=full, stderr=subprocess.PIPE, text=True)
-    assert process.returncode == 2
-    assert process.stderr == "cmg-mj: standard output: No space left on device\n"
-
-
-@pytest.mark.slow
-def test_wrong_input_in_a_process_of_its_own() -> None:
-    """As a user meets it: one line, nothing else, status 2, nothing written."""
-    outcome = cmg_mj_process("run", "push_recovery", "--set", "plant.timestep=1", cwd=Path())
-    assert "plant.timestep: no such field; did you mean 'timestep_s'?" in outcome.complaint
-    assert list(Path().iterdir()) == []

@@ -57,7 +57,3 @@ def forbidden_modules(command: str, modules: set[str]) -> list[str]:
 )
 def test_imports_no_library_that_it_does_not_need(command: str, tmp_path: Path) -> None:
     assert forbidden_modules(command, imported_modules(command, tmp_path)) == []
-
-
-def test_sees_a_library_that_is_imported(tmp_path: Path) -> None:
-    assert forbidden_modules("--help", imported_modules("--help", tmp_path, before="import numpy")) == ["numpy"]

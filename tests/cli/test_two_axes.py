@@ -84,19 +84,6 @@ def test_what_a_run_writes_reruns_and_has_every_axis(tmp_path: Path) -> None:
     assert {"plot-roll.png", "plot-pitch.png", "recording.rrd"} <= {path.name for path in place.iterdir()}
 
 
-def test_with_open_loop_observers_it_reruns_with_the_same_columns(tmp_path: Path) -> None:
-    """An axis' own observer is no open-loop observer of its own; of the other axis it may be."""
-    experiment = two_axes("axes.roll.observer.kind=linear", "open_loop_observers=['homogeneous', 'kalman']")
-    experiment.save(tmp_path / "scenario.toml")
-    first, rerun = (
-        run.run().trajectory for run in (experiment, prepare(load_scenario(str(tmp_path / "scenario.toml"))))
-    )
-    assert first is not None
-    assert rerun is not None
-    assert list(rerun.columns) == list(first.columns)
-    assert "roll/estimate/homogeneous/x2_rad_s" in first.columns
-
-
 def test_the_observer_that_is_named_is_that_of_all_axes() -> None:
     mixed_axes = load_scenario("two_axes", ["axes.roll.observer.kind=linear"])
     assert prepare(mixed_axes).observer_title == "roll linear, pitch homogeneous"
@@ -104,14 +91,6 @@ def test_the_observer_that_is_named_is_that_of_all_axes() -> None:
         assert prepare(mixed_axes.with_observer(kind)).observer_title == kind
     tuned_axis = load_scenario("two_axes", ["axes.roll.observer.k1=25"])
     assert tuned_axis.with_observer("homogeneous").of_axis("roll").observer.parameters == {"k1": 25}
-
-
-def test_an_observer_on_the_command_line_is_that_of_all_axes(tmp_path: Path) -> None:
-    file = tmp_path / "mixed.toml"
-    file.write_text('[plant]\nmodel = "two_axes"\n[axes.roll.observer]\nkind = "linear"\n', encoding="utf-8")
-    assert load_scenario(str(file), observer="kalman").of_axis("roll").observer.kind == "kalman"
-    assert load_scenario(str(file), observer="linear").of_axis("pitch").observer.kind == "linear"
-    assert load_scenario(str(file)).of_axis("roll").observer.kind == "linear"
 
 
 def test_another_law_does_without_the_files_gains() -> None:
@@ -124,22 +103,6 @@ def test_another_law_does_without_the_files_gains() -> None:
     )
     roll = lqg_scenario.with_law("lqg").of_axis("roll").controller
     assert (roll.kind, roll.gains, roll.rate_limit_rad_s) == ("lqg", None, 3.0)
-
-
-def test_sensors_of_an_axis_have_rates_of_their_own() -> None:
-    experiment = two_axes("axes.roll.sensors.accelerometer.rate_hz=1000")
-    assert experiment.plant.timestep == 0.001
-    assert experiment.run().outcomes[0].kind == "done"
-
-
-def test_the_true_rate_is_used_throughout_where_it_is_fed_back() -> None:
-    """The observer's estimate then changes nothing, the gimbals' turn against the other axis included."""
-    runs = [two_axes("controller.feedback=truth", f"observer.kind={kind}").run() for kind in ("homogeneous", "linear")]
-    first, second = (run.trajectory for run in runs)
-    assert first is not None
-    assert second is not None
-    for name in ("roll/u_rad_s", "pitch/u_rad_s", "angle/roll/cube1/gimbal_rad"):
-        np.testing.assert_array_equal(first[name], second[name], err_msg=name)
 
 
 def test_replay_of_several_axes_is_refused_for_what_it_is(run_folder: Path, run_outcome: CommandOutcome) -> None:
@@ -197,18 +160,12 @@ def test_the_command_prints_each_axis(run_outcome: CommandOutcome, run_summary: 
         (["axes.rol.plant.initial_tilt_deg=1"], "axes.rol: the rig has no such axis; did you mean 'roll'"),
         (["axes.roll.plant.modl=1"], "axes.roll.plant.modl: no such field; allowed: accelerometer_inner_m"),
         (["axes.roll.plant=3"], "axes.roll.plant = 3: must be a section"),
-        (["axes.roll=3"], "axes.roll = 3: must be a section"),
-        (["axes=3"], "axes = 3: must be a section"),
         (["axes.roll.controller.rate_hz=100"], "[axes.roll]: controller.rate_hz: is the same on all axes"),
-        (["axes.roll.controller.compensate_turning=false"], "controller.compensate_turning: is the same on all axes"),
         (
             ["swing=[{frequency_hz=15.0, axis='roll'}]", "controller.rate_hz=100"],
             "at most 10 Hz at controller.rate_hz = 100",
         ),
-        (["axes.roll.controller.gain=[1,2,3,4]"], "[axes.roll]: controller.gain: no such field"),
-        (["axes.roll.observer.k9=1"], "[axes.roll]: observer.k9: no such field of"),
         (["axes.pitch.observer.kind=lineer"], "[axes.pitch]: observer.kind = 'lineer'"),
-        (["axes.roll.sensors.encoder.counts=3"], "[axes.roll]: sensors.encoder.counts: no such field"),
         (["axes.roll.plant.initial_tilt_deg=60"], "axes.roll.plant.initial_tilt_deg = 60"),
         (["push.0.axis=yaw"], "push.0.axis = 'yaw': the rig has no such axis; allowed: pitch, roll"),
         (["push=[{start_s=1.0}]"], "push.0.axis: the rig has several axes: which of roll, pitch?"),
@@ -242,15 +199,6 @@ def test_what_takes_one_axis_says_so() -> None:
         complaint = cmg_mj(*arguments).complaint
         assert "tilts about several axes (roll, pitch)" in complaint
         assert "plant.locked_axes" in complaint
-
-
-def test_a_rig_of_two_axes_with_one_locked_is_a_rig_of_one() -> None:
-    experiment = two_axes('plant.locked_axes=["roll"]')
-    result = experiment.run()
-    assert result.trajectory is not None
-    assert result.trajectory.axes == ()
-    assert AXES not in result.summaries[0]
-    assert experiment.axes[0].scenario.plant.equilibrium_bias_deg == -0.3
 
 
 def test_in_a_loop_of_ones_own() -> None:

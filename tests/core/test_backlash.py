@@ -10,15 +10,15 @@ from scipy.signal import lsim
 
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs.experiment import Experiment, prepare
-from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.runs.experiment import Experiment
 from cmg_mj.stages.backlash import Backlash
+from tests.recorded import push_recovery, recorded
 
 DT = 0.005
 
 
 def experiment(*settings: str) -> Experiment:
-    return prepare(load_scenario("push_recovery", ["duration_s=1.5", "push=[]", *settings]))
+    return push_recovery("duration_s=1.5", "push=[]", "open_loop_observers=[]", *settings)
 
 
 def test_the_gap_in_radians() -> None:
@@ -56,12 +56,6 @@ def test_without_a_gap_the_command_goes_through_as_it_is() -> None:
     np.testing.assert_array_equal(gimbal_rates[:, 1], [alone(float(rate)) for rate in rates[:, 1]])
 
 
-def trajectory(setup: Experiment, driver: Any = "native") -> Trajectory:
-    result = setup.run(driver=driver).trajectory
-    assert result is not None
-    return result
-
-
 def gimbals_from_commands(run: Trajectory, gap: float) -> np.ndarray:
     """Where a gap leaves the gimbal behind the recorded commands: the motor's angle, followed at half the gap."""
     motor = np.concatenate([[0.0], np.cumsum(run["u_rad_s"][:-1] * DT)])
@@ -76,7 +70,7 @@ def gimbals_from_commands(run: Trajectory, gap: float) -> np.ndarray:
 def test_the_rigs_gimbals_stay_behind_the_recorded_commands(driver: Any) -> None:
     """But for their servos' motion, I x'' = kp (setpoint - x) - kv x', and what the tilt does to it."""
     gap = np.radians(60.0 / 60.0)
-    run = trajectory(experiment("plant.gimbal_backlash_arcmin=60.0"), driver)
+    run = recorded(experiment("plant.gimbal_backlash_arcmin=60.0").run(driver=driver))
     prediction = gimbals_from_commands(run, gap)
     servo = [85.6], [1.56e-3, 0.731, 85.6]
 
@@ -89,42 +83,15 @@ def test_the_rigs_gimbals_stay_behind_the_recorded_commands(driver: Any) -> None
     assert np.abs(np.diff(prediction)[20:] == 0.0).mean() > 0.1  # it does rest
 
 
-def test_a_users_own_loop_has_it_too() -> None:
-    import mujoco
-
-    from cmg_mj.runs.callback import control
-
-    setup = experiment("plant.gimbal_backlash_arcmin=60.0", "plant.timestep_s=0.005")
-    controller, data = setup.axis_controller(), setup.plant.new_data()
-    for _ in range(100):
-        control(setup.plant, controller, data)
-        mujoco.mj_step(setup.plant.model, data)
-    assert data.qpos[setup.plant.tilt] - setup.plant.tilt_zero + setup.plant.bias == trajectory(setup)["x1_rad"][100]
-    controller.reset()
-    assert controller.gimbal_rate is None
-
-
 def test_observers_get_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
-    setup = experiment("plant.gimbal_backlash_arcmin=60.0")
-    commands: list[float] = []
-    controller = setup.axis_controller()
-    observer: Any = controller.observer
-    monkeypatch.setattr(type(observer), "step", _record(type(observer).step, commands))
-    expected = []
-    step = 0
-    ideal = setup.plant.ideal_readings(setup.plant.new_data().sensordata.tolist(), setup.plant.new_data().qvel.tolist())
-    while len(expected) < 20:
-        if controller.update(step, ideal):
-            assert controller.tick is not None
-            expected.append(controller.tick.u)
-        step += controller.steps_per_sample
-    assert commands == expected[:-1]
-    assert controller.gimbal_rate != expected[-1] or controller.gimbal_rate == 0.0
+    setup, commands = experiment("plant.gimbal_backlash_arcmin=60.0", "duration_s=0.1"), []
+    observer: Any = type(setup.axis_controller().observer)
+    step = observer.step
 
-
-def _record(step: Any, commands: list[float]) -> Any:
     def record_step(self: Any, state: Any, y: Any, u: float) -> Any:
         commands.append(u)
         return step(self, state, y, u)
 
-    return record_step
+    monkeypatch.setattr(observer, "step", record_step)
+    run = recorded(setup.run())
+    assert commands == run["u_rad_s"].tolist()[:-1]

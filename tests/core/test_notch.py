@@ -8,8 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj import InputError, load_scenario, prepare
+from cmg_mj import InputError, load_scenario
 from cmg_mj.stages.notch import DEPTH_DAMPING, WIDTH_DAMPING, Notch
+from tests.recorded import push_recovery, recorded
 
 DT = 0.005
 
@@ -52,13 +53,9 @@ def test_its_result_is_within_the_limit() -> None:
 
 
 def test_the_command_that_is_recorded_and_observed_is_behind_it() -> None:
-    settings = ["duration_s=0.3", "push=[]"]
     plain, behind = (
-        prepare(load_scenario("push_recovery", [*settings, *more])).run().trajectory
-        for more in ([], ["controller.notch_hz=20"])
+        recorded(push_recovery("duration_s=0.3", "push=[]", *more).run()) for more in ([], ["controller.notch_hz=20"])
     )
-    assert plain is not None
-    assert behind is not None
     first = Notch(20.0, DT, math.inf)(float(plain["u_rad_s"][0]))
     assert behind["u_rad_s"][0] == first != plain["u_rad_s"][0]
 

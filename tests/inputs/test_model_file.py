@@ -30,6 +30,8 @@ def delete_element(start: str) -> tuple[str, str]:
     return rf"<{start}.*?/>", ""
 
 
+KEYFRAME_ANGLES = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
+"""The keyframe's angles of tilt, gimbal, flywheel and gimbal."""
 BODY = '<body name="more" pos="1 0 0">{}<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
 
 
@@ -45,44 +47,30 @@ BODY = '<body name="more" pos="1 0 0">{}<inertial pos="0 0 0" mass="1" diaginert
         {"cube": delete_element('joint name="flywheel"')},
         "has no joint 'cube1/flywheel', 'cube2/flywheel'; its joints: cube1/g",
     ),
-    ("joint gimbal", {"cube": delete_element('joint name="gimbal"')}, "the model has no joint 'cube1/gimbal'"),
     (
         "actuator servo",
         {"cube": delete_element("intvelocity")},
         "has no actuator 'cube1/gimbal_servo', 'cube2/gimbal_servo'; its actuators: cube1/f",
     ),
-    ("actuator motor", {"cube": delete_element("velocity name")}, "the model has no actuator 'cube1/flywheel_motor'"),
     ("sensor encoder", {"cube": delete_element("jointpos")}, "the model has no sensor 'cube1/gimbal_encoder'"),
     (
         "accelerometer",
         {"rig": delete_element('accelerometer name="accelerometer_inner"')},
         "no sensor 'accelerometer_inner'",
     ),
-    ("gyro", {"rig": delete_element("gyro")}, "the model has no sensor 'fog'; its sensors: accelerometer_inner"),
     (
         "keyframe",
         {"rig": ("<keyframe>.*</keyframe>", "")},
         "the model has no keyframe 'equilibrium'; its keyframes: none",
     ),
-    ("typo in keyframe", {"rig": ('"equilibrium"', '"equilibrum"')}, "'equilibrium'; did you mean 'equilibrum'?"),
-    ("modules", {"rig": ('<frame name="cube..mount.*?</frame>', "")}, "the model has no joint 'cube1/gimbal'"),
     ("the cube's file", {"rig": ('file="cube.xml"', 'file="cub.xml"')}, "not a model MuJoCo can read: ", "cub.xml"),
-)
-def test_a_model_that_lacks(wrong_input: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)
-
-
-@table(
     ("an end", {"rig": ("<keyframe>.*", "")}, "not a model MuJoCo can read: XML syntax error at line "),
-    ("nothing", {"rig": (".*", "")}, "not a model MuJoCo can read: ", "empty file"),
-    ("no XML", {"rig": (".*", "a = 1")}, "not a model MuJoCo can read: XML syntax error at line 1"),
     ("an unknown element", {"rig": ("<headlight", "<headlite")}, "unrecognized element", "'headlite', line 20"),
     (
         "a gimbal that slides",
         {"cube": ('joint name="gimbal" type="hinge"', 'joint name="gimbal" type="slide"')},
         "joint 'cube1/gimbal' must be a hinge",
     ),
-    ("a slide", {"rig": ('name="yaw" type="hinge"', 'name="yaw" type="slide"')}, "joint 'yaw' must be a hinge"),
     ("no name", {"rig": ("</worldbody>", BODY.format("<joint/>"))}, "the joint of body 'more' has no name"),
     ("a tilt about x", {"rig": ('name="tilt" type="hinge" axis="0 1 0"', 'name="tilt"')}, "'tilt' must turn about y"),
     (
@@ -122,40 +110,8 @@ def test_a_model_that_lacks(wrong_input: dict[str, Any], fragments: list[str]) -
         "the rig must stand upright",
     ),
     ("no mass", {"cube": ('mass="0.61"', 'mass="0"')}, "does not compile: mass and inertia", "'cube1/flywheel'"),
-)
-def test_a_model_that_has(wrong_input: dict[str, Any], fragments: list[str]) -> None:
-    assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)
-
-
-def test_the_unedited_copy_is_a_model() -> None:
-    assert check_edited().status == 0
-
-
-def test_a_lock_without_a_bearing() -> None:
-    check_edited(rig=('<joint name="yaw".*?/>', ""))
-    complaint = cmg_mj("run", "my.toml", "--set", "plant.lock_thrust_bearing=true").complaint
-    assert "plant.lock_thrust_bearing = true: rig.xml has no joint 'yaw' to lock" in complaint
-
-
-def test_a_lock_where_the_keyframe_gives_no_rates() -> None:
-    check_edited(rig=('qvel="[^"]*"', ""))
-    with pytest.raises(
-        InputError, match=r"^rig\.xml: keyframe 'equilibrium' must start 'cube1/flywheel' at its motor's"
-    ):
-        load_plant(model="rig.xml", lock_thrust_bearing=True)
-
-
-KEYFRAME_ANGLES = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966"
-"""The keyframe's angles of tilt, gimbal, flywheel and gimbal."""
-
-
-@table(
     ("no gravity", {"rig": ("0 0 -9.81", "0 0 0")}, "<option gravity='0 0 0'>: must point straight down"),
-    ("a gravity that is none", {"rig": ("0 0 -9.81", "0 0 nan")}, "<option gravity='0 0 nan'>: must point straight"),
     ("gravity aslant", {"rig": ("0 0 -9.81", "0 9.81 -9.81")}, "<option gravity='0 9.81 -9.81'>: must point straight"),
-    ("a step that is none", {"rig": ('timestep="[^"]*"', 'timestep="nan"')}, "<option timestep='nan'>: must be from"),
-    ("a rate that is none", {"rig": ("0 0 0 314 0", "0 0 0 nan 0")}, "qvel of key 'equilibrium' is no number"),
-    ("a setpoint that is none", {"rig": (' act="1.5707963267948966', ' act="nan')}, "act of key 'equilibrium' is no"),
     (
         "a place that is none",
         {"rig": ('outer" pos="0.14250000000000004', 'outer" pos="nan')},
@@ -194,11 +150,6 @@ KEYFRAME_ANGLES = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966
         "the site of sensor 'accelerometer_outer' must lie on the radial line, from the tilt axis through the centre",
     ),
     (
-        "an accelerometer before the line",
-        {"rig": ('outer" pos="0.14250000000000004 0', 'outer" pos="0.14250000000000004 0.08')},
-        "'accelerometer_outer' must lie on the radial line, from the tilt axis through the centre of mass; it lies",
-    ),
-    (
         "a mesh that is none",
         {"rig": ("<asset>", '<asset><mesh name="rig" file="rig.xml"/>')},
         "does not compile: no decoder found for mesh file 'rig.xml'",
@@ -206,8 +157,26 @@ KEYFRAME_ANGLES = r"-0.78539816339744828 1.5707963267948966 0 1.5707963267948966
     ("a model that is no text", {"rig": ("sun", "sun\xff")}, "not UTF-8 text (at byte "),
     ("a part that is no text", {"cube": ("<!--", "<!--\xff")}, "cube.xml: not UTF-8 text (at byte "),
 )
-def test_a_model_that_is_set_wrongly(wrong_input: dict[str, Any], fragments: list[str]) -> None:
+def test_a_model_that_is_wrong_is_named_with_what_is_wrong(wrong_input: dict[str, Any], fragments: list[str]) -> None:
     assert_in_order(["my.toml: rig.xml: ", *fragments], check_edited(**wrong_input).complaint)
+
+
+def test_the_unedited_copy_is_a_model() -> None:
+    assert check_edited().status == 0
+
+
+def test_a_lock_without_a_bearing() -> None:
+    check_edited(rig=('<joint name="yaw".*?/>', ""))
+    complaint = cmg_mj("run", "my.toml", "--set", "plant.lock_thrust_bearing=true").complaint
+    assert "plant.lock_thrust_bearing = true: rig.xml has no joint 'yaw' to lock" in complaint
+
+
+def test_a_lock_where_the_keyframe_gives_no_rates() -> None:
+    check_edited(rig=('qvel="[^"]*"', ""))
+    with pytest.raises(
+        InputError, match=r"^rig\.xml: keyframe 'equilibrium' must start 'cube1/flywheel' at its motor's"
+    ):
+        load_plant(model="rig.xml", lock_thrust_bearing=True)
 
 
 def test_a_file_that_is_no_text() -> None:

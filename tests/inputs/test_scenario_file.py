@@ -120,32 +120,6 @@ def test_names_the_nearest_name(text: str, field: str, guess: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "field"),
-    [
-        ("kind = 'adaptive'\ntorque = true", "bias, torque"),
-        ("kind = 'adaptive'\nbias = false", "bias, torque, sinusoid_hz"),
-        ("kind = 'adaptive'\nL = [1.0, -3.0]", "L"),
-        ("kind = 'adaptive'\nsinusoid_hz = 500", "sinusoid_hz = 500"),
-        ("kind = 'homogeneous_adaptive'\nL = [20.0, 0.0]", "L"),
-        ("kind = 'high_gain'\nd_inf = 1.0", "d_inf = 1.0"),
-        ("kind = 'high_gain'\nb = 2.0", "b = 2"),
-        ("kind = 'homogeneous'\nfriction_n_m = 8.0", "friction_n_m, damping_n_m_s"),
-        ("kind = 'luenberger'\nL = [[0, 0], [0, 0], [0, 0]]", "L"),
-    ],
-)
-def test_conditions_of_the_theorems(text: str, field: str) -> None:
-    message = check(f"[observer]\n{text}").complaint
-    assert message.startswith(f"my.toml: observer.{field}: "), message
-    assert message.endswith(f"(observer {text.split(chr(39))[1]})"), message
-
-
-def test_all_that_is_wrong_is_said_at_once() -> None:
-    message = check('seed = "b"\n[plant]\nmodl = 3').complaint
-    assert "seed = 'b': " in message
-    assert "; plant.modl: " in message
-
-
-@pytest.mark.parametrize(
     ("name", "guess"), [("push_recvery", "push_recovery"), ("push_recovry.toml", "push_recovery"), (".", None)]
 )
 @pytest.mark.parametrize("command", ["check", "run", "compare"])

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj import InputError, load_scenario, prepare, sweep
+from cmg_mj import InputError
 from cmg_mj.core.types import feedback_state, law_needs
-from cmg_mj.features.tuning.simulations import tuning_scenario
 from cmg_mj.laws import LAW_CLASSES, LAWS, FeedbackState, Law, make_law
 from cmg_mj.observers import Measurement
 from cmg_mj.results.trajectory import Trajectory
 from tests.command import cmg_mj
 from tests.observers.reference import DT, NOISE, PAPER
+from tests.recorded import assert_same_bits, push_recovery, recorded
 
 EVERY = sorted(LAWS)
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1")
@@ -102,32 +102,22 @@ def test_a_law_that_needs_no_estimate_takes_none(kind: str) -> None:
 @pytest.mark.parametrize("kind", EVERY)
 def test_drivers_and_batch_are_one(kind: str) -> None:
     """The runner, MuJoCo's callback and a batch: one trajectory, to the last bit."""
-    experiment = prepare(load_scenario("push_recovery", [*SHORT, f"controller.kind={kind}"]))
-    native, callback, batch = experiment.run(), experiment.run(driver="callback"), experiment.run_many(2)
-    assert native.trajectory is not None
-    assert callback.trajectory is not None
-    assert batch.trajectory is not None
-    assert np.isfinite(native.trajectory["x_e_rad_times_s"]).all()
-    for name, column in native.trajectory.columns.items():
-        np.testing.assert_array_equal(callback.trajectory[name], column, name)
-        batch_column = batch.trajectory[name]
-        np.testing.assert_array_equal(batch_column if batch_column.ndim == 1 else batch_column[:, 0], column, name)
+    experiment = push_recovery(*SHORT, f"controller.kind={kind}")
+    native = recorded(experiment.run())
+    assert np.isfinite(native["x_e_rad_times_s"]).all()
+    assert_same_bits(recorded(experiment.run(driver="callback")), native)
+    assert_same_bits(recorded(experiment.run_many(2)).world(0), native)
 
 
 @pytest.mark.daily_cases("state_feedback")
 @pytest.mark.parametrize("kind", EVERY)
 def test_worlds_of_other_limits_share_a_batch(kind: str) -> None:
     settings = ["plant.initial_tilt_deg=6.0", f"controller.kind={kind}"]
-    experiment = prepare(load_scenario("push_recovery", [*SHORT, *settings]))
     limits = [3.0, 2.0, 1.5]
-    many = experiment.run_many(3, vary={"controller.rate_limit_rad_s": limits}).trajectory
-    assert many is not None
+    vary = {"controller.rate_limit_rad_s": limits}
+    many = recorded(push_recovery(*SHORT, *settings).run_many(3, vary=vary))
     for i, limit in enumerate(limits):
-        single_experiment = prepare(
-            load_scenario("push_recovery", [*SHORT, *settings, f"controller.rate_limit_rad_s={limit}"])
-        )
-        one = single_experiment.run(world=i).trajectory
-        assert one is not None
+        one = recorded(push_recovery(*SHORT, *settings, f"controller.rate_limit_rad_s={limit}").run(world=i))
         np.testing.assert_array_equal(many["u_rad_s"][:, i], one["u_rad_s"])
         assert np.abs(one["u_rad_s"]).max() == limit
 
@@ -139,61 +129,9 @@ def test_what_the_bench_gives_is_no_parameter() -> None:
 
 
 def test_a_law_that_uses_the_noise_keeps_worlds_of_other_noise_apart() -> None:
-    experiment = prepare(load_scenario("push_recovery", [*SHORT, "controller.kind=lqg"]))
+    experiment = push_recovery(*SHORT, "controller.kind=lqg")
     with pytest.raises(InputError, match="the noise that the law is told differs"):
         experiment.run_many(2, vary={"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]})
-
-
-@pytest.mark.slow
-def test_a_sweep_over_the_law() -> None:
-    """Each law in batches of its own, each row as if run alone; where one raises, its own trials alone are lost."""
-    scenario = load_scenario("push_recovery", SHORT)
-    axes = {"controller.kind": [*EVERY, f"{__name__}:RaisesLate"], "plant.equilibrium_bias_deg": [0.0, 1.0]}
-    rows = sweep(scenario, axes, observers=["linear", "kalman"], worlds=2).trials.to_pylist()
-    assert len(rows) == 3 * 2 * 2 * 2
-    for row in rows:
-        kind, bias = row["controller.kind"], row["plant.equilibrium_bias_deg"]
-        if kind not in LAWS:
-            assert (row["outcome"], row["stood"]) == ("stopped", False)
-            assert row["reason"].startswith("law RaisesLate")
-            continue
-        settings = [*SHORT, f"controller.kind={kind}", f"plant.equilibrium_bias_deg={bias}"]
-        alone = prepare(load_scenario("push_recovery", settings, row["observer"])).run(world=row["world"])
-        assert row["tilt_rms_deg"] == alone.summaries[0]["tilt_rms_deg"]
-
-
-class RaisesLate:
-    def __init__(self, dt: float, rate_limit: float) -> None:
-        self.dt, self.rate_limit = dt, rate_limit
-
-    def init(self, y: Measurement) -> int:
-        return 0
-
-    def step(self, state: int, y: Measurement, x: FeedbackState, u: Any) -> tuple[int, Any]:
-        if state == 40:
-            raise KeyError("late")
-        return state + 1, -35.0 * x.x1 - 4.0 * x.x2
-
-
-def test_observers_are_tuned_in_a_loop_that_takes_nothing_of_them() -> None:
-    scenario = load_scenario("push_recovery", ["controller.kind=lqg"])
-    assert tuning_scenario(scenario).controller == scenario.controller
-    assert tuning_scenario(load_scenario("push_recovery")).controller.feedback == "fog"
-
-
-@pytest.mark.slow
-def test_a_run_says_which_law_and_reruns(elsewhere: None) -> None:
-    outcome = cmg_mj(
-        "run", "push_recovery", "--set", "controller.kind=lqg", "--set", "controller.torque_walk=0.1", "--plot"
-    )
-    assert outcome.status == 0
-    name = "runs/push_recovery-homogeneous-0-kind=lqg-torque_walk=0.1"
-    assert name in outcome.err
-    rerun = cmg_mj("run", f"{name}/scenario.toml", "--out", "again")
-    assert rerun.status == 0
-    one, other = Trajectory.load(Path(name, "trajectory.parquet")), Trajectory.load(Path("again/trajectory.parquet"))
-    for column in one.columns:
-        np.testing.assert_array_equal(one[column], other[column])
 
 
 @pytest.mark.slow
@@ -205,6 +143,12 @@ def test_a_law_without_an_integrator_is_recorded_and_plotted(elsewhere: None) ->
     assert "lqg takes nothing of the observer: every loop is the same" in outcome.err
 
 
-class NoMemory(RaisesLate):
+class NoMemory:
+    def __init__(self, dt: float, rate_limit: float) -> None:
+        self.dt, self.rate_limit = dt, rate_limit
+
+    def init(self, y: Measurement) -> int:
+        return 0
+
     def step(self, state: int, y: Measurement, x: FeedbackState, u: Any) -> tuple[int, Any]:
         return 0, -35.0 * x.x1 - 4.0 * x.x2 + x.x3

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import expm, solve_discrete_are
 
-from cmg_mj import load_scenario, prepare
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import TiltNoise
 from cmg_mj.core.types import feedback_state
@@ -19,6 +17,7 @@ from cmg_mj.laws import make_law
 from cmg_mj.laws.lqg import Lqg
 from cmg_mj.observers import Measurement
 from tests.plant import paper_model as paper
+from tests.recorded import push_recovery, recorded
 
 PAIR = ReducedModel(paper.J1, paper.J2, paper.J_d, paper.omega_d, paper.gravity_torque, 2)
 NOISE = TiltNoise(0.0063, 0.41, 0.89, 3.1e-4)
@@ -138,35 +137,25 @@ def test_the_closed_loops_poles_are_the_regulators_and_the_filters(dt: float, pa
     assert np.sort(np.abs(joint_poles))[-2] < 1.0 - 1e-4
 
 
-@cache
-def errors(worlds: int = 3000, seconds: float = 16.0) -> tuple[Lqg, np.ndarray]:
-    """Return the errors of the state that the law expects at a sample, on the linear rig with all its noises."""
-    control_law = law()
-    rng = np.random.default_rng(5)
-    _, _, Q = estimator(control_law.dt, *noises(control_law))
+@pytest.mark.slow
+def test_the_error_is_what_the_filter_says() -> None:
+    """Its covariance over worlds on the linear rig with all its noises, in units of the standard deviations."""
+    control_law, worlds, rng, errors = law(), 3000, np.random.default_rng(5), []
+    P, _, Q = estimator(control_law.dt, *noises(control_law))
     F, G = discretise(*rig(), control_law.dt)
     root = np.linalg.cholesky(Q + 1e-24 * np.eye(4))
     x = np.zeros((4, worlds))
-    state, u, result = control_law.init(Measurement(x[0], x[2])), np.zeros(worlds), []
-    for k in range(round(seconds / control_law.dt)):
+    state, u = control_law.init(Measurement(x[0], x[2])), np.zeros(worlds)
+    for k in range(round(16.0 / control_law.dt)):
         if k * control_law.dt >= 12.0 and k % 100 == 0:  # the filter's slowest pole is at -0.37 1/s
-            result.append((x - np.array(state[:4])).T)
+            errors.append((x - np.array(state[:4])).T)
         y = Measurement(x[0] + NOISE.tilt * rng.normal(size=worlds), x[2] + NOISE.gimbal * rng.normal(size=worlds))
         state, u = control_law.step(state, y, feedback_state(0.0, 0.0, 0.0), u)
         x = F @ x + G * u + root @ rng.normal(size=(4, worlds))
-    return control_law, np.concatenate(result)
-
-
-@pytest.mark.slow
-def test_the_error_is_what_the_filter_says() -> None:
-    """Its covariance over seeds, entry by entry, in units of the standard deviations."""
-    control_law, result = errors()
-    P, _, _ = estimator(control_law.dt, *noises(control_law))
     sigma = np.sqrt(np.diag(P))
-    np.testing.assert_allclose(
-        result.T @ result / len(result) / np.outer(sigma, sigma), P / np.outer(sigma, sigma), atol=0.04
-    )
-    assert np.abs(result.mean(axis=0) / sigma).max() < 0.04
+    scaled = np.concatenate(errors) / sigma
+    np.testing.assert_allclose(scaled.T @ scaled / len(scaled), P / np.outer(sigma, sigma), atol=0.04)
+    assert np.abs(scaled.mean(axis=0)).max() < 0.04
 
 
 def test_its_noises_are_those_of_the_observer_kalman() -> None:
@@ -209,35 +198,28 @@ def test_a_sensor_without_noise_is_taken() -> None:
 def test_the_gimbals_come_back_whatever_the_bias(e: float) -> None:
     """Integral action, on the rig: the mean gimbal angle of the last seconds."""
     settings = ["controller.kind=lqg", f"plant.equilibrium_bias_deg={e}", "duration_s=30", "push=[]"]
-    result = prepare(load_scenario("push_recovery", settings)).run_many(4)
+    result = push_recovery(*settings).run_many(4)
     assert result.stood.all()
-    assert result.trajectory is not None
-    late = result.trajectory["y2_rad"][-2000:]
-    assert np.abs(np.degrees(late.mean(axis=0))).max() < 2.0
-    assert math.degrees(np.abs(result.trajectory["y2_rad"]).max()) > 5.0
+    angles = np.degrees(recorded(result)["y2_rad"])
+    assert np.abs(angles[-2000:].mean(axis=0)).max() < 2.0
+    assert np.abs(angles).max() > 5.0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("missing_part", ["torque", "integrator"])
 def test_either_integral_action_alone_falls_at_a_large_bias(missing_part: str) -> None:
     """Why it is there twice."""
-    settings = ["controller.kind=lqg", "plant.equilibrium_bias_deg=2.0"]
-    experiment = prepare(load_scenario("push_recovery", settings))
+    experiment = push_recovery("controller.kind=lqg", "plant.equilibrium_bias_deg=2.0")
     assert experiment.run_many(4).stood.all()
-    control_law = experiment.law
-    assert isinstance(control_law, Lqg)
+    control_law: Any = experiment.law
     if missing_part == "integrator":
-        A, B = rig()
-        K = solve_without_integrator(A[:3, :3], B[:3], control_law)
-        control_law.__dict__["gains"] = (*K, 0.0)
+        (A, B), dt = rig(), control_law.dt
+        F, G = discretise(A[:3, :3], B[:3], dt)
+        Q, R = dt * np.diag(control_law.state_cost[:3]), np.array([[dt * control_law.input_cost]])
+        S = solve_discrete_are(F, G, Q, R)
+        K = np.linalg.solve(G.T @ S @ G + R, G.T @ S @ F)
+        control_law.__dict__["gains"] = (*K.ravel().tolist(), 0.0)
     else:
         control_law.__dict__["innovation_gain"] = np.vstack([control_law.innovation_gain[:3], [[0.0, 0.0]]])
     control_law.__dict__.pop("_numbers", None)
     assert not experiment.run_many(4).stood.any()
-
-
-def solve_without_integrator(A: np.ndarray, B: np.ndarray, control_law: Lqg) -> list[float]:
-    F, G = discretise(A, B, control_law.dt)
-    Q, R = control_law.dt * np.diag(control_law.state_cost[:3]), np.array([[control_law.dt * control_law.input_cost]])
-    S = solve_discrete_are(F, G, Q, R)
-    return np.ravel(np.linalg.solve(G.T @ S @ G + R, G.T @ S @ F)).tolist()

@@ -40,24 +40,25 @@ def observer(kind: str, dt: float = DT, model: ReducedModel = PAPER, **parameter
     return make_observer(kind, dt, model, NOISE, **parameters)
 
 
-def run(estimator: Observer, y1: Signal, y2: Signal, u: Signal) -> tuple[np.ndarray, list]:
-    """Estimates after the first sample, (n - 1, 3), and all n states."""
-    states, estimates = [estimator.init(Measurement(float(y1[0]), float(y2[0])))], []
-    for a, b, command in zip(y1[1:], y2[1:], u, strict=False):
-        state, estimate = estimator.step(states[-1], Measurement(float(a), float(b)), float(command))
+def columns(*signals: Signal | float) -> list[list]:
+    """Signals of the same length, in floats, or in arrays (n_worlds,) where one has them."""
+    return [s.tolist() if s.ndim == 1 else list(s) for s in np.broadcast_arrays(*signals)]
+
+
+def run(
+    estimator: Any, y1: Signal, y2: Signal | float = 0.0, u: Signal | float = 0.0, a: Signal | float = math.nan
+) -> tuple[np.ndarray, list]:
+    """Estimates after the first sample, (n - 1, 3 or more), and all n states; a is the measured acceleration."""
+    y1, y2, u, a = columns(y1, y2, u, a)
+    states, estimates = [estimator.init(Measurement(y1[0], y2[0], a[0]))], []
+    for k in range(1, len(y1)):
+        state, estimate = estimator.step(states[-1], Measurement(y1[k], y2[k], a[k]), u[k - 1])
         states.append(state)
         estimates.append(estimate)
     return np.array(estimates), states
 
 
-def integrate(
-    slope: Slope,
-    start: Signal,
-    y1: Signal,
-    y2: Signal,
-    u: Signal,
-    dt: float = DT,
-) -> np.ndarray:
+def integrate(slope: Slope, start: Signal, y1: Signal, y2: Signal, u: Signal, dt: float = DT) -> np.ndarray:
     """The continuous observer's state after each sample but the first, (n - 1, len(start))."""
     state, rows = np.array(start, dtype=float), []
     for k in range(1, len(y1)):

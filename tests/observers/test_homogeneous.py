@@ -12,14 +12,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import Measurement, Observer
 from tests.observers.reference import (
     DT,
-    GRAVITY_TORQUE,
     HEAVY,
-    J1,
     PAPER,
     homogeneous_slope,
     integrate,
@@ -74,7 +71,6 @@ def test_follows_the_continuous_observer_at_200_hz(parameters: dict, model: Redu
     expected = integrate(homogeneous_slope(model, **parameters), [y1[0], 0.0], y1, y2, u)
     estimates, _ = run(observer("homogeneous", model=model, **parameters), y1, y2, u)
     error = np.sqrt(np.mean((estimates[:, 1] - expected[:, 1]) ** 2))
-    print(f"{parameters}: rms rate {np.std(expected[:, 1]):.3f} rad/s, rms error of the step {error:.2e}")
     tolerance = 2e-2 if parameters.get("alpha") == 0.7 else 3e-3
     assert error < tolerance * np.std(expected[:, 1])
 
@@ -103,26 +99,12 @@ def test_converges_to_the_continuous_observer_with_the_square_of_the_period() ->
     errors = []
     for n in (200, 400, 800, 1600):
         t = np.linspace(0.0, duration, n + 1)
-        estimates, _ = run(observer("homogeneous", duration / n), y1(t), y2(t), np.full(n, u))
+        estimates, _ = run(observer("homogeneous", duration / n), y1(t), y2(t), u)
         error = np.abs(estimates[:, 1] - reference(t[1:])[1])
         errors.append(error[t[1:] > 0.3].max())
     orders = [math.log2(coarse / fine) for coarse, fine in itertools.pairwise(errors)]
-    print(f"largest error at 200 Hz {errors[0]:.2e} rad/s, orders {np.round(orders, 3)}")
     assert errors[0] < 1e-4
     assert min(orders) > 1.95
-
-
-@pytest.mark.parametrize(
-    ("alpha", "e_deg"), [(0.85, 0.5), (0.85, -1.0), (0.85, 2.0), (0.7, -1.0), (0.7, 2.0), (1.0, 0.5)]
-)
-def test_a_bias_leaves_a_rate_error_of_the_closed_form(alpha: float, e_deg: float) -> None:
-    """At rest y1 = -e: k2 [x1 - y1]^(2 alpha - 1) balances gravity, and x2 = k1 [x1 - y1]^alpha."""
-    y1 = -math.radians(e_deg)
-    n = 1200
-    estimates, _ = run(observer("homogeneous", alpha=alpha), [y1] * n, [0.0] * n, [0.0] * n)
-    pull = GRAVITY_TORQUE * math.sin(abs(y1)) / J1 / 150.0
-    expected = math.copysign(20.0 * pull ** (alpha / (2.0 * alpha - 1.0)), y1)
-    assert estimates[-1, 1] == pytest.approx(expected, rel=1e-7)
 
 
 def free_errors(alpha: float, dt: float, n: int, x1: float, x2: float) -> np.ndarray:
@@ -140,7 +122,6 @@ def test_converges_in_finite_time() -> None:
     dt = 1e-3
     ours, linear = (np.abs(free_errors(alpha, dt, 1500, 0.05, -1.0)[:, 1]) for alpha in (0.85, 1.0))
     end_time = dt * (1 + int(np.flatnonzero(ours > 1e-9)[-1]))
-    print(f"1e-9 rad/s after {end_time:.3f} s; alpha = 1 then has {linear[round(end_time / dt)]:.1e} rad/s")
     assert end_time < 1.2
     assert linear[round(end_time / dt)] > 1e-6
 
@@ -155,26 +136,6 @@ def test_is_homogeneous(alpha: float) -> None:
     np.testing.assert_allclose(large[:, 1], small[:, 1] * scale**alpha, rtol=0.0, atol=1e-8)
 
 
-def test_without_noise_and_bias_it_finds_the_rate() -> None:
-    """Along a free motion of (4), the true x1, x3 measured."""
-    u, dt = 0.5, 5e-4
-    slope = homogeneous_slope(k1=0.0, k2=0.0)
-    t = np.arange(0.0, 0.8, dt)
-    x1, x2 = solve_ivp(
-        lambda s, x: slope(x, x[0], u * s - 0.1, u),
-        (0.0, 0.8),
-        [-0.04, 0.25],
-        "DOP853",
-        t,
-        rtol=1e-11,
-        atol=1e-12,
-    ).y
-    estimates, _ = run(observer("homogeneous", dt), x1, u * t - 0.1, np.full(len(t), u))
-    error = np.abs(estimates[:, 1] - x2[1:])
-    assert error[:10].min() > 0.1
-    assert error[t[1:] > 0.7].max() < 5e-5
-
-
 def test_with_alpha_1_it_is_a_linear_observer() -> None:
     """x' = [[-k1, 1], [-k2, 0]] x without drive. The step's error is RK4's, of fourth order."""
     errors = []
@@ -184,17 +145,6 @@ def test_with_alpha_1_it_is_a_linear_observer() -> None:
         errors.append(np.abs(free_errors(1.0, dt, n, 0.03, -0.4)[-1] - exact).max())
     assert errors[0] < 2e-6
     assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.3)
-
-
-@pytest.mark.parametrize("alpha", [0.5, 0.2, 1.0001, -0.85, math.nan])
-def test_alpha_outside_its_interval_is_refused(alpha: float) -> None:
-    with pytest.raises(InputError, match=r"^observer\.alpha = .*(greater|less|finite).*homogeneous"):
-        observer("homogeneous", alpha=alpha)
-
-
-@pytest.mark.parametrize("alpha", [0.501, 1.0])
-def test_alpha_inside_its_interval_is_taken(alpha: float) -> None:
-    observer("homogeneous", alpha=alpha)
 
 
 # --- the friction model and a known bias: the papers' future work ---------------------------------------------
@@ -239,12 +189,3 @@ def test_a_known_bias_is_where_gravity_pulls() -> None:
         plain_state, plain_estimate = estimator.step(plain_state, y, 0.0)
     assert abs(biased_estimate.x2) < 1e-8
     assert abs(plain_estimate.x2) > 0.05
-
-
-def test_friction_beyond_what_the_step_tolerates_is_refused() -> None:
-    """c h = (friction/width + damping) h/(gimbals D) at most 2.5: up to 1.546 N m on one gimbal."""
-    observer("homogeneous", friction_n_m=1.54)
-    bad_arguments: list[dict[str, Any]] = [{"friction_n_m": 1.56}, {"damping_n_m_s": 31.5}, {"friction_n_m": 1e6}]
-    for arguments in bad_arguments:
-        with pytest.raises(InputError, match="friction_n_m, damping_n_m_s: too much for the sample period"):
-            observer("homogeneous", **arguments)

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm, solve_discrete_are
-from scipy.stats import chi2
 
-from cmg_mj import load_scenario, prepare
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import Measurement
-from cmg_mj.observers.kalman import COLUMNS, PAIRS, Covariance, Kalman, State
-from tests.observers.reference import DT, HEAVY, PAPER, observer, rough_signals
+from cmg_mj.observers.kalman import PAIRS, Covariance, Kalman
+from tests.observers.reference import DT, HEAVY, PAPER, observer, rough_signals, run
+from tests.recorded import push_recovery
 
 C = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 PAIR = dataclasses.replace(PAPER, gimbals=2)
@@ -83,10 +82,8 @@ def reference(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) 
     """The textbook's extended Kalman filter: estimates (n - 1, 4), and the last covariance (4, 4)."""
     R = measured_noise(estimator)
     Q = sample_noise(estimator, jacobian(estimator, np.zeros(4), 0.0))
-    x, P = (
-        np.array([y1[0], 0.0, y2[0], 0.0]),
-        np.diag([R[0, 0], estimator.rate_start**2, R[1, 1], estimator.torque_start**2]),
-    )
+    x = np.array([y1[0], 0.0, y2[0], 0.0])
+    P = np.diag([R[0, 0], estimator.rate_start**2, R[1, 1], estimator.torque_start**2])
     estimates = []
     for k in range(1, len(y1)):
         command = float(u[k - 1])
@@ -102,25 +99,16 @@ def reference(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) 
     return np.array(estimates), P
 
 
-def run_filter(estimator: Kalman, y1: np.ndarray, y2: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, State]:
-    """Estimates (n - 1, 4), and the last state."""
-    state, estimates = estimator.init(Measurement(float(y1[0]), float(y2[0]))), []
-    for k in range(1, len(y1)):
-        state, estimate = estimator.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
-        estimates.append(estimate)
-    return np.array(estimates), state
-
-
 @pytest.mark.parametrize("model", [PAIR, HEAVY], ids=["pair", "heavy"])
 def test_equals_the_textbooks_filter(model: ReducedModel) -> None:
     """But for the third order of a step with the command at its limit: 2 % of the estimate's own noise."""
     estimator = kalman(model)
     signals = rough_signals(200, seed=1)
     expected, P = reference(estimator, *signals)
-    estimates, state = run_filter(estimator, *signals)
+    estimates, states = run(estimator, *signals)
     off = np.abs(estimates - expected).max(axis=0)
     assert (off < [2e-6, 2e-4, 1e-9, 1e-4]).all(), off
-    np.testing.assert_allclose(matrix(state.P), P, rtol=2e-3, atol=1e-10)
+    np.testing.assert_allclose(matrix(states[-1].P), P, rtol=2e-3, atol=1e-10)
 
 
 def test_defaults() -> None:
@@ -139,17 +127,10 @@ def test_the_series_ends_where_it_says(pole_dt: float, most: float) -> None:
 def test_settles_at_the_linear_filter() -> None:
     """About the upright the gains become those of the algebraic Riccati equation."""
     estimator = kalman()
-    F, Q = (
-        expm(jacobian(estimator, np.zeros(4), 0.0) * DT),
-        sample_noise(estimator, jacobian(estimator, np.zeros(4), 0.0)),
-    )
-    R = measured_noise(estimator)
-    prediction_covariance = solve_discrete_are(F.T, C.T, Q, R)
-    covariance = prediction_covariance - prediction_covariance @ C.T @ np.linalg.solve(
-        C @ prediction_covariance @ C.T + R, C @ prediction_covariance
-    )
-    zeros = np.zeros(8000)
-    _, state = run_filter(estimator, zeros, zeros, zeros)
+    A, R = jacobian(estimator, np.zeros(4), 0.0), measured_noise(estimator)
+    P = solve_discrete_are(expm(A * DT).T, C.T, sample_noise(estimator, A), R)
+    covariance = P - P @ C.T @ np.linalg.solve(C @ P @ C.T + R, C @ P)
+    state = run(estimator, np.zeros(8000))[1][-1]
     np.testing.assert_allclose(matrix(state.P), covariance, rtol=1e-6, atol=1e-14)
     gain = covariance @ C.T @ np.linalg.inv(R)
     for column, y in ((0, Measurement(1e-9, 0.0)), (1, Measurement(0.0, 1e-9))):
@@ -162,91 +143,18 @@ def test_settles_at_the_linear_filter() -> None:
 def test_covariance_stays_a_covariance(dt: float) -> None:
     """Over 20,000 samples of signals that no rig makes, from a start that knows next to nothing."""
     estimator = kalman(dt=dt, rate_start=100.0, torque_start=100.0)
-    y1, y2, u = rough_signals(20_000, seed=2)
-    state = estimator.init(Measurement(float(y1[0]), float(y2[0])))
-    for k in range(1, len(y1)):
-        state, _ = estimator.step(state, Measurement(float(y1[k]), float(y2[k])), float(u[k - 1]))
-        if k % 100 == 0 or k < 100:
-            P = matrix(state.P)
-            scale = np.sqrt(np.diag(P))
-            assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > 1e-6, k
-
-
-def simulate(
-    rig: Kalman, estimator: Kalman, runs: int, ticks: int, seed: int
-) -> tuple[np.ndarray, np.ndarray, list[State]]:
-    """The reduced model with just the noise that one filter expects, and another filter on it; many runs side by side.
-
-    Returns:
-        Errors (ticks, 4, runs), innovations normalised and squared (ticks, runs), and the states.
-    """
-    rng = np.random.default_rng(seed)
-    m, parts = rig.model, 10
-    h = rig.dt / parts
-    v1, v2 = rig.noise.tilt, math.sqrt(measured_noise(estimator)[1, 1])
-    x1, x3 = np.full(runs, 0.01), np.full(runs, 0.05)
-    x2, torque = rig.rate_start * rng.standard_normal(runs), rig.torque_start * rng.standard_normal(runs)
-    u = np.zeros(runs)
-    state = estimator.init(Measurement(x1 + v1 * rng.standard_normal(runs), x3 + v2 * rng.standard_normal(runs)))
-    errors, squares, states = [], [], []
-    for _ in range(ticks):
-        for _ in range(parts):
-            torque_noise, gimbal_noise, walk_noise = rng.standard_normal((3, runs)) * math.sqrt(h)
-            D = m.J1 + m.J2 * np.sin(x3) ** 2
-            rate = u * h + rig.gimbal_white * gimbal_noise
-            gyroscopic = (m.J_d * m.omega_d * np.cos(x3) - m.J2 * x2 * np.sin(2.0 * x3)) * rate
-            impulse = (torque * h + rig.torque_white * torque_noise) / m.gimbals
-            x1 = x1 + h * x2
-            x2 = x2 + (gyroscopic + h * m.gravity_torque * np.sin(x1) + impulse) / D
-            x3, torque = x3 + rate, torque + rig.torque_walk * walk_noise
-        y = Measurement(x1 + v1 * rng.standard_normal(runs), x3 + v2 * rng.standard_normal(runs))
-        x, P = estimator._predicted(state, u)
-        (r1, _), (_, r2) = measured_noise(estimator)
-        S = np.array([[P.p11 + r1, P.p13], [P.p13, P.p33 + r2]])
-        off = np.array([y.y1 - x[0], y.y2 - x[2]])
-        squares.append(np.einsum("ir,rij,jr->r", off, np.linalg.inv(np.moveaxis(S, -1, 0)), off))
-        state, estimate = estimator.step(state, y, u)
-        errors.append(np.array([x1, x2, x3, torque]) - np.array(estimate))
-        states.append(state)
-        u = np.clip(-35.0 * x1 - 4.0 * x2 + x3, -4.7, 4.7)  # a law that holds it; it sees the truth
-    return np.array(errors), np.array(squares), states
-
-
-def normalise(estimator: Kalman) -> list[tuple[str, float, float, float]]:
-    """On a rig with the default's noise: mean of the squares, and between what they should be, 1 time in 10,000 not."""
-    runs, ticks, ends = 300, 300, [5e-5, 1.0 - 5e-5]
-    errors, squares, states = simulate(kalman(), estimator, runs, ticks, seed=3)
-    low, high = chi2.ppf(ends, 4 * runs) / runs
-    result = []
-    for k in (0, 1, 5, 20, 100, ticks - 1):
-        P = np.moveaxis(np.array([[states[k].P[place] for place in row] for row in COLUMNS]), -1, 0)
-        e = errors[k]
-        result.append((f"errors at {k}", low, np.einsum("ir,rij,jr->r", e, np.linalg.inv(P), e).mean(), high))
-    # Innovations of a filter that is right are independent from sample to sample.
-    low, high = chi2.ppf(ends, 2 * runs * ticks) / (runs * ticks)
-    return [*result, ("innovations", low, squares.mean(), high)]
-
-
-def test_errors_are_as_large_as_the_covariance_says() -> None:
-    for label, low, mean, high in normalise(kalman()):
-        assert low < mean < high, label
-
-
-@pytest.mark.daily_cases("gimbal_white-2.0", "torque_white-0.5", "torque_start-2.0")
-@pytest.mark.parametrize("factor", [0.5, 2.0])
-@pytest.mark.parametrize("name", ["torque_white", "gimbal_white", "torque_start"])
-def test_a_filter_that_expects_another_noise_is_found_out(name: str, factor: float) -> None:
-    default = kalman()
-    wrong = kalman(**{name: factor * getattr(default, name)})
-    assert not all(low < mean < high for _, low, mean, high in normalise(wrong))
+    _, states = run(estimator, *rough_signals(20_000, seed=2))
+    for state in (*states[1:100], *states[100::100]):
+        P = matrix(state.P)
+        scale = np.sqrt(np.diag(P))
+        assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > 1e-6
 
 
 def test_a_bias_is_found_as_a_torque() -> None:
     """At rest at y1 = -e gravity pulls as if upright: the torque that e makes is n M sin e."""
     estimator = kalman()
     e = math.radians(1.0)
-    zeros = np.zeros(3000)
-    estimates, _ = run_filter(estimator, zeros - e, zeros, zeros)
+    estimates, _ = run(estimator, [-e] * 3000)
     expected = (0.0 - e, 0.0, 0.0, PAIR.gimbals * PAIR.gravity_torque * math.sin(e))
     np.testing.assert_allclose(estimates[-1], expected, atol=1e-4)
     assert "bias_rad" not in estimator.extra_signals
@@ -255,6 +163,5 @@ def test_a_bias_is_found_as_a_torque() -> None:
 @pytest.mark.parametrize("counts", [64, 4096])
 def test_it_uses_the_noise_of_the_scenarios_encoders(counts: int) -> None:
     """y2 is the mean of two, each rounded to whole counts."""
-    changes = [f"sensors.encoder.counts_per_revolution={counts}"]
-    setup: Any = prepare(load_scenario("push_recovery", changes, "kalman")).design.observer()
+    setup: Any = push_recovery(f"sensors.encoder.counts_per_revolution={counts}", observer="kalman").design.observer()
     assert setup.noise.gimbal**2 == pytest.approx((2.0 * math.pi / counts) ** 2 / 12.0 / 2.0)

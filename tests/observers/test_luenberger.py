@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from tests.observers.reference import (
     GRAVITY_TORQUE,
@@ -46,32 +45,3 @@ def test_error_poles_are_those_of_table_II() -> None:
     half = math.sqrt(100.0 - 150.0 + GRAVITY_TORQUE / J1)
     np.testing.assert_allclose(sorted(poles.real), [-20.0, -10.0 - half, -10.0 + half], rtol=1e-9)
     np.testing.assert_allclose(poles.imag, 0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("e_deg", [0.5, -2.0])
-def test_a_bias_leaves_a_rate_error_of_the_closed_form(e_deg: float) -> None:
-    """At rest y1 = -e, 0 = x2 + l11 (y1 - x1) and 0 = w^2 x1 + l21 (y1 - x1), w^2 = m g l/(sqrt(2) J1)."""
-    y1 = -math.radians(e_deg)
-    w2 = GRAVITY_TORQUE / J1
-    n = 800
-    estimates, _ = run(observer("luenberger"), [y1] * n, [0.0] * n, [0.0] * n)
-    assert estimates[-1, 1] == pytest.approx(20.0 * w2 * y1 / (150.0 - w2), rel=1e-9)
-    assert estimates[-1, 0] == pytest.approx(150.0 * y1 / (150.0 - w2), rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    "L",
-    [
-        pytest.param(((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), id="none"),
-        pytest.param(((20.0, 0.0), (55.0, 0.0), (0.0, 20.0)), id="less than the unstable pole asks for"),
-        pytest.param(((20.0, 0.0), (150.0, 0.0), (0.0, 0.0)), id="third state not corrected"),
-        pytest.param(((-20.0, 0.0), (150.0, 0.0), (0.0, 20.0)), id="sign"),
-    ],
-)
-def test_a_gain_that_does_not_stabilise_is_refused_by_name(L: tuple) -> None:
-    with pytest.raises(InputError, match=r"L: A - L C must be Hurwitz .+, its eigenvalues are .+luenberger"):
-        observer("luenberger", L=L)
-
-
-def test_a_gain_just_above_the_unstable_pole_is_taken() -> None:
-    observer("luenberger", L=((20.0, 0.0), (56.5, 0.0), (0.0, 20.0)))  # m g l/(sqrt(2) J1) = 55.84

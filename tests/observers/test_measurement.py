@@ -23,16 +23,6 @@ def test_two_angles_unpack_and_the_acceleration_is_beside_them() -> None:
     assert math.isnan(Measurement(0.1, 0.2).acceleration)
 
 
-def test_a_turning_body_shows_its_angular_acceleration() -> None:
-    """Specific forces at radius r of a body that turns: r alpha - g sin(tilt), -r rate^2 + g cos(tilt)."""
-    tilt, rate, alpha = 0.3, 1.7, -4.0
-    tilt_estimate = RadialTilt(0.07, 0.2)
-    inner, outer = (r * alpha - G * math.sin(tilt) for r in (tilt_estimate.r_inner, tilt_estimate.r_outer))
-    assert tilt_estimate.acceleration(inner, outer) == pytest.approx(alpha, rel=1e-12)
-    z = [-r * rate**2 + G * math.cos(tilt) for r in (tilt_estimate.r_inner, tilt_estimate.r_outer)]
-    assert tilt_estimate(inner, z[0], outer, z[1]) == pytest.approx(tilt, rel=1e-12)
-
-
 def test_noise_and_correlation_are_those_of_random_readings() -> None:
     tilt_estimate, sigma = RadialTilt(0.067, 0.201), 0.0392
     rng = np.random.default_rng(1)

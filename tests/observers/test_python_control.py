@@ -14,7 +14,7 @@ from control import input_output_response, linearize
 from scipy.integrate import solve_ivp
 
 from cmg_mj.core.reduced_model import ReducedModel
-from tests.observers.reference import GRAVITY_TORQUE, HEAVY, J1, PAPER
+from tests.observers.reference import HEAVY, PAPER
 
 MODELS = pytest.mark.parametrize("model", [PAPER, HEAVY, dataclasses.replace(HEAVY, gimbals=2)])
 
@@ -30,34 +30,11 @@ def test_linear_system_has_the_models_matrices(model: ReducedModel) -> None:
     assert system.isctime()
 
 
-def test_open_loop_poles_of_table_1() -> None:
-    """+-sqrt(m g l/(sqrt(2) J1)) of the pendulum, and the gimbal's integrator."""
-    fall = np.sqrt(GRAVITY_TORQUE / J1)
-    poles: Any = PAPER.linear_system().poles()
-    np.testing.assert_allclose(np.sort(poles.real), [-fall, 0.0, fall], atol=1e-12)
-
-
 @MODELS
 def test_linearisation_of_the_nonlinear_system_is_the_linear_one(model: ReducedModel) -> None:
     linear: Any = linearize(model.nonlinear_system(), [0.0, 0.0, 0.0], [0.0])
     for matrix, expected in ((linear.A, model.A), (linear.B, model.B), (linear.C, model.C)):
         np.testing.assert_allclose(matrix, expected, atol=1e-4)  # one-sided differences of 1e-6
-
-
-def test_linearisation_away_from_the_equilibrium() -> None:
-    """At a turned gimbal the gyroscopic torque has the cosine, and x2 couples to u: by hand for f2 in (4)."""
-    x1, x2, x3, u = 0.2, -0.7, 0.9, 1.5
-    D = HEAVY.J1 + HEAVY.J2 * np.sin(x3) ** 2
-    linear: Any = linearize(HEAVY.nonlinear_system(), [x1, x2, x3], [u])
-    twice = HEAVY.J2 * np.sin(2.0 * x3)
-    expected = {
-        (1, 0): HEAVY.gravity_torque * np.cos(x1) / D,
-        (1, 1): -twice * u / D,
-        (0, 1): 1.0,
-    }
-    for place, value in expected.items():
-        assert linear.A[place] == pytest.approx(value, abs=1e-4)
-    assert linear.B[1, 0] == pytest.approx((HEAVY.J_d * HEAVY.omega_d * np.cos(x3) - twice * x2) / D, abs=1e-4)
 
 
 def test_simulated_response_of_the_nonlinear_system() -> None:

@@ -14,7 +14,7 @@ from cmg_mj.laws import scaled_gains
 from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
 from cmg_mj.observers.scaling import PURE, TORQUE, UNITS, Owner, Scales, Unit, scale_value, scaled_parameters, scales_of
-from tests.observers.reference import DT, HEAVY, NOISE, PAPER, rough_signals
+from tests.observers.reference import DT, HEAVY, NOISE, rough_signals
 
 EXTRA = {"bias_rad": PURE}
 """Units of estimates beyond x; the others are torques."""
@@ -88,22 +88,6 @@ def test_every_number_has_a_unit(kind: str) -> None:
 def test_the_scale_of_time_is_that_of_the_law() -> None:
     model = ReducedModel(J1=40.0, J2=0.01, J_d=0.04, omega_d=300.0, gravity_torque=350.0, gimbals=2)
     np.testing.assert_allclose(scaled_gains(model)[2], TABLE_2_GAINS[2] / scales_of(model).time, rtol=1e-12)
-
-
-def test_nothing_changes_on_the_papers_rig() -> None:
-    for kind in OBSERVERS:
-        for name, value in scaled_parameters(kind, replace(PAPER, gimbals=2)).items():
-            default = OBSERVER_CLASSES.takes(kind)[name].default
-            np.testing.assert_allclose(value, default, rtol=2e-3)
-
-
-def test_a_slow_robot_gets_slow_gains() -> None:
-    humanoid = ReducedModel(J1=68.79, J2=-0.0098, J_d=0.0567, omega_d=314.0, gravity_torque=536.6, gimbals=2)
-    time, inertia = scales_of(humanoid)
-    assert (time, inertia) == pytest.approx((2.675, 1112.0), rel=2e-3)
-    assert scaled_parameters("homogeneous", humanoid) == pytest.approx({"k1": 20.0 / time, "k2": 150.0 / time**2})
-    assert scaled_parameters("linear", humanoid) == {"tau": pytest.approx(0.02 * time)}
-    assert scaled_parameters("kalman", humanoid)["torque_start"] == pytest.approx(0.2 * inertia / time**2)
 
 
 def test_the_sensors_observers_and_a_users_own_stay_as_they_are() -> None:

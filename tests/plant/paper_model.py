@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 import sympy as sp
@@ -57,65 +57,48 @@ def twice_module_energy(w_b: sp.Matrix, q: Sequence[sp.Expr], dq: Sequence[sp.Ex
     return twice_body_energy([I_d, J_d, K_d], w_d) + twice_body_energy([I_c, J_c, K_c], w_c)
 
 
-class Lagrangian:
-    """Functions of a system L = T - P, compiled at first use. Coordinates lie on every array's last axis."""
+class EulerLagrange:
+    """Equations (1) of a system by its energies. Coordinates lie on every array's last axis."""
 
-    def __init__(self, q: Sequence[sp.Symbol], dq: Sequence[sp.Symbol], T: sp.Expr, P: sp.Expr) -> None:
-        self.q, self.dq, self.T, self.P = sp.Matrix(q), sp.Matrix(dq), T, P
+    kinetic: Function
+    """T(q, dq) [J]."""
+    potential: Function
+    """P(q) [J]."""
+    momenta: Function
+    """dT/d(dq)(q, dq) [N m s]; constant where neither T nor P knows the coordinate."""
+    mass_matrix: Function
+    """M(q), (..., n, n) [kg m^2]."""
 
-    @cached_property
-    def _dT_ddq(self) -> sp.Matrix:
-        return sp.Matrix([self.T]).jacobian(self.dq).T
-
-    @cached_property
-    def kinetic(self) -> Function:
-        """T(q, dq) [J]."""
-        energy = _compile(sp.Matrix([self.T]), self.q, self.dq)
-        return lambda q, dq: energy(q, dq)[..., 0, 0]
-
-    @cached_property
-    def potential(self) -> Function:
-        """P(q) [J]."""
-        energy = _compile(sp.Matrix([self.P]), self.q)
-        return lambda q: energy(q)[..., 0, 0]
-
-    @cached_property
-    def momenta(self) -> Function:
-        """dT/d(dq)(q, dq) [N m s]; constant where neither T nor P knows the coordinate."""
-        momenta = _compile(self._dT_ddq, self.q, self.dq)
-        return lambda q, dq: momenta(q, dq)[..., 0]
-
-    @cached_property
-    def mass_matrix(self) -> Function:
-        """M(q), (..., n, n) [kg m^2]: the momenta M dq, of which T is the quadratic form, at unit rates."""
-        momenta, units = self.momenta, np.eye(len(self.q))
-
-        def mass_matrix(q: np.ndarray) -> np.ndarray:
-            each = np.broadcast_to(q[..., None, :], (*q.shape, q.shape[-1]))
-            return momenta(each, np.broadcast_to(units, each.shape)).swapaxes(-1, -2)
-
-        return mass_matrix
-
-    @cached_property
-    def bias(self) -> Function:
-        """What the Euler-Lagrange equations (1) have besides M ddq: tau = M ddq + bias(q, dq) [N m].
+    def bias(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+        """What the equations have besides M ddq: tau = M ddq + bias(q, dq) [N m].
 
         By complex steps, which are exact to rounding: sympy takes a second for these derivatives.
         """
-        momenta, kinetic, potential = self.momenta, self.kinetic, self.potential
-        steps = 1j * STEP * np.eye(len(self.q))
-
-        def bias(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-            turning = np.imag(momenta(q + 1j * STEP * dq, dq)) / STEP
-            stepped = q[..., None, :] + steps
-            lagrangian = kinetic(stepped, np.broadcast_to(dq[..., None, :], stepped.shape)) - potential(stepped)
-            return turning - np.imag(lagrangian) / STEP
-
-        return bias
+        turning = np.imag(self.momenta(q + 1j * STEP * dq, dq)) / STEP
+        stepped = q[..., None, :] + 1j * STEP * np.eye(q.shape[-1])
+        lagrangian = self.kinetic(stepped, np.broadcast_to(dq[..., None, :], stepped.shape)) - self.potential(stepped)
+        return turning - np.imag(lagrangian) / STEP
 
     def accelerations(self, q: np.ndarray, dq: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """ddq of the Euler-Lagrange equations (1) under the generalised torques tau [rad/s^2]."""
+        """ddq under the generalised torques tau [rad/s^2]."""
         return np.linalg.solve(self.mass_matrix(q), (tau - self.bias(q, dq))[..., None])[..., 0]
+
+
+class Lagrangian(EulerLagrange):
+    """Functions of a system L = T - P in sympy, compiled."""
+
+    def __init__(self, q: Sequence[sp.Symbol], dq: Sequence[sp.Symbol], T: sp.Expr, P: sp.Expr) -> None:
+        symbols, rates = sp.Matrix(q), sp.Matrix(dq)
+        kinetic, potential = _compile(sp.Matrix([T]), symbols, rates), _compile(sp.Matrix([P]), symbols)
+        momenta = _compile(sp.Matrix([T]).jacobian(rates).T, symbols, rates)
+        self.kinetic = lambda q, dq: kinetic(q, dq)[..., 0, 0]
+        self.potential = lambda q: potential(q)[..., 0, 0]
+        self.momenta = lambda q, dq: momenta(q, dq)[..., 0]
+
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+        """The momenta M dq, of which T is the quadratic form, at unit rates."""
+        each = np.broadcast_to(q[..., None, :], (*q.shape, q.shape[-1]))
+        return self.momenta(each, np.broadcast_to(np.eye(q.shape[-1]), each.shape)).swapaxes(-1, -2)
 
 
 def _compile(matrix: sp.Matrix, *arguments: sp.Matrix) -> Function:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -67,8 +68,7 @@ def test_six_bodies_in_symmetric_motion_obey_the_reduced_equations(plant: Plant)
 # --- along a swing ------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Swing:
+class Swing(NamedTuple):
     """A motion of the six bodies at every half step: what drives the reduced model and what it must give."""
 
     tilt: np.ndarray
@@ -151,12 +151,6 @@ def test_reduced_model_follows_the_six_bodies_through_a_swing(plant: Plant, name
     error = tilt_error(true, motion)
     wrong_sign_error = tilt_error(replace(true, J2=-true.J2), motion)
     constant = tilt_error(true, motion, constant_speed=True)
-    print(
-        f"{name}: gimbal {np.degrees(motion.gimbal.min()):.0f} to {np.degrees(motion.gimbal.max()):.0f} deg,",
-        f"tilt {np.degrees(motion.tilt.min()):.0f} to {np.degrees(motion.tilt.max()):.0f} deg,",
-        f"flywheel {motion.flywheel.min():.1f} to {motion.flywheel.max():.1f} rad/s;",
-        f"tilt error {error:.1e} rad, J2 turned {wrong_sign_error:.1e}, constant omega_d {constant:.1e}",
-    )
     assert error < 1e-5
     assert wrong_sign_error > 1e-3
     # Hypothesis 3, with these flywheel drives, costs more than leaving out J2 would, and less than 2 degrees.
@@ -184,6 +178,5 @@ def test_linearisation_is_the_slope_of_the_full_model(model: str) -> None:
 
     reduced = plant.reduced
     expected = np.array([reduced.A[1, 0], reduced.A[1, 1], reduced.B[1, 0]])
-    print(f"{model}: slopes {slopes}, off by {slopes - expected}")
     np.testing.assert_allclose(slopes, expected, rtol=0.0, atol=1e-6 * expected.max())
     np.testing.assert_allclose(slopes[[0, 2]], expected[[0, 2]], rtol=1e-6)

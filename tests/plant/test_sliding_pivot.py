@@ -15,7 +15,6 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.features.bend import Bend, BendBeyond
 from cmg_mj.features.mounting.limits import ReducedPhysics
 from cmg_mj.linear.plant import linearise
-from cmg_mj.plant.elements import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
 from tests.features.bend.test_bend import frequency, ring
 from tests.features.mounting.push_robots import cart_pole
@@ -187,13 +186,6 @@ def test_a_pivot_at_rest_is_what_it_was(model: str) -> None:
     assert not plant.reduced.pivot_arm
     with pytest.raises(InputError, match=r"plant.pivot_slides = true: .*the pivot.* does not slide freely; leave it"):
         load_plant(model=model, pivot_slides=True)
-
-
-@pytest.mark.slow
-def test_a_held_cart_is_a_pivot_at_rest(tmp_path: Path) -> None:
-    spec = mujoco.MjSpec.from_string(cart_pole())
-    model = mount(spec, "pole", axis="hinge").save(tmp_path / "held.xml")
-    assert load_plant(model=str(model)).reduced.pivot_arm == 0.0
 
 
 TWO_JOINTS = """

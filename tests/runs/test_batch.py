@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-import tracemalloc
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -14,10 +11,9 @@ import pytest
 
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement
-from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.result import Result
-from cmg_mj.runs.experiment import Experiment, prepare
-from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.runs.experiment import Experiment
+from tests.recorded import assert_same_bits, push_recovery, recorded
 
 SHORT = ("duration_s=0.8", "push.0.start_s=0.2", "push.0.duration_s=0.1")
 
@@ -35,18 +31,13 @@ IMPERFECT = (
 
 @cache
 def experiment(*settings: str) -> Experiment:
-    return prepare(load_scenario("push_recovery", [*SHORT, *settings]))
+    return push_recovery(*SHORT, *settings)
 
 
 def assert_same(batch: Result, singles: Sequence[Result]) -> None:
     """Bit by bit: outcomes, summaries and every column, each world up to its end."""
-    assert batch.trajectory is not None
     for i, single in enumerate(singles):
-        world = batch.trajectory.world(i)
-        assert single.trajectory is not None
-        assert world.columns.keys() == single.trajectory.columns.keys()
-        for name, values in single.trajectory.columns.items():
-            np.testing.assert_array_equal(world[name], values, err_msg=f"world {i}, {name}")
+        assert_same_bits(recorded(batch).world(i), recorded(single))
         assert batch.outcomes[i] == single.outcomes[0]
         assert batch.summaries[i].keys() == single.summaries[0].keys()
         assert_same_numbers(batch.summaries[i], single.summaries[0])
@@ -97,7 +88,6 @@ def test_worlds_that_fall_midway_leave_the_others_alone(kind: str, fall_angle_de
     setup = experiment(f"observer.kind={kind}", *settings)
     batch = setup.run_many(12)
     has_fallen = [outcome.fell for outcome in batch.outcomes]
-    print(f"{kind}: {sum(has_fallen)} of 12 fell, at {sorted({o.time_s for o in batch.outcomes if o.fell})}")
     assert 0 < sum(has_fallen) < 12
     assert_same(batch, [setup.run(world=i) for i in range(12)])
     for outcome, summary in zip(batch.outcomes, batch.summaries, strict=True):
@@ -109,27 +99,19 @@ def test_worlds_that_fall_midway_leave_the_others_alone(kind: str, fall_angle_de
 BIASES = (-10.0, -1.0, 0.0, 0.5, 1.5, 8.0)
 
 
-def with_bias(setup: Experiment, bias_deg: float) -> Experiment:
-    plant = setup.scenario.plant
-    fields = {name: getattr(plant, name) for name in plant.__dataclass_fields__}  # type: ignore[attr-defined]
-    return replace(setup, plant=load_plant(**{**fields, "equilibrium_bias_deg": bias_deg}))
-
-
 @pytest.mark.daily_cases("homogeneous")
 @pytest.mark.parametrize("kind", ["homogeneous", "ltv"])
 def test_each_world_may_have_its_own_rig(kind: str) -> None:
     """Large biases fall at once and at different times; in the batch each world keeps its own model."""
     setup = experiment(f"observer.kind={kind}", "metrics.fall_angle_deg=12")
-    world_experiments = [with_bias(setup, bias) for bias in BIASES]
-    batch = setup.run_many(len(BIASES), [one.plant for one in world_experiments])
-    singles = [one.run(world=i) for i, one in enumerate(world_experiments)]
-    assert_same(batch, singles)
+    vary = {"equilibrium_bias_deg": BIASES}
+    batch = setup.run_many(len(BIASES), vary=vary)
+    assert_same(batch, [one.run(world=i) for i, one in enumerate(setup.with_varied(vary))])
     ends = [outcome.time_s for outcome in batch.outcomes]
     assert [outcome.fell for outcome in batch.outcomes] == [True, False, False, False, False, True]
     assert 0.05 < ends[0] < 0.8
     assert 0.05 < ends[-1] < 0.8
-    assert batch.trajectory is not None
-    x1 = batch.trajectory["x1_rad"]
+    x1 = recorded(batch)["x1_rad"]
     assert np.isnan(x1[-1]).tolist() == [True, False, False, False, False, True]
     np.testing.assert_allclose(x1[0], np.radians(1.0), atol=1e-12)  # from each world's own equilibrium
 
@@ -138,78 +120,29 @@ def test_when_all_worlds_have_fallen_the_batch_ends() -> None:
     setup = experiment("metrics.fall_angle_deg=1.5", "push.0.torque_n_m=9.0")
     batch = setup.run_many(4)
     assert all(outcome.fell for outcome in batch.outcomes)
-    assert batch.trajectory is not None
-    assert len(batch.trajectory) < 100
+    assert len(recorded(batch)) < 100
     assert_same(batch, [setup.run(world=i) for i in range(4)])
 
 
 # --- randomness ----------------------------------------------------------------------------------------
 
 
-def columns(result: Result) -> Mapping[str, np.ndarray]:
-    assert result.trajectory is not None
-    return result.trajectory.columns
-
-
-def assert_equal(ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray]) -> None:
-    assert ours.keys() == theirs.keys()
-    for name, values in ours.items():
-        np.testing.assert_array_equal(values, theirs[name], err_msg=name)
-
-
 def test_the_same_seed_gives_the_same_batch() -> None:
-    assert_equal(columns(experiment().run_many(4)), columns(experiment().run_many(4)))
-    assert_equal(columns(experiment().run()), columns(experiment().run()))
+    assert_same_bits(recorded(experiment().run_many(4)), recorded(experiment().run_many(4)))
 
 
 def test_a_world_is_the_same_in_any_batch() -> None:
     """Whatever its place and the others."""
-    whole = experiment().run_many(6).trajectory
-    some = experiment().run_many([5, 2]).trajectory
-    assert whole is not None
-    assert some is not None
+    whole, some = (recorded(experiment().run_many(worlds)) for worlds in (6, [5, 2]))
     for place, world in enumerate((5, 2)):
-        assert_equal(some.world(place).columns, whole.world(world).columns)
+        assert_same_bits(some.world(place), whole.world(world))
 
 
 def test_seeds_and_worlds_differ() -> None:
-    y1 = columns(experiment().run_many(3))["y1_rad"]
-    other = columns(experiment("seed=1").run_many(3))["y1_rad"]
+    y1 = recorded(experiment().run_many(3))["y1_rad"]
+    other = recorded(experiment("seed=1").run_many(3))["y1_rad"]
     signals = [*y1.T, *other.T]
     assert len({tuple(signal) for signal in signals}) == 6
-
-
-# --- cost ----------------------------------------------------------------------------------------------
-
-
-def peak_bytes(duration_s: float, n_worlds: int | None, keep_trajectory: bool) -> int:
-    settings = ["push=[]", "controller.feedback=truth", "observer.kind=finite_difference"]
-    setup = prepare(load_scenario("push_recovery", [*settings, f"duration_s={duration_s}"]))
-    gc.collect()  # what tests before this one left would count, whenever it goes
-    tracemalloc.start()
-    result = (
-        setup.run(keep_trajectory=keep_trajectory)
-        if n_worlds is None
-        else setup.run_many(n_worlds, keep_trajectory=keep_trajectory)
-    )
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert result.outcomes[0].kind == "done"
-    assert (result.trajectory is not None) == keep_trajectory
-    return peak
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("n_worlds", [None, 4])
-def test_memory_does_not_grow_with_the_duration_unless_the_trajectory_is_kept(n_worlds: int | None) -> None:
-    """Once two pieces of 256 ticks have been made: the second is made beside the first. The first run fills caches."""
-    _, short, long, full = (
-        peak_bytes(duration, n_worlds, keep)
-        for duration, keep in ((0.1, False), (2.8, False), (6.0, False), (6.0, True))
-    )
-    print(f"{n_worlds} worlds: {short / 1e3:.0f} kB for 2.8 s, {long / 1e3:.0f} for 6 s, {full / 1e3:.0f} if kept")
-    assert long < 1.05 * short + 20_000
-    assert full > long + 100_000  # 920 ticks more, of 26 columns
 
 
 def test_without_trajectory_the_numbers_are_the_same() -> None:
@@ -247,9 +180,3 @@ def test_a_world_whose_observer_returns_nan_ends_as_it_does_alone() -> None:
     for outcome, single in zip(batch.outcomes, singles, strict=True):
         outcome.reason = single.outcomes[0].reason  # in other words
     assert_same(batch, singles)
-
-
-def test_plants_are_those_of_the_scenario_by_default() -> None:
-    setup = experiment()
-    assert isinstance(setup.plant, Plant)
-    assert_equal(columns(setup.run_many(2)), columns(setup.run_many(2, [setup.plant, setup.plant])))

@@ -11,11 +11,11 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.runs.batch import BATCHED_FIELDS, batch_values, value_of_world
-from cmg_mj.runs.experiment import Experiment, prepare, run_batch
-from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.runs.experiment import Experiment, run_batch
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.gyros import Fog
 from cmg_mj.sensors.sampled import Sensors
+from tests.recorded import assert_same_bits, push_recovery, recorded
 
 N = 6
 TRACK = Path(__file__).parents[1] / "features/pivot/track.csv"
@@ -26,7 +26,7 @@ MOVING = (
 
 
 def experiment(observer: str, *more: str) -> Experiment:
-    return prepare(load_scenario("push_recovery", ["duration_s=2.6", *more], observer))
+    return push_recovery("duration_s=2.6", *more, observer=observer)
 
 
 def values(seed: int = 3) -> dict[str, Any]:
@@ -80,26 +80,22 @@ def test_each_world_is_its_own_experiments(observer: str, more: tuple[str, ...])
     setup = experiment(observer, MOVING, *more)
     worlds = [5, 5, 0, 1, 2, 9]
     pool = setup.run_many(worlds, vary=values())
-    assert pool.trajectory is not None
     for i, (world_experiment, world) in enumerate(zip(setup.with_varied(values()), worlds, strict=True)):
         alone = world_experiment.run(world=world)
-        assert alone.trajectory is not None
         assert pool.summaries[i] == alone.summaries[0]
-        for name in alone.trajectory.columns:
-            column = pool.trajectory[name]
-            column = column if column.ndim == 1 else column[: len(alone.trajectory[name]), i]
-            np.testing.assert_array_equal(column[: len(alone.trajectory[name])], alone.trajectory[name], name)
+        assert_same_bits(recorded(pool).world(i), recorded(alone))
 
 
-def test_an_observer_that_uses_the_noise_keeps_worlds_of_other_noise_apart() -> None:
-    noise = {"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]}
-    with pytest.raises(InputError, match="the sensors' noise, which gyro_free is told, differs"):
-        experiment("gyro_free").run_many(2, vary=noise)
-
-
-def test_an_observer_that_uses_the_noise_keeps_worlds_of_other_places_apart() -> None:
-    with pytest.raises(InputError, match="the sensors' noise, which kalman is told, differs"):
-        experiment("kalman").run_many(2, vary={"accelerometer_outer_m": [0.2, 0.25]})
+@pytest.mark.parametrize(
+    ("kind", "vary"),
+    [
+        ("gyro_free", {"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]}),
+        ("kalman", {"accelerometer_outer_m": [0.2, 0.25]}),
+    ],
+)
+def test_an_observer_that_uses_the_noise_keeps_worlds_of_other_noise_apart(kind: str, vary: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=f"the sensors' noise, which {kind} is told, differs"):
+        experiment(kind).run_many(2, vary=vary)
 
 
 def test_gains_by_other_weights_run_together() -> None:

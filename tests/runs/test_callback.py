@@ -20,13 +20,13 @@ from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.observers import OBSERVERS, Estimate, Measurement
-from cmg_mj.plant.plant import Plant, load_plant
+from cmg_mj.plant.plant import load_plant
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.callback import control, control_callback
-from cmg_mj.runs.experiment import Experiment, prepare
-from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.runs.experiment import Experiment
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.sampled import Sensors
+from tests.recorded import push_recovery, recorded
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1")
 INTEGRATORS = ["RK4", "Euler", "implicitfast", "implicit", "discrete"]
@@ -60,32 +60,27 @@ DAILY = (
 )
 
 
-def in_every_setting(test: Callable) -> Callable:
-    """Try a test in every setting, by day in those of `DAILY`."""
-    return pytest.mark.daily_cases(*DAILY)(pytest.mark.parametrize("settings", SETTINGS)(test))
-
-
 @cache
 def experiment(settings: tuple[str, ...] = ()) -> Experiment:
-    return prepare(load_scenario("push_recovery", [*SHORT, *settings]))
+    return push_recovery(*SHORT, *settings)
 
 
 @cache
 def native(settings: tuple[str, ...] = ()) -> Trajectory:
-    trajectory = experiment(settings).run().trajectory
-    assert trajectory is not None
-    return trajectory
+    return recorded(experiment(settings).run())
 
 
 class Loop:
-    """A user's own loop: physics steps, pushes by hand, and a record at the ticks."""
+    """A user's own loop from fresh data at the keyframe: physics steps, pushes by hand, and a record at the ticks.
 
-    def __init__(self, setup: Experiment, *, cold: bool = False) -> None:
+    Without a forward pass before the first step, MuJoCo's accelerometers then still show zero.
+    """
+
+    def __init__(self, setup: Experiment) -> None:
         self.setup, self.plant = setup, setup.plant
         self.controller = setup.axis_controller()
-        self.data = mujoco.MjData(self.plant.model) if cold else self.plant.new_data()
-        if cold:
-            self.start()
+        self.data = mujoco.MjData(self.plant.model)
+        self.start()
         self.last_tick: Any = None
         self.rows: list[tuple] = []
 
@@ -146,28 +141,15 @@ def assert_same_run(rows: list[tuple], trajectory: Trajectory) -> None:
 # --- one trajectory ------------------------------------------------------------------------------------
 
 
-@in_every_setting
-def test_callback_in_the_runner_equals_the_runner(settings: tuple[str, ...]) -> None:
-    trajectory = experiment(settings).run(driver="callback").trajectory
-    assert trajectory is not None
-    assert trajectory.columns.keys() == native(settings).columns.keys()
+@pytest.mark.daily_cases(*DAILY)
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_callback_and_a_users_loop_equal_the_runner(settings: tuple[str, ...]) -> None:
+    callback = recorded(experiment(settings).run(driver="callback"))
+    assert callback.columns.keys() == native(settings).columns.keys()
     for name, values in native(settings).columns.items():
-        np.testing.assert_allclose(trajectory[name], values, rtol=0.0, atol=1e-9, err_msg=name)
-
-
-@in_every_setting
-def test_a_users_loop_equals_the_runner(settings: tuple[str, ...]) -> None:
+        np.testing.assert_allclose(callback[name], values, rtol=0.0, atol=1e-9, err_msg=name)
     assert_same_run(Loop(experiment(settings)).by_control().rows, native(settings))
-
-
-@in_every_setting
-def test_the_callback_in_a_users_loop_equals_the_runner(settings: tuple[str, ...]) -> None:
-    """From fresh data at the keyframe, without a forward pass: MuJoCo's accelerometers then still show zero."""
-    assert_same_run(Loop(experiment(settings), cold=True).by_callback().rows, native(settings))
-
-
-def test_a_users_loop_starts_cold_as_well() -> None:
-    assert_same_run(Loop(experiment(), cold=True).by_control().rows, native())
+    assert_same_run(Loop(experiment(settings)).by_callback().rows, native(settings))
 
 
 def test_the_callback_drives_one_world_only() -> None:
@@ -183,7 +165,7 @@ def test_the_callback_drives_one_world_only() -> None:
 def test_forward_passes_in_between_change_nothing(integrator: str) -> None:
     """Once, twice or not at all after a step, as a viewer or a logger does; the first is where sensors are read."""
     settings = (f"plant.integrator={integrator}",)
-    loop = Loop(experiment(settings), cold=True)
+    loop = Loop(experiment(settings))
     calls = iter([0, 1, 2] * 1000)
 
     def look() -> None:
@@ -195,7 +177,7 @@ def test_forward_passes_in_between_change_nothing(integrator: str) -> None:
 
 
 def test_a_forward_pass_before_the_first_step_changes_nothing() -> None:
-    loop = Loop(experiment(), cold=True)
+    loop = Loop(experiment())
     with control_callback(loop.plant, loop.controller):
         mujoco.mj_forward(loop.plant.model, loop.data)
         for _ in loop.steps():
@@ -209,7 +191,7 @@ def test_a_forward_pass_before_the_first_step_changes_nothing() -> None:
 def test_resetting_the_time_restarts_the_controller(integrator: str, steps: int) -> None:
     """Noise, observer and integrator start again: the run after the reset is a fresh one."""
     settings = (f"plant.integrator={integrator}",)
-    loop = Loop(experiment(settings), cold=True)
+    loop = Loop(experiment(settings))
     with control_callback(loop.plant, loop.controller):
         for _ in range(steps):
             loop.step()
@@ -329,38 +311,6 @@ def test_an_exception_comes_out_of_mj_step_and_takes_the_callback_out() -> None:
         assert mujoco.get_mjcb_control() is other_callback
     assert isinstance(info.value.__cause__, KeyError)
     assert calls["step"] == 7
-
-
-@pytest.mark.parametrize("driver", ["native", "callback"])
-def test_the_runner_keeps_what_was_recorded_until_an_exception(driver: Any) -> None:
-    setup, _, _ = count_steps("observer.fail_at=7")
-    result = setup.run(driver=driver)
-    (outcome,) = result.outcomes
-    assert (outcome.kind, outcome.time_s) == ("stopped", pytest.approx(0.035))
-    assert "KeyError: 'lost'" in outcome.reason
-    assert result.trajectory is not None
-    assert len(result.trajectory) == 7
-    assert result.summaries[0]["settle_time_s"] is None
-    assert mujoco.get_mjcb_control() is None
-
-
-def test_a_plant_can_be_stepped_without_the_callback_afterwards() -> None:
-    setup = experiment()
-    setup.run(driver="callback")
-    data = setup.plant.new_data()
-    mujoco.mj_step(setup.plant.model, data, 10)
-    assert data.ctrl[setup.plant.axis.servos].tolist() == [0.0, 0.0]
-
-
-def test_commands_reach_the_servos_in_their_directions() -> None:
-    loop = Loop(experiment())
-    plant: Plant = loop.plant
-    for _ in range(50):
-        loop.step(lambda: control(plant, loop.controller, loop.data))
-        assert loop.controller.tick is not None
-        u = loop.controller.tick.u
-        assert loop.data.ctrl[plant.axis.servos].tolist() == [u, -u]
-        assert loop.data.ctrl[[module.motor for module in plant.axis.modules]].tolist() == [314.0, -314.0]
 
 
 def test_rollout_runs_the_callback() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cmg_mj.results.summary_keys import NESTED
-from cmg_mj.runs.experiment import Experiment, prepare
-from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.runs.experiment import Experiment
+from tests.recorded import push_recovery, recorded
 
 PERFECT = (
     "duration_s=1",
@@ -26,7 +26,7 @@ STEPS_MS = (0.25, 1.0, 2.5, 5.0)
 
 
 def perfect(*settings: str) -> Experiment:
-    return prepare(load_scenario("push_recovery", [*PERFECT, *settings]))
+    return push_recovery(*PERFECT, *settings)
 
 
 @pytest.mark.daily_cases("native-0.25", "native-2.5", "callback-1.0", "callback-5.0")
@@ -34,8 +34,7 @@ def perfect(*settings: str) -> Experiment:
 @pytest.mark.parametrize("driver", ["native", "callback"])
 def test_perfect_sensors_show_the_present_state_at_every_tick(driver: str, step_ms: float) -> None:
     """At rates of 0.68 rad/s one late step of 5 ms would be off by 3e-3 rad."""
-    run = perfect(f"plant.timestep_s={step_ms / 1e3}").run(driver=driver).trajectory  # type: ignore[arg-type]
-    assert run is not None
+    run = recorded(perfect(f"plant.timestep_s={step_ms / 1e3}").run(driver=driver))
     assert np.abs(run["x2_rad_s"]).max() > 0.6
     e = math.radians(0.5)
     np.testing.assert_allclose(run["y1_rad"], run["x1_rad"] - e, rtol=0.0, atol=1e-9)
@@ -49,8 +48,7 @@ def test_perfect_sensors_show_the_present_state_at_every_tick(driver: str, step_
 def test_latency_is_a_time_and_not_a_number_of_steps(step_ms: float, latency_s: float, ticks: int) -> None:
     """All at 200 Hz: a tick shows the newest sample that has been on its way for so long, whatever the step."""
     late = [f"sensors.{kind}.latency_s={latency_s}" for kind in ("accelerometer", "encoder", "fog")]
-    run = perfect(f"plant.timestep_s={step_ms / 1e3}", *late).run().trajectory
-    assert run is not None
+    run = recorded(perfect(f"plant.timestep_s={step_ms / 1e3}", *late).run())
     tilt = run["x1_rad"][:-ticks] - math.radians(0.5)
     np.testing.assert_allclose(run["y1_rad"][ticks:], tilt, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(run["y2_rad"][ticks:], run["x3_rad"][:-ticks], rtol=0.0, atol=1e-12)
@@ -68,7 +66,7 @@ def test_figures_do_not_depend_on_the_step(kind: str) -> None:
     """
     results = []
     for settings in ([], ["plant.timestep_s=0.001"]):
-        experiment = prepare(load_scenario("push_recovery", ["duration_s=6", *settings], kind))
+        experiment = push_recovery("duration_s=6", *settings, observer=kind)
         results.append((experiment.plant.timestep, experiment.run_many(64, keep_trajectory=False)))
     (default_step, coarse), (_, fine) = results
     assert default_step == 0.005
@@ -102,6 +100,6 @@ def test_figures_do_not_depend_on_the_step(kind: str) -> None:
 )
 def test_the_step_that_is_chosen(settings: list[str], step_s: float) -> None:
     """It divides every period and meets every edge, and `check` says the same without loading the rig."""
-    experiment = prepare(load_scenario("push_recovery", settings))
+    experiment = push_recovery(*settings)
     assert experiment.plant.timestep == pytest.approx(step_s, rel=1e-12)
     assert experiment.resolved()["plant"]["timestep_s"] == experiment.plant.timestep

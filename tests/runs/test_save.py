@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import gc
 import json
-import os
-import subprocess
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,14 +14,14 @@ import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj import Estimate, Measurement, load_scenario, parse_scenario, prepare
-from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.files import folder
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs import comparison
 from cmg_mj.runs import save as runs
-from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj, environment
+from tests.command import cmg_mj
+from tests.recorded import assert_same_bits
 from tests.run_folders import assert_whole, names, write
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -91,19 +88,6 @@ def test_a_written_scenario_reruns_to_the_same_bits(kind: str, monkeypatch: pyte
     assert scenarios[0] == scenarios[1] == scenarios[2]
 
 
-def test_another_seed_is_another_run() -> None:
-    file = write("duration_s = 0.3")
-    assert cmg_mj("run", file, "--json").out != cmg_mj("run", file, "--json", "--seed", 1).out
-
-
-def test_the_callback_writes_the_same() -> None:
-    file = write("duration_s = 0.5\n[[push]]\nstart_s = 0.1")
-    native = cmg_mj("run", file, "--out", "native", "--json")
-    callback = cmg_mj("run", file, "--out", "callback", "--json", "--driver", "callback")
-    assert native.out == callback.out
-    assert Path("native/trajectory.parquet").read_bytes() == Path("callback/trajectory.parquet").read_bytes()
-
-
 # --- what is written -----------------------------------------------------------------------------------------
 
 
@@ -158,13 +142,6 @@ def test_a_run_without_a_tick_can_be_written() -> None:
     assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_numbers_json_does_not_know() -> None:
-    experiment = prepare(load_scenario(write("duration_s = 0.1")))
-    result = experiment.run()
-    result.summaries[0]["gimbal_peak_deg"] = float("nan")
-    assert runs.report_run(experiment, result).summary["gimbal_peak_deg"] is None
-
-
 # --- comparisons ---------------------------------------------------------------------------------------------
 
 
@@ -184,32 +161,11 @@ def test_a_comparison_of_one_world_equals_single_runs() -> None:
         shared = {key: entry[key] for key in single.keys() & entry.keys()}
         assert shared == {key: single[key] for key in shared}
         assert len(shared) == 15
-        columns = Trajectory.load(Path(f"it/trajectory-{name}.parquet")).columns
-        assert all(
-            (columns[key] == values).all()
-            for key, values in Trajectory.load(Path(f"{name}/trajectory.parquet")).columns.items()
+        compared, alone = (
+            Trajectory.load(Path(place)) for place in (f"it/trajectory-{name}.parquet", f"{name}/trajectory.parquet")
         )
-    assert names("it") == [
-        "recording.rrd",
-        "scenario.toml",
-        "summary.json",
-        "trajectory-Mine.parquet",
-        "trajectory-homogeneous.parquet",
-        "trajectory-ltv.parquet",
-        "worlds.parquet",
-    ]
-
-
-def test_a_comparison_of_many_worlds() -> None:
-    """Means over the worlds that stood, and how they spread."""
-    experiment = prepare(load_scenario(write("duration_s = 0.5")))
-    (entry,) = comparison.compare([experiment], 3)
-    singles: list[dict[str, Any]] = [experiment.run(world=world).summaries[0] for world in range(3)]
-    for key in ("velocity_rms_error_rad_s", "tilt_rms_deg", "settle_time_s"):
-        assert entry.summary[key] == pytest.approx(sum(single[key] for single in singles) / 3, rel=1e-12)
-    summary: dict[str, Any] = entry.summary
-    assert summary["velocity_rms_error_std_rad_s"] > 0.0
-    assert (summary["worlds"], summary["fell_fraction"], summary["settled_fraction"]) == (3, 0.0, 1.0)
+        assert_same_bits(compared, alone)
+    assert {"recording.rrd", "trajectory-Mine.parquet", "worlds.parquet"} <= set(names("it"))
 
 
 def test_a_comparison_reports_progress_from_nothing_to_all() -> None:
@@ -259,81 +215,7 @@ def test_a_comparisons_scenario_runs_to_the_same_comparison(scenario: str, obser
     assert fields["compare"] == {"observers": same, "worlds": 2}
 
 
-@pytest.mark.slow
-def test_options_come_before_what_the_scenario_says_to_compare() -> None:
-    file = write("duration_s = 0.2\n[compare]\nobservers = ['ltv', 'linear', 'ltv']\nworlds = 3")
-    plain = json.loads(cmg_mj("compare", file, "--json").out)
-    assert [(row["observer"], row["worlds"]) for row in plain[: -len(REFERENCES)]] == [("ltv", 3), ("linear", 3)]
-    rows = json.loads(cmg_mj("compare", file, "--json", "--observers", "homogeneous", "--worlds", 1).out)
-    assert [(row["observer"], row["worlds"]) for row in rows[: -len(REFERENCES)]] == [("homogeneous", 1)]
-    fewer = json.loads(cmg_mj("compare", file, "--json", "--set", "compare.worlds=2").out)
-    assert fewer[0]["worlds"] == 2
-
-
 def test_run_says_that_it_does_not_compare() -> None:
     outcome = cmg_mj("run", write("duration_s = 0.2\n[compare]\nworlds = 3"), "--json")
     assert (outcome.status, outcome.err) == (0, "cmg-mj: [compare] is for cmg-mj compare; this is one run\n")
     assert json.loads(outcome.out)["observer"] == "homogeneous"
-
-
-@pytest.mark.slow
-def test_a_comparison_is_drawn_if_it_is_asked_for() -> None:
-    file = write("duration_s = 1.0\n[plant]\nequilibrium_bias_deg = 6.0")
-    outcome = cmg_mj("compare", file, "--observers", "linear,luenberger", "--worlds", 3, "--plot", "--out", "it")
-    assert outcome.status == 0
-    assert Path("it/plot.png").read_bytes().startswith(b"\x89PNG")
-
-
-# --- letters -------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("elsewhere")
-@pytest.mark.parametrize("command", ["run", "compare"])
-def test_a_title_of_any_letters_under_an_ascii_locale(command: str) -> None:
-    Path("my.toml").write_text('title = "Stoß – 1°"\nduration_s = 0.2', encoding="utf-8")
-    options = ["--observers", "linear", "--worlds", "1"] if command == "compare" else []
-    process = subprocess.run(
-        [*COMMAND, command, "my.toml", "--out", "it", *options],
-        env=environment(LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0"),
-        capture_output=True,
-        timeout=HANGS_AFTER_S,
-    )
-    assert process.returncode == 0, process.stderr
-    assert b"Sto\\xdf" in process.stdout
-    assert tomllib.loads(Path("it/scenario.toml").read_text(encoding="utf-8"))["title"] == "Stoß – 1°"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("command", ["run", "compare", "tune", "sweep"])
-@pytest.mark.parametrize("locale", [{}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}], ids=["", "C"])
-def test_a_folder_and_a_file_named_in_bytes_that_are_no_letters(command: str, locale: dict[str, str]) -> None:
-    Path(os.fsdecode(b"my\xff.toml")).write_text("duration_s = 0.2\n[observer]\nkind = 'linear'")
-    options = {
-        "run": [],
-        "compare": ["--observers", "linear", "--worlds", "1"],
-        "tune": ["--worlds", "2"],
-        "sweep": ["--vary", "plant.equilibrium_bias_deg=0,1", "--worlds", "2"],
-    }[command]
-    for place in (["--out", b"it\xff"], []):
-        process = subprocess.run(
-            [*COMMAND, command, b"my\xff.toml", *options, *place],
-            env=environment(**locale),
-            capture_output=True,
-            timeout=HANGS_AFTER_S,
-        )
-        assert process.returncode == 0, process.stderr
-    assert len(os.listdir(b"it\xff")) > 2
-    assert all(name.decode().isascii() for name in os.listdir(b"runs"))
-
-
-@pytest.mark.usefixtures("elsewhere")
-def test_a_title_that_no_file_can_hold_loses_nothing_else(capfd: pytest.CaptureFixture[str]) -> None:
-    """A lone surrogate, as the command line makes of a byte that is no UTF-8."""
-    experiment = prepare(parse_scenario({"duration_s": 0.2, "title": "ok"}))
-    bad = replace(experiment, scenario=experiment.scenario.model_copy(update={"title": "\udcff"}))
-    with pytest.raises(InputError, match="cannot be written: UnicodeEncodeError"):
-        runs.save_run(Path("it"), runs.report_run(bad, bad.run()))
-    assert {"summary.json", "trajectory.parquet"} <= {path.name for path in Path("it").iterdir()}
-    gc.collect()
-    assert capfd.readouterr().err == ""  # nor does rerun complain of a recording that it did not get to write

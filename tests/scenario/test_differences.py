@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from cmg_mj import load_scenario, parse_scenario, prepare
-from cmg_mj.core.errors import TomlValue
-from cmg_mj.scenario.resolve import LONGEST_NAME, describe_differences, differences, folder_suffix, safe_name
+from cmg_mj.scenario.resolve import describe_differences, folder_suffix
 from tests.command import cmg_mj
 from tests.run_folders import write
 
@@ -60,26 +59,6 @@ def test_names_that_need_their_section() -> None:
     assert describe_differences(values) == ", encoder.rate_hz=1, fog.rate_hz=2, push.0.start_s=1, and 1 more"
 
 
-@pytest.mark.parametrize("value", ["ß" * 300, "\udcff/..\\ \n*?", "a" * 300, [0.1234567891] * 40, {"a": {}}])
-def test_any_value_makes_a_file_name(value: TomlValue) -> None:
-    name = folder_suffix({"plant.x": value, "plant.y": value})
-    assert name.isascii()
-    assert len(name) <= LONGEST_NAME + len("-and-2-more")
-    assert not set(name) & set('/\\:*?"<>| \n')
-    assert len(os.fsencode(safe_name(str(value)))) <= 4 * LONGEST_NAME
-
-
-def test_a_field_that_is_not_there() -> None:
-    observer = {"observer": {"kind": "ltv"}}
-    assert differences({"a": {"x": 1, "y": 2}, **observer}, {"a": {"x": 1}, **observer}) == {"a.y": None}
-    assert folder_suffix({"a.y": None}) == "-y=none"
-
-
-def test_a_scenario_of_a_users_own_differs_from_none() -> None:
-    file = write("duration_s = 0.3\n[plant]\nequilibrium_bias_deg = 2.0", "my.toml")
-    assert differences_of("duration_s=0.5", name=file) == {}
-
-
 def test_a_users_version_of_a_bundled_one() -> None:
     assert cmg_mj("run", "push_recovery", *SHORT, "--out", "it").status == 0
     write(
@@ -111,9 +90,3 @@ def test_an_observer_that_the_bundled_scenario_does_not_suit() -> None:
     """No trimming without an estimate of the bias."""
     result = prepare(load_scenario("bias_estimation", ["controller.bias_trim_s=0"], "linear")).differences
     assert result == {"controller.bias_trim_s": 0.0}
-
-
-def test_a_long_name_of_a_users_file() -> None:
-    file = write("duration_s = 0.1", f"{'long' * 60}.toml")
-    assert cmg_mj("run", file).status == 0
-    assert [len(name) < 100 for name in os.listdir("runs")] == [True]

@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from scipy.signal import butter, lfilter, welch
+from scipy.signal import butter, lfilter
 
 import cmg_mj
 from cmg_mj.core.controller import Controller
@@ -22,11 +22,10 @@ from cmg_mj.core.noise import NoiseStream
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.plant.plant import load_plant
-from cmg_mj.runs.experiment import prepare
-from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.stages.low_pass import noise_gain
+from tests.recorded import assert_same_bits, push_recovery, recorded
 from tests.sensors.test_sampled import G, assert_sigma, measuring
 
 QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
@@ -158,7 +157,7 @@ def test_the_loop_meets_the_older_instant(
         off = ["noise_density_ug_rthz=0", "counts_per_g=0", f"rate_hz={rate_hz}"]
         free = ["duration_s=0.3", "push.0.start_s=0.1", "controller.gains=[0.0,0.0,0.0,0.0]", "plant.timestep_s=0.0025"]
         sensor = [f"sensors.accelerometer.{name}" for name in (*off, *settings)]
-        experiment = prepare(load_scenario("push_recovery", [*free, *sensor, f"controller.rate_hz={rate_hz}"]))
+        experiment = push_recovery(*free, *sensor, f"controller.rate_hz={rate_hz}")
         axis = replace(experiment.plant.axis, radial_tilt=RecordingTilt(TILT.r_inner, TILT.r_outer))
         monkeypatch.setattr(experiment.plant, "axes", (axis,))
         experiment.run(driver=driver)
@@ -193,15 +192,6 @@ def test_noise_after_the_low_pass(bandwidth_hz: float) -> None:
         # A narrow filter's noise is the density's over pi/(2 sqrt 2) bandwidths.
         white = 400e-6 * G * math.sqrt(bandwidth_hz * math.pi / (2.0 * math.sqrt(2.0)))
         assert sensor.white_noise_sigma == pytest.approx(white, rel=1e-3)
-
-
-def test_noise_in_the_pass_band_is_the_datasheets() -> None:
-    """400 ug/rtHz at 10 Hz, whatever is filtered above."""
-    sensor = Accelerometer(bandwidth_hz=184.0, rate_hz=1000.0, counts_per_g=0.0)
-    noise = deliver(sensor, 20_000, lambda _: np.zeros((4, 2)), worlds=[0, 1])
-    frequency, density = welch(noise, 1000.0, nperseg=1000, axis=0)
-    low = (frequency > 1.0) & (frequency < 40.0)
-    assert math.sqrt(density[low].mean()) == pytest.approx(400e-6 * G, rel=0.02)
 
 
 @pytest.mark.parametrize(("frequency_hz", "alias_hz"), [(20.0, 20.0), (180.0, -20.0), (330.0, -70.0)])
@@ -261,18 +251,6 @@ def test_allan_deviation_of_the_drift_is_the_bias_instability() -> None:
     assert np.abs(correlation).max() < 0.25
 
 
-def test_the_drift_is_the_same_for_a_part_that_filters() -> None:
-    """Density from 20 to 40 Hz, above the last corner."""
-
-    def density(bandwidth_hz: float) -> float:
-        sensor = Accelerometer(bias_instability_ug=36.0, bandwidth_hz=bandwidth_hz, **QUIET)
-        noise = deliver(sensor, 2000, lambda _: np.zeros((4, 8)), worlds=list(range(8)))
-        frequency, result = welch(noise, 200.0, nperseg=400, axis=0)
-        return float(result[(frequency > 20.0) & (frequency < 40.0)].mean())
-
-    assert density(184.0) == pytest.approx(density(0.0), rel=0.2)  # the slower rate folds a little more into the band
-
-
 def test_every_sensor_of_every_axis_has_a_stream_of_its_own() -> None:
     numbers = [stream.on_axis(axis) for axis in range(3) for stream in NoiseStream]
     assert sorted(numbers)[: len(NoiseStream)] == list(range(10))
@@ -309,23 +287,6 @@ def test_vibration_of_unbalanced_wheels_at_the_accelerometers() -> None:
     np.testing.assert_allclose(amplitude, expected, rtol=0.01)
 
 
-def test_a_step_that_follows_the_wheel_is_chosen() -> None:
-    """The rate's swing is within 0.2 % of that with a step ten times smaller; at 5 ms it would be off by 0.5 %."""
-    quiet = ["push=[]", "duration_s=2", "controller.feedback=truth", f"plant.flywheel_imbalance_kg_m={G_6_3}"]
-    quiet += ["sensors.accelerometer.noise_density_ug_rthz=0", "sensors.accelerometer.counts_per_g=0"]
-    swings, steps = [], []
-    for step in ([], ["plant.timestep_s=0.00025"], ["plant.timestep_s=0.005"]):
-        experiment = prepare(load_scenario("push_recovery", [*quiet, *step]))
-        trajectory = experiment.run().trajectory
-        assert trajectory is not None
-        swings.append(float(trajectory["x2_rad_s"][200:].std()))
-        steps.append(experiment.plant.timestep)
-    assert steps[0] == pytest.approx(0.0025)
-    assert swings[0] == pytest.approx(swings[1], rel=2e-3)
-    assert abs(swings[2] / swings[1] - 1.0) > 3e-3
-    assert swings[1] * math.sqrt(2.0) == pytest.approx(2.0 * G_6_3 * 314.0 * 0.095 / 0.123682, rel=0.05)
-
-
 # --- in the loop -------------------------------------------------------------------------------------------
 
 ALL = tuple(
@@ -337,13 +298,9 @@ ALL = tuple(
 def test_the_callback_sees_what_the_loop_sees() -> None:
     """Bit for bit, everything switched on, an unbalanced wheel too."""
     settings = ["duration_s=0.5", "push.0.start_s=0.2", f"plant.flywheel_imbalance_kg_m={G_6_3}", *ALL]
-    experiment = prepare(load_scenario("push_recovery", settings))
+    experiment = push_recovery(*settings)
     assert experiment.plant.timestep == pytest.approx(MS)
-    native, callback = (experiment.run(driver=driver).trajectory for driver in ("native", "callback"))
-    assert native is not None
-    assert callback is not None
-    for name, values in native.columns.items():
-        np.testing.assert_array_equal(values, callback[name], err_msg=name)
+    assert_same_bits(*(recorded(experiment.run(driver=driver)) for driver in ("native", "callback")))
 
 
 def test_a_controller_of_ones_own_is_refused_what_does_not_fit() -> None:

@@ -11,9 +11,8 @@ from scipy.signal import welch
 
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.results.baselines import GYROS, References
-from cmg_mj.runs.experiment import prepare
-from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.gyros import MemsGyro
+from tests.recorded import assert_same_bits, push_recovery, recorded
 from tests.sensors.test_sampled import assert_mean, assert_sigma
 
 DT = 0.005
@@ -114,42 +113,11 @@ def test_calibrated_it_is_what_it_was() -> None:
     np.testing.assert_allclose(as_bought[0] - resting(rate)[1][0], np.radians([20.0, -20.0]), atol=2e-4)
 
 
-@pytest.mark.parametrize("stream", range(3))
-def test_its_noise_is_none_of_the_other_sensors(stream: int) -> None:
-    rate, gyro = np.zeros((50, 1)), MemsGyro()
-    other_stream = gyro.make_reading_function(DT, normals(5, 4, stream, gyro.channels))(rate)
-    assert not np.array_equal(References(gyro, DT, 5, 4, [0.006]).rates(rate, rate)["mems_gyro"], other_stream)
-
-
-def test_zero_is_zero() -> None:
-    assert not References(MemsGyro(), DT, 0, 0, [0.006]).rates(np.ones((5, 1)), np.ones((5, 1)))["zero"].any()
-
-
 def test_it_is_open_loop_and_changes_nothing() -> None:
     """The other sensors' noise is as it was without it."""
-    settings = ["duration_s=2.5"]
-    plain = prepare(load_scenario("push_recovery", settings)).run()
-    noisy = prepare(load_scenario("push_recovery", [*settings, "sensors.mems_gyro.scale_error=0.5"])).run()
-    assert plain.trajectory is not None
-    assert noisy.trajectory is not None
-    for name, values in plain.trajectory.columns.items():
-        np.testing.assert_array_equal(values, noisy.trajectory[name])
-    plain_fit, noisy_fit = (result.mean("velocity_fit", "mems_gyro") for result in (plain, noisy))
-    assert plain_fit is not None
+    plain = push_recovery("duration_s=2.5").run()
+    noisy = push_recovery("duration_s=2.5", "sensors.mems_gyro.scale_error=0.5").run()
+    assert_same_bits(recorded(plain), recorded(noisy))
+    plain_fit, noisy_fit = (result.values("velocity_fit", "mems_gyro")[0] for result in (plain, noisy))
     assert plain_fit > 0.9
     assert noisy_fit == pytest.approx(0.5, abs=0.02)
-
-
-@pytest.mark.parametrize("calibration_s", [0.3, 1.0, 10.0])
-def test_a_world_of_many_reads_what_it_reads_alone(calibration_s: float) -> None:
-    """To the last bit: the gyro about the vertical turns the gimbals of a rig of several axes."""
-    gyro, rate = MemsGyro(calibration_s=calibration_s, counts_per_deg_s=0.0), np.linspace(-1.0, 1.0, 50)
-
-    def read(worlds: int | list[int]) -> np.ndarray:
-        reading = gyro.make_reading_function(0.005, normals(0, worlds, NoiseStream.TURN_GYRO, gyro.channels))
-        shape = (50, 1 if isinstance(worlds, int) else len(worlds))
-        return reading(np.broadcast_to(rate[:, None], shape))
-
-    together = read([0, 1, 2, 3])
-    for world in range(4):
-        np.testing.assert_array_equal(read(world)[:, 0], together[:, world])

@@ -16,12 +16,10 @@ from scipy import stats
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import normals
 from cmg_mj.core.sensor import Site
-from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
-from cmg_mj.runs.experiment import prepare
-from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
 from cmg_mj.sensors.gyros import Fog
+from tests.recorded import push_recovery, recorded
 
 G = 9.80665
 READING_AT_REST = IdealReading((0.0, G, 0.0, G), [0.0, 0.0], 0.0, 0.0)
@@ -81,15 +79,6 @@ def test_accelerometer_noise_is_density_times_root_of_half_the_rate(
         assert stats.kstest(channel / sigma, "norm").pvalue > 1e-3
 
 
-def test_accelerometer_noise_is_white() -> None:
-    """One-sided density of the mean of two halves of the band: 400 ug/rtHz (MPU-6050) in either."""
-    noise = readings(Accelerometer(counts_per_g=0.0), N)[:, 0]
-    spectrum = 2.0 * np.abs(np.fft.rfft(noise)[1:-1]) ** 2 / (200.0 * N)  # (m/s^2)^2/Hz
-    for half in np.array_split(spectrum, 2):
-        low, high = stats.chi2.ppf([0.0005, 0.9995], 2 * len(half)) / (2 * len(half))
-        assert low < half.mean() / (400e-6 * 9.80665) ** 2 < high
-
-
 def test_accelerometer_counts() -> None:
     """16384 counts a g (MPU-6050): readings are whole counts, and rounding adds step^2/12 to the variance."""
     noise = readings(Accelerometer(), N)[:, 0]
@@ -109,14 +98,6 @@ def test_accelerometer_saturates_at_its_range(force: float, reading: float) -> N
     assert np.abs(noisy).max() <= 2.0 * G * (1.0 + 1e-12)
 
 
-@pytest.mark.parametrize("bias_mg", [(8.0, 0.0), (0.0, 8.0), (-15.0, 20.0)])
-def test_accelerometer_bias_shifts_the_tilt_as_e_does(bias_mg: tuple[float, float]) -> None:
-    """Weights of sites at 1/4 and 3/4: y1 = -atan((1.5 b_inner - 0.5 b_outer)/g) where the tilt is 0."""
-    reading = readings(Accelerometer(bias_mg=bias_mg, **QUIET), 1)[0]
-    tilt = RadialTilt(0.06717514421272202, 0.20152543263816603)(*reading.tolist())
-    assert tilt == pytest.approx(-math.atan(1.5e-3 * bias_mg[0] - 0.5e-3 * bias_mg[1]), rel=1e-12)
-
-
 def test_accelerometer_bias_and_equilibrium_bias_move_the_loop_alike() -> None:
     """e is what a tilt shift of -e is: the rig ends upright either way, and the integrator at +k_e1/k_e4 e."""
     e = math.radians(0.5)
@@ -125,8 +106,7 @@ def test_accelerometer_bias_and_equilibrium_bias_move_the_loop_alike() -> None:
     ends = []
     for setting in ("plant.equilibrium_bias_deg=0.5", f"sensors.accelerometer.bias_mg=[{bias_mg}, 0.0]"):
         other = [] if "equilibrium" in setting else ["plant.equilibrium_bias_deg=0.0"]
-        trajectory = prepare(load_scenario("push_recovery", [setting, *other, *quiet])).run().trajectory
-        assert trajectory is not None
+        trajectory = recorded(push_recovery(setting, *other, *quiet).run())
         ends.append([np.mean(trajectory[name][-400:]) for name in ("x1_rad", "y1_rad", "x_e_rad_times_s")])
     for x1, y1, x_e in ends:
         assert x1 == pytest.approx(0.0, abs=0.02 * e)
@@ -167,12 +147,6 @@ def test_fog_angle_walks_randomly(walk_deg_rth: float, rate_hz: float) -> None:
     angles = np.array([readings(sensor, n, seed=1, world=w)[:, 0].sum() / rate_hz for w in range(gyros)])
     assert_sigma(angles, walk * math.sqrt(0.5))
     assert_mean(angles, 0.0, walk * math.sqrt(0.5))
-
-
-def test_fog_noise_of_one_sample() -> None:
-    """0.02 deg/rt(h) (DSP-1750) at 200 Hz: 8.23e-5 rad/s."""
-    rate = readings(Fog(), N)[:, 0]
-    assert_sigma(rate, 0.02 / 60.0 * math.pi / 180.0 * math.sqrt(200.0))
 
 
 def test_fog_bias_and_range() -> None:
@@ -259,20 +233,7 @@ def test_newest_delivered_sample_at_each_tick(rate_hz: float, latency_s: float, 
 @pytest.mark.parametrize("kind", ["accelerometer", "encoder", "fog"])
 def test_what_does_not_fit_the_physics_step_is_refused(kind: str, field: str, value: float, message: str) -> None:
     with pytest.raises(InputError, match=message.replace("{kind}", kind)):
-        prepare(load_scenario("push_recovery", ["plant.timestep_s=0.001", f"sensors.{kind}.{field}={value}"]))
-
-
-def test_the_loop_sees_late_and_slow_sensors() -> None:
-    """Through the whole runner: a gyro 10 ms late, an encoder at 50 Hz, against the true signals of the record."""
-    settings = ["duration_s=0.5", "push=[]", "plant.initial_tilt_deg=3.0", "controller.feedback=truth"]
-    settings += ["sensors.fog.latency_s=0.01", "sensors.fog.angle_random_walk_deg_rth=0", "sensors.fog.bandwidth_hz=0"]
-    settings += ["sensors.encoder.rate_hz=50", "sensors.encoder.counts_per_revolution=0"]
-    trajectory = prepare(load_scenario("push_recovery", settings)).run().trajectory
-    assert trajectory is not None
-    np.testing.assert_allclose(trajectory["fog_rad_s"][2:], trajectory["x2_rad_s"][:-2], rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(trajectory["fog_rad_s"][:2], trajectory["x2_rad_s"][0], rtol=0.0, atol=1e-13)
-    held_angle = trajectory["x3_rad"][np.arange(100) // 4 * 4]
-    np.testing.assert_allclose(trajectory["y2_rad"], held_angle, rtol=0.0, atol=1e-13)
+        push_recovery("plant.timestep_s=0.001", f"sensors.{kind}.{field}={value}")
 
 
 # --- randomness --------------------------------------------------------------------------------------------
@@ -293,9 +254,9 @@ def test_noise_depends_on_seed_and_world_alone() -> None:
 
 
 def test_streams_are_uncorrelated_standard_normals() -> None:
-    """Seeds, worlds and sensors: no pair correlates, and neighbours in time do not."""
+    """Seeds, worlds, sensors and channels: no pair correlates, and neighbours in time do not."""
     sources = list(itertools.product((0, 1), (0, 1, 2), (0, 2)))
-    streams = [draw(seed, world, stream, N)[:, 0] for seed, world, stream in sources]
+    streams = [channel for source in sources for channel in draw(*source, N, 2).T]
     correlation = np.corrcoef(np.stack(streams))[np.triu_indices(len(streams), 1)]
     assert np.abs(correlation).max() < stats.norm.ppf(1.0 - 0.0005 / len(correlation)) / math.sqrt(N)
     for stream in streams:
@@ -304,34 +265,16 @@ def test_streams_are_uncorrelated_standard_normals() -> None:
         assert abs(np.corrcoef(stream[:-1], stream[1:])[0, 1]) < stats.norm.ppf(0.9999) / math.sqrt(N)
 
 
-def test_channels_are_uncorrelated() -> None:
-    correlation = np.corrcoef(draw(0, 0, 0, N, 4).T)[np.triu_indices(4, 1)]
-    assert np.abs(correlation).max() < stats.norm.ppf(1.0 - 0.0005 / 6.0) / math.sqrt(N)
-
-
 def test_sensors_of_a_run_do_not_share_noise() -> None:
     """The gyro's noise and the tilt's in the loop, and two worlds' and two seeds'."""
     settings = ["duration_s=2.5", "push=[]", "controller.feedback=truth", "sensors.fog.bandwidth_hz=0"]
     noises = []
     for seed, world in ((0, 0), (0, 1), (1, 0)):
-        experiment = prepare(load_scenario("push_recovery", [*settings, f"seed={seed}"]))
-        trajectory = experiment.run(world=world).trajectory
-        assert trajectory is not None
+        experiment = push_recovery(*settings, f"seed={seed}")
+        trajectory = recorded(experiment.run(world=world))
         x1, e = trajectory["x1_rad"], experiment.plant.bias
         noises += [trajectory["fog_rad_s"] - trajectory["x2_rad_s"], trajectory["y1_rad"] - (x1 - e)]
     noises = np.array(noises)[:, 1:]
     correlation = np.corrcoef(noises)[np.triu_indices(len(noises), 1)]
     assert np.abs(correlation).max() < stats.norm.ppf(1.0 - 0.0005 / len(correlation)) / math.sqrt(noises.shape[1])
     assert_sigma(noises[0], 0.02 / 60.0 * math.pi / 180.0 * math.sqrt(200.0))
-
-
-def test_tilt_noise_in_the_loop_is_that_of_the_two_accelerometers() -> None:
-    """Weights 1.5 and 0.5: sigma(y1) = 4 mg sqrt(1.5^2 + 0.5^2) = 6.3 mrad near the upright position."""
-    settings = ["duration_s=10", "push=[]", "controller.feedback=truth", "plant.initial_tilt_deg=0.0"]
-    experiment = prepare(load_scenario("push_recovery", settings))
-    trajectory = experiment.run().trajectory
-    assert trajectory is not None
-    noise = (trajectory["y1_rad"] - trajectory["x1_rad"] + experiment.plant.bias)[1:]
-    sigma = 400e-6 * 9.80665 / 9.81 * 10.0 * math.sqrt(1.5**2 + 0.5**2)
-    print(f"tilt noise {np.std(noise) * 1e3:.3f} mrad, expected {sigma * 1e3:.3f}")
-    assert_sigma(noise, sigma)

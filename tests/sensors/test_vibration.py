@@ -11,11 +11,12 @@ import pytest
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.core.types import STANDARD_GRAVITY, IdealReading
-from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.runs.experiment import Experiment
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.stages.vibration import BroadbandVibration, WheelTones
+from tests.recorded import push_recovery, recorded
 
 MG = 1e-3 * STANDARD_GRAVITY
 SILENT = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
@@ -55,27 +56,12 @@ def test_the_rms_is_the_same_at_any_sample_rate(band_hz: tuple[float, float], dt
     power = (f * (high - low)) ** 2 / ((low * high - f * f) ** 2 + (f * (high - low)) ** 2)
     expected = float((power * np.cos(2.0 * np.pi * f * dt)).sum() / power.sum())
     together = float((samples[10] * samples[11]).mean())
-    print(f"{band_hz} Hz, {dt:g} s: covariance {together:.3f}, {expected:.3f} expected")
     assert together == pytest.approx(expected, abs=0.02)
 
 
 def test_axes_vibrate_each_by_itself() -> None:
     samples = broadband((20.0, 500.0), 0.005, 1, range(4000))[0]
     np.testing.assert_allclose(np.corrcoef(samples), np.eye(4), atol=0.06)
-
-
-def test_a_band_is_where_it_is_told() -> None:
-    """Half of the peak's power density at both ends, by a spectrum of its own."""
-    dt, n = 2.5e-4, 2048
-    samples = broadband((100.0, 400.0), dt, n, range(100)).reshape(n, -1)
-    density = (np.abs(np.fft.rfft(samples * np.hanning(n)[:, None], axis=0)) ** 2).mean(axis=1)
-    f = np.fft.rfftfreq(n, dt)
-
-    def at(frequency: float) -> float:
-        return float(density[np.abs(f - frequency) < 0.05 * frequency].mean())
-
-    assert at(100.0) / at(200.0) == pytest.approx(0.5, rel=0.12)
-    assert at(400.0) / at(200.0) == pytest.approx(0.5, rel=0.12)
 
 
 def test_poles_that_coincide_are_no_division_by_zero() -> None:
@@ -89,26 +75,6 @@ def test_poles_that_coincide_are_no_division_by_zero() -> None:
 def test_accelerometers_show_it_in_mg() -> None:
     samples = readings(20, range(2000), vibration_mg=4.0)
     assert float(samples.std()) == pytest.approx(4.0 * MG, rel=0.02)
-
-
-def test_a_low_pass_takes_off_what_lies_beyond_it() -> None:
-    """The low-pass works on the part's samples of 1 kHz, with what they alias: 44 Hz leave so much of 100 to 450 Hz."""
-    fields = {"vibration_mg": 10.0, "vibration_band_hz": (100.0, 450.0)}
-    filtered = readings(600, range(100), h=0.001, bandwidth_hz=44.0, **fields)[::5]
-    bare = readings(100, range(100), **fields)
-    share = float(filtered.std() / bare.std())
-    f, fold = np.arange(0.0, 500.0, 0.5), range(-40, 41)
-
-    def power(f: np.ndarray) -> np.ndarray:
-        return (f * 350.0) ** 2 / ((45000.0 - f * f) ** 2 + (f * 350.0) ** 2)
-
-    aliased = np.sum([power(np.abs(f + 1000.0 * k)) for k in fold], axis=0)
-    t = math.tan(math.pi * 44.0 / 1000.0)
-    passed = 1.0 / (1.0 + (np.tan(math.pi * f / 1000.0) / t) ** 4)
-    expected = math.sqrt(float((aliased * passed).sum() / aliased.sum()))
-    print(f"{share:.3f} of the RMS passes, {expected:.3f} expected")
-    assert share == pytest.approx(expected, rel=0.06)
-    assert expected < 0.4
 
 
 def test_one_world_of_many_vibrates_as_alone() -> None:
@@ -155,7 +121,7 @@ def test_a_tone_shifts_with_the_wheel() -> None:
 
 
 def experiment(*settings: str) -> Experiment:
-    return prepare(load_scenario("push_recovery", ["duration_s=2.0", "push=[]", *settings], "gyro_free"))
+    return push_recovery("duration_s=2.0", "push=[]", *settings, observer="gyro_free")
 
 
 @pytest.mark.parametrize("speed", [314.0, 220.0])
@@ -163,9 +129,9 @@ def test_the_rigs_own_wheels_make_the_tone(speed: float) -> None:
     """In the angular acceleration that the accelerometers show; the frequency moves with the wheels' speed."""
     quiet = [f"sensors.accelerometer.{name}={value:g}" for name, value in SILENT.items()]
     rig = experiment(*quiet, "sensors.accelerometer.wheel_harmonics_mg=[20.0]", f"plant.flywheel_speed_rad_s={speed:g}")
-    trajectory = rig.run().trajectory
-    assert trajectory is not None
-    assert strongest(trajectory["acceleration_rad_s2"][40:], 0.005) == pytest.approx(speed / (2.0 * math.pi), abs=0.6)
+    assert strongest(recorded(rig.run())["acceleration_rad_s2"][40:], 0.005) == pytest.approx(
+        speed / (2.0 * math.pi), abs=0.6
+    )
 
 
 # --- in a run --------------------------------------------------------------------------------------------------
@@ -195,26 +161,16 @@ def test_four_mg_cost_gyro_free_what_as_much_noise_costs() -> None:
 
 
 @pytest.mark.parametrize(
-    ("setting", "message"),
+    "setting",
     [
-        ("vibration_mg=-1", "vibration_mg = -1: "),
-        ("vibration_band_hz=[500, 20]", "vibration_band_hz: 500 Hz to 20 Hz: the lower end comes first"),
-        ("vibration_band_hz=[0, 20]", "vibration_band_hz"),
-        ("wheel_harmonics_mg=[1, -1]", "wheel_harmonics_mg"),
-        (f"wheel_harmonics_mg={[1.0] * 21}", "wheel_harmonics_mg: 21 amplitudes: at most 20 harmonics"),
-        ("wheel_harmonics_mg=3", "wheel_harmonics_mg = 3: "),
+        "vibration_mg=-1",
+        "vibration_band_hz=[500, 20]",
+        "vibration_band_hz=[0, 20]",
+        "wheel_harmonics_mg=[1, -1]",
+        f"wheel_harmonics_mg={[1.0] * 21}",
+        "wheel_harmonics_mg=3",
     ],
 )
-def test_what_does_not_vibrate_is_refused(setting: str, message: str) -> None:
-    with pytest.raises(InputError) as refused:
+def test_what_does_not_vibrate_is_refused(setting: str) -> None:
+    with pytest.raises(InputError, match=rf"^.*sensors\.accelerometer\.{setting.partition('=')[0]}\b"):
         load_scenario("push_recovery", [f"sensors.accelerometer.{setting}"])
-    print(refused.value)
-    assert message in str(refused.value).replace("sensors.accelerometer.", "")
-
-
-def test_the_plugin_refuses_it_by_name() -> None:
-    from cmg_mj.features.plugin.make import describe_rig
-
-    for field in ("vibration_mg=4.0", "wheel_harmonics_mg=[2.0]"):
-        with pytest.raises(InputError, match=rf"sensors\.accelerometer\.{field.partition('=')[0]}: the "):
-            describe_rig(experiment(f"sensors.accelerometer.{field}"), "plugin")

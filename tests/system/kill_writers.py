@@ -5,13 +5,9 @@ It forks, which pytest's own processes, with threads in them, had better not.
 
 from __future__ import annotations
 
-import json
 import os
-import random
 import signal
 import sys
-import time
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,8 +19,8 @@ EVENTS = {"open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "shutil.rmtr
 OLD, NEW = {"a": "old", "b": "old", "c": "old"}, {"b": "new", "c": "new", "d": "new"}
 
 
-def fork(child: Callable[[], None]) -> int:
-    """Run it in a process of its own; the process."""
+def run_in_a_fork(child: Callable[[], None]) -> int:
+    """Run it in a process of its own; its exit code."""
     process = os.fork()
     if process == 0:
         try:
@@ -33,10 +29,6 @@ def fork(child: Callable[[], None]) -> int:
         except BaseException as error:
             print(repr(error), file=sys.stderr, flush=True)
             os._exit(1)
-    return process
-
-
-def wait_for(process: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
 
 
@@ -70,7 +62,7 @@ def kill_at_every_event() -> None:
             sys.addaudithook(hook)
             save(NEW)
 
-        status = wait_for(fork(save_and_die))
+        status = run_in_a_fork(save_and_die)
         assert status in (0, -signal.SIGKILL), status
         finished = status == 0
         seen.append(read_files())
@@ -86,55 +78,5 @@ def kill_at_every_event() -> None:
     print(f"{kills - 1} kills")
 
 
-def kill_at_random(times: int) -> None:
-    """Kill whole runs being saved over one another: every file is of one and the same run."""
-    from cmg_mj import parse_scenario, prepare
-    from cmg_mj.runs import save as runs
-
-    reports = []
-    for seed in (1, 2):
-        experiment = prepare(parse_scenario({"duration_s": 0.05, "seed": seed}))
-        reports.append(runs.report_run(experiment, experiment.run()))
-
-    def save_run(number: int) -> None:
-        with RunFolder(Path("it"), overwrite=True) as folder:
-            runs.save_run(folder, reports[number])
-
-    def save_for_ever() -> None:
-        while True:
-            save_run(0)
-            save_run(1)
-
-    save_run(0)
-    chance = random.Random(8)
-    seeds = []
-    for _ in range(times):
-        process = fork(save_for_ever)
-        time.sleep(chance.uniform(0.05, 0.4))
-        os.kill(process, signal.SIGKILL)
-        assert wait_for(process) == -signal.SIGKILL
-        with RunFolder(Path("it")):
-            pass
-        assert os.listdir() == ["it"], os.listdir()
-        assert is_complete(Path("it"))
-        seeds.append(wait_for(fork(lambda: os._exit(10 + seed_of(Path("it"))))) - 10)
-        assert seeds[-1] in (1, 2), seeds
-    print(f"{times} kills, seeds {seeds}")
-
-
-def seed_of(folder: Path) -> int:
-    """The seed of a run, which all its files agree on."""
-    from cmg_mj.results.trajectory import Trajectory
-    from tests.run_folders import recorded_scenario
-
-    (seed,) = {
-        tomllib.loads((folder / "scenario.toml").read_text())["seed"],
-        json.loads((folder / "summary.json").read_text())["seed"],
-        Trajectory.load(folder / "trajectory.parquet").metadata["scenario"]["seed"],
-        tomllib.loads(recorded_scenario(folder))["seed"],
-    }
-    return seed
-
-
 if __name__ == "__main__":
-    {"every": kill_at_every_event, "random": lambda: kill_at_random(40)}[sys.argv[1]]()
+    kill_at_every_event()

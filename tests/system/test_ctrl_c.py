@@ -13,7 +13,7 @@ import pytest
 
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.trajectory import Trajectory
-from tests.command import COMMAND, HANGS_AFTER_S, cmg_mj_process, environment
+from tests.command import COMMAND, HANGS_AFTER_S, CommandOutcome, cmg_mj_process, environment
 from tests.run_folders import assert_whole, names, write
 
 pytestmark = pytest.mark.usefixtures("elsewhere", "ctrl_c")
@@ -59,56 +59,48 @@ class Slow(Interrupts):
 LONG = "duration_s = 600.0\n[controller]\nfeedback = 'truth'\n[observer]\nkind = 'pressing:Interrupts'"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("driver", ["native", "callback"])
-def test_ends_a_run_at_the_next_clean_point(driver: str) -> None:
-    """The class is found in the current folder."""
+PARTLY = "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
+
+
+def command(*arguments: object) -> CommandOutcome:
+    """Run a command in the current folder, where the observers are."""
     write(OBSERVER, "pressing.py")
-    outcome = cmg_mj_process("run", write(LONG), "--out", "it", "--json", "--driver", driver, cwd=Path())
-    assert outcome.status == 130, outcome
-    assert outcome.err == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it\n"
-    assert len(assert_whole("it")) == 600
-    assert json.loads(outcome.out)["outcome"] == "interrupted"
+    return cmg_mj_process(*arguments, cwd=Path())
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
-def test_what_ends_a_process_from_outside_counts_as_ctrl_c(name: str) -> None:
+@pytest.mark.parametrize(
+    ("options", "ticks"),
+    [
+        (["--driver", "native"], 600),
+        (["--driver", "callback"], 600),
+        (["--set", "observer.times=2"], 599),  # a second one ends it at once
+        (["--set", "observer.signal=SIGTERM"], 600),
+        (["--set", "observer.signal=SIGHUP"], 600),
+    ],
+)
+def test_ends_a_run_at_the_next_clean_point(options: list[str], ticks: int) -> None:
     """Started by nohup a process ignores SIGHUP, and so do those that it starts: not here."""
-    write(OBSERVER, "pressing.py")
-    number = signal.Signals[name]
-    inherited = signal.signal(number, signal.SIG_DFL)
+    inherited = signal.signal(signal.SIGHUP, signal.SIG_DFL)
     try:
-        outcome = cmg_mj_process("run", write(LONG), "--out", "it", "--set", f"observer.signal={name}", cwd=Path())
+        outcome = command("run", write(LONG), "--out", "it", *options)
     finally:
-        signal.signal(number, inherited)
+        signal.signal(signal.SIGHUP, inherited)
     assert outcome.status == 130, outcome
-    assert outcome.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
-    assert len(assert_whole("it")) == 600
+    assert outcome.err.splitlines()[-1] == PARTLY
+    assert len(assert_whole("it")) == ticks
+    assert json.loads(Path("it/summary.json").read_text())["outcome"] == "interrupted"
 
 
 @pytest.mark.slow
-def test_twice_ends_a_run_at_once() -> None:
-    write(OBSERVER, "pressing.py")
-    outcome = cmg_mj_process("run", write(LONG), "--out", "it", "--set", "observer.times=2", cwd=Path())
-    assert outcome.status == 130, outcome
-    assert outcome.err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
-    assert len(assert_whole("it")) == 599
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("command", [["run"], ["compare", "--observers", "pressing:Slow", "--worlds", 2]])
-def test_is_heard_after_the_tick_however_slow_an_observer_is(command: list) -> None:
+@pytest.mark.parametrize("arguments", [["run"], ["compare", "--observers", "pressing:Slow", "--worlds", 2]])
+def test_is_heard_after_the_tick_however_slow_an_observer_is(arguments: list) -> None:
     """An observer of 0.1 s a sample: not one more sample is taken."""
-    write(OBSERVER, "pressing.py")
-    outcome = cmg_mj_process(
-        command[0], write(LONG.replace("Interrupts", "Slow")), *command[1:], "--out", "it", cwd=Path()
-    )
+    name, *options = arguments
+    outcome = command(name, write(LONG.replace("Interrupts", "Slow")), *options, "--out", "it")
     assert outcome.status == 130, outcome
     assert Path("after").read_text() == ""
-    if command == ["run"]:
-        assert outcome.err.splitlines()[-1].startswith("cmg-mj: interrupted at 0.015 s; ")
-        assert len(assert_whole("it")) == 4
+    assert name == "compare" or len(assert_whole("it")) == 4
 
 
 WRITING = """
@@ -126,62 +118,44 @@ cli.main(["run", "my.toml", "--out", "it"])
 """
 
 
-def run_python(program: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", program],
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("times", "last_line"),
+    [(1, "cmg-mj: interrupted at the end; the complete run is in it"), (2, "cmg-mj: interrupted")],
+)
+def test_while_files_are_written_lets_them_be_finished_unless_it_comes_twice(times: int, last_line: str) -> None:
+    write("duration_s = 0.2")
+    process = subprocess.run(
+        [sys.executable, "-c", WRITING.format(times=times)],
         env=environment(),
         capture_output=True,
         text=True,
         timeout=HANGS_AFTER_S,
-        check=False,
     )
-
-
-@pytest.mark.slow
-def test_while_files_are_written_lets_them_be_finished() -> None:
-    write("duration_s = 0.2")
-    process = run_python(WRITING.format(times=1))
     assert process.returncode == 130, process
-    assert process.stderr.splitlines()[-1] == "cmg-mj: interrupted at the end; the complete run is in it"
-    assert_whole("it")
-
-
-@pytest.mark.slow
-def test_twice_while_files_are_written_leaves_no_broken_one() -> None:
-    write("duration_s = 0.2")
-    process = run_python(WRITING.format(times=2))
-    assert process.returncode == 130, process
-    assert process.stderr == "cmg-mj: interrupted\n"
-    assert [name for name in names("it") if not name.startswith(".")] == ["trajectory.parquet"]
+    assert process.stderr.splitlines()[-1] == last_line
+    if times == 1:
+        assert_whole("it")
+    else:
+        assert [name for name in names("it") if not name.startswith(".")] == ["trajectory.parquet"]
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 40
 
 
 @pytest.mark.slow
 def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
-    write(OBSERVER, "pressing.py")
     file = write("duration_s = 3.0\n[controller]\nfeedback = 'truth'")
-    outcome = cmg_mj_process(
-        "compare", file, "--observers", "linear,pressing:Interrupts,ltv", "--worlds", 1, "--out", "it", cwd=Path()
-    )
+    observers = "linear,pressing:Interrupts,ltv"
+    outcome = command("compare", file, "--observers", observers, "--worlds", 1, "--out", "it")
     assert outcome.status == 130, outcome
     assert outcome.err.splitlines()[-1] == "cmg-mj: interrupted; 1 of 3 observers are in it"
-    assert names("it") == [
-        "recording.rrd",
-        "scenario.toml",
-        "summary.json",
-        "trajectory-linear.parquet",
-        "worlds.parquet",
-    ]
-    observers = [entry["observer"] for entry in json.loads(Path("it/summary.json").read_text())]
-    assert observers == ["linear", *REFERENCES]
+    assert {"trajectory-linear.parquet", "worlds.parquet"} <= set(names("it"))
+    rows = json.loads(Path("it/summary.json").read_text())
+    assert [entry["observer"] for entry in rows] == ["linear", *REFERENCES]
 
 
 @pytest.mark.slow
 def test_before_the_first_observer_is_done_leaves_nothing() -> None:
-    write(OBSERVER, "pressing.py")
-    outcome = cmg_mj_process(
-        "compare", write(LONG), "--observers", "pressing:Interrupts", "--worlds", 1, "--out", "it", cwd=Path()
-    )
+    outcome = command("compare", write(LONG), "--observers", "pressing:Interrupts", "--worlds", 1, "--out", "it")
     assert (outcome.status, outcome.out) == (130, "")
     assert outcome.err == "cmg-mj: interrupted before the first observer was done; nothing was written\n"
     assert not Path("it").exists()
@@ -209,7 +183,7 @@ def test_from_outside() -> None:
         finally:
             process.kill()
     assert process.returncode == 130, err
-    assert err.splitlines()[-1] == "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it"
+    assert err.splitlines()[-1] == PARTLY
     assert len(assert_whole("it")) == 600
     verified = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", "it/recording.rrd"], capture_output=True)
     assert verified.returncode == 0, verified
@@ -217,26 +191,16 @@ def test_from_outside() -> None:
 
 @pytest.mark.slow
 def test_leaves_the_complete_result_of_a_run_before() -> None:
-    write(OBSERVER, "pressing.py")
-    assert cmg_mj_process("run", write("duration_s = 0.1"), "--out", "it", cwd=Path()).status == 0
-    outcome = cmg_mj_process("run", write(LONG), "--out", "it", cwd=Path())
-    assert outcome.err.splitlines()[-1] == (
-        "cmg-mj: interrupted at 2.995 s; what was recorded until then is in it-2; what was in it stays as it was"
-    )
+    assert command("run", write("duration_s = 0.1"), "--out", "it").status == 0
+    assert "; what was in it stays as it was" in command("run", write(LONG), "--out", "it").err
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 20
     assert len(assert_whole("it-2")) == 600
 
 
 @pytest.mark.slow
-def test_a_study_that_cannot_begin_leaves_no_folder() -> None:
-    outcome = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "a/b", cwd=Path())
-    assert outcome.status == 2
-    assert not Path("a").exists()
-
-
-@pytest.mark.slow
-def test_a_folder_that_was_there_stays() -> None:
-    Path("mine").mkdir()
-    outcome = cmg_mj_process("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "mine", cwd=Path())
-    assert outcome.status == 2
-    assert Path("mine").is_dir()
+@pytest.mark.parametrize("was_there", [False, True])
+def test_a_study_that_cannot_begin_leaves_no_folder_but_one_that_was_there(was_there: bool) -> None:
+    if was_there:
+        Path("a").mkdir()
+    assert command("tune", write("duration_s = 1.0"), "--parameters", "nothing", "--out", "a").status == 2
+    assert Path("a").is_dir() == was_there

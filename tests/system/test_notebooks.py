@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 import warnings
 from pathlib import Path
@@ -10,8 +9,6 @@ from typing import Any
 
 import pytest
 
-import cmg_mj
-from cmg_mj.view.recording import save
 from tests.command import ROOT
 
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
@@ -53,29 +50,3 @@ def test_every_cell_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyP
     else:
         assert "application/vnd.jupyter.widget-view+json" in data[-1]
     assert list((tmp_path / "cwd").iterdir()) == []
-
-
-class Widget:
-    """In place of the widget: keeps what it is sent."""
-
-    def __init__(self, **options: Any) -> None:
-        self.options, self.sent = options, b""
-
-    def send_rrd(self, data: bytes) -> None:
-        self.sent += data
-
-
-def test_a_recording_is_shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    path = tmp_path / "recording.rrd"
-    path.write_bytes(b"RRF2")
-    real = save.importlib.import_module
-    module = type("module", (), {"Viewer": Widget})
-    monkeypatch.setattr(
-        save.importlib, "import_module", lambda name: module if name == "rerun_notebook" else real(name)
-    )
-    monkeypatch.setenv("RERUN_NOTEBOOK_ASSET", "")
-    monkeypatch.delenv("RERUN_NOTEBOOK_ASSET")
-    viewer = cmg_mj.show_recording(path, height=300)
-    assert os.environ["RERUN_NOTEBOOK_ASSET"] == "serve-local"
-    assert viewer.sent == b"RRF2"
-    assert viewer.options == {"width": "auto", "height": 300}

@@ -9,13 +9,13 @@ the joint, where all three lines meet, stands still.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from cmg_mj.inputs.files import folder
+from tests.plant.paper_model import EulerLagrange
 
 N = 11
 SIDE = 0.095
@@ -59,7 +59,7 @@ def _rotation(axis: str, angle: np.ndarray | float) -> np.ndarray:
     return np.stack(rows, axis=-1).reshape(*np.shape(angle), 3, 3)
 
 
-class Chain:
+class Chain(EulerLagrange):
     """Masses and inertias are read off the model files' own elements; nothing compiled is."""
 
     def __init__(self, model: str = "two_axes.xml") -> None:
@@ -120,20 +120,3 @@ class Chain:
     def momenta(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
         """dT/d(dq), (..., 11) [N m s]: the first is the momentum about the vertical."""
         return np.einsum("...ij,...j->...i", self.mass_matrix(q), dq)
-
-    def gravity(self, q: np.ndarray) -> np.ndarray:
-        """-dP/dq, (..., 11) [N m]."""
-        return -self._slopes(self.potential, q)
-
-    def bias(self, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-        """Return the terms of Lagrange's equations besides M ddq: dM/dt dq - d(T - P)/dq, (..., 11) [N m]."""
-        derivative = np.imag(self.momenta(q + 1e-30j * dq, dq)) / 1e-30  # the derivative of M along the motion, exactly
-        return derivative - self._slopes(
-            lambda coordinates: self.kinetic(coordinates, dq) - self.potential(coordinates), q
-        )
-
-    @staticmethod
-    def _slopes(function: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> np.ndarray:
-        """The gradient by complex steps, which is exact to rounding."""
-        steps = 1e-30j * np.eye(N)
-        return np.stack([np.imag(function(q + step)) / 1e-30 for step in steps], axis=-1)

@@ -11,8 +11,6 @@ from cmg_mj.features.mounting import mount
 from cmg_mj.plant.tilt_line import SupportLine
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
-from tests.features.studio.session import Session, as_rows
-from tests.features.studio.test_session import same
 
 POST = """
 <mujoco model="post">
@@ -32,8 +30,6 @@ SET = (
     "plant.initial_tilt_deg=0",
     "axes={}",
 )
-PUSH = 7
-"""Column of a session's rows; the second axis' comes seven later."""
 
 
 @pytest.fixture(scope="module")
@@ -70,16 +66,3 @@ def test_a_push_about_either_axis_is_felt_there(model: Path, axis: str, other: s
     inertia = plant.single_axis(axis).reduced.gimbals * plant.single_axis(axis).reduced.J1
     assert rate[axis] == pytest.approx(12.0 * 0.1 / inertia, rel=0.3)  # the controller is at it meanwhile
     assert abs(rate[other]) < 0.05 * rate[axis]
-
-
-def test_in_studio_too(model: Path) -> None:
-    experiment = pushed(model, roll=5.0, pitch=3.0)
-    studio = Session(lambda _: experiment)
-    with studio.handle:
-        studio.run(0.35)
-        rows = studio.rows
-    trajectory = experiment.run().trajectory
-    assert trajectory is not None
-    assert len(rows) == 70
-    rows[:, [PUSH, PUSH + 7]] = rows[:, [PUSH, PUSH + 7]].round(12)  # put together again from the joint's three torques
-    same(rows, as_rows(trajectory))

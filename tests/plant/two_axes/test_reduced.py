@@ -46,7 +46,6 @@ def test_what_grows_is_what_the_reduced_models_say(plant: Plant) -> None:
         momentum = axis.reduced.J_d * axis.reduced.omega_d
         stiffness = kp + kv * pole + gimbal * pole**2
         expected = math.sqrt(axis.reduced.gravity_torque / (axis.reduced.J1 + momentum**2 / stiffness))
-        print(f"{plant.path.name}, {axis.name}: pole {pole:.4f}/s, expected {expected:.4f}/s")
         assert pole == pytest.approx(expected, rel=5e-4)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
 import math
 import statistics
 from collections.abc import Sequence
@@ -15,10 +14,11 @@ import pyarrow.compute as pc
 import pytest
 from scipy import stats
 
+from cmg_mj.core.errors import InputError
 from cmg_mj.results.baselines import REFERENCES
 from cmg_mj.results.intervals import Interval, format_interval, in_line
-from cmg_mj.results.reports import comparison_markdown
 from cmg_mj.results.result import Outcome, Result
+from cmg_mj.runs import api
 from cmg_mj.runs.comparison import (
     ComparedObserver,
     best_observer,
@@ -141,16 +141,6 @@ def test_a_reference_has_no_loop_of_its_own() -> None:
     assert (zero["seed"], zero["worlds"]) == (7, 2)
 
 
-@pytest.mark.slow
-def test_one_world_has_no_intervals() -> None:
-    row = rows_by_name([entry("ltv", [0.1]), entry("linear", [0.3])])["linear"]
-    assert row["intervals"][ERROR] is None
-    assert row["minus_best"][ERROR]["interval"] is None
-    example = [dataclasses.replace(compare_two()[0], result=compare_two()[0].world_0)]
-    assert "Less the best" not in comparison_markdown(standings(example))
-    assert "±" not in comparison_markdown(standings(example)).split("\n\n")[0]
-
-
 def test_a_figure_that_is_missing_in_a_world() -> None:
     """One that did not settle: it counts neither in the mean nor in a difference."""
     linear = entry("linear", [0.2, 0.2, 0.2])
@@ -198,12 +188,26 @@ def test_what_stood_averages_to_what_is_printed() -> None:
     assert set(fell["settle_time_s"].to_pylist()) == {None}
 
 
-def test_a_world_is_that_of_a_run_of_its_own() -> None:
-    ltv = compare_two()[0]
-    table = worlds_table(compare_two())
-    alone = ltv.experiment.run(world=2, keep_trajectory=False)
-    (row,) = alone.rows()
-    (table_row,) = table.filter((pc.field("observer") == "ltv") & (pc.field("world") == 2)).to_pylist()
-    assert row["world"] == 2
-    for key, value in row.items():
-        assert table_row[key] == (pytest.approx(value, rel=1e-9) if isinstance(value, float) else value), key
+def test_a_comparison_as_a_mapping_and_a_frame() -> None:
+    pytest.importorskip("pandas")
+    scenario = load_scenario("push_recovery", ["duration_s=0.4", "push=[]"])
+    compared = api.compare(scenario, ["linear", "gyro_free"], 2)
+    assert list(dict(compared)) == list(compared) == ["linear", "gyro_free"]
+    means: Any = compared.to_pandas().groupby("observer")["velocity_rms_error_rad_s"].mean()
+    for summary in compared.summaries[:2]:
+        assert means[summary["observer"]] == pytest.approx(summary["velocity_rms_error_rad_s"], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("observers", "worlds", "message"),
+    [
+        (["linear", "linear"], 2, "different names"),
+        ("linear", 2, "different names"),
+        ([], 2, "different names"),
+        (["linear"], 0, "worlds = 0"),
+        (["liner"], 1, "did you mean 'linear'"),
+    ],
+)
+def test_a_comparison_that_cannot_be_is_refused(observers: Any, worlds: int, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        api.compare(load_scenario("push_recovery"), observers, worlds)
