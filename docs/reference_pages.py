@@ -22,6 +22,7 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from cmg_mj.cli import HELP, cli
+from cmg_mj.features.bend import Bend
 from cmg_mj.features.export.constants import attribute_descriptions
 from cmg_mj.features.pivot import FIELDS_OF, Pivot
 from cmg_mj.inputs.files import bundled, folder
@@ -317,7 +318,19 @@ noise_density_ug_rthz = 100.0
 skew_s = 0.0025
 ```
 """
-OWN_TABLES = ("plant", "controller", "observer", "sensors", "axes", "push", "swing", "pivot", "metrics", "compare")
+OWN_TABLES = (
+    "plant",
+    "bend",
+    "controller",
+    "observer",
+    "sensors",
+    "axes",
+    "push",
+    "swing",
+    "pivot",
+    "metrics",
+    "compare",
+)
 """Sections of a scenario."""
 SENSOR_SECTIONS: dict[str, type] = {
     "sensors.accelerometer": Accelerometer,
@@ -375,6 +388,7 @@ def scenario_sections() -> dict[str, type]:
     return {
         "": Scenario,
         "plant": PlantSettings,
+        "bend": Bend,
         "controller": ControllerSettings,
         "controller.lqr": LqrSettings,
         "observer": type(Scenario().observer),
@@ -512,8 +526,9 @@ def _descriptions(cls: type) -> dict[str, str]:
     texts: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         texts |= attribute_descriptions(base.__doc__ or "")
-    if issubclass(cls, BaseModel):
-        body = ast.parse(textwrap.dedent(inspect.getsource(cls))).body[0]
+    models = [base for base in reversed(cls.__mro__) if issubclass(base, BaseModel) and base is not BaseModel]
+    for model in models:
+        body = ast.parse(textwrap.dedent(inspect.getsource(model))).body[0]
         assert isinstance(body, ast.ClassDef)
         for field, below in zip(body.body, body.body[1:], strict=False):
             if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(below, ast.Expr):

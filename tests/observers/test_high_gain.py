@@ -84,7 +84,8 @@ def test_follows_the_printed_observer_at_200_hz(parameters: dict, model: Reduced
 
 
 def test_defaults() -> None:
-    assert high_gain() == high_gain(**DEFAULTS)
+    defaults: Any = DEFAULTS
+    assert high_gain() == high_gain(**defaults)
 
 
 def test_largest_damping_is_the_largest() -> None:

@@ -15,6 +15,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.features.bend import Bend, BendBeyond
 from cmg_mj.features.mounting.limits import ReducedPhysics
 from cmg_mj.linear.plant import linearise
+from cmg_mj.plant.elements import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
 from tests.features.bend.test_bend import frequency, ring
 from tests.features.mounting.push_robots import cart_pole
