@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from cmg_mj.core.errors import InputError as InputError
     from cmg_mj.core.errors import RunStopped as RunStopped
     from cmg_mj.core.reduced_model import ReducedModel as ReducedModel
+    from cmg_mj.core.tilt import MeasurementNoise as MeasurementNoise
     from cmg_mj.core.tilt import RadialTilt as RadialTilt
-    from cmg_mj.core.tilt import TiltNoise as TiltNoise
     from cmg_mj.features.export import export as export
     from cmg_mj.features.mounting import MountedRobot as MountedRobot
     from cmg_mj.features.mounting import mount as mount

@@ -26,7 +26,7 @@ UPPER_PACKAGES, LOWER_PACKAGES = (
 )
 """The packages from top to bottom, as docs/architecture.md lists them."""
 ORDER = [*UPPER_PACKAGES, *LOWER_PACKAGES]
-MOST_ENTRIES = 18
+MAX_ENTRIES = 18
 
 HEAVY = dict(re.findall(r"^\| ([\w.]+) \| `([\w/, `]+)` \|$", ARCHITECTURE, re.MULTILINE))
 """Library -> the only sub-package or module that imports it, because it costs time."""
@@ -100,7 +100,7 @@ def test_the_top_is_small() -> None:
     entries = sorted(path.name for path in PACKAGE.iterdir() if path.name not in ("__pycache__", "models", "scenarios"))
     files = [name for name in entries if (PACKAGE / name).is_file()]
     assert files == ["__init__.py", "py.typed"]
-    assert len(entries) <= MOST_ENTRIES
+    assert len(entries) <= MAX_ENTRIES
 
 
 def test_every_package_is_in_the_table_once() -> None:
@@ -171,10 +171,10 @@ def test_every_observer_works_without_mujoco() -> None:
 import sys
 from cmg_mj.observers import OBSERVERS, Measurement, make_observer
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 model = {PAPER!r}
 for kind in OBSERVERS:
-    observer = make_observer(kind, 0.005, model, TiltNoise(0.006, 0.4, 0.9))
+    observer = make_observer(kind, 0.005, model, MeasurementNoise(0.006, 0.4, 0.9))
     observer.step(observer.init(Measurement(0.0, 0.0, 0.0)), Measurement(0.01, 0.0, 1.0), 0.0)
 print("mujoco" in sys.modules)
 """

@@ -26,7 +26,7 @@ Command = Callable[..., None]
 Decorator = Callable[[Command], Command]
 
 OVERWRITE = "cmg_mj.overwrite"
-MOST_WORLDS = 10_000
+MAX_WORLDS = 10_000
 """Most worlds of a batch; one takes about 0.1 MB of memory."""
 
 
@@ -126,7 +126,7 @@ def settings_option(
     return click.option("--set", "settings", multiple=True, metavar=metavar, help=f"{help} May be given again.")
 
 
-def worlds_option(help: str, default: int | None = None, range: tuple[int, int] = (1, MOST_WORLDS)) -> Decorator:
+def worlds_option(help: str, default: int | None = None, range: tuple[int, int] = (1, MAX_WORLDS)) -> Decorator:
     """Make the option `--worlds`."""
     kind = click.IntRange(*range)
     return click.option("--worlds", type=kind, default=default, show_default=True, metavar="N", help=help)

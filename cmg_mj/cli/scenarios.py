@@ -160,7 +160,7 @@ def compare(
                 f"--observers {','.join(names)}; the others are compared with their default parameters"
             )
     experiments = comparison.prepare_comparison(scenario, names)
-    rerun = comparison.rerunnable(scenario, experiments, worlds)
+    rerun = comparison.repeatable(scenario, experiments, worlds)
     note_hints(rerun.hints)
     if not law_needs(rerun.law):
         note(f"{scenario.controller.kind} takes nothing of the observer: every loop is the same, the estimates differ")

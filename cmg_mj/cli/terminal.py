@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
 """Exit statuses."""
-LONGEST_LINE, LONGEST_WORD = 4000, 400
+MAX_LINE, MAX_WORD = 4000, 400
 """Characters of a message, and of a word in it, such as a path."""
 
 
@@ -109,8 +109,8 @@ def own_stdout() -> TextIO:
 def note(message: str) -> None:
     """Write one line to standard error, if it is read; of a very long message its beginning."""
     with suppress(OSError):
-        words = " ".join(shortened(word, LONGEST_WORD) for word in message.split())
-        click.echo(f"cmg-mj: {shortened(words, LONGEST_LINE)}", err=True)
+        words = " ".join(shortened(word, MAX_WORD) for word in message.split())
+        click.echo(f"cmg-mj: {shortened(words, MAX_LINE)}", err=True)
 
 
 def note_hints(hints: Iterable[str]) -> None:

@@ -87,4 +87,4 @@ class MultiAxisController:
             self._between(self.parts, self._ideals)
 
 
-AnyController = Controller | MultiAxisController
+ControllerLike = Controller | MultiAxisController

@@ -76,7 +76,7 @@ class ControllerSite(NamedTuple):
     """The settings of stages, by the name of the scenario's field."""
 
 
-class PlantInterface(NamedTuple):
+class KnownPlant(NamedTuple):
     """The plant's properties that its controller knows."""
 
     tilt: RadialTilt
@@ -136,7 +136,7 @@ class Controller:
         observer: Observer,
         law: Law,
         sensors: Sensors,
-        plant: PlantInterface,
+        plant: KnownPlant,
         *,
         seed: int = 0,
         worlds: int | Sequence[int] = 0,

@@ -9,9 +9,9 @@ from typing import TypeAlias
 
 TomlValue: TypeAlias = "bool | int | float | str | date | time | Sequence[TomlValue] | Mapping[str, TomlValue] | None"
 """A value that a TOML file can hold."""
-LONGEST_SHOWN = 80  # characters of a value in a message
-LONGEST_LIST = 800  # characters of a list of names
-LONGEST_RAISED = 300  # characters of what a user's code says
+MAX_SHOWN = 80  # characters of a value in a message
+MAX_LIST = 800  # characters of a list of names
+MAX_RAISED = 300  # characters of what a user's code says
 
 
 class InputError(ValueError):
@@ -36,7 +36,7 @@ def nearest(name: str, allowed: Iterable[str], label: str = "allowed", *, quoted
     """
     names = sorted(allowed)
     folded = {known.casefold(): known for known in names}
-    match = difflib.get_close_matches(name[:LONGEST_SHOWN].casefold(), folded, n=1)
+    match = difflib.get_close_matches(name[:MAX_SHOWN].casefold(), folded, n=1)
     listing = f"{label}: {listed(names) or 'none'}"
     if not match:
         return listing
@@ -47,7 +47,7 @@ def nearest(name: str, allowed: Iterable[str], label: str = "allowed", *, quoted
 def listed(names: Sequence[str]) -> str:
     """Names with commas between, each shortened; of very many the first, and how many more there are."""
     parts: list[str] = []
-    room = LONGEST_LIST
+    room = MAX_LIST
     for name in names:
         parts.append(shortened(name))
         room -= len(parts[-1]) + 2
@@ -58,12 +58,12 @@ def listed(names: Sequence[str]) -> str:
 
 def raised(error: BaseException) -> str:
     """Describe what a user's code raised, `ValueError: too large`, shortened, even if its own message raises."""
-    text = shortened(_safely(lambda: str(error), "its message cannot be shown"), LONGEST_RAISED)
-    name = shortened(type(error).__name__, LONGEST_SHOWN)
+    text = shortened(_safely(lambda: str(error), "its message cannot be shown"), MAX_RAISED)
+    name = shortened(type(error).__name__, MAX_SHOWN)
     return f"{name}: {text}" if text else name
 
 
-def shortened(text: str, longest: int = LONGEST_SHOWN) -> str:
+def shortened(text: str, longest: int = MAX_SHOWN) -> str:
     """Return the beginning of a text, with `...` where more follows."""
     return text if len(text) <= longest else f"{text[:longest]}..."
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.axes import AnyController
+from cmg_mj.core.axes import ControllerLike
 from cmg_mj.core.controller import Tick
 from cmg_mj.core.outside import Disturbance, Outside, instants
 from cmg_mj.core.types import IdealReading, MultiAxisReading
@@ -130,7 +130,7 @@ class ControlLoop:
     def __init__(
         self,
         physics: Physics,
-        controller: AnyController,
+        controller: ControllerLike,
         end: int,
         disturbances: Sequence[Disturbance],
         fall_angle: float,

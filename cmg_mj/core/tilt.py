@@ -16,7 +16,7 @@ from cmg_mj.core.types import Forces
 
 
 @dataclass(frozen=True)
-class TiltNoise:
+class MeasurementNoise:
     """The noise of one sample of what observers are given.
 
     Attributes:
@@ -110,7 +110,7 @@ class RadialTilt:
         """
         return (outer_x - inner_x) / (self.r_outer - self.r_inner)
 
-    def noise(self, sigma: float, gravity: float) -> TiltNoise:
+    def noise(self, sigma: float, gravity: float) -> MeasurementNoise:
         """Return the noise of tilt and angular acceleration, to first order in the noise of the accelerometers.
 
         Args:
@@ -124,7 +124,7 @@ class RadialTilt:
         both = math.hypot(w_inner, w_outer)
         span = self.r_outer - self.r_inner
         correlation = (w_inner + w_outer) / (math.sqrt(2.0) * both)
-        return TiltNoise(sigma * both / gravity, sigma * math.sqrt(2.0) / span, correlation)
+        return MeasurementNoise(sigma * both / gravity, sigma * math.sqrt(2.0) / span, correlation)
 
     def offset(self, tilt: float, response: Callable[[Forces], Forces], gravity: float) -> float:
         """Compute the error of y1 at rest that the accelerometers' response to the specific forces makes.

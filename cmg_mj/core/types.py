@@ -63,8 +63,8 @@ class Observer(Protocol):
     their unit, such as ("bias_rad",), and appends the values to its estimate in that order. `BIAS` among them is what
     the summary judges and the controller can trim its integrator with.
 
-    Its constructor is given `dt` and `model`, and `noise` (`TiltNoise`, of the sensors' datasheet) if it takes that. An
-    attribute `needs` says what it cannot do without (`NEEDS`).
+    Its constructor is given `dt` and `model`, and `noise` (`MeasurementNoise`, of the sensors' datasheet) if it takes
+    that. An attribute `needs` says what it cannot do without (`NEEDS`).
     """
 
     def init(self, y: Measurement) -> State:
@@ -139,7 +139,7 @@ class Law(Protocol):
     """A control law in discrete time: from what is measured and estimated to the gimbal rate u.
 
     All memory is in the state, so that one value serves any number of runs and worlds. Its constructor is given `dt`
-    and `rate_limit`, which it keeps under these names, and `model` and `noise` (`TiltNoise`, of the sensors'
+    and `rate_limit`, which it keeps under these names, and `model` and `noise` (`MeasurementNoise`, of the sensors'
     datasheet) if it takes them. The controller limits u to `rate_limit` whatever the law says; a law that has memory
     should know the limit, and not wind up.
 

@@ -73,11 +73,11 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 NoiseSize = Annotated[float, Field(ge=0.0, le=1e6)]
 """No part is noisier than 1 g/rtHz [ug/rtHz], or shaken by more than 1000 g [mg]."""
 
-LONGEST_S = 1e6
+MAX_TIME_S = 1e6
 """No time in a scenario is longer: eleven days [s]."""
-Duration = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
+Duration = Annotated[float, Field(gt=0.0, le=MAX_TIME_S)]
 """A time that passes [s]."""
-Instant = Annotated[float, Field(ge=0.0, le=LONGEST_S)]
+Instant = Annotated[float, Field(ge=0.0, le=MAX_TIME_S)]
 """A time after the start, or a delay [s]."""
 GridDuration = Annotated[Duration, OnGrid("s")]
 """A time that passes in whole physics steps [s]."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import FeedbackState, Law
 from cmg_mj.inputs.user_classes import UserClassKind
 from cmg_mj.laws.state_feedback import TABLE_2_GAINS, StateFeedback, lqr_gains, scaled_gains
@@ -37,7 +37,7 @@ LAW_CLASSES = UserClassKind(
 
 
 def make_law(
-    kind: str, dt: float, rate_limit: float, model: ReducedModel, noise: TiltNoise, /, **parameters: Any
+    kind: str, dt: float, rate_limit: float, model: ReducedModel, noise: MeasurementNoise, /, **parameters: Any
 ) -> Law:
     """Construct a law.
 

@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, clip, where
 from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import FeedbackState, Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.kalman import COLUMNS, Kalman
@@ -75,7 +75,7 @@ class Lqg:
     dt: Positive
     rate_limit: Positive
     model: ReducedModel
-    noise: TiltNoise
+    noise: MeasurementNoise
     state_cost: tuple[NonNegative, NonNegative, NonNegative, NonNegative] = (405.6, 2.26, 0.223, 0.096)
     input_cost: Positive = 1.0
     torque_walk: Positive = Kalman.torque_walk

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from cmg_mj.core.controller import PlantInterface
+from cmg_mj.core.controller import KnownPlant
 from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.core.types import IdealReading
 from cmg_mj.linear.plant import LinearPlant
@@ -62,7 +62,7 @@ def march(design: Design, plant: LinearPlant) -> Motion:
     """
     scenario, rig = design.scenario, design.rig
     worlds = len(STARTS_RAD_S) + 1  # one for each small start, and the scenario's own as the last
-    known = PlantInterface(rig.tilt, GimbalAngle((1.0,), (0.0,)), rig.timestep)
+    known = KnownPlant(rig.tilt, GimbalAngle((1.0,), (0.0,)), rig.timestep)
     controller = design.controller(
         known, worlds=range(worlds), sensors=_quiet(scenario.sensors), open_loop_observers={}
     )

@@ -11,7 +11,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
 from cmg_mj.plant.axis import Axis, pivot_rows
 from cmg_mj.plant.elements import BEND_JOINT, TILT_ELEMENT, element_id
-from cmg_mj.plant.mjcf import at_keyframe
+from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.step_limit import input_column, state_matrix
 from cmg_mj.plant.tilt_line import HingeLine
@@ -130,7 +130,7 @@ def _without_bend(model: mujoco.MjModel, key: int, whole: np.ndarray) -> np.ndar
     bend, nv = int(model.jnt_dofadr[joint]), model.nv
     unit, gives = np.zeros((1, nv)), np.zeros((1, nv))
     unit[0, bend] = 1.0
-    mujoco.mj_solveM(model, at_keyframe(model, key), gives, unit)
+    mujoco.mj_solveM(model, data_at_keyframe(model, key), gives, unit)
     rigid = whole.copy()
     rigid[nv : 2 * nv] -= np.outer(gives[0] / gives[0, bend], whole[nv + bend])
     rigid[[bend, nv + bend]] = 0.0
@@ -146,7 +146,7 @@ def _outputs(plant: Plant, whole: np.ndarray, height: float) -> np.ndarray:
     model, key, axis = plant.model, plant.key, plant.axis
     nv, columns = model.nv, np.eye(whole.shape[1])
     angle, rate, acceleration = columns[:nv], columns[nv : 2 * nv], whole[nv : 2 * nv]
-    modules = axis.line.motion(model, at_keyframe(model, key))
+    modules = axis.line.motion(model, data_at_keyframe(model, key))
     sensors, gimbals = modules.copy(), np.zeros(nv)
     if _sensors_bend(plant):
         sensors[int(model.joint(BEND_JOINT).dofadr[0])] = 1.0

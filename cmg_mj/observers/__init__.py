@@ -6,7 +6,7 @@ from typing import Any
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import NEEDS, Estimate, Measurement, Observer, needs
 from cmg_mj.inputs.user_classes import UserClassKind
 
@@ -37,7 +37,7 @@ OBSERVER_CLASSES = UserClassKind(
 
 
 def make_observer(
-    kind: str, dt: float, model: ReducedModel, noise: TiltNoise | None = None, /, **parameters: Any
+    kind: str, dt: float, model: ReducedModel, noise: MeasurementNoise | None = None, /, **parameters: Any
 ) -> Observer:
     """Construct an observer.
 
@@ -56,5 +56,5 @@ def make_observer(
     """
     parameter = OBSERVER_CLASSES.takes(kind).get("noise")
     if noise is None and parameter is not None and parameter.default is parameter.empty:
-        raise InputError(f"observer {kind}: needs the noise of its sensors (a TiltNoise after the model)")
+        raise InputError(f"observer {kind}: needs the noise of its sensors (a MeasurementNoise after the model)")
     return OBSERVER_CLASSES.make(kind, {"dt": dt, "model": model, "noise": noise}, parameters)

@@ -14,7 +14,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, where
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import Estimate, Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 
@@ -107,7 +107,7 @@ class FreePivot:
 
     dt: Positive
     model: ReducedModel
-    noise: TiltNoise
+    noise: MeasurementNoise
     rate_start: Positive = 0.02
     bias_start: Positive = 0.5
     bias_walk: NonNegative = 0.01

@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import TORQUE, Measurement
 from cmg_mj.inputs.types import STRICT, Positive
 
@@ -103,7 +103,7 @@ class Kalman:
 
     dt: Positive
     model: ReducedModel
-    noise: TiltNoise
+    noise: MeasurementNoise
     torque_walk: Positive = 0.03
     torque_white: Positive = 0.082
     gimbal_white: Positive = 0.017

@@ -19,14 +19,14 @@ from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.inertia import inertia_about
-from cmg_mj.plant.mjcf import at_keyframe
+from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_at_site, line_of_joint
 from cmg_mj.sensors.accelerometer import Accelerometer
 
 _new = tuple.__new__  # a named tuple's own takes twice as long
 
 QUARTER_TURN = math.pi / 2.0
-LEAST_ARM_M = 1e-4
+MIN_ARM_M = 1e-4
 """A pivot that moves by less for a tilt of 1 rad is at rest [m]."""
 TURNS_ALIKE = 1e-6
 """A frame whose rate differs from the hinge's by less turns with the hinge."""
@@ -182,7 +182,7 @@ def resolve(
 
 
 def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]) -> Axis:
-    """Resolve the names of an axis, all of whose elements are there: see `parts.missing_parts`.
+    """Resolve the names of an axis, all of whose elements are there: see `parts.missing_elements`.
 
     Args:
         model: The compiled model, as its file has it.
@@ -194,7 +194,7 @@ def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]
         The axis, without bias.
     """
     prefix = f"{name}/" if name else ""
-    data = at_keyframe(model, key)
+    data = data_at_keyframe(model, key)
     joint, site = element_id(model, "joint", prefix + TILT_ELEMENT), element_id(model, "site", prefix + TILT_ELEMENT)
     if joint >= 0:
         line: Line | None = line_of_joint(model, joint, key)
@@ -267,7 +267,7 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     J2 = turned.tilt_inertia / n - J1
     J_d = sum(abs(turned.coupling_row[c.flywheel_dof]) for c in axis.modules) / n
     momentum = sum(turned.coupling_row[c.flywheel_dof] * c.speed for c in axis.modules)
-    data = at_keyframe(model, key)
+    data = data_at_keyframe(model, key)
     data.qvel[:] = 0.0
     line.tilt(data, QUARTER_TURN)
     mujoco.mj_forward(model, data)
@@ -288,7 +288,7 @@ def pivot_rows(model: mujoco.MjModel, key: int, axis: Axis) -> tuple[np.ndarray,
         The pivot's velocity across the axis, to the side a positive tilt leans to, (nv,); the frame's rate about the
         axis, (nv,).
     """
-    data = at_keyframe(model, key)
+    data = data_at_keyframe(model, key)
     turn = data.xmat[axis.frame].reshape(3, 3)
     slides, turns = np.zeros((3, model.nv)), np.zeros((3, model.nv))
     mujoco.mj_jac(model, data, slides, turns, data.xpos[axis.frame] + turn @ axis.point, axis.frame)
@@ -305,4 +305,4 @@ def _pivot_arm(model: mujoco.MjModel, key: int, axis: Axis, rates: np.ndarray) -
     if abs(float(about @ rates) - 1.0) > TURNS_ALIKE:
         return 0.0
     arm = -float(across @ rates)
-    return arm if arm > LEAST_ARM_M else 0.0
+    return arm if arm > MIN_ARM_M else 0.0

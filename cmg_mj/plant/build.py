@@ -13,7 +13,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.features import entries
 from cmg_mj.plant.axis import ResolvedModel, resolve
 from cmg_mj.plant.checks import RigChecker, invalid_numbers
-from cmg_mj.plant.elements import REQUIRED_PARTS, axes_of, missing_parts
+from cmg_mj.plant.elements import REQUIRED_ELEMENTS, axis_modules, missing_elements
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
 from cmg_mj.plant.mjcf import compile_model, parse, parse_without_plugins
 from cmg_mj.scenario.plant_settings import PlantSettings
@@ -39,7 +39,7 @@ def build(path: Path, settings: PlantSettings, sections: Mapping[str, Any]) -> R
         InputError: The file holds no rig. All that is missing or wrong is named.
     """
     spec, plugins = parse_without_plugins(path)
-    missing = missing_parts(spec)
+    missing = missing_elements(spec)
     if settings.lock_thrust_bearing and not missing:
         lock_thrust_bearing(spec, path)
     spec.compiler.discardvisual = True
@@ -53,12 +53,12 @@ def build(path: Path, settings: PlantSettings, sections: Mapping[str, Any]) -> R
         if "keyframe" not in str(error):  # whose sizes are wrong because something is missing
             wrong.append(str(error).removeprefix(f"{path}: "))
     else:
-        modules, numbers = axes_of(model), invalid_numbers(model)
+        modules, numbers = axis_modules(model), invalid_numbers(model)
         placement = None if numbers else RigChecker(model, modules)
         wrong += numbers if placement is None else placement.wrong
         hints = [] if placement is None else placement.hints
     if wrong or model is None:
-        raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([REQUIRED_PARTS] if missing else [])]))
+        raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([REQUIRED_ELEMENTS] if missing else [])]))
     rig = edit(spec, resolve(path, model, modules), settings, sections)
     return rig._replace(hints=(*hints, *(_HAS_PLUGIN.format(name) for name in plugins)))
 

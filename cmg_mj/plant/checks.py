@@ -12,7 +12,7 @@ from cmg_mj.core.errors import shown
 from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, element_id
 from cmg_mj.plant.inertia import wheel_momentum
-from cmg_mj.plant.mjcf import at_keyframe
+from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 
 TRUE_DEG = 0.05
@@ -73,7 +73,7 @@ class RigChecker:
         self.key = element_id(model, "key", EQUILIBRIUM_KEY)
         if self.key < 0:
             return
-        self.model, self.data = model, at_keyframe(model, self.key)
+        self.model, self.data = model, data_at_keyframe(model, self.key)
         complete = {
             name: [module for module in modules if min(self._addresses(module)) >= 0] for name, modules in axes.items()
         }

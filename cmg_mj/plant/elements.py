@@ -16,7 +16,7 @@ TILT_ELEMENT = "tilt"
 BEND_JOINT = "bend"
 """Joint and body that a frame which bends gets, beside what its file has."""
 SENSORS = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
-REQUIRED_PARTS = (
+REQUIRED_ELEMENTS = (
     "a rig needs a joint or a site tilt, the joints MODULE/gimbal, MODULE/flywheel, the actuators MODULE/gimbal_servo, "
     f"MODULE/flywheel_motor, the sensors MODULE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe "
     f"{EQUILIBRIUM_KEY}, for one MODULE or more; of several axes each has its name before these, as roll/tilt and "
@@ -59,12 +59,12 @@ class Module:
     speed: float
 
     @property
-    def of_axis(self) -> str:
+    def short_name(self) -> str:
         """The module's name without that of its axis: `cube1` of `roll/cube1`."""
         return self.name.rpartition("/")[2]
 
 
-def missing_parts(spec: mujoco.MjSpec) -> list[str]:
+def missing_elements(spec: mujoco.MjSpec) -> list[str]:
     """List the joints, actuators, sensors and the keyframe that a rig needs and a parsed model lacks.
 
     The compiler, which comes after this, would only say that the keyframe has the wrong size.
@@ -143,7 +143,7 @@ def modules_in(names: Iterable[str], axis: str) -> list[str]:
     return [prefix for prefix in prefixes if prefix.rpartition("/")[0] == axis]
 
 
-def axes_of(model: mujoco.MjModel) -> dict[str, list[str]]:
+def axis_modules(model: mujoco.MjModel) -> dict[str, list[str]]:
     """Find the axes of a compiled model, each with the names of its modules."""
     joints = [model.joint(i).name for i in range(model.njnt)]
     sites = [model.site(i).name for i in range(model.nsite)]

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.plant.elements import BEND_JOINT, ON_A_JOINT, element_id
-from cmg_mj.plant.mjcf import at_keyframe
+from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine, Line
 
 SMALL = 1e-9
@@ -46,7 +46,7 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
     Returns:
         The inertia.
     """
-    data = at_keyframe(model, key)
+    data = data_at_keyframe(model, key)
     for address, angle in angles.items():
         data.qpos[address] = angle
     mujoco.mj_forward(model, data)

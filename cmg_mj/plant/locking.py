@@ -12,7 +12,7 @@ import numpy as np
 from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.plant.axis import ResolvedModel
 from cmg_mj.plant.elements import ON_A_JOINT, TILT_ELEMENT, element_id, joint_sizes
-from cmg_mj.plant.mjcf import at_keyframe
+from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
 from cmg_mj.scenario.plant_settings import PlantSettings
 
@@ -63,7 +63,7 @@ def _hinges_of(
     model: mujoco.MjModel, key: int, axes: Sequence[str], known: Collection[str], path: Path
 ) -> list[HingeLine]:
     setting = _setting(axes, path)
-    data = at_keyframe(model, key)
+    data = data_at_keyframe(model, key)
     hinges = []
     for axis in dict.fromkeys(axes):
         if axis not in known:

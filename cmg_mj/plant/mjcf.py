@@ -130,7 +130,7 @@ def set_control_callback(callback: object | None) -> Iterator[None]:
         mujoco.set_mjcb_control(before)
 
 
-def at_keyframe(model: mujoco.MjModel, key: int) -> mujoco.MjData:
+def data_at_keyframe(model: mujoco.MjModel, key: int) -> mujoco.MjData:
     """Return fresh data at a keyframe, after a forward pass."""
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, key)

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import PlantInterface
+from cmg_mj.core.controller import KnownPlant
 from cmg_mj.core.errors import InputError, TomlValue, nearest
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
@@ -31,8 +31,8 @@ from cmg_mj.plant.mjcf import compile_model, quiet, set_control_callback
 from cmg_mj.plant.settings import apply, place_accelerometers
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.turning import turning
-from cmg_mj.scenario.design import PlantParameters
-from cmg_mj.scenario.plant_settings import COMPILED_FIELDS, FINEST_STEP_S, PlantSettings
+from cmg_mj.scenario.design import PlantNumbers
+from cmg_mj.scenario.plant_settings import MIN_STEP_S, NEEDS_COMPILING, PlantSettings
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import TimeGrid, time_grid
 from cmg_mj.sensors.accelerometer import Accelerometer
@@ -47,7 +47,7 @@ class Plant:
         filed: The rig as its file has it.
         settings: Its settings.
         sections: Settings of the features that edit the model, by name.
-        of_axes: The settings of axes that have their own.
+        axis_settings: The settings of axes that have their own.
         grid: The times that whole physics steps must fill; by default the step is the largest that is accurate enough.
 
     Attributes:
@@ -68,18 +68,18 @@ class Plant:
         filed: ResolvedModel,
         settings: PlantSettings,
         sections: Mapping[str, Any] = MappingProxyType({}),
-        of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+        axis_settings: Mapping[str, PlantSettings] = MappingProxyType({}),
         grid: TimeGrid | None = None,
     ) -> None:
-        self.filed, self.settings, self.sections, self.of_axes = filed, settings, sections, of_axes
+        self.filed, self.settings, self.sections, self.axis_settings = filed, settings, sections, axis_settings
         self.path, self.key, self.hints = filed.path, filed.key, filed.hints
-        self.model, self.axes, self.largest_step = apply(filed, settings, of_axes, sections)
+        self.model, self.axes, self.largest_step = apply(filed, settings, axis_settings, sections)
         self.yaw = int(self.model.joint("yaw").qposadr[0]) if "yaw" in self.joint_names else None
         self.backlash = math.radians(settings.gimbal_backlash_arcmin / ARCMIN_A_DEGREE)
-        if settings.timestep_s is None and self.largest_step < FINEST_STEP_S:
+        if settings.timestep_s is None and self.largest_step < MIN_STEP_S:
             raise InputError(
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
-                f"{FINEST_STEP_S:g} s; soften it, or set plant.timestep_s"
+                f"{MIN_STEP_S:g} s; soften it, or set plant.timestep_s"
             )
         step = grid.physics_step(self.largest_step) if grid else settings.timestep_s
         self.model.opt.timestep = step or self.largest_step
@@ -91,18 +91,18 @@ class Plant:
 
     def can_reuse(self, settings: PlantSettings, sections: Mapping[str, Any]) -> bool:
         """Return whether a plant with these settings has the same compiled file, locks and edits."""
-        same = all(getattr(self.settings, name) == getattr(settings, name) for name in COMPILED_FIELDS)
+        same = all(getattr(self.settings, name) == getattr(settings, name) for name in NEEDS_COMPILING)
         return same and self.sections == sections
 
     def with_settings(
         self,
         settings: PlantSettings,
-        of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+        axis_settings: Mapping[str, PlantSettings] = MappingProxyType({}),
         grid: TimeGrid | None = None,
     ) -> Plant:
         """Return the rig with other settings, without compiling its file again: see `can_reuse`."""
         with set_control_callback(None):
-            return Plant(self.filed, settings, self.sections, of_axes, grid)
+            return Plant(self.filed, settings, self.sections, axis_settings, grid)
 
     @property
     def _error_source(self) -> str:
@@ -116,7 +116,7 @@ class Plant:
         with set_control_callback(None), quiet():  # compiling a model runs it
             model = compile_model(self.drawn_spec(), self.path)
         for axis in self.filed.axes:
-            place_accelerometers(model, self.of_axes.get(axis.name, self.settings), axis, self.path)
+            place_accelerometers(model, self.axis_settings.get(axis.name, self.settings), axis, self.path)
         return model
 
     def drawn_spec(self) -> mujoco.MjSpec:
@@ -220,11 +220,11 @@ class Plant:
         return self.axis.apparent_bias(accelerometer, self.gravity)
 
     @property
-    def interface(self) -> PlantInterface:
+    def interface(self) -> KnownPlant:
         """The plant as a controller of the axis knows it."""
         zeros = tuple(module.gimbal_zero for module in self.axis.modules)
         gimbal_angle = GimbalAngle(tuple(self.axis.directions), zeros)
-        return PlantInterface(self.radial_tilt, gimbal_angle, self.model.opt.timestep, backlash(self.backlash))
+        return KnownPlant(self.radial_tilt, gimbal_angle, self.model.opt.timestep, backlash(self.backlash))
 
     @property
     def timestep(self) -> float:
@@ -237,11 +237,11 @@ class Plant:
         return float(np.linalg.norm(self.model.opt.gravity))
 
     @property
-    def parameters(self) -> PlantParameters:
+    def parameters(self) -> PlantNumbers:
         """Parameters from which a scenario's controller and observers are made."""
         names = tuple(module.name for module in self.axis.modules)
         numbers = self.reduced, self.radial_tilt, self.gravity, self.timestep, self.largest_step
-        return PlantParameters(self.path, names, *numbers, self.hints)
+        return PlantNumbers(self.path, names, *numbers, self.hints)
 
     def initialise(self, data: mujoco.MjData) -> None:
         """Put data at the scenario's initial state: flywheels at speed, tilted by initial_tilt_deg."""
@@ -274,7 +274,7 @@ def load_plant(
     settings: PlantSettings | None = None,
     beside: Path | None = None,
     grid: TimeGrid | None = None,
-    of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+    axis_settings: Mapping[str, PlantSettings] = MappingProxyType({}),
     sections: Mapping[str, Any] = MappingProxyType({}),
     **fields: TomlValue,
 ) -> Plant:
@@ -284,7 +284,8 @@ def load_plant(
         settings: Its settings; or give them as keyword arguments.
         beside: A folder that a relative model path may start from.
         grid: The times that whole physics steps must fill; by default the step is the largest that is accurate enough.
-        of_axes: The settings of axes that have their own: equilibrium bias, initial tilt, places of the accelerometers.
+        axis_settings: The settings of axes that have their own: equilibrium bias, initial tilt, places of the
+            accelerometers.
         sections: Settings of the features that edit the model, such as {"bend": Bend(frequency_hz=20.0)}.
         **fields: Fields of `PlantSettings`.
 
@@ -303,7 +304,7 @@ def load_plant(
             raise InputError("; ".join(f"plant.{clause}" for clause in wrong)) from error
     path = find("models", settings.model, ".xml", "plant.model =", beside)
     with set_control_callback(None):  # compiling a model runs it
-        return Plant(build(path, settings, sections), settings, sections, of_axes, grid)
+        return Plant(build(path, settings, sections), settings, sections, axis_settings, grid)
 
 
 @quiet()
@@ -320,11 +321,11 @@ def load_scenario_plant(scenario: Scenario, reuse: Plant | None = None, grid: Ti
     """
     with scenario.named_in_errors():
         settings, grid = scenario.plant, grid or time_grid(scenario)
-        of_axes = {name: part.plant for name, part in scenario.of_axes.items()}
+        axis_settings = {name: part.plant for name, part in scenario.axis_scenarios.items()}
         sections = {name: scenario.section(name) for name in entries("edit")}
         if reuse is not None and reuse.can_reuse(settings, sections):
-            return reuse.with_settings(settings, of_axes, grid)
-        plant = load_plant(settings, None, grid, of_axes, sections)
+            return reuse.with_settings(settings, axis_settings, grid)
+        plant = load_plant(settings, None, grid, axis_settings, sections)
         if plant.path.resolve().parent != folder("models").resolve():
             _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
         return plant

@@ -18,7 +18,7 @@ from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.inputs.features import entries
 from cmg_mj.plant.axis import Axis, ResolvedModel, read_reduced
 from cmg_mj.plant.elements import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
-from cmg_mj.plant.mjcf import at_keyframe
+from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
@@ -51,7 +51,7 @@ class Varied(NamedTuple):
 def apply(
     rig: ResolvedModel,
     settings: PlantSettings,
-    of_axes: Mapping[str, PlantSettings] = MappingProxyType({}),
+    axis_settings: Mapping[str, PlantSettings] = MappingProxyType({}),
     sections: Mapping[str, Any] = MappingProxyType({}),
 ) -> Varied:
     """Change a copy of a compiled model as settings say.
@@ -59,7 +59,7 @@ def apply(
     Args:
         rig: The model as its file has it.
         settings: The properties to change; a property without a value stays.
-        of_axes: The settings of axes that have their own.
+        axis_settings: The settings of axes that have their own.
         sections: Settings of the features that edit the model.
 
     Returns:
@@ -72,13 +72,13 @@ def apply(
     path, key, model, speed = rig.path, rig.key, copy.copy(rig.model), settings.flywheel_speed_rad_s
     held, axes = rig.held, []
     for axis in rig.axes:
-        axis_settings = of_axes.get(axis.name, settings)
+        own = axis_settings.get(axis.name, settings)
         changed = replace(
             axis,
-            bias=math.radians(axis_settings.equilibrium_bias_deg),
-            initial_tilt=math.radians(axis_settings.initial_tilt_deg),
-            radial_tilt=place_accelerometers(model, axis_settings, axis, path),
-            misplaced=axis_settings.has_misplaced,
+            bias=math.radians(own.equilibrium_bias_deg),
+            initial_tilt=math.radians(own.initial_tilt_deg),
+            radial_tilt=place_accelerometers(model, own, axis, path),
+            misplaced=own.has_misplaced,
         )
         if speed is not None:
             changed = replace(changed, modules=_set_flywheel_speed(model, key, axis.modules, speed, path))
@@ -273,7 +273,7 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
             "its own to move (give the model's compiler fusestatic=\"true\", so that the modules' halves become part "
             "of it)"
         )
-    data = at_keyframe(model, element_id(model, "key", EQUILIBRIUM_KEY))
+    data = data_at_keyframe(model, element_id(model, "key", EQUILIBRIUM_KEY))
     to_frame = data.xmat[frame].reshape(3, 3).T
     centre = to_frame @ (data.subtree_com[all_that_tilts] - data.xpos[frame]) - axis.point
     radial = centre - (centre @ axis.direction) * axis.direction

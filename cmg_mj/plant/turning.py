@@ -10,7 +10,7 @@ import numpy as np
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.elements import Module
 from cmg_mj.plant.inertia import wheel_momentum
-from cmg_mj.plant.mjcf import at_keyframe
+from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import UP
 from cmg_mj.stages.turning import YawCoupling
 
@@ -26,7 +26,7 @@ def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCouplin
     Returns:
         The coefficients, from the wheels' axes and speeds and the masses as the model has them.
     """
-    data = at_keyframe(model, key)
+    data = data_at_keyframe(model, key)
     along = [data.xmat[axis.frame].reshape(3, 3) @ axis.direction for axis in axes]
     swept = [sum((_turned(model, data, module) for module in axis.modules), np.zeros(3)) for axis in axes]
     pushes = [float(n @ s) for n, s in zip(along, swept, strict=True)]

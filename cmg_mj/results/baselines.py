@@ -17,7 +17,7 @@ GYROS = (MEMS_AS_BOUGHT, MEMS_GYRO, MEMS_FUSED)
 """The cheap gyro as it is bought, calibrated, and as bought but fused with y1."""
 RATES = (ZERO, *GYROS)
 """Baselines that give a rate at every tick."""
-REFERENCES = (*RATES, *FLOORS)
+BASELINES = (*RATES, *FLOORS)
 """Names of all baselines, in the order of every table."""
 
 RATE_START = 0.02
@@ -130,7 +130,7 @@ class FusedGyro:
         return gains
 
 
-class References:
+class Baselines:
     """Baselines that give a rate from the frame's own. They close no loop.
 
     Args:

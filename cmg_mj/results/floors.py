@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 
 FLOOR_Y1, FLOOR_ACCELERATION = "floor_y1", "floor_accel"
 FLOORS = (FLOOR_Y1, FLOOR_ACCELERATION)
@@ -38,7 +38,7 @@ ROWS_A_TAP = 10
 
 
 @lru_cache(maxsize=256)
-def acceleration_floor(noise: TiltNoise, dt: float) -> float:
+def acceleration_floor(noise: MeasurementNoise, dt: float) -> float:
     """Compute the least RMS error of a filter of y1 and its acceleration that must serve for any motion.
 
     The acceleration runs straight between samples, and nothing else is known of the motion. Then only the noise is
@@ -161,7 +161,7 @@ class Floors:
             where a pivot moves, or where accelerometers vibrate or are off their radii.
     """
 
-    def __init__(self, noises: Sequence[TiltNoise], dt: float, has_acceleration: Sequence[bool]) -> None:
+    def __init__(self, noises: Sequence[MeasurementNoise], dt: float, has_acceleration: Sequence[bool]) -> None:
         self._y1 = TiltFloor(dt, len(noises))
         self._acceleration = [acceleration_floor(noise, dt) for noise in noises]
         self._has_acceleration = has_acceleration

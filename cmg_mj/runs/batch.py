@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import PlantInterface
+from cmg_mj.core.controller import KnownPlant
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.types import State, extra_signals
 from cmg_mj.inputs.types import Batched, NoEffect, marked_fields
@@ -33,7 +33,7 @@ UNUSED = frozenset(marked_fields(Scenario, NoEffect))
 """Fields on which no number of a run depends."""
 
 
-class KeyPart(NamedTuple):
+class KeyField(NamedTuple):
     """One of the things that worlds of one batch have in common.
 
     Attributes:
@@ -54,9 +54,9 @@ class KeyPart(NamedTuple):
 class BatchKey:
     """All that worlds of one batch have in common: worlds with equal keys can run together."""
 
-    parts: tuple[tuple[KeyPart, Hashable], ...]
+    parts: tuple[tuple[KeyField, Hashable], ...]
 
-    def first_difference(self, other: BatchKey) -> KeyPart | None:
+    def first_difference(self, other: BatchKey) -> KeyField | None:
         """Return the first part in which two keys differ."""
         a, b = dict(self.parts), dict(other.parts)
         return next((part for part in (*a, *b) if a.get(part) != b.get(part)), None)
@@ -89,18 +89,18 @@ def batch_key(parts: Sequence[AxisPart]) -> BatchKey:
     return BatchKey(tuple(part for axis_part in parts for part in _key_parts(*axis_part)))
 
 
-def _key_parts(scenario: Scenario, design: Design, axis: str) -> Iterator[tuple[KeyPart, Hashable]]:
+def _key_parts(scenario: Scenario, design: Design, axis: str) -> Iterator[tuple[KeyField, Hashable]]:
     law = scenario.controller.kind
     for field, value in _leaves(scenario.as_fields()):
         if field.partition(".")[0] not in UNUSED and not can_vary_in_batch(field, law):
-            yield KeyPart(field, axis, field.partition(".")[0] == "observer"), hashable(value)
+            yield KeyField(field, axis, field.partition(".")[0] == "observer"), hashable(value)
     _, model, noise = design.constructor_arguments
-    yield KeyPart("the reduced model", axis), model
+    yield KeyField("the reduced model", axis), model
     observer = scenario.observer.kind
     if "noise" in OBSERVER_CLASSES.takes(observer):
-        yield KeyPart(f"the sensors' noise, which {observer} is told,", axis, is_of_observer=True), noise
+        yield KeyField(f"the sensors' noise, which {observer} is told,", axis, is_of_observer=True), noise
     if "noise" in LAW_CLASSES.takes(law):
-        yield KeyPart("the noise that the law is told", axis), noise
+        yield KeyField("the noise that the law is told", axis), noise
 
 
 def _leaves(fields: Any, at: str = "") -> Iterator[tuple[str, Any]]:
@@ -157,7 +157,7 @@ def plant_structure(plant: Plant) -> PlantStructure:
     return PlantStructure(options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds)
 
 
-def batched_interface(plant: Plant, plants: Sequence[Plant], axis: int) -> PlantInterface:
+def stack_known_plants(plant: Plant, plants: Sequence[Plant], axis: int) -> KnownPlant:
     """Combine the properties that a controller of many worlds knows of an axis.
 
     Args:
@@ -165,8 +165,8 @@ def batched_interface(plant: Plant, plants: Sequence[Plant], axis: int) -> Plant
         plants: The plant of each world.
         axis: The number of the axis.
     """
-    tilt = batch_values([world_plant.axes[axis].radial_tilt for world_plant in plants])
-    gap = batch_values([world_plant.backlash for world_plant in plants])
+    tilt = stack_worlds([world_plant.axes[axis].radial_tilt for world_plant in plants])
+    gap = stack_worlds([world_plant.backlash for world_plant in plants])
     return plant.interface._replace(tilt=tilt, servos=backlash(gap))
 
 
@@ -189,8 +189,8 @@ def batched(worlds: Sequence[tuple[Law, Scenario]]) -> tuple[Law, Sensors, Outsi
     """
     laws, scenarios = zip(*worlds, strict=True)
     acting = [outsides(scenario) for scenario in scenarios]
-    outside = {name: batch_values([world[name] for world in acting]) for name in acting[0]}
-    sensors = batch_values([scenario.sensors for scenario in scenarios])
+    outside = {name: stack_worlds([world[name] for world in acting]) for name in acting[0]}
+    sensors = stack_worlds([scenario.sensors for scenario in scenarios])
     return _batched_law(laws), sensors, outside
 
 
@@ -255,7 +255,7 @@ def batched_open_loop_observers(designs: Sequence[Design]) -> dict[str, Observer
     }
 
 
-def once(items: Sequence[T]) -> list[T]:
+def unique(items: Sequence[T]) -> list[T]:
     """Return each of some things once."""
     return list({id(item): item for item in items}.values())
 
@@ -264,7 +264,7 @@ def _batched_law(laws: Sequence[Law]) -> Law:
     """Return one law for a law of each world; the laws differ in their array fields alone."""
     law = laws[0]
     arrays = {
-        name: batch_values([getattr(world_law, name) for world_law in laws]) for name in getattr(law, "arrays", ())
+        name: stack_worlds([getattr(world_law, name) for world_law in laws]) for name in getattr(law, "arrays", ())
     }
     if all(values is getattr(law, name) for name, values in arrays.items()):
         return law
@@ -277,7 +277,7 @@ def _batched_law(laws: Sequence[Law]) -> Law:
 T = TypeVar("T")
 
 
-def batch_values(values: Sequence[T]) -> T:
+def stack_worlds(values: Sequence[T]) -> T:
     """Stack the values of the worlds into one value.
 
     Args:
@@ -296,28 +296,28 @@ def batch_values(values: Sequence[T]) -> T:
         fields = {}
         for field in dataclasses.fields(first):
             try:
-                fields[field.name] = batch_values([getattr(value, field.name) for value in values])
+                fields[field.name] = stack_worlds([getattr(value, field.name) for value in values])
             except InputError as error:
                 raise InputError(f"{field.name}: {error}") from error
         return _with_fields(type(first), fields)  # type: ignore[return-value]
     if isinstance(first, tuple) and {len(value) for value in values} == {len(first)}:  # type: ignore[arg-type]
-        return tuple(map(batch_values, zip(*values, strict=True)))  # type: ignore[call-overload,return-value]
+        return tuple(map(stack_worlds, zip(*values, strict=True)))  # type: ignore[call-overload,return-value]
     if not all(type(value) in (int, float) for value in values):
         raise InputError("must have one value for all worlds of a batch")
     return np.array(values, dtype=float)  # type: ignore[return-value]
 
 
-def split_values(value: T, worlds: int) -> list[T]:
+def unstack(value: T, worlds: int) -> list[T]:
     """Return the value of each world, from a value that is stacked or not."""
-    first = value_of_world(value, 0)
-    return [first] * worlds if first is value else [value_of_world(value, world) for world in range(worlds)]
+    first = world_value(value, 0)
+    return [first] * worlds if first is value else [world_value(value, world) for world in range(worlds)]
 
 
-def value_of_world(value: T, world: int) -> T:
+def world_value(value: T, world: int) -> T:
     """Return a stacked value's value in one world.
 
     Args:
-        value: What `batch_values` returned.
+        value: What `stack_worlds` returned.
         world: The world's index.
 
     Returns:
@@ -326,11 +326,11 @@ def value_of_world(value: T, world: int) -> T:
     if isinstance(value, np.ndarray):
         return value[world].item()
     if isinstance(value, tuple):
-        parts = tuple(value_of_world(part, world) for part in value)
+        parts = tuple(world_value(part, world) for part in value)
         return value if all(a is b for a, b in zip(parts, value, strict=True)) else parts  # type: ignore[return-value]
     if not dataclasses.is_dataclass(value):
         return value
-    parts = {field.name: value_of_world(getattr(value, field.name), world) for field in dataclasses.fields(value)}
+    parts = {field.name: world_value(getattr(value, field.name), world) for field in dataclasses.fields(value)}
     if all(part is getattr(value, name) for name, part in parts.items()):
         return value
     return _with_fields(type(value), parts)

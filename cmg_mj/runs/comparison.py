@@ -11,7 +11,7 @@ import numpy as np
 
 from cmg_mj.core.types import BIAS, extra_signals
 from cmg_mj.plant.plant import Plant, load_scenario_plant
-from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.baselines import BASELINES
 from cmg_mj.results.intervals import finite_mean, finite_values, known_interval
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import KEYS, NESTED, Summary, as_table, finite, open_loop_figures, section
@@ -130,7 +130,7 @@ def compare(
     return compared
 
 
-def rerunnable(scenario: Scenario, experiments: Sequence[Experiment], worlds: int) -> Experiment:
+def repeatable(scenario: Scenario, experiments: Sequence[Experiment], worlds: int) -> Experiment:
     """Choose the experiment whose scenario, written out, runs to the same comparison again.
 
     Args:
@@ -220,7 +220,7 @@ def comparison_rows(compared: Sequence[ComparedObserver]) -> list[ComparisonRow]
     """
     leader = best_observer(compared, PUSH_ERROR) or best_observer(compared, ERROR)
     known = section(leader.result.summaries[0], "references") if leader else {}
-    references = [ComparisonRow(leader, name) for name in REFERENCES if name in known] if leader else []
+    references = [ComparisonRow(leader, name) for name in BASELINES if name in known] if leader else []
     return [*map(ComparisonRow, compared), *references]
 
 

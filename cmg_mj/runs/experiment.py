@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 import numpy as np
 import tomli_w
 
-from cmg_mj.core.axes import AnyController, MultiAxisController
+from cmg_mj.core.axes import ControllerLike, MultiAxisController
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.core.loop import ControlLoop
@@ -31,15 +31,14 @@ from cmg_mj.runs.batch import (
     BatchKey,
     batch_key,
     batched,
-    batched_interface,
     batched_open_loop_observers,
     hashable,
-    once,
     require_same_structure,
+    stack_known_plants,
+    unique,
     varied_settings,
 )
 from cmg_mj.runs.disturbances import Outsides, outsides
-from cmg_mj.runs.rerun_head import rerun_head
 from cmg_mj.runs.simulate import SimulationOptions, simulate
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.loading import base_of
@@ -87,7 +86,7 @@ class Experiment:
         first = self.parts[0].scenario
         return [first.observer.kind, *first.open_loop_names()]
 
-    def controller(self, worlds: int | Sequence[int] = 0) -> AnyController:
+    def controller(self, worlds: int | Sequence[int] = 0) -> ControllerLike:
         """Make a fresh controller.
 
         Args:
@@ -96,7 +95,7 @@ class Experiment:
         Returns:
             The controller; of several axes a `MultiAxisController`.
         """
-        return self.of_axes(
+        return self.join_axes(
             [part.design.controller(part.plant.interface, worlds=worlds, axis=i) for i, part in enumerate(self.parts)]
         )
 
@@ -122,7 +121,7 @@ class Experiment:
         part = self.require_single_axis("one controller")
         return part.design.controller(part.plant.interface, worlds=worlds, observer=observer, make=make)
 
-    def of_axes(self, controllers: Sequence[Controller]) -> AnyController:
+    def join_axes(self, controllers: Sequence[Controller]) -> ControllerLike:
         """Join the controllers of the axes; of one axis its controller itself."""
         if len(controllers) == 1:
             return controllers[0]
@@ -181,10 +180,10 @@ class Experiment:
         plants = [self.plant] * len(numbers) if plants is None else list(plants)
         require_same_structure(plants, len(numbers), self.plant)
         controllers = [
-            part.design.controller(batched_interface(part.plant, plants, i), worlds=numbers, axis=i)
+            part.design.controller(stack_known_plants(part.plant, plants, i), worlds=numbers, axis=i)
             for i, part in enumerate(self.parts)
         ]
-        return self.simulate(plants, self.of_axes(controllers), **options)
+        return self.simulate(plants, self.join_axes(controllers), **options)
 
     @property
     def batch_key(self) -> BatchKey:
@@ -235,7 +234,7 @@ class Experiment:
     def simulate(
         self,
         plant: Plant | Sequence[Plant],
-        controller: AnyController,
+        controller: ControllerLike,
         outside: Outsides | None = None,
         driver: str = "native",
         loop: type[ControlLoop] = ControlLoop,
@@ -365,7 +364,7 @@ class Experiment:
 
     def as_toml(self, driver: str = "native", world: int = 0) -> str:
         """Return the resolved scenario: running it again gives the same run; its head says if that needs options."""
-        return rerun_head(driver, world) + tomli_w.dumps(self.resolved())
+        return replay_comment(driver, world) + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path) -> None:
         """Write it as TOML."""
@@ -396,7 +395,7 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
             check(scenario, plant)
     if len(plant.axes) == 1 and not scenario.axes:
         return Experiment(scenario, plant, design(scenario, plant.parameters))
-    parts = [(scenario.of_axis(name), plant.single_axis(name)) for name in plant.axis_names]
+    parts = [(scenario.axis_scenario(name), plant.single_axis(name)) for name in plant.axis_names]
     axes = tuple(Experiment(part, rig, design(part, rig.parameters)) for part, rig in parts)
     return Experiment(scenario, plant, axes[0].design, axes)
 
@@ -416,7 +415,7 @@ def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **option
         InputError: They differ in something that worlds of one batch have in common.
     """
     require_same_structure([experiment.plant for experiment in experiments], len(worlds))
-    first, *others = once(experiments)
+    first, *others = unique(experiments)
     key = first.batch_key
     for other in others:
         part = key.first_difference(other.batch_key)
@@ -430,7 +429,7 @@ def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **option
 
 def batch_inputs(
     experiments: Sequence[Experiment], worlds: Sequence[int], observer: Observer | None = None
-) -> tuple[list[Plant], AnyController, Outsides]:
+) -> tuple[list[Plant], ControllerLike, Outsides]:
     """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, what moves all worlds.
 
     Args:
@@ -446,7 +445,7 @@ def batch_inputs(
         open_loop = batched_open_loop_observers([one.design for one in parts])
         controllers.append(
             part.design.controller(
-                batched_interface(part.plant, plants, i),
+                stack_known_plants(part.plant, plants, i),
                 worlds=worlds,
                 axis=i,
                 observer=observer,
@@ -455,4 +454,21 @@ def batch_inputs(
                 sensors=sensors,
             )
         )
-    return plants, first.of_axes(controllers), outside
+    return plants, first.join_axes(controllers), outside
+
+
+def replay_comment(driver: str, world: int) -> str:
+    """Write the head as comments; empty where the scenario alone gives the same run.
+
+    Args:
+        driver: Who calls the controller, or is it.
+        world: Number of the world.
+    """
+    why, command = "", "cmg-mj run scenario.toml"
+    if driver == "board":
+        why += "Run on the emulated board (docs/board.md), whose numbers are not quite the host's. "
+        command += " --driver board"
+    if world:
+        why += f"World {world}: its noise is not that of world 0. "
+        command += f" --world {world}"
+    return f"# {why}To the same numbers it runs with\n#     {command}\n\n" if why else ""

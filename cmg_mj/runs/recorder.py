@@ -11,7 +11,7 @@ from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.controller import Controller, Tick
 from cmg_mj.plant.physics import Joints
 from cmg_mj.plant.plant import Plant
-from cmg_mj.results.baselines import References
+from cmg_mj.results.baselines import Baselines
 from cmg_mj.results.metrics import Metrics, TickBlock
 from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
 
@@ -38,7 +38,7 @@ class TickRecorder:
         observers: Sequence[str],
         controller: Controller,
         metrics: Metrics,
-        references: References,
+        references: Baselines,
         *,
         keep: bool,
         joints: bool,

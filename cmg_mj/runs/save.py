@@ -139,7 +139,7 @@ def save_comparison(
 
     Args:
         folder: Where to. What cmg_mj has not written there stays, and the next number is taken.
-        experiment: The experiment whose scenario runs to the same comparison: `comparison.rerunnable`.
+        experiment: The experiment whose scenario runs to the same comparison: `comparison.repeatable`.
         observers: The observers with their runs.
         plot: Write plot.png as well: how every figure is distributed over the worlds.
         complete: Whether these are all observers that were to be compared.

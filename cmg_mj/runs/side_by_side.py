@@ -12,11 +12,11 @@ import numpy as np
 from cmg_mj.core.types import extra_signals
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs.batch import BatchedObservers, BatchKey, PlantStructure, once, plant_structure
+from cmg_mj.runs.batch import BatchedObservers, BatchKey, PlantStructure, plant_structure, unique
 from cmg_mj.runs.experiment import Experiment, batch_inputs, run_batch
 from cmg_mj.runs.simulate import SimulationOptions
 
-MOST_WORLDS = 1024
+MAX_WORLDS = 1024
 """Most worlds of one batch: beyond, Python's share of a world no longer falls and memory grows."""
 
 
@@ -37,7 +37,7 @@ def run_of(experiment: Experiment, worlds: int) -> BatchJob:
     return BatchJob([experiment] * worlds, range(worlds))
 
 
-def run_side_by_side(runs: Sequence[BatchJob], **options: Unpack[SimulationOptions]) -> list[Result]:
+def run_jobs(runs: Sequence[BatchJob], **options: Unpack[SimulationOptions]) -> list[Result]:
     """Run what differs in the observer, its parameters, or in numbers that worlds of one batch may differ in.
 
     Args:
@@ -70,7 +70,7 @@ def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
     for indices in alike.values():
         batch: list[int] = []
         for i in indices:
-            if batch and sum(len(jobs[j].worlds) for j in [*batch, i]) > MOST_WORLDS:
+            if batch and sum(len(jobs[j].worlds) for j in [*batch, i]) > MAX_WORLDS:
                 yield batch
                 batch = []
             batch.append(i)
@@ -89,7 +89,7 @@ class SharedKey(NamedTuple):
 def _shared_key(job: BatchJob) -> SharedKey | None:
     """Return the key that jobs of one batch share; None for a job that cannot share a batch."""
     first = job.experiments[0]
-    if first.axes or len({one.batch_key for one in once(job.experiments)}) > 1:
+    if first.axes or len({one.batch_key for one in unique(job.experiments)}) > 1:
         return None
     key = first.batch_key.without_observer()
     names = extra_signals(first.design.observer())

@@ -10,7 +10,7 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from cmg_mj.core.axes import AnyController
+from cmg_mj.core.axes import ControllerLike
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import ControlLoop, Ending
@@ -20,12 +20,12 @@ from cmg_mj.core.types import BIAS
 from cmg_mj.plant.mjcf import quiet
 from cmg_mj.plant.physics import ManyWorlds, OneWorld
 from cmg_mj.plant.plant import Plant
-from cmg_mj.results.baselines import RATES, References
+from cmg_mj.results.baselines import RATES, Baselines
 from cmg_mj.results.floors import Floors
 from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
-from cmg_mj.runs.batch import split_values
+from cmg_mj.runs.batch import unstack
 from cmg_mj.runs.callback import CallbackLoop, control_callback
 from cmg_mj.runs.disturbances import Outsides, disturbances
 from cmg_mj.runs.recorder import MultiAxisRecorder, TickRecorder
@@ -53,7 +53,7 @@ class SimulationOptions(TypedDict, total=False):
 @quiet()
 def simulate(
     plant: Plant | Sequence[Plant],
-    controller: AnyController,
+    controller: ControllerLike,
     duration_s: float,
     *,
     observers: Sequence[str] | Mapping[str, Sequence[str]],
@@ -103,7 +103,7 @@ class _Simulation:
     def __init__(
         self,
         plants: Sequence[Plant],
-        controller: AnyController,
+        controller: ControllerLike,
         duration_s: float,
         observers: Mapping[str, Sequence[str]],
         outside: Outsides,
@@ -128,7 +128,7 @@ class _Simulation:
     def _recorder_of(self, axis: str, controller: Controller, options: SimulationOptions) -> TickRecorder:
         """Make what records and judges the ticks of one axis; that of the first axis has the joints."""
         plants, observers = [plant.single_axis(axis) for plant in self.plants], self.observers[axis]
-        pairs = list(zip(plants, split_values(controller.sensors, len(plants)), strict=True))
+        pairs = list(zip(plants, unstack(controller.sensors, len(plants)), strict=True))
         targets = {BIAS: [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs]}
         dt, limit, sensors = controller.law.dt, controller.law.rate_limit, controller.sensors
         noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
@@ -142,7 +142,7 @@ class _Simulation:
         floors = Floors(noises, y1_period, has_acceleration)
         # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
         tilt_sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
-        references = References(
+        references = Baselines(
             sensors.mems_gyro, dt, controller.seed, controller.worlds, tilt_sigmas, axis=controller.axis
         )
         metrics = Metrics(

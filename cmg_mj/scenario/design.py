@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack
 
-from cmg_mj.core.controller import Controller, ControllerOptions, ControllerSite, PlantInterface
+from cmg_mj.core.controller import Controller, ControllerOptions, ControllerSite, KnownPlant
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import RadialTilt, TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise, RadialTilt
 from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
 from cmg_mj.laws import LAW_CLASSES, LAWS, Law
 from cmg_mj.observers import OBSERVER_CLASSES, Observer, make_observer
@@ -34,11 +34,11 @@ class Design:
     """
 
     scenario: Scenario
-    rig: PlantParameters
+    rig: PlantNumbers
     law: Law
 
     @property
-    def constructor_arguments(self) -> tuple[float, ReducedModel, TiltNoise]:
+    def constructor_arguments(self) -> tuple[float, ReducedModel, MeasurementNoise]:
         """Arguments of every observer: control period [s], reduced model, noise by the datasheet."""
         return self.law.dt, self.rig.reduced, self.rig.noise(self.scenario.sensors)
 
@@ -57,7 +57,7 @@ class Design:
 
     def controller(
         self,
-        plant: PlantInterface,
+        plant: KnownPlant,
         *,
         worlds: int | Sequence[int] = 0,
         axis: int = 0,
@@ -103,7 +103,7 @@ class Design:
         )
 
 
-def design(scenario: Scenario, rig: PlantParameters) -> Design:
+def design(scenario: Scenario, rig: PlantNumbers) -> Design:
     """Check what pydantic could not, and construct the law and the observers.
 
     Args:
@@ -154,7 +154,7 @@ def _check(scenario: Scenario) -> None:
             )
 
 
-class PlantParameters(NamedTuple):
+class PlantNumbers(NamedTuple):
     """The parameters that a scenario's controller and observers are made from.
 
     Attributes:
@@ -177,7 +177,7 @@ class PlantParameters(NamedTuple):
     largest_step: float
     hints: tuple[str, ...]
 
-    def noise(self, sensors: Sensors) -> TiltNoise:
+    def noise(self, sensors: Sensors) -> MeasurementNoise:
         """Return the noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""
         gimbal = sensors.encoder.sample_sigma / math.sqrt(self.reduced.gimbals)
         return replace(self.tilt.noise(sensors.accelerometer.sample_sigma, self.gravity), gimbal=gimbal)
@@ -202,7 +202,7 @@ def make_controller(
     observer: Observer,
     law: Law,
     sensors: Sensors,
-    plant: PlantInterface,
+    plant: KnownPlant,
     make: Callable[..., Controller] = Controller,
     **options: Unpack[StageOptions],
 ) -> Controller:

@@ -10,10 +10,10 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.inputs.types import STRICT, Batched, NonNegative, PerAxis, Positive
 
-FINEST_STEP_S = 1e-6
+MIN_STEP_S = 1e-6
 """The smallest physics step [s]."""
 Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
-COMPILED_FIELDS = ("model", "lock_thrust_bearing", "locked_axes")
+NEEDS_COMPILING = ("model", "lock_thrust_bearing", "locked_axes")
 """Settings on which it depends what is compiled; the others change the compiled model."""
 
 
@@ -57,7 +57,7 @@ class PlantSettings:
     model: str = "scissored_pair.xml"
     equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0), Batched(), PerAxis()] = 0.5
     initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0), Batched(), PerAxis()] = 1.0
-    timestep_s: Annotated[float, Field(ge=FINEST_STEP_S, le=0.1)] | None = None
+    timestep_s: Annotated[float, Field(ge=MIN_STEP_S, le=0.1)] | None = None
     integrator: Integrator = "RK4"
     lock_thrust_bearing: bool = False
     locked_axes: tuple[str, ...] = ()

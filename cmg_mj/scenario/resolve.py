@@ -156,7 +156,7 @@ def _are_sections(value: TomlValue | None) -> TypeGuard[list[TomlValue]]:
     return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
 
 
-LONGEST_NAME = 60
+MAX_NAME = 60
 """Longest text of the differences in a folder's name [characters]."""
 SHOWN = 3
 """Most differences in one line."""
@@ -175,14 +175,14 @@ def folder_suffix(differing: Mapping[str, TomlValue | None]) -> str:
         for name, value in zip(_short(differing), differing.values(), strict=True)
     ]
     count = len(assignments)
-    while count and sum(len(text) + 1 for text in assignments[:count]) > LONGEST_NAME:
+    while count and sum(len(text) + 1 for text in assignments[:count]) > MAX_NAME:
         count -= 1
     return "".join(f"-{text}" for text in _first(assignments, count, "and-{}-more"))
 
 
 def safe_name(text: str) -> str:
     """Make a user's name a part of a folder's: without letters that some system refuses, and not too long."""
-    return re.sub(r'[\x00-\x1f\x7f/\\:*?"<>|\ud800-\udfff]', "_", text)[:LONGEST_NAME]
+    return re.sub(r'[\x00-\x1f\x7f/\\:*?"<>|\ud800-\udfff]', "_", text)[:MAX_NAME]
 
 
 def _first(texts: list[str], count: int, rest: str) -> list[str]:

@@ -14,7 +14,7 @@ from pydantic.dataclasses import dataclass
 from cmg_mj.core.controller import AngleSource, Feedback
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.inputs.features import FEATURES, entries
 from cmg_mj.inputs.messages import complaints, fields_of, out_of_size
 from cmg_mj.inputs.types import (
@@ -43,7 +43,7 @@ from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
 
 FORBID = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-MOST_CLAUSES = 20
+MAX_CLAUSES = 20
 """So many wrong fields are named in one line."""
 
 
@@ -102,7 +102,7 @@ class ControllerSettings(BaseModel):
         """The section's fields that belong to the law alone."""
         return dict(self.__pydantic_extra__ or {})
 
-    def law(self, model: ReducedModel, noise: TiltNoise) -> Law:
+    def law(self, model: ReducedModel, noise: MeasurementNoise) -> Law:
         """The law for a reduced model and the sensors' noise."""
         parameters = self.parameters
         if self.gains is not None:
@@ -135,7 +135,7 @@ class ObserverSettings(BaseModel):
         """The section's fields besides the kind."""
         return dict(self.__pydantic_extra__ or {})
 
-    def make(self, dt: float, model: ReducedModel, noise: TiltNoise) -> Observer:
+    def make(self, dt: float, model: ReducedModel, noise: MeasurementNoise) -> Observer:
         """Construct the observer."""
         return make_observer(self.kind, dt, model, noise, **self.parameters)
 
@@ -275,11 +275,11 @@ class Scenario(create_model("Scenario", __base__=Sections, **_OF_FEATURES)):
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Copy the scenario, as pydantic does; the copy makes the scenarios of its axes anew."""
         scenario = super().model_copy(update=update, deep=deep)
-        vars(scenario).pop("of_axes", None)
+        vars(scenario).pop("axis_scenarios", None)
         return scenario
 
     @functools.cached_property
-    def of_axes(self) -> dict[str, Scenario]:
+    def axis_scenarios(self) -> dict[str, Scenario]:
         """The scenario of each axis in [axes], by the axis' name: that of the plant with the axis' own fields in it.
 
         Where an axis names another observer or law, no parameter of the common one is left.
@@ -289,9 +289,9 @@ class Scenario(create_model("Scenario", __base__=Sections, **_OF_FEATURES)):
         """
         return {name: self._with_fields_of(name, axis.as_fields()) for name, axis in self.axes.items()}
 
-    def of_axis(self, axis: str) -> Scenario:
+    def axis_scenario(self, axis: str) -> Scenario:
         """The scenario of one axis, whether it has fields of its own or not."""
-        return self.of_axes[axis] if axis in self.axes else self.model_copy(update={"axes": {}})
+        return self.axis_scenarios[axis] if axis in self.axes else self.model_copy(update={"axes": {}})
 
     def _with_fields_of(self, axis: str, sections: Mapping[str, Mapping[str, Any]]) -> Scenario:
         source = f"{self._source}, [axes.{axis}]".removeprefix(", ")
@@ -367,7 +367,7 @@ def parse_scenario(fields: Mapping[str, Any], source: str = "") -> Scenario:
     wrong = [*_unknown_to_bench_law(fields), *out_of_size(fields)]
     if wrong:
         raise InputError(located(source, _clauses(wrong)))
-    _ = scenario.of_axes  # their fields are checked, too
+    _ = scenario.axis_scenarios  # their fields are checked, too
     return scenario
 
 
@@ -394,8 +394,8 @@ def _merged(common: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str
 def _clauses(wrong: Iterable[str]) -> str:
     """All that is wrong, or the first of very much."""
     clauses = list(dict.fromkeys(wrong))
-    more = [f"and {len(clauses) - MOST_CLAUSES} more"] if len(clauses) > MOST_CLAUSES else []
-    return "; ".join(clauses[:MOST_CLAUSES] + more)
+    more = [f"and {len(clauses) - MAX_CLAUSES} more"] if len(clauses) > MAX_CLAUSES else []
+    return "; ".join(clauses[:MAX_CLAUSES] + more)
 
 
 def located(source: str, wrong: str) -> str:

@@ -12,15 +12,15 @@ from cmg_mj.core.sensor import whole_steps
 from cmg_mj.inputs.types import Held, OnGrid, Start, marked_values
 from cmg_mj.scenario.schema import Scenario
 
-FINEST_S = 1e-4
+MIN_PERIOD_S = 1e-4
 """A scenario whose rates and times leave only a smaller step than this must name the step itself [s]."""
 SWING_SHARE = 10.0
 """A swinging torque or pivot has at least so many samples a period."""
-MOST_TICKS = 2_000_000
+MAX_TICKS = 2_000_000
 """Most ticks of a run; a tick takes about 1.5 kB of memory until the recording is written."""
-MOST_STEPS = 1_000_000_000
+MAX_STEPS = 1_000_000_000
 """Most physics steps of a run; so many take hours."""
-_LARGEST_DENOMINATOR = 10**9  # 1/3 s as a float is the fraction 1/3
+_MAX_DENOMINATOR = 10**9  # 1/3 s as a float is the fraction 1/3
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,10 @@ class TimeGrid:
         """
         step = self.timestep_s or self.period_s / math.ceil(self.period_s / limit_s * (1.0 - 1e-9))
         steps = self.duration_s / step
-        if steps > MOST_STEPS:
+        if steps > MAX_STEPS:
             raise InputError(
                 f"duration_s = {self.duration_s:g}: {steps:.3g} physics steps of {step:g} s; at most "
-                f"{MOST_STEPS:g} are taken, {MOST_STEPS * step:g} s"
+                f"{MAX_STEPS:g} are taken, {MAX_STEPS * step:g} s"
             )
         return step
 
@@ -102,10 +102,10 @@ def time_grid(scenario: Scenario) -> TimeGrid:
         InputError: A rate or time is on no grid, the nearest that would be is named; or a torque does not fit the run.
     """
     duration, timestep, control = scenario.duration_s, scenario.plant.timestep_s, scenario.controller.rate_hz
-    if duration * control > MOST_TICKS:
+    if duration * control > MAX_TICKS:
         raise InputError(
             f"duration_s = {duration:g}: {duration * control:.3g} control ticks at controller.rate_hz = {control:g}; "
-            f"at most {MOST_TICKS} are kept, {MOST_TICKS / control:g} s"
+            f"at most {MAX_TICKS} are kept, {MAX_TICKS / control:g} s"
         )
     grid = TimeGrid(duration, timestep, common_period(scenario) if timestep is None else timestep)
     if timestep is not None:
@@ -128,22 +128,25 @@ def common_period(scenario: Scenario) -> float:
     """Return the longest time that divides every period and time of a scenario [s].
 
     Raises:
-        InputError: It is shorter than `FINEST_S`; the first field that makes it so is named.
+        InputError: It is shorter than `MIN_PERIOD_S`; the first field that makes it so is named.
     """
     common = Fraction(0)
     for time in sorted(_grid_times(scenario), key=lambda time: time.unit == "s"):
         common = _common_divisor(common, time.exact)
-        if common and common < _fraction(FINEST_S):
+        if common and common < _fraction(MIN_PERIOD_S):
             raise InputError(
-                f"{time.field} = {time.text}: does not fit the other rates and times: no physics step of {FINEST_S:g} "
-                "s or more divides them all; take rounder numbers, or set plant.timestep_s"
+                f"{time.field} = {time.text}: does not fit the other rates and times: no physics step of "
+                f"{MIN_PERIOD_S:g} s or more divides them all; take rounder numbers, or set plant.timestep_s"
             )
     return float(common)
 
 
 def _grid_times(scenario: Scenario) -> Iterator[_GridTime]:
     """Return all periods and times of a scenario and of its axes: rates first, then times."""
-    for prefix, part in {"": scenario, **{f"axes.{name}.": part for name, part in scenario.of_axes.items()}}.items():
+    for prefix, part in {
+        "": scenario,
+        **{f"axes.{name}.": part for name, part in scenario.axis_scenarios.items()},
+    }.items():
         numbers = [(prefix + field, number, mark.unit) for field, number, mark in marked_values(part, OnGrid)]
         for field, rate, unit in numbers:
             if unit == "Hz":
@@ -159,7 +162,7 @@ def _grid_times(scenario: Scenario) -> Iterator[_GridTime]:
 
 
 def _fraction(number: float) -> Fraction:
-    return Fraction(number).limit_denominator(_LARGEST_DENOMINATOR)
+    return Fraction(number).limit_denominator(_MAX_DENOMINATOR)
 
 
 def _common_divisor(a: Fraction, b: Fraction) -> Fraction:

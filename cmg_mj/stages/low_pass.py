@@ -18,7 +18,7 @@ from cmg_mj.stages.pair import PairSettings
 
 INSIDE_HZ = 1000.0
 """The part's own sampling, at which its low-pass works (MPU-6050: the accelerometer's output rate)."""
-NARROWEST_HZ = 1.0
+MIN_BANDWIDTH_HZ = 1.0
 """No part has a narrower low-pass, and one needs as many samples to settle [Hz]."""
 
 
@@ -36,8 +36,8 @@ class LowPassSettings(PairSettings):
     @field_validator("bandwidth_hz")
     @classmethod
     def _rate_divides(cls, bandwidth_hz: float, info: ValidationInfo) -> float:
-        if 0.0 < bandwidth_hz < NARROWEST_HZ:
-            raise ValueError(f"{bandwidth_hz:g} Hz: at least {NARROWEST_HZ:g} Hz, or 0 for no low-pass")
+        if 0.0 < bandwidth_hz < MIN_BANDWIDTH_HZ:
+            raise ValueError(f"{bandwidth_hz:g} Hz: at least {MIN_BANDWIDTH_HZ:g} Hz, or 0 for no low-pass")
         rate = info.data.get("rate_hz")
         if bandwidth_hz and rate and abs(round(INSIDE_HZ / rate) * rate - INSIDE_HZ) > 1e-6:
             raise ValueError(

@@ -18,7 +18,7 @@ from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
 from cmg_mj.inputs.types import STRICT, Batched, NoiseSize, NonNegative
 from cmg_mj.stages.pair import PairSettings
 
-MOST_HARMONICS = 20
+MAX_HARMONICS = 20
 """No flywheel's tones beyond this multiple of its speed."""
 VibrationFrequency = Annotated[float, Field(ge=0.1, le=1e5)]
 
@@ -51,8 +51,8 @@ class VibrationSettings(PairSettings):
     @field_validator("wheel_harmonics_mg")
     @classmethod
     def _not_too_many(cls, amplitudes: tuple[float, ...]) -> tuple[float, ...]:
-        if len(amplitudes) > MOST_HARMONICS:
-            raise ValueError(f"{len(amplitudes)} amplitudes: at most {MOST_HARMONICS} harmonics")
+        if len(amplitudes) > MAX_HARMONICS:
+            raise ValueError(f"{len(amplitudes)} amplitudes: at most {MAX_HARMONICS} harmonics")
         return amplitudes
 
     @property

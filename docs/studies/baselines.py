@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmg_mj.results.baselines import MEMS_FUSED, MEMS_GYRO, RATE_START, FusedGyro, References
+from cmg_mj.results.baselines import MEMS_FUSED, MEMS_GYRO, RATE_START, Baselines, FusedGyro
 from cmg_mj.results.floors import acceleration_floor
 from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -43,7 +43,7 @@ def gyros(worlds: int) -> None:
 
     def baselines(**changed: float) -> dict[str, np.ndarray]:
         """Rates of a gyro with other errors; the rig does not turn, so the tilt rate is the frame's."""
-        return References(replace(gyro, **changed), dt, setup.scenario.seed, range(worlds), sigmas).rates(rate, y1)
+        return Baselines(replace(gyro, **changed), dt, setup.scenario.seed, range(worlds), sigmas).rates(rate, y1)
 
     def without_rest(offset: float) -> np.ndarray:
         reading = baselines(as_bought_offset_deg_s=offset)["mems_as_bought"]

@@ -15,9 +15,9 @@ import numpy as np
 from cmg_mj import load_scenario, prepare
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.tables import markdown_table
-from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
+from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 
-SEED, WORLDS, LARGEST_DEG, CUTS, PARTS = 30_000, 5, 4.0, 2, 8
+SEED, WORLDS, MAX_BIAS_DEG, CUTS, PARTS = 30_000, 5, 4.0, 2, 8
 
 
 class Case(NamedTuple):
@@ -31,7 +31,7 @@ def limits(cases: Sequence[Case]) -> list[np.ndarray]:
     """Largest e at which a world stands, (2, WORLDS) a case, for the signs - and + [deg]; negative if it falls at 0."""
     experiments = [prepare(load_scenario("push_recovery", [f"seed={SEED}", *more], name)) for name, more in cases]
     signs = np.repeat([-1.0, 1.0], WORLDS)
-    lows, width = [np.zeros(len(signs)) for _ in cases], LARGEST_DEG
+    lows, width = [np.zeros(len(signs)) for _ in cases], MAX_BIAS_DEG
     for cut in range(CUTS):
         # In the first cut, e = 0 itself is tried too: a world may fall without any bias.
         parts = np.arange(1 if cut else 0, PARTS) * width / PARTS
@@ -41,12 +41,12 @@ def limits(cases: Sequence[Case]) -> list[np.ndarray]:
             BatchJob(experiment.with_varied({"equilibrium_bias_deg": (signs[:, None] * of).ravel()}), worlds)
             for experiment, of in zip(experiments, tried, strict=True)
         ]
-        for i, result in enumerate(run_side_by_side(runs, keep_trajectory=False)):
+        for i, result in enumerate(run_jobs(runs, keep_trajectory=False)):
             stands = result.stood.reshape(tried[i].shape)
             first_fall = np.where(stands.all(axis=1), len(parts), np.argmin(stands, axis=1))
             standing = np.column_stack([lows[i] if cut else np.full(len(signs), -1.0), tried[i]])
             low = standing[np.arange(len(signs)), first_fall]
-            lows[i] = np.where(low < 0.0, -LARGEST_DEG, low)
+            lows[i] = np.where(low < 0.0, -MAX_BIAS_DEG, low)
         width /= PARTS
     return [low.reshape(2, WORLDS) for low in lows]
 

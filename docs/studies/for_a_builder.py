@@ -23,7 +23,7 @@ from rich.progress import track
 from cmg_mj import load_scenario, prepare
 from cmg_mj.core.errors import InputError
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, needs
-from cmg_mj.results.baselines import GYROS, MEMS_FUSED, REFERENCES
+from cmg_mj.results.baselines import BASELINES, GYROS, MEMS_FUSED
 from cmg_mj.results.intervals import format_interval, in_line, known_interval
 from cmg_mj.results.result import Result
 from cmg_mj.results.tables import markdown_table
@@ -89,8 +89,8 @@ def main() -> None:
         )
     asked = dict.fromkeys(GYROS, "a gyro") | {MEMS_FUSED: "a gyro, y1"}
     loop = results[LOOP_OF_BASELINES]
-    rows += [[f"`{name}`", *errors(loop, name), "-", "-", "-", asked.get(name, "-")] for name in REFERENCES]
-    print(f"{worlds} worlds; the last {len(REFERENCES)} rows are open loop, in the loop of {LOOP_OF_BASELINES}\n")
+    rows += [[f"`{name}`", *errors(loop, name), "-", "-", "-", asked.get(name, "-")] for name in BASELINES]
+    print(f"{worlds} worlds; the last {len(BASELINES)} rows are open loop, in the loop of {LOOP_OF_BASELINES}\n")
     print(markdown_table(list(HEADINGS), rows))
 
 

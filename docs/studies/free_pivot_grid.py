@@ -49,7 +49,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import Measurement, Observer
 from cmg_mj.observers import OBSERVERS, make_observer
 from cmg_mj.observers.free_pivot import FreePivot
@@ -128,7 +128,13 @@ class Matched(NamedTuple):
 
 
 def matched_bound(
-    noise: TiltNoise, dt: float, motion: tuple[str, float, float] | None, gravity: float, *, offset: float, rate: float
+    noise: MeasurementNoise,
+    dt: float,
+    motion: tuple[str, float, float] | None,
+    gravity: float,
+    *,
+    offset: float,
+    rate: float,
 ) -> Matched:
     """Compute the errors of the filter that is told all but the course of the motion.
 
@@ -226,10 +232,10 @@ def replayed(observer: Observer, y1: np.ndarray, acceleration: np.ndarray) -> np
     return np.array(rates)
 
 
-def with_white(noise: TiltNoise, more: TiltNoise) -> TiltNoise:
+def with_white(noise: MeasurementNoise, more: MeasurementNoise) -> MeasurementNoise:
     """Add the variances of two noises of the same correlation."""
     both = (math.hypot(noise.tilt, more.tilt), math.hypot(noise.acceleration, more.acceleration))
-    return TiltNoise(*both, noise.correlation, noise.gimbal)
+    return MeasurementNoise(*both, noise.correlation, noise.gimbal)
 
 
 def best_other(errors: dict[str, np.ndarray]) -> str:

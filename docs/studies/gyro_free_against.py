@@ -22,7 +22,7 @@ from rich.progress import track
 from cmg_mj import load_scenario, prepare
 from cmg_mj.results.result import Result
 from cmg_mj.results.tables import markdown_table
-from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import run_jobs, run_of
 
 SEED = 160_000
 OBSERVERS = ("gyro_free", "free_pivot", "adaptive", "homogeneous", "kalman")
@@ -97,7 +97,7 @@ def row(case: Case, worlds: int) -> list[str]:
     settings = [f"seed={SEED}", *case.settings]
     loops = [(name, settings) for name in OBSERVERS] + [("gyro_free", [*settings, "controller.feedback=truth"])]
     jobs = [run_of(prepare(load_scenario("push_recovery", given, name)), worlds) for name, given in loops]
-    *own, true = run_side_by_side(jobs, keep_trajectory=False)
+    *own, true = run_jobs(jobs, keep_trajectory=False)
     return [case.name, *map(cell, own), *(cell(true, name) for name in BASELINES), str(int(true.fell.sum()))]
 
 

@@ -11,7 +11,7 @@ import argparse
 from collections.abc import Sequence
 
 import numpy as np
-from bias_limits import LARGEST_DEG, PARTS, SEED, WORLDS, Case, cell, limits
+from bias_limits import MAX_BIAS_DEG, PARTS, SEED, WORLDS, Case, cell, limits
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.results.intervals import format_interval, in_line, known_interval
@@ -91,8 +91,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         (name, cell(below), cell(above), cell(borne_pushes(case)))
         for (name, case), (below, above) in zip(LOOPS.items(), biases, strict=True)
     ]
-    step = f"{LARGEST_DEG / PARTS**2:g} degrees"
-    print(f"\nBorne, biases in steps of {step} up to {LARGEST_DEG:g}, pushes of 0.1 s in steps of {PUSHES[0]:g} N m\n")
+    step = f"{MAX_BIAS_DEG / PARTS**2:g} degrees"
+    print(f"\nBorne, biases in steps of {step} up to {MAX_BIAS_DEG:g}, pushes of 0.1 s in steps of {PUSHES[0]:g} N m\n")
     print(markdown_table(("loop", "-e [deg], push of 1 N m", "e [deg], the same", "push [N m], e = 0.5"), rows))
 
 

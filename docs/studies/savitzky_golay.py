@@ -25,7 +25,7 @@ from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.tuning.simulations import record
 from cmg_mj.observers import Estimate, Measurement, make_observer
-from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 
 NAME = "docs.studies.savitzky_golay:SavitzkyGolay"
@@ -98,7 +98,7 @@ def _closed_loop(scenario: Scenario, candidates: list[tuple[str, dict]], worlds:
         prepare(scenario.model_copy(update={"observer": ObserverSettings(kind=kind, **parameters)}))
         for kind, parameters in candidates
     ]
-    results = run_side_by_side([run_of(experiment, worlds) for experiment in experiments], keep_trajectory=False)
+    results = run_jobs([run_of(experiment, worlds) for experiment in experiments], keep_trajectory=False)
     falls = np.array([worlds - int(result.stood.sum()) for result in results])
     tilts = [result.mean("tilt_rms_deg") for result in results]
     half = [

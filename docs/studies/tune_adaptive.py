@@ -25,7 +25,7 @@ from cmg_mj.results.tables import markdown_table
 from cmg_mj.scenario.schema import ObserverSettings
 
 SEED, WORLDS, LATE_S = 30_000, 6, 5.0
-LARGEST_BIAS_ERROR_DEG = 0.05
+MAX_BIAS_ERROR_DEG = 0.05
 BIASES_DEG = (0.5, 1.0, 1.5)
 
 pushed = load_scenario("push_recovery", [f"seed={SEED}", "duration_s=10", "observer.kind=adaptive"])
@@ -63,7 +63,7 @@ rows, scores = [], {}
 for w, damping, s in itertools.product((16.0, 20.0, 25.0, 30.0), (0.5, 0.7, 0.9), (0.5, 1.0, 2.0)):
     with_push, without, bias, fell = errors(gains(w, damping, s))
     rows.append((f"{w:g}", f"{damping:g}", f"{s:g}", f"{with_push:.4f}", f"{without:.4f}", f"{bias:.3f}", f"{fell}"))
-    if not fell and bias <= LARGEST_BIAS_ERROR_DEG:
+    if not fell and bias <= MAX_BIAS_ERROR_DEG:
         scores[w, damping, s] = math.hypot(with_push, without)
 headings = ("w [rad/s]", "damping ratio", "s [1/s]", "velocity, push [rad/s]", "no push [rad/s]", "bias [deg]", "fell")
 print(markdown_table(headings, rows, text_columns=0))

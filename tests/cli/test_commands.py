@@ -17,7 +17,7 @@ import tomli_w
 from cmg_mj.cli import cli
 from cmg_mj.inputs.files import bundled
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.baselines import BASELINES
 from tests.command import COMMAND, cmg_mj, environment
 
 SUMMARY = [
@@ -171,7 +171,7 @@ def test_compare_prints_a_list_of_summaries(quick: str) -> None:
     outcome = cmg_mj("compare", quick, "--observers", "ltv, linear,ltv", "--worlds", 2, "--json")
     assert (outcome.status, outcome.err) == (0, "")
     summaries = json.loads(outcome.out)
-    assert [entry["observer"] for entry in summaries] == ["ltv", "linear", *REFERENCES]
+    assert [entry["observer"] for entry in summaries] == ["ltv", "linear", *BASELINES]
     assert all([key for key in entry if key in SUMMARY] == SUMMARY for entry in summaries)
     assert json.loads(Path("runs/quick-compare-0/summary.json").read_text()) == summaries
 

@@ -51,7 +51,7 @@ def test_an_axis_has_what_it_is_given_and_the_rest_of_what_holds_for_all() -> No
             "axes.roll.sensors.accelerometer.latency_s=0.005",
         ],
     )
-    roll, pitch = (scenario.of_axis(name) for name in ("roll", "pitch"))
+    roll, pitch = (scenario.axis_scenario(name) for name in ("roll", "pitch"))
     assert roll.observer.parameters == {"k1": 25}
     assert (pitch.observer.kind, pitch.observer.parameters) == ("linear", {})
     assert (roll.controller.gains, pitch.controller.gains) == ("scaled", (1.0, 2.0, 3.0, 4.0))
@@ -90,7 +90,7 @@ def test_the_observer_that_is_named_is_that_of_all_axes() -> None:
     for kind in ("homogeneous", "linear", "kalman"):
         assert prepare(mixed_axes.with_observer(kind)).observer_title == kind
     tuned_axis = load_scenario("two_axes", ["axes.roll.observer.k1=25"])
-    assert tuned_axis.with_observer("homogeneous").of_axis("roll").observer.parameters == {"k1": 25}
+    assert tuned_axis.with_observer("homogeneous").axis_scenario("roll").observer.parameters == {"k1": 25}
 
 
 def test_another_law_does_without_the_files_gains() -> None:
@@ -101,7 +101,7 @@ def test_another_law_does_without_the_files_gains() -> None:
     lqg_scenario = load_scenario(
         "two_axes", ["axes.roll.controller.rate_limit_rad_s=3", "axes.roll.controller.gains=[1, 2, 3, 4]"]
     )
-    roll = lqg_scenario.with_law("lqg").of_axis("roll").controller
+    roll = lqg_scenario.with_law("lqg").axis_scenario("roll").controller
     assert (roll.kind, roll.gains, roll.rate_limit_rad_s) == ("lqg", None, 3.0)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.core.controller import Controller, PlantInterface
+from cmg_mj.core.controller import Controller, KnownPlant
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import IdealReading
@@ -205,7 +205,7 @@ def controller(observer: Any, law: StateFeedback | None = None, **options: Any) 
         observer,
         law or StateFeedback(DT),
         IDEAL_SENSORS,
-        PlantInterface(RadialTilt(0.1, 0.3), GimbalAngle((1.0, -1.0), (math.pi / 2.0, math.pi / 2.0)), 0.001),
+        KnownPlant(RadialTilt(0.1, 0.3), GimbalAngle((1.0, -1.0), (math.pi / 2.0, math.pi / 2.0)), 0.001),
         **options,
     )
 

@@ -11,7 +11,7 @@ from scipy.integrate import quad_vec
 from scipy.linalg import expm, solve_discrete_are
 
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import feedback_state
 from cmg_mj.laws import make_law
 from cmg_mj.laws.lqg import Lqg
@@ -20,7 +20,7 @@ from tests.plant import paper_model as paper
 from tests.recorded import push_recovery, recorded
 
 PAIR = ReducedModel(paper.J1, paper.J2, paper.J_d, paper.omega_d, paper.gravity_torque, 2)
-NOISE = TiltNoise(0.0063, 0.41, 0.89, 3.1e-4)
+NOISE = MeasurementNoise(0.0063, 0.41, 0.89, 3.1e-4)
 UNLIMITED = 1e9
 CASES: list[tuple[float, dict[str, Any]]] = [
     (0.005, {}),
@@ -29,7 +29,7 @@ CASES: list[tuple[float, dict[str, Any]]] = [
 EVERY = pytest.mark.parametrize(("dt", "parameters"), CASES)
 
 
-def law(dt: float = 0.005, rate_limit: float = UNLIMITED, noise: TiltNoise = NOISE, **parameters: Any) -> Lqg:
+def law(dt: float = 0.005, rate_limit: float = UNLIMITED, noise: MeasurementNoise = NOISE, **parameters: Any) -> Lqg:
     result = make_law("lqg", dt, rate_limit, PAIR, noise, **parameters)
     assert isinstance(result, Lqg)
     return result
@@ -189,7 +189,7 @@ def test_at_the_limit_it_expects_what_was_commanded_and_does_not_wind_up(tilt: f
 
 
 def test_a_sensor_without_noise_is_taken() -> None:
-    control_law = law(noise=TiltNoise(0.0, 0.0, 0.0, 0.0))
+    control_law = law(noise=MeasurementNoise(0.0, 0.0, 0.0, 0.0))
     np.testing.assert_allclose(np.diag(control_law.innovation_gain[[0, 2]]), 1.0, atol=0.01)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.observers import Measurement, Observer, make_observer
 from tests.plant import paper_model as paper
 
@@ -27,7 +27,7 @@ HEAVY = ReducedModel(J1=0.06, J2=0.05, J_d=2e-3, omega_d=150.0, gravity_torque=2
 EPSILON, BOUND = 0.0287, 10.4
 """Defaults that are not a paper's: epsilon of linear_high_gain and L of super_twisting, from `cmg-mj tune`."""
 
-NOISE = TiltNoise(0.0063, 0.41, 0.89, 3.1e-4)
+NOISE = MeasurementNoise(0.0063, 0.41, 0.89, 3.1e-4)
 """The noise of the bundled rig's accelerometers, 400 ug/rtHz at 200 Hz."""
 
 Signal = Sequence[float] | np.ndarray

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.observers.free_pivot import FreePivot
 from tests.observers.double_integrator import INDEPENDENT, C, motion, shares_of_y1
 from tests.observers.reference import DT, NOISE, PAPER, run
@@ -173,7 +173,7 @@ def test_in_the_loop_it_keeps_to_its_share_of_gyro_free(setting: str, most: floa
 
 def test_without_noise_the_pivots_variance_has_a_floor() -> None:
     """Without one y1 would have no variance at all, by which a rise is divided."""
-    silent = TiltNoise(0.0, 0.0, 0.0)
+    silent = MeasurementNoise(0.0, 0.0, 0.0)
     with pytest.raises(ValueError, match="pivot_floor = 0: "):
         FreePivot(DT, PAPER, silent, pivot_start=0.0, pivot_floor=0.0)
     *_, y1, a = motion(50, np.random.default_rng(3), bias=0.0)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.observers import make_observer
 from cmg_mj.observers.free_pivot import FreePivot
 from cmg_mj.observers.gyro_free import GyroFree
@@ -18,7 +18,7 @@ from tests.observers.reference import DT, PAPER, observer
 UNSTABLE = [((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), ((20.0, 0.0), (55.0, 0.0), (0.0, 20.0))]
 UNSTABLE += [((20.0, 0.0), (150.0, 0.0), (0.0, 0.0)), ((-20.0, 0.0), (150.0, 0.0), (0.0, 20.0))]
 """Gains of the time-invariant observer: none, less than the unstable pole asks for, no third state, a sign."""
-PERFECT = TiltNoise(0.0, 0.0, 0.9)
+PERFECT = MeasurementNoise(0.0, 0.0, 0.9)
 REFUSED: dict[str, list[tuple[str, dict[str, Any]]]] = {
     "adaptive": [
         ("bias, torque", {"torque": True}),

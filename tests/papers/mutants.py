@@ -55,8 +55,8 @@ MUTANTS = [
            "command.py::test_one_rule_decides"),
     # --- aranovskiy2020 ---
     Mutant("Figs 5 to 7: runs taken from another observer", R + "section_5.py",
-           "zip(observers, run_side_by_side(runs), strict=True)",
-           "zip(observers, run_side_by_side(runs)[1:2] * 3, strict=True)", FIGURES_5_TO_7),
+           "zip(observers, run_jobs(runs), strict=True)",
+           "zip(observers, run_jobs(runs)[1:2] * 3, strict=True)", FIGURES_5_TO_7),
     Mutant("the order: an interval's other end", R + "section_5.py", "interval.low > 0.0", "interval.high > 0.0",
            SECTION_5 + "test_an_order_is_one_beyond_chance_in_both_steps"),
     Mutant("the cause: (11) by Euler left out", R + "section_5.py", "- (errors[ELEVEN_BY_EULER] - errors[ELEVEN])",

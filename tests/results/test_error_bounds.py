@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 from scipy.signal import lfilter
 
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.results.floors import ROWS_A_TAP, TiltFloor, acceleration_floor
 from tests.observers.reference import DT, NOISE, PAPER
@@ -18,7 +18,7 @@ from tests.observers.reference import DT, NOISE, PAPER
 WHOLE = 2000
 
 
-def floor_with_correlated_noise(noise: TiltNoise, h: float) -> float:
+def floor_with_correlated_noise(noise: MeasurementNoise, h: float) -> float:
     """The same floor in another form: of z = x2 - h/2 x1'', p = x1 - h^2/6 x1'', whose noises are correlated."""
     v, n, c = noise.tilt, noise.acceleration, noise.correlation * noise.tilt * noise.acceleration
     F, C = np.array([[1.0, h], [0.0, 1.0]]), np.array([[1.0, 0.0]])
@@ -35,17 +35,17 @@ def floor_with_correlated_noise(noise: TiltNoise, h: float) -> float:
     return math.sqrt(weights @ residual @ weights)
 
 
-@pytest.mark.parametrize("noise", [NOISE, TiltNoise(0.0032, 0.21, 0.2), TiltNoise(1e-4, 3.0, -0.7)])
+@pytest.mark.parametrize("noise", [NOISE, MeasurementNoise(0.0032, 0.21, 0.2), MeasurementNoise(1e-4, 3.0, -0.7)])
 @pytest.mark.parametrize("dt", [0.001, 0.005, 0.05])
-def test_floor_with_acceleration_in_another_form(noise: TiltNoise, dt: float) -> None:
+def test_floor_with_acceleration_in_another_form(noise: MeasurementNoise, dt: float) -> None:
     assert acceleration_floor(noise, dt) == pytest.approx(floor_with_correlated_noise(noise, dt), rel=1e-6)
 
 
 def test_no_noise_no_floor() -> None:
-    assert acceleration_floor(TiltNoise(0.0, 0.0, 0.9), DT) == 0.0
+    assert acceleration_floor(MeasurementNoise(0.0, 0.0, 0.9), DT) == 0.0
 
 
-def accelerate(noise: TiltNoise, runs: int, ticks: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def accelerate(noise: MeasurementNoise, runs: int, ticks: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Any motion whose acceleration runs straight between samples: y1, measured acceleration, rate, (ticks, runs)."""
     rng = np.random.default_rng(seed)
     a = np.cumsum(rng.normal(0.0, 3.0, (ticks, runs)), axis=0)
@@ -58,7 +58,7 @@ def accelerate(noise: TiltNoise, runs: int, ticks: int, seed: int) -> tuple[np.n
     return tilt + noise.tilt * (r * n + math.sqrt(1.0 - r * r) * noise_y1), a + noise.acceleration * n, rate
 
 
-def squared_errors(noise: TiltNoise) -> np.ndarray:
+def squared_errors(noise: MeasurementNoise) -> np.ndarray:
     """Mean square, once settled, of a filter that is told some noise, on any motion and NOISE, (runs,)."""
     parameters = {"rate_start": 1.0, "bias_start": 1e-9, "bias_walk": 0.0, "jerk": 0.0}
     estimator = make_observer("gyro_free", DT, PAPER, noise, **parameters)

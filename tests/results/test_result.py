@@ -14,14 +14,14 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.plant.plant import load_plant
-from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.baselines import BASELINES
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import open_loop_figures
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 
-ROWS = 2 + len(REFERENCES)  # of a world: two observers, and what they are judged beside
+ROWS = 2 + len(BASELINES)  # of a world: two observers, and what they are judged beside
 BIASES = [0.5, 0.5, 40.0, 40.0]  # two worlds that stand, two that fall
 
 
@@ -53,8 +53,8 @@ def test_worlds_vary_and_those_that_fell_do_not_count() -> None:
 
 def test_the_table_has_a_row_per_observer_and_world() -> None:
     table = result().table()
-    assert table["observer"].to_pylist() == [name for name in ("homogeneous", "linear", *REFERENCES) for _ in BIASES]
-    assert table["in_loop_of"].to_pylist() == [None] * 4 + ["homogeneous"] * 4 * (1 + len(REFERENCES))
+    assert table["observer"].to_pylist() == [name for name in ("homogeneous", "linear", *BASELINES) for _ in BIASES]
+    assert table["in_loop_of"].to_pylist() == [None] * 4 + ["homogeneous"] * 4 * (1 + len(BASELINES))
     assert table["world"].to_pylist() == [0, 1, 2, 3] * ROWS
     assert table["stood"].to_pylist() == [True, True, False, False] * ROWS
     assert table["outcome"].to_pylist() == ["done", "done", "fell", "fell"] * ROWS

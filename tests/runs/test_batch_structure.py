@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.runs.batch import BATCHED_FIELDS, batch_values, value_of_world
+from cmg_mj.runs.batch import BATCHED_FIELDS, stack_worlds, world_value
 from cmg_mj.runs.experiment import Experiment, run_batch
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.gyros import Fog
@@ -114,18 +114,18 @@ def test_as_many_experiments_as_worlds() -> None:
 
 
 def test_what_is_equal_stays_as_it_is() -> None:
-    assert batch_values([Sensors(), Sensors()]) == Sensors()
-    assert batch_values([1.0, 1.0]) == 1.0
+    assert stack_worlds([Sensors(), Sensors()]) == Sensors()
+    assert stack_worlds([1.0, 1.0]) == 1.0
 
 
 def test_a_stack_gives_every_world_its_own_back() -> None:
     worlds = [Sensors(Accelerometer(bias_mg=(0.0, float(i))), fog=Fog(bias_deg_h=float(i))) for i in range(3)]
-    stack = batch_values(worlds)
+    stack = stack_worlds(worlds)
     np.testing.assert_array_equal(stack.fog.bias_deg_h, [0.0, 1.0, 2.0])
-    assert [value_of_world(stack, i) for i in range(3)] == worlds
-    assert value_of_world(worlds[0], 2) is worlds[0]
+    assert [world_value(stack, i) for i in range(3)] == worlds
+    assert world_value(worlds[0], 2) is worlds[0]
 
 
 def test_what_is_no_number_cannot_differ() -> None:
     with pytest.raises(InputError, match="must have one value for all worlds of a batch"):
-        batch_values(["a", "b"])
+        stack_worlds(["a", "b"])

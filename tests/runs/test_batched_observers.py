@@ -8,7 +8,7 @@ from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.result import Result
 from cmg_mj.runs import side_by_side as side_by_side
 from cmg_mj.runs.experiment import Experiment, run_batch
-from cmg_mj.runs.side_by_side import BatchJob, run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import BatchJob, run_jobs, run_of
 from tests.recorded import assert_same_bits, push_recovery, recorded
 
 
@@ -34,7 +34,7 @@ def assert_alike(jobs: list[BatchJob], batches: list[int], keep_trajectory: bool
     """Each run alone and side by side; what remains in `batches` are the sizes of those side by side."""
     alone = [run_batch(*job, keep_trajectory=keep_trajectory) for job in jobs]
     batches.clear()
-    for a, b in zip(run_side_by_side(jobs, keep_trajectory=keep_trajectory), alone, strict=True):
+    for a, b in zip(run_jobs(jobs, keep_trajectory=keep_trajectory), alone, strict=True):
         assert (a.observers, list(a.worlds), a.seconds) == (b.observers, list(b.worlds), b.seconds)
         assert (a.outcomes, a.summaries) == (b.outcomes, b.summaries)
         if keep_trajectory:
@@ -97,8 +97,8 @@ def test_rigs_may_differ_too(batches: list[int]) -> None:
 
 
 def test_a_batch_has_an_end(batches: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(side_by_side, "MOST_WORLDS", 5)
-    run_side_by_side([run_of(experiment(name, *BRIEF), 2) for name in ("linear", "ltv", "kalman")])
+    monkeypatch.setattr(side_by_side, "MAX_WORLDS", 5)
+    run_jobs([run_of(experiment(name, *BRIEF), 2) for name in ("linear", "ltv", "kalman")])
     assert batches == [4, 2]
 
 
@@ -131,6 +131,6 @@ class Raises:
 def test_an_observer_that_raises_stops_its_own_run_alone() -> None:
     short = ("duration_s=0.5", "push=[]")
     runs = [run_of(experiment(name, *short), 2) for name in ("linear", f"{__name__}:Raises", "ltv")]
-    actual = run_side_by_side(runs)
+    actual = run_jobs(runs)
     assert [{outcome.kind for outcome in result.outcomes} for result in actual] == [{"done"}, {"stopped"}, {"done"}]
     assert "ValueError: enough" in actual[1].outcomes[0].reason

@@ -15,7 +15,7 @@ import pytest
 
 from cmg_mj import Estimate, Measurement, load_scenario, parse_scenario, prepare
 from cmg_mj.inputs.files import folder
-from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.baselines import BASELINES
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs import comparison
@@ -155,7 +155,7 @@ def test_a_comparison_of_one_world_equals_single_runs() -> None:
     assert (outcome.status, outcome.err) == (0, "")
     rows = json.loads(outcome.out)
     assert json.loads(Path("it/summary.json").read_text()) == rows
-    assert [entry["observer"] for entry in rows] == ["ltv", "homogeneous", user_observer, *REFERENCES]
+    assert [entry["observer"] for entry in rows] == ["ltv", "homogeneous", user_observer, *BASELINES]
     for entry, name in zip(rows, ("ltv", "homogeneous", "Mine"), strict=False):
         single = json.loads(cmg_mj("run", file, "--observer", entry["observer"], "--json", "--out", name).out)
         shared = {key: entry[key] for key in single.keys() & entry.keys()}
@@ -208,7 +208,7 @@ def test_a_comparisons_scenario_runs_to_the_same_comparison(scenario: str, obser
     rerun = cmg_mj("compare", "a/scenario.toml", "--out", "b", "--json")
     assert (rerun.status, rerun.err) == (0, "")
     assert rerun.out == first.out
-    assert [row["observer"] for row in json.loads(rerun.out)][: -len(REFERENCES)] == same
+    assert [row["observer"] for row in json.loads(rerun.out)][: -len(BASELINES)] == same
     assert pq.read_table("a/worlds.parquet").equals(pq.read_table("b/worlds.parquet"))
     fields = tomllib.loads(Path("a/scenario.toml").read_text(encoding="utf-8"))
     assert fields == tomllib.loads(Path("b/scenario.toml").read_text(encoding="utf-8"))

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import welch
 
 from cmg_mj.core.noise import NoiseStream, normals
-from cmg_mj.results.baselines import GYROS, References
+from cmg_mj.results.baselines import GYROS, Baselines
 from cmg_mj.sensors.gyros import MemsGyro
 from tests.recorded import assert_same_bits, push_recovery, recorded
 from tests.sensors.test_sampled import assert_mean, assert_sigma
@@ -79,14 +79,14 @@ def test_scale_offset_range_and_resolution() -> None:
 @pytest.mark.parametrize("name", GYROS)
 def test_a_world_reads_the_same_alone_and_in_a_batch_and_in_any_pieces(name: str, sigmas: list[float]) -> None:
     rate, y1 = np.random.default_rng(0).normal(size=(2, 700, 3))
-    batch = References(MemsGyro(), DT, 5, [4, 0, 7], sigmas).rates(rate, y1)[name]
+    batch = Baselines(MemsGyro(), DT, 5, [4, 0, 7], sigmas).rates(rate, y1)[name]
     for i, world in enumerate((4, 0, 7)):
-        alone = References(MemsGyro(), DT, 5, world, sigmas[i : i + 1])
+        alone = Baselines(MemsGyro(), DT, 5, world, sigmas[i : i + 1])
         parts = zip(*(np.split(signal[:, [i]], (1, 256, 300)) for signal in (rate, y1)), strict=True)
         pieces = [alone.rates(*part)[name] for part in parts]
         np.testing.assert_array_equal(np.concatenate(pieces)[:, 0], batch[:, i])
     assert not np.array_equal(batch[:, 0] - rate[:, 0], batch[:, 1] - rate[:, 1])
-    other = References(MemsGyro(), DT, 6, [4, 0, 7], sigmas).rates(rate, y1)[name]
+    other = Baselines(MemsGyro(), DT, 6, [4, 0, 7], sigmas).rates(rate, y1)[name]
     assert not np.array_equal(batch, other)
 
 

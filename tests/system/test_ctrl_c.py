@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.baselines import BASELINES
 from cmg_mj.results.trajectory import Trajectory
 from tests.command import COMMAND, HANGS_AFTER_S, CommandOutcome, cmg_mj_process, environment
 from tests.run_folders import assert_whole, names, write
@@ -150,7 +150,7 @@ def test_ends_a_comparison_with_the_observers_that_are_done() -> None:
     assert outcome.err.splitlines()[-1] == "cmg-mj: interrupted; 1 of 3 observers are in it"
     assert {"trajectory-linear.parquet", "worlds.parquet"} <= set(names("it"))
     rows = json.loads(Path("it/summary.json").read_text())
-    assert [entry["observer"] for entry in rows] == ["linear", *REFERENCES]
+    assert [entry["observer"] for entry in rows] == ["linear", *BASELINES]
 
 
 @pytest.mark.slow

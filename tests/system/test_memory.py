@@ -23,7 +23,7 @@ with open("/proc/self/status") as file:  # ru_maxrss would count the parent's me
     peak_kb = next(int(line.split()[1]) for line in file if line.startswith("VmHWM"))
 print(status, peak_kb // 1024, file=sys.stderr)
 """
-MOST_MB = 1000
+MAX_MB = 1000
 
 
 def peak_mb(*arguments: str, folder: Path) -> int:
@@ -41,7 +41,7 @@ def test_a_long_run_with_its_recording_and_plot(tmp_path: Path) -> None:
     settings = ("duration_s=2000", 'open_loop_observers=["linear", "kalman"]')
     options = [argument for setting in settings for argument in ("--set", setting)]
     peak = peak_mb("run", "push_recovery", "--plot", "--out", "out", "--json", *options, folder=tmp_path)
-    assert peak < MOST_MB
+    assert peak < MAX_MB
     assert (tmp_path / "out" / "recording.rrd").stat().st_size > 20e6
 
 
@@ -67,5 +67,5 @@ def test_a_long_log_through_two_observers(tmp_path: Path, jitter_s: float) -> No
         "linear_high_gain,finite_difference",
     ]
     peak = peak_mb("replay", "log.csv", *options, "--json", "--out", "out", folder=tmp_path)
-    assert peak < MOST_MB
+    assert peak < MAX_MB
     assert (tmp_path / "out" / "recording.rrd").stat().st_size > 20e6

@@ -15,7 +15,7 @@ from cmg_mj.features.bend import Bend
 from cmg_mj.plant.axis import Axis, ResolvedModel
 from cmg_mj.plant.elements import BEND_JOINT, SENSORS, element_id, joint_sizes
 from cmg_mj.plant.inertia import free_motions
-from cmg_mj.plant.mjcf import at_keyframe
+from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 
@@ -172,7 +172,7 @@ def mode_inertia(model: mujoco.MjModel, key: int, line: HingeLine, *, slides: bo
         line: The tilt's hinge.
         slides: True if the pivot slides freely. It then moves with the mode, as all unheld joints do.
     """
-    data = at_keyframe(model, key)
+    data = data_at_keyframe(model, key)
     dense = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, dense)
     dofs = [line.dof, int(model.joint(BEND_JOINT).dofadr[0])]
@@ -185,7 +185,7 @@ def mode_inertia(model: mujoco.MjModel, key: int, line: HingeLine, *, slides: bo
 
 def _leaf_part(rigid: mujoco.MjModel, key: int, frame: int, line: HingeLine, section: Bend, path: Path) -> float:
     """Part of the frame's own inertia and mass that goes to the new body."""
-    data = at_keyframe(rigid, key)
+    data = data_at_keyframe(rigid, key)
     dense = np.zeros((rigid.nv, rigid.nv))
     mujoco.mj_fullM(rigid, data, dense)
     whole = float(dense[line.dof, line.dof]) - float(rigid.dof_armature[line.dof])

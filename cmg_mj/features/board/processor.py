@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, NamedTuple, Protocol, Unpack
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import Controller, ControllerOptions, PlantInterface, Sensors, Tick
+from cmg_mj.core.controller import Controller, ControllerOptions, KnownPlant, Sensors, Tick
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.runners import as_estimate
 from cmg_mj.core.types import Forces, Law, Measurement, Observer
@@ -87,7 +87,7 @@ class ProcessorController(Controller):
         observer: Observer,
         law: Law,
         sensors: Sensors,
-        plant: PlantInterface,
+        plant: KnownPlant,
         **options: Unpack[ControllerOptions],
     ) -> None:
         self.processor = processor

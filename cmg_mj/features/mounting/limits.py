@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import PlantInterface
+from cmg_mj.core.controller import KnownPlant
 from cmg_mj.core.loop import ControlLoop, Joints
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import GimbalAngle
@@ -20,9 +20,9 @@ from cmg_mj.features.mounting.stance import overlap, simulated_pole
 from cmg_mj.linear.verdict import SlidingPoles, sliding_poles
 from cmg_mj.plant.mjcf import quiet, set_control_callback
 from cmg_mj.plant.plant import Plant
-from cmg_mj.runs.batch import batch_values
+from cmg_mj.runs.batch import stack_worlds
 from cmg_mj.runs.experiment import Experiment
-from cmg_mj.scenario.design import Design, PlantParameters
+from cmg_mj.scenario.design import Design, PlantNumbers
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import common_period
 from cmg_mj.stages.push import Push, Pushes
@@ -147,13 +147,13 @@ def _stands(scenario: Scenario, design: Design, impulses: np.ndarray) -> np.ndar
     alone = dataclasses.replace(design, scenario=scenario.model_copy(update={"open_loop_observers": []}))
     gimbal_angle = GimbalAngle((1.0,) * model.gimbals, (0.0,) * model.gimbals)
     numbers = np.repeat(np.arange(WORLDS), len(impulses)).tolist()
-    controller = alone.controller(PlantInterface(plant.tilt, gimbal_angle, h), worlds=numbers)
+    controller = alone.controller(KnownPlant(plant.tilt, gimbal_angle, h), worlds=numbers)
     physics = ReducedPhysics(plant, len(numbers), h)
     after = AFTER_TIME_CONSTANTS / ceiling(model, design.law.rate_limit).pole
     steps = math.ceil((BEFORE_S + PUSH_S + after) / h)
     end = -(-steps // controller.steps_per_sample) * controller.steps_per_sample
     start, duration = round(BEFORE_S / h) * h, round(PUSH_S / h) * h
-    push = batch_values([Push(start, duration, torque) for torque in (impulses / PUSH_S).tolist()] * WORLDS)
+    push = stack_worlds([Push(start, duration, torque) for torque in (impulses / PUSH_S).tolist()] * WORLDS)
     fall_angle = math.radians(scenario.metrics.fall_angle_deg)
     loop = ControlLoop(physics, controller, end, [Pushes([push], h, [""])], fall_angle)
     with np.errstate(all="ignore"):
@@ -181,7 +181,7 @@ class ReducedPhysics:
     running = None
     stop_failed = None  # a world without a finite command falls
 
-    def __init__(self, plant: PlantParameters, n_worlds: int, timestep: float) -> None:
+    def __init__(self, plant: PlantNumbers, n_worlds: int, timestep: float) -> None:
         self._plant, self._timestep = plant, timestep
         self.x = np.zeros((3, n_worlds))
         self.fallen = np.zeros(n_worlds, dtype=bool)

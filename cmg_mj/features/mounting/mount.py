@@ -36,7 +36,7 @@ from cmg_mj.features.mounting.stance import (
 from cmg_mj.inputs.files import expanded, folder, model_files
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.build import check_rig
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, axes_of
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, axis_modules
 from cmg_mj.plant.mjcf import as_mjcf, compile_model, parse, posed, quiet, set_control_callback
 from cmg_mj.results.folder import is_signed, signed, whole_file
 
@@ -254,7 +254,7 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
         write_keyframe(spec, model, name, as_qpos(model, own | gimbals), speeds)
     model = compile_model(spec, path)
     key = model.key(EQUILIBRIUM_KEY).id
-    check_falls(model, key, find_axis(model, key, request.name, axes_of(model)[request.name]).line)
+    check_falls(model, key, find_axis(model, key, request.name, axis_modules(model)[request.name]).line)
     return MountedRobot(spec, path, tuple(held), tuple(notes))
 
 

@@ -13,7 +13,7 @@ from cmg_mj.core.loop import ControlLoop
 from cmg_mj.features.mounting.limits import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS, Prospects
 from cmg_mj.plant.mjcf import quiet, set_control_callback
 from cmg_mj.plant.physics import ManyWorlds
-from cmg_mj.runs.batch import batch_values
+from cmg_mj.runs.batch import stack_worlds
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.stages.push import Push, Pushes
 
@@ -221,7 +221,7 @@ def _attempt(
     """Push worlds, each with an impulse [N m s]; with `early` only until the first one falls."""
     plant = experiment.plant
     controller = experiment.controller([world for world, _ in pushes])
-    push = batch_values([Push(BEFORE_S, PUSH_S, impulse / PUSH_S, axis or None) for _, impulse in pushes])
+    push = stack_worlds([Push(BEFORE_S, PUSH_S, impulse / PUSH_S, axis or None) for _, impulse in pushes])
     period = controller.period
     steps = period * math.ceil(duration_s / (period * plant.timestep))
     pushed = Pushes([push], plant.timestep, plant.axis_names)

@@ -15,7 +15,7 @@ from cmg_mj.features.mounting.hold import joint_held, unused_name
 from cmg_mj.inputs.files import expanded, require_file
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.checks import STEPS_S
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, axes_in, axes_of, missing_parts
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, axes_in, axis_modules, missing_elements
 from cmg_mj.plant.mjcf import compile_model, parse, posed
 from cmg_mj.plant.tilt_line import HingeLine
 
@@ -264,13 +264,13 @@ def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str) ->
         if is_key:
             raise InputError(f"has a keyframe {EQUILIBRIUM_KEY!r} already, which a mounted pair brings: rename it")
         return ExistingAxes()
-    missing = missing_parts(spec)
+    missing = missing_elements(spec)
     if missing:
         raise InputError(f"the robot has an axis already, and yet {missing[0]}")
     if not name:
         known = f" {', '.join(filter(None, names))}" if any(names) else ""
         raise InputError(f"the robot has an axis{known} already: give the new one a name, such as --name pitch")
-    key, names_of = model.key(EQUILIBRIUM_KEY).id, axes_of(model)
+    key, names_of = model.key(EQUILIBRIUM_KEY).id, axis_modules(model)
     axes = [find_axis(model, key, axis, names_of[axis]) for axis in names]
     modules = [module for axis in axes for module in axis.modules]
     return ExistingAxes(

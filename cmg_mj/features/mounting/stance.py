@@ -16,7 +16,7 @@ from cmg_mj.features.mounting.attach import place_modules
 from cmg_mj.features.mounting.hold import as_qpos, rest_controls
 from cmg_mj.features.mounting.request import MountRequest, Place
 from cmg_mj.plant.checks import TRUE_DEG
-from cmg_mj.plant.mjcf import at_keyframe, compile_model, posed
+from cmg_mj.plant.mjcf import compile_model, data_at_keyframe, posed
 from cmg_mj.plant.tilt_line import UP, HingeLine, Line
 
 MAX_SETTLE_S = 10.0
@@ -376,7 +376,7 @@ def overlap(model: mujoco.MjModel, key: int, line: Line, pole: float) -> str:
     Returns:
         A clause; "" for a robot on the floor, where nothing overlaps, and where the robot falls alike without contacts.
     """
-    data = at_keyframe(model, key)
+    data = data_at_keyframe(model, key)
     deepest = min(data.contact[: data.ncon], key=lambda contact: contact.dist, default=None)
     if not isinstance(line, HingeLine) or deepest is None or deepest.dist > -OVERLAP_M:
         return ""

@@ -13,9 +13,9 @@ from pydantic.dataclasses import dataclass
 from cmg_mj.inputs.files import whole_path
 from cmg_mj.inputs.types import STRICT, Batched, Duration, Held, Instant, Section, Start
 
-MOST_M_S2 = 50.0
+MAX_ACCELERATION_M_S2 = 50.0
 """No pivot is accelerated by more [m/s^2]."""
-FASTEST_HZ = 20.0
+MAX_FREQUENCY_HZ = 20.0
 """Highest frequency of a sine and highest corner of the noise [Hz]."""
 FIELDS_OF = {
     "sine": ("acceleration_m_s2", "frequency_hz", "phase_deg"),
@@ -27,8 +27,8 @@ FIELDS_OF = {
 OPTIONAL = ("phase_deg", "column", "scale")
 """Fields that a kind which has them does without."""
 
-Acceleration = Annotated[float, Field(ge=-MOST_M_S2, le=MOST_M_S2)]
-Frequency = Annotated[float, Field(gt=0.0, le=FASTEST_HZ)]
+Acceleration = Annotated[float, Field(ge=-MAX_ACCELERATION_M_S2, le=MAX_ACCELERATION_M_S2)]
+Frequency = Annotated[float, Field(gt=0.0, le=MAX_FREQUENCY_HZ)]
 HELD = Held("acceleration")
 
 

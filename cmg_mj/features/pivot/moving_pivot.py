@@ -11,7 +11,7 @@ from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
 from cmg_mj.features.pivot.pivot_track import MAX_RECORDED_M_S2, read_track
 from cmg_mj.inputs.features import Judgement
-from cmg_mj.plant.mjcf import at_keyframe
+from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.plant import Plant, check_axis
 from cmg_mj.plant.tilt_line import UP
 from cmg_mj.scenario.design import Design
@@ -91,7 +91,7 @@ def pivot_directions(plant: Plant, pivots: Sequence[Pivot]) -> list[list[float]]
     if not pivots:
         return []
     refuse_other_forces(plant)
-    data = at_keyframe(plant.model, plant.key)
+    data = data_at_keyframe(plant.model, plant.key)
     along = {}
     for axis in plant.axes:
         line = data.xmat[axis.frame].reshape(3, 3) @ axis.direction

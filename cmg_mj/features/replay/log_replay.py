@@ -12,7 +12,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, raised
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import extra_signals, needs
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.noise import noise_of
@@ -25,7 +25,7 @@ from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.trajectory import ESTIMATES, Layout, NamedColumns, Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay_all
-from cmg_mj.scenario.design import PlantParameters, design
+from cmg_mj.scenario.design import PlantNumbers, design
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.scenario.schema import Scenario
 
@@ -79,7 +79,7 @@ class ReplayResult(NamedColumns):
     left_out: Mapping[str, str]
     alignment: Alignment | None
     settle_s: float
-    noise: TiltNoise
+    noise: MeasurementNoise
     parameters: Parameters = field(default_factory=dict)
     zero_phase: ZeroPhase | None = None
     misfit: float | None = None
@@ -110,7 +110,7 @@ def replay_log(
     observers: Sequence[str] | None = None,
     *,
     model: ReducedModel | None = None,
-    noise: TiltNoise | None = None,
+    noise: MeasurementNoise | None = None,
     parameters: Parameters | None = None,
     settle_s: float = SETTLE_S,
     on_share: OnShare | None = None,
@@ -186,7 +186,7 @@ def _gimbals_matter(model: ReducedModel | None) -> bool:
 
 
 def _ready(
-    log: Log, names: Iterable[str], model: ReducedModel | None, noise: TiltNoise, parameters: Parameters
+    log: Log, names: Iterable[str], model: ReducedModel | None, noise: MeasurementNoise, parameters: Parameters
 ) -> tuple[dict[str, Observer], dict[str, str]]:
     """Make the observers that can take part, and say why the others cannot."""
     available = {*log.has, *(["model"] if model else []), *([] if _gimbals_matter(model) else ["gimbals"])}
@@ -228,7 +228,7 @@ def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
     return estimates
 
 
-def _with_noise(log: Log, noise: TiltNoise) -> Log:
+def _with_noise(log: Log, noise: MeasurementNoise) -> Log:
     """Add noise to the tilt, and to the angular acceleration if there is one, with the given correlation."""
     random = np.random.default_rng(SEED)
     first, other = random.standard_normal(len(log)), random.standard_normal(len(log))
@@ -264,7 +264,7 @@ def model_of(text: str) -> ReducedModel:
     return ReducedModel(inertia, added, values.get("momentum", 0.0), 1.0, values["gravity_torque"])
 
 
-def _plant_of(scenario: Scenario) -> PlantParameters:
+def _plant_of(scenario: Scenario) -> PlantNumbers:
     experiment = prepare(scenario)
     experiment.require_single_axis("replay")
     return experiment.plant.parameters
@@ -274,7 +274,7 @@ class ObserverInputs(NamedTuple):
     """Inputs of the observers of a log, as `replay_log` takes them: model, noise and parameters."""
 
     model: ReducedModel | None
-    noise: TiltNoise
+    noise: MeasurementNoise
     parameters: Parameters
 
 

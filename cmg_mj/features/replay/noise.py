@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import EVEN, Log, LogNoise, Segment, Values, WhiteNoise
 from cmg_mj.observers.parameter_options import numbers
@@ -231,7 +231,7 @@ def _correlation(spectra: np.ndarray) -> float:
     return correlation if abs(correlation) > 3.0 / math.sqrt(known) else 0.0
 
 
-def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> TiltNoise:
+def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> MeasurementNoise:
     """Return the noise of a log's sensors that observers assume: the user's, else the log's own, else a default.
 
     Args:
@@ -256,7 +256,7 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> TiltNoise:
         if acceleration is None or "acceleration" in noises:
             acceleration = noises.get("acceleration", ACCELERATION_NOISE_RAD_S2)
         correlation = 0.0 if {"tilt", "acceleration"} <= noises.keys() else shown.correlation
-        return TiltNoise(tilt, acceleration, correlation, gimbal)
+        return MeasurementNoise(tilt, acceleration, correlation, gimbal)
     if noises.keys() - {"accelerometer"}:
         raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
     if tilt is None or noises:
@@ -265,7 +265,7 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> TiltNoise:
     elif acceleration is None:
         sigma = tilt / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
     else:
-        return TiltNoise(tilt, acceleration, shown.correlation, gimbal)
+        return MeasurementNoise(tilt, acceleration, shown.correlation, gimbal)
     return replace(log.tilt.noise(sigma, STANDARD_GRAVITY), gimbal=gimbal)
 
 
@@ -310,7 +310,7 @@ def _sampling_rate(log: Log) -> float:
     return 1.0 / period if log.dt > 1.000001 * period else 1.0 / log.dt
 
 
-def noise_remarks(log: Log, noise: TiltNoise) -> list[str]:
+def noise_remarks(log: Log, noise: MeasurementNoise) -> list[str]:
     """Describe the noise that observers assume, and what the log shows.
 
     Args:
@@ -345,7 +345,7 @@ def _remark(name: str, used: float, shown: WhiteNoise | str, factor: float, unit
     return f"{remark}: give --noise {name}={sigma:.3g}, or no {name} for the log's own."
 
 
-def noise_figures(log: Log, noise: TiltNoise) -> dict[str, SummaryValue]:
+def noise_figures(log: Log, noise: MeasurementNoise) -> dict[str, SummaryValue]:
     """Return the noise that a log shows as `--json` prints it; nothing for a run's recording."""
     if log.white_noise is None:
         return {}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from cmg_mj.cli.arguments import (
-    MOST_WORLDS,
+    MAX_WORLDS,
     RunArguments,
     all_of,
     claim_output,
@@ -57,7 +57,7 @@ parameter_options = all_of(
 @worlds_option(
     "Worlds to fit; as many more are held out for scoring.",
     default=20,
-    range=(2, MOST_WORLDS // 10),  # whose trajectories are kept
+    range=(2, MAX_WORLDS // 10),  # whose trajectories are kept
 )
 @parameter_options
 @click.option(

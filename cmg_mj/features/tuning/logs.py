@@ -14,7 +14,7 @@ from scipy.stats import binomtest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.log_replay import NO_MODEL, ObserverInputs, misfit_of, observer_inputs, replay_log
 from cmg_mj.features.replay.noise import noise_figures, noise_remarks
@@ -27,7 +27,7 @@ from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, paired
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay
-from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.stages.push import push_windows
@@ -173,7 +173,7 @@ def compare_in_loop(
             experiment.require_single_axis("tune-log")
     except InputError as error:
         return LoopComparison(title, duration, worlds, refused=str(error))
-    results = run_side_by_side([run_of(experiment, worlds) for experiment in experiments], keep_trajectory=False)
+    results = run_jobs([run_of(experiment, worlds) for experiment in experiments], keep_trajectory=False)
     if any(outcome.kind == "interrupted" for result in results for outcome in result.outcomes):
         raise KeyboardInterrupt
     tilts = [result.values("tilt_rms_deg") for result in results]
@@ -234,7 +234,7 @@ class LogEvidence(NamedTuple):
     """Evidence of a log beside its errors."""
 
     name: str
-    noise: TiltNoise
+    noise: MeasurementNoise
     """Sensor noise that the observer assumed."""
     noise_by_the_log: Mapping[str, SummaryValue]
     """White noise that the log shows, as `--json` prints it."""

@@ -21,7 +21,7 @@ from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.runs.open_loop import replay
-from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
+from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.scenario.time_grid import common_period
 from cmg_mj.stages.push import Window, inside, push_windows
@@ -150,7 +150,7 @@ def recorder(requests: Sequence[RecordingRequest], *, warm_up_s: float = WARM_UP
     ]
     recordings = {
         key: _recorded(request[0], job.experiments[0], result, warm_up_s)
-        for (key, request), job, result in zip(distinct.items(), jobs, run_side_by_side(jobs), strict=True)
+        for (key, request), job, result in zip(distinct.items(), jobs, run_jobs(jobs), strict=True)
     }
 
     def recorded(scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None = None) -> Recorded:

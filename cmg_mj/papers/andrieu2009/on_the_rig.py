@@ -12,7 +12,7 @@ from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.result import Result
 from cmg_mj.runs.experiment import Experiment, prepare
-from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
@@ -34,7 +34,7 @@ def claims(on_share: OnShare) -> list[Claim]:
     """Judge the velocity RMS errors beside those of aranovskiy2020's observers; how idle the update of the gain is."""
     on_share(0.0)
     runs = [run_of(experiment(label, SEED), WORLDS) for label in KINDS]
-    results = dict(zip(KINDS, run_side_by_side(runs), strict=True))
+    results = dict(zip(KINDS, run_jobs(runs), strict=True))
     return [comparison_claim(results), idle_claim(results["high_gain"])]
 
 

@@ -18,7 +18,7 @@ from cmg_mj.papers.claim import Assumption, Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 # --- inverse optimality -----------------------------------------------------------------------------------------
@@ -190,7 +190,7 @@ def find_rests(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> li
     for case, worlds, extra in cases:
         observer, settings = CASES[case]
         runs.append(run_of(push_recovery(observer, seed, [*common, *settings, *extra], DURATION_S), worlds))
-    results = run_side_by_side(runs)
+    results = run_jobs(runs)
     return [_average(CASES[case][0], trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)]
 
 

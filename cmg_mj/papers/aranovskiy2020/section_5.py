@@ -17,7 +17,7 @@ from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import KEYS
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
-from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
@@ -101,7 +101,7 @@ def close_loops(
     """Close the loop on each observer, a push at 2 s."""
     settings = [f'controller.angle_source="{angles}"']
     runs = [run_of(push_recovery(observer, seed, settings, duration_s), worlds) for observer in observers]
-    return dict(zip(observers, run_side_by_side(runs), strict=True))
+    return dict(zip(observers, run_jobs(runs), strict=True))
 
 
 def figure(name: str, results: Mapping[str, Result]) -> Claim:
@@ -231,7 +231,7 @@ FORMS: Mapping[str, tuple[str, Sequence[str]]] = {
 def errors_of(forms: Sequence[str], worlds: int, seed: int) -> dict[str, np.ndarray]:
     """Close the loop on some of `FORMS` as Figs 5 to 7 do: velocity RMS errors, (n_worlds,) [rad/s]."""
     experiments = [push_recovery(observer, seed, settings) for observer, settings in (FORMS[form] for form in forms)]
-    results = run_side_by_side([run_of(experiment, worlds) for experiment in experiments], keep_trajectory=False)
+    results = run_jobs([run_of(experiment, worlds) for experiment in experiments], keep_trajectory=False)
     return {form: result.values(JUDGED) for form, result in zip(forms, results, strict=True)}
 
 

@@ -12,7 +12,7 @@ from cmg_mj.papers.aranovskiy2020.rig import push_recovery
 from cmg_mj.papers.claim import Assumption, Claim, OnShare
 from cmg_mj.papers.retuned import Pushes, Studies, figures_of, tune_all
 from cmg_mj.results.intervals import Interval, ratio_interval
-from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.view.plots.figure import Line, Panel, Picture
@@ -122,7 +122,7 @@ def loop_ratios(
         tuned_settings = [f"observer.{name}={json.dumps(level.parameters[name])}" for name in names]
         for settings in ([], tuned_settings):
             runs.append(run_of(push_recovery(observer, seed, [*push, noise, *settings]), worlds))
-    errors = [result.values("velocity_rms_error_rad_s") for result in run_side_by_side(runs, keep_trajectory=False)]
+    errors = [result.values("velocity_rms_error_rad_s") for result in run_jobs(runs, keep_trajectory=False)]
     return [ratio_interval(table, tuned) for table, tuned in zip(errors[::2], errors[1::2], strict=True)]
 
 

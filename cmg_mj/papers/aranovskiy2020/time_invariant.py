@@ -10,7 +10,7 @@ from cmg_mj.papers.aranovskiy2020.paper import printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
 from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim
-from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
+from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED, WORLDS = 72_002, 5
@@ -87,7 +87,7 @@ def find_fates(
     biases = {"equilibrium_bias_deg": [e for e in biases_deg for _ in range(worlds)]}
     numbers = [*range(worlds)] * len(biases_deg)
     experiments = [push_recovery(observer, seed, settings, duration_s) for observer, settings in observers]
-    results = run_side_by_side(
+    results = run_jobs(
         [BatchJob(experiment.with_varied(biases), numbers) for experiment in experiments], keep_trajectory=False
     )
     return [

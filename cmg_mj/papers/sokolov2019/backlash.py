@@ -16,7 +16,7 @@ from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
-from cmg_mj.runs.side_by_side import run_of, run_side_by_side
+from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.stages.backlash import ARCMIN_A_DEGREE
 
 GAP_ARCMIN = 20.0
@@ -54,7 +54,7 @@ def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -
 
 def find_cycles(releases: Sequence[Experiment]) -> list[Cycle]:
     """Find the cycles that rigs let go end in, one world each: size and main frequency over the last window."""
-    return [_cycle(trajectory_of(result)) for result in run_side_by_side([run_of(release, 1) for release in releases])]
+    return [_cycle(trajectory_of(result)) for result in run_jobs([run_of(release, 1) for release in releases])]
 
 
 def _cycle(trajectory: Trajectory) -> Cycle:

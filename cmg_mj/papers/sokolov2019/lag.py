@@ -16,7 +16,7 @@ from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, estimator, experiment,
 from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
-from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
+from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 # --- releases on MuJoCo -----------------------------------------------------------------------------------------
@@ -64,7 +64,7 @@ def releases(servos: Mapping[str, Sequence[Servo]], settings: Sequence[str] = ()
         base = experiment([*RELEASE, FINE, *settings], observer)
         rigs = [replace(base, plant=make_rig(base.scenario.plant, servo)) for servo in observer_servos]
         runs.append(BatchJob(rigs, range(len(rigs))))
-    results = run_side_by_side(runs)
+    results = run_jobs(runs)
     return {observer: trajectory_of(result) for observer, result in zip(servos, results, strict=True)}
 
 

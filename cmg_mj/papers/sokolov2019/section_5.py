@@ -16,7 +16,7 @@ from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import NO_NOISE, PUSH_AND_NOISE, experiment
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.result import Result
-from cmg_mj.runs.side_by_side import BatchJob, run_side_by_side
+from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 from cmg_mj.view.plots.figure import Picture
 
 SEED, WORLDS = 83_000, 20
@@ -60,7 +60,7 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Loops:
         "gimbal_backlash_arcmin": np.repeat([*[0.0] * len(BIASES_DEG), GAP_ARCMIN], worlds),
     }
     runs = [BatchJob(experiment(settings, name).with_varied(values), [*range(worlds)] * cases) for name in OBSERVERS]
-    by_case = zip(*(result.split(cases) for result in run_side_by_side(runs)), strict=True)
+    by_case = zip(*(result.split(cases) for result in run_jobs(runs)), strict=True)
     *no_gap, gap = (dict(zip(OBSERVERS, results, strict=True)) for results in by_case)
     on_share(0.8)
     quiet = {name: experiment([*settings, *NO_NOISE], name).run() for name in OBSERVERS}

@@ -14,7 +14,7 @@ from cmg_mj.features.mounting import mount
 from cmg_mj.features.mounting.limits import prospects
 from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.plant.axis import find_axis
-from cmg_mj.plant.elements import axes_of
+from cmg_mj.plant.elements import axis_modules
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.plant.tilt_line import SupportLine
 from cmg_mj.runs.experiment import prepare
@@ -124,7 +124,7 @@ def test_the_line_on_the_floor_is_a_hinge_in_its_place() -> None:
     result = mount(ROBOTS["bicycle"].path, **ROBOTS["bicycle"].options)
     model = result.spec.compile()
     key = model.key("equilibrium").id
-    free = find_axis(model, key, "", axes_of(model)[""])
+    free = find_axis(model, key, "", axis_modules(model)[""])
     assert isinstance(free.line, SupportLine)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, key)
@@ -135,7 +135,7 @@ def test_the_line_on_the_floor_is_a_hinge_in_its_place() -> None:
     frame.add_joint(name="roll", type=mujoco.mjtJoint.mjJNT_HINGE, pos=free.point, axis=free.direction)
     spec.key("equilibrium").qpos, spec.key("equilibrium").qvel = [0.0, *qpos[7:]], [0.0, *qvel[6:]]
     hinged = spec.compile()
-    hinge_axis = find_axis(hinged, hinged.key("equilibrium").id, "", axes_of(hinged)[""])
+    hinge_axis = find_axis(hinged, hinged.key("equilibrium").id, "", axis_modules(hinged)[""])
     for name in ("J1", "J2", "J_d", "omega_d", "gravity_torque"):
         expected = getattr(hinge_axis.reduced, name)
         assert getattr(free.reduced, name) == pytest.approx(expected, rel=1e-5, abs=1e-6 * hinge_axis.reduced.J1), name

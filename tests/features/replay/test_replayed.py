@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
-from cmg_mj.core.tilt import RadialTilt, TiltNoise
+from cmg_mj.core.tilt import MeasurementNoise, RadialTilt
 from cmg_mj.core.types import needs
 from cmg_mj.features.replay.log import Log, ReadOptions
 from cmg_mj.features.replay.log_replay import NO_MODEL, model_of, observer_inputs, replay_log, replay_prepared
@@ -102,7 +102,7 @@ def test_observers_that_need_no_model_do_not_look_at_it() -> None:
     """They are given one of NaN; whatever is made of it is no number."""
     for kind in OBSERVERS:
         if "model" not in needs(OBSERVER_CLASSES.find(kind)):
-            observer = make_observer(kind, DT, NO_MODEL, TiltNoise(1e-3, 1.0, 0.5))
+            observer = make_observer(kind, DT, NO_MODEL, MeasurementNoise(1e-3, 1.0, 0.5))
             _, estimate = observer.step(observer.init(Measurement(0.1, 0.0, 0.2)), Measurement(0.11, 0.0, 0.2), 0.0)
             assert np.isfinite(list(estimate)).all(), kind
 

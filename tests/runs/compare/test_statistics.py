@@ -15,7 +15,7 @@ import pytest
 from scipy import stats
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.baselines import BASELINES
 from cmg_mj.results.intervals import Interval, format_interval, in_line
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.runs import api
@@ -40,7 +40,7 @@ def entry(
     """An observer with these errors in its worlds, some of which fell."""
     base_figures = {"settle_time_s": 1.0, "tilt_rms_deg": 0.5, PUSH_ERROR: None, FIT: None} | (figures or {})
     rate = {ERROR: 0.2, PUSH_ERROR: None, FIT: 0.0}
-    references = dict.fromkeys(REFERENCES, rate) | {"mems_gyro": rate | {ERROR: 0.01}}
+    references = dict.fromkeys(BASELINES, rate) | {"mems_gyro": rate | {ERROR: 0.01}}
     summaries = [{**base_figures, ERROR: error, "references": copy.deepcopy(references)} for error in errors]
     outcomes = [
         Outcome("fell" if i in fallen_worlds else "done", 3.0 if i in fallen_worlds else 9.0)
@@ -125,8 +125,8 @@ def test_references_are_open_loop_in_the_run_of_the_best_in_the_push_window() ->
     slow = entry("ltv", [0.1, 0.1], figures={PUSH_ERROR: 0.4})
     quick = entry("linear", [0.2, 0.2], figures={PUSH_ERROR: 0.3})
     rows = rows_by_name([slow, quick])
-    assert list(rows) == ["ltv", "linear", *REFERENCES]
-    assert {rows[name]["in_loop_of"] for name in REFERENCES} == {"linear"}
+    assert list(rows) == ["ltv", "linear", *BASELINES]
+    assert {rows[name]["in_loop_of"] for name in BASELINES} == {"linear"}
     assert "in_loop_of" not in rows["linear"]
     calm = rows_by_name([entry("ltv", [0.1, 0.1]), entry("linear", [0.2, 0.2])])
     assert calm["zero"]["in_loop_of"] == "ltv"
@@ -163,12 +163,12 @@ def compare_two() -> tuple[ComparedObserver, ...]:
 
 def test_the_table_has_every_world_of_every_row() -> None:
     table = worlds_table(compare_two())
-    assert table.num_rows == (2 + len(REFERENCES)) * 3
-    assert table["observer"].to_pylist() == [n for n in ("ltv", "luenberger", *REFERENCES) for _ in range(3)]
-    assert table["world"].to_pylist() == [0, 1, 2] * (2 + len(REFERENCES))
+    assert table.num_rows == (2 + len(BASELINES)) * 3
+    assert table["observer"].to_pylist() == [n for n in ("ltv", "luenberger", *BASELINES) for _ in range(3)]
+    assert table["world"].to_pylist() == [0, 1, 2] * (2 + len(BASELINES))
     assert set(table["seed"].to_pylist()) == {3}
-    assert table["outcome"].to_pylist() == ["done"] * 3 + ["fell"] * 3 + ["done"] * 3 * len(REFERENCES)
-    assert table["in_loop_of"].to_pylist() == [None] * 6 + ["ltv"] * 3 * len(REFERENCES)
+    assert table["outcome"].to_pylist() == ["done"] * 3 + ["fell"] * 3 + ["done"] * 3 * len(BASELINES)
+    assert table["in_loop_of"].to_pylist() == [None] * 6 + ["ltv"] * 3 * len(BASELINES)
     assert set(compare_two()[0].result.summaries[0]) - {"references", "open_loop_observers"} <= set(table.column_names)
 
 

@@ -16,7 +16,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.results.baselines import REFERENCES
+from cmg_mj.results.baselines import BASELINES
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.summary_keys import KEYS, capitalised, format_figure, heading
 from cmg_mj.results.trajectory import Trajectory
@@ -326,7 +326,7 @@ def test_pages_name_and_layout(path: Path, run: Run) -> None:
     assert rows[2:] == [capitalised(heading(key)) for key in KEYS if key in run.summary]
     assert format_figure("tilt_rms_deg", run.summary["tilt_rms_deg"]) in summary
     (observers,) = static(path, "/observers", "TextDocument:text")
-    assert all(name in observers for name in ("homogeneous", "linear", *REFERENCES))
+    assert all(name in observers for name in ("homogeneous", "linear", *BASELINES))
     assert static(path, "/__properties", "RecordingInfo:name") == ["A title: homogeneous"]
     assert len(RrdReader(path).blueprints()) == 1
     assert {name for chunk in RrdReader(path).stream() for name in chunk.timeline_names} == {"sim_time"}
