@@ -52,7 +52,10 @@ def complaints(root: Any, errors: Iterable[Mapping[str, Any]], fields: Mapping[s
             location.pop()  # what is wrong with an element is wrong with its list
         where = shortened(".".join(map(str, location)))
         if kind in ("extra_forbidden", "unexpected_keyword_argument"):
-            clause = f"no such field; {nearest(str(location[-1]), _section(_type_at(root, location[:-1])))}"
+            elsewhere = {f"{section}_{name}": f"{section}.{name}" for section, name in _dotted(root)}
+            name, known = str(location[-1]), _section(_type_at(root, location[:-1]))
+            guess = f"did you mean {elsewhere[name]}?" if name in elsewhere else nearest(name, known)
+            clause = f"no such field; {guess}"
         elif kind in ("missing", "missing_argument") and isinstance(detail["loc"][-1], str):
             clause = "missing"
         elif kind == "value_error" or not location:
@@ -67,6 +70,11 @@ def complaints(root: Any, errors: Iterable[Mapping[str, Any]], fields: Mapping[s
             where += f" = {shown(value)}"
         clauses[where] = f"{clauses[where]}, or {clause.removeprefix('must be ')}" if where in clauses else clause
     return [f"{where}: {clause}" if where else clause for where, clause in clauses.items()]
+
+
+def _dotted(root: Any) -> Iterator[tuple[str, str]]:
+    """List the fields of the sections of a class, each with its section."""
+    return ((section, name) for section, annotation in fields_of(root).items() for name in _section(annotation))
 
 
 _WORDS_OF_TYPE = {

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, shown
 from cmg_mj.core.reduced_model import MARGIN, ReducedModel, hold_matrices, is_hurwitz
-from cmg_mj.inputs.features import entries
+from cmg_mj.inputs.features import FEATURES
 from cmg_mj.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.linear.loop import ClosedLoop, sensors_used
 from cmg_mj.linear.plant import linear_reduced, linearise
@@ -320,7 +320,7 @@ def _sliding_hint(scenario: Scenario, law: object, plant: Plant) -> str | None:
 SIMULATED = (
     "plant.accelerometer_inner_misplaced_mm",
     "plant.accelerometer_outer_misplaced_mm",
-    *entries("edit"),
+    *(name for name, feature in FEATURES.items() if feature.edit),
 )
 """The properties that the plant's MuJoCo model itself has, whoever steps it."""
 
