@@ -43,7 +43,10 @@ class Sensors(Protocol):
 
 
 class CommandStage(Protocol):
-    """An effect on the gimbal rate: on the law's command, which observers are told, or behind it in the servo."""
+    """An effect on the gimbal rate: on the law's command, which observers are told, or behind it in the servo.
+
+    The law's limit lies before it: a stage on the command keeps to that limit itself.
+    """
 
     def __call__(self, u: Scalar, /) -> Scalar:
         """Return the rate with the effect, once a control tick [rad/s]."""
@@ -51,7 +54,7 @@ class CommandStage(Protocol):
 
 
 class MemoryStage(Protocol):
-    """An effect on the law's memory before its step."""
+    """An effect on the law's memory before its step. It outlives a reset, and so has no memory of its own."""
 
     def __call__(self, step: int, estimate: Sequence[Scalar], memory: State, /) -> State:
         """Return the memory with the effect, once a control tick.
@@ -110,7 +113,7 @@ class Controller:
 
     Args:
         observer: The observer whose estimate the law uses.
-        law: The control law; its `dt` is the control period, beyond its `rate_limit` no command goes.
+        law: The control law; its `dt` is the control period, and what it decides is limited to its `rate_limit`.
         sensors: The sensors between the ideal readings and the controller.
         plant: The controller's knowledge of the plant.
         seed: Seed of the sensors' noise.

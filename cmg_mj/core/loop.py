@@ -53,7 +53,7 @@ class Physics(Protocol):
         ...
 
     def reading(self, v: Joints) -> Reading:
-        """Compute what perfect sensors show at the present state, with the torques and commands that hold there."""
+        """Compute what perfect sensors show at the present state, with the torques and the last commands in force."""
         ...
 
     def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
@@ -65,7 +65,7 @@ class Physics(Protocol):
         ...
 
     def command(self, u: Scalar, axis: int = 0) -> None:
-        """Set the gimbal rates of an axis, each module in its direction [rad/s]."""
+        """Set the rate of an axis' gimbal servos, whose setpoints it moves, each module in its direction [rad/s]."""
         ...
 
     def advance(self, steps: int, /) -> None:
@@ -122,10 +122,15 @@ class ControlLoop:
         disturbances: What acts from outside.
         fall_angle: A world that tilts farther is stepped no more [rad].
 
+    Where MuJoCo itself calls the controller, the decision falls in `advance`: its tick is there only afterwards.
+
     Attributes:
+        takes_samples: Whether the loop takes the samples that are due; False if MuJoCo calls the controller.
         step: Number of the physics step at the present instant.
         endings: How worlds ended that are stepped no more, by their index.
     """
+
+    takes_samples = True
 
     def __init__(
         self,
@@ -143,7 +148,7 @@ class ControlLoop:
         self._fall_angle = fall_angle
         self._steps = 0
         self._parts = list(enumerate(controller.parts))
-        self._sample = self._sampler()
+        self._sample: Callable[[int, Any], None] | None = controller.sample if self.takes_samples else None
 
     def ticks(self) -> Iterator[ControlTick]:
         """Go from control tick to control tick, until the instants or the running worlds are at their end."""
@@ -192,7 +197,3 @@ class ControlLoop:
     def advance(self) -> None:
         """Take the physics to the next instant."""
         self.physics.advance(self._steps)
-
-    def _sampler(self) -> Callable[[int, Any], None] | None:
-        """Return what takes the samples that are due, of one axis or several; None if something else does."""
-        return self.controller.sample

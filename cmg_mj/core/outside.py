@@ -15,7 +15,7 @@ class Outside(NamedTuple):
     torques: Sequence[Scalar]
     """About each axis, one for all worlds or (n_worlds,) [N m]."""
     acceleration: Sequence[Scalar] | None = None
-    """The pivot's: x, y, z, likewise; None while nothing moves it [m/s^2]."""
+    """The pivot's: x, y, z, likewise; None: it stays what it was, at first zero [m/s^2]."""
 
 
 class Disturbance(Protocol):
@@ -28,11 +28,14 @@ class Disturbance(Protocol):
 
     @property
     def accelerates(self) -> bool:
-        """Whether it accelerates the pivot."""
+        """Whether it accelerates the pivot: gravity of the plant's model then changes."""
         ...
 
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
-        """Add what acts from a physics step on, for so many steps. Torques that stay are the same sequence."""
+        """Add what acts from a physics step on, held or averaged for so many steps, until the next instant.
+
+        Torques that stay are the same sequence.
+        """
         ...
 
 

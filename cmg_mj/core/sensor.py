@@ -62,8 +62,8 @@ class Timing(NamedTuple):
 class SensorStage(Protocol):
     """An effect on a sensor's signal.
 
-    A stage may have a `timing`, and a method `watch(step, period, ideal)` that is called at every instant, with the
-    physics steps between the samples that its part takes.
+    A stage may have a `timing`, and a method `watch(step, period, ideal)` that is called at every instant of its
+    part, with the physics steps between the samples that the part takes.
     """
 
     def __call__(self, signal: Any, ideal: IdealReading, /) -> Any:

@@ -68,7 +68,7 @@ class Observer(Protocol):
     """
 
     def init(self, y: Measurement) -> State:
-        """Return the state at the first sample. The estimate of that sample is (y1, 0, y2)."""
+        """Return the state at the first sample. The estimate of that sample is (y1, 0, y2), extra signals are 0."""
         ...
 
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:

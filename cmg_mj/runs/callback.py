@@ -136,8 +136,7 @@ class ControlCallback:
 class CallbackLoop(ControlLoop):
     """The loop of a run in which MuJoCo calls the controller, while `control_callback` is in force."""
 
-    def _sampler(self) -> None:
-        """Leave the samples to the callback."""
+    takes_samples = False
 
     def decide(self) -> None:
         """Leave the decision to the callback, which takes it at the first of the next physics steps."""

@@ -184,7 +184,7 @@ def actuator_torques(model: mujoco.MjModel, run: Motion, command: np.ndarray) ->
         _, stiffness, damping = model.actuator_biasprm[actuator, :3]
         torque = model.actuator_gainprm[actuator, 0] * setpoints
         torque = torque + stiffness * run.qpos[..., joint] + damping * run.qvel[..., joint]
-        limits = model.actuator_forcerange[actuator] if model.actuator_forcelimited[actuator] else (None, None)
+        limits = model.actuator_forcerange[actuator] if model.actuator_forcelimited[actuator] else (-np.inf, np.inf)
         torques[..., joint] = np.clip(torque, *limits)
     return torques
 
