@@ -167,7 +167,7 @@ class ClosedLoop:
         ]
         self.inputs = [*INPUTS, *(f"{INPUTS[-1]}_{tick}" for tick in range(1, self.ticks))]
         rows = np.eye(len(self.states) + len(self.inputs))
-        self._rows = dict(zip((*self.states, *self.inputs), rows, strict=True))
+        self._start = dict(zip((*self.states, *self.inputs), rows, strict=True))
         self._y1_slopes = _measured_slopes(design)
         bandwidth = design.scenario.sensors.accelerometer.bandwidth_hz
         self._low_pass = coefficients(bandwidth, INSIDE_HZ) if bandwidth else [[0.0] * 3] * 2
@@ -191,8 +191,8 @@ class ClosedLoop:
 
         With several ticks in a period their commands and gimbal rates are further signals.
         """
-        rows, plant = self._rows, self._plant
-        start = dict(rows)
+        start, plant = self._start, self._plant
+        rows = self._rows = dict(start)
         x, turned, push = np.array([rows[name] for name in plant.names]), rows["u_before"], rows["push_n_m"]
         taken = {
             (channel.name, channel.taken(tick) % self._steps) for channel in self._channels for tick in self._tick_steps
@@ -202,6 +202,7 @@ class ClosedLoop:
         hold = cache(lambda steps: plant.hold(steps * self._timestep))
         latched: dict[tuple[str, int], np.ndarray] = {}
         shown, commands = [], []
+        rate_noises = [name for name in self.inputs if name.startswith(INPUTS[-1])]  # one a tick
         for step, after in zip(sorted(instants), [*sorted(instants)[1:], self._steps], strict=True):
             motion = plant.C @ x + plant.D @ np.array([turned, push])
             ideal = self._ideal(motion)
@@ -212,14 +213,15 @@ class ClosedLoop:
                 if (channel.name, step) in taken:
                     latched[channel.name, step] = value
             if step in self._tick_steps:
-                readings = {
-                    channel.name: latched[channel.name, newest]
-                    if (newest := channel.taken(step)) >= 0
-                    else start[self._late[channel.name, newest % self._steps, -(newest // self._steps)]]
-                    for channel in self._channels
-                }
+                readings = {}
+                for channel in self._channels:
+                    periods_later, taken_at = divmod(channel.taken(step), self._steps)
+                    if periods_later == 0:
+                        readings[channel.name] = latched[channel.name, taken_at]
+                    else:  # taken in an earlier period
+                        readings[channel.name] = start[self._late[channel.name, taken_at, -periods_later]]
                 u, estimate = self._decide(motion, readings)
-                turned = u + rows[[INPUTS[-1], *self.inputs[len(INPUTS) :]][len(commands)]]
+                turned = u + rows[rate_noises[len(commands)]]
                 commands.append(u)
                 shown = shown or [*motion[:3], u, *estimate]
             F, G = hold(after - step)
@@ -229,10 +231,11 @@ class ClosedLoop:
             rows[reading] = latched[name, step] if age == 1 else start[self._late[name, step, age - 1]]
         n = len(self.states)
         ahead, out = np.array([rows[name] for name in self.states]), np.array([*shown, *commands[1:]])
-        names = [*OUTPUTS, *(f"estimated_{name}" for name in (*OUTPUTS[:3], *self._extra))]
-        outputs = [*names[: 4 if self._true_state else None], *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
-        kept = needed_states(ahead[:, :n], out[:, :n])
-        return ahead[kept][:, :n][:, kept], ahead[kept][:, n:], out[:, :n][:, kept], out[:, n:], kept, outputs
+        estimates = [] if self._true_state else [f"estimated_{name}" for name in (*OUTPUTS[:3], *self._extra)]
+        outputs = [*OUTPUTS, *estimates, *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
+        A, B, C, D = ahead[:, :n], ahead[:, n:], out[:, :n], out[:, n:]
+        kept = needed_states(A, C)
+        return A[np.ix_(kept, kept)], B[kept], C[:, kept], D, kept, outputs
 
     def _ideal(self, motion: np.ndarray) -> dict[str, np.ndarray]:
         """Return what perfect sensors show of the plant's outputs, to first order: tangential forces, y2, the gyro."""

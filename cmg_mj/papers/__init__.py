@@ -54,9 +54,10 @@ def check_installed(papers: Iterable[str]) -> None:
     Raises:
         InputError: A package is missing.
     """
-    if (needing := sorted(SYMBOLIC.intersection(papers))) and find_spec("sympy") is None:
-        needing = " and ".join(needing)
-        raise InputError(f'{needing}: sympy is not installed: python -m pip install "cmg_mj[papers]"')
+    symbolic = sorted(SYMBOLIC.intersection(papers))
+    if symbolic and find_spec("sympy") is None:
+        names = " and ".join(symbolic)
+        raise InputError(f'{names}: sympy is not installed: python -m pip install "cmg_mj[papers]"')
 
 
 def sections_of(paper: str) -> list[Section]:

@@ -236,21 +236,14 @@ def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:
     """
     rows = comparison_rows(compared)
     keys = dict.fromkeys(key for entry in compared for key in entry.result.summaries[0] if key in KEYS)
-    leaders = {
-        key: ComparisonRow(leader) for key in keys if KEYS[key].better and (leader := best_observer(compared, key))
-    }
-    return [
-        finite(
-            row.summary
-            | {
-                "intervals": {key: _ends(row.values(key), KEYS[key].positive) for key in keys},
-                "minus_best": {
-                    key: _paired_difference(row, leader, key) for key, leader in leaders.items() if row != leader
-                },
-            }
-        )
-        for row in rows
-    ]
+    best = {key: best_observer(compared, key) for key in keys if KEYS[key].better}
+    leaders = {key: ComparisonRow(observer) for key, observer in best.items() if observer}
+    standing = []
+    for row in rows:
+        intervals = {key: _ends(row.values(key), KEYS[key].positive) for key in keys}
+        minus_best = {key: _paired_difference(row, leader, key) for key, leader in leaders.items() if row != leader}
+        standing.append(finite(row.summary | {"intervals": intervals, "minus_best": minus_best}))
+    return standing
 
 
 def worlds_table(compared: Sequence[ComparedObserver]) -> pa.Table:

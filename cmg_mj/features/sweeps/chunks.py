@@ -76,23 +76,27 @@ def compute(
 
         Each trial is through or has raised by itself, so that no row depends on another's.
         """
-        again = list(batch)
+        stopped = run_once(batch, tick)
+        half = (len(stopped) + 1) // 2
+        for part in (stopped[:half], stopped[half:]):
+            if part:
+                run({trial: batch[trial] for trial in part}, tick)
+
+    def run_once(batch: Mapping[Trial, Experiment], tick: OnProgress) -> list[Trial]:
+        """Run trials in one batch; return those that another one may have stopped."""
+        worlds = [world for _, world in batch]
         try:
-            worlds = [world for _, world in batch]
             result = run_batch(list(batch.values()), worlds, keep_trajectory=False, on_progress=tick, threads=threads)
         except Exception as error:  # a user's observer may fail in any way
-            if len(batch) == 1:
-                results.update(dict.fromkeys(again, unfinished("stopped", raised(error))))
-                return
-        else:
-            if any(outcome.kind == "interrupted" for outcome in result.outcomes):
-                raise KeyboardInterrupt
-            rows = result.rows(observer if observer in study.baselines else None)
-            results.update(zip(batch, rows, strict=True))
-            again = [trial for trial, end in zip(batch, result.outcomes, strict=True) if end.with_others]
-        half = (len(again) + 1) // 2
-        for part in filter(None, (again[:half], again[half:])):
-            run({trial: batch[trial] for trial in part}, tick)
+            if len(batch) > 1:
+                return list(batch)
+            results.update(dict.fromkeys(batch, unfinished("stopped", raised(error))))
+            return []
+        if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+            raise KeyboardInterrupt
+        rows = result.rows(observer if observer in study.baselines else None)
+        results.update(zip(batch, rows, strict=True))
+        return [trial for trial, outcome in zip(batch, result.outcomes, strict=True) if outcome.with_others]
 
     done = len(results) / len(trials)
     for batch in batches.values():

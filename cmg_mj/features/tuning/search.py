@@ -109,9 +109,8 @@ def numbers_of(
             empty.
     """
     integers = {p.name for p in OBSERVER_CLASSES.takes(kind).values() if p.annotation in (int, bool, "int", "bool")}
-    candidates = [
-        TunedScalar(*leaf) for name, value in values.items() if name not in integers for leaf in _leaves(value, name)
-    ]
+    real = {name: value for name, value in values.items() if name not in integers}
+    candidates = [TunedScalar(place, start) for name, value in real.items() for place, start in _leaves(value, name)]
     if not candidates:
         raise InputError(f"observer {kind} has no number to tune")
     allowed = {name for number in candidates for name in (number.parameter, number.name)}
@@ -125,8 +124,11 @@ def numbers_of(
             raise InputError(f"--range {name}: not tuned; {nearest(name, names, 'tuned')}")
         if not 0.0 < low < high < math.inf:
             raise InputError(f"--range {name}={low:g}:{high:g}: must be two positive numbers, the smaller first")
-    ends = [ranges[n.name] if n.name in ranges else _accepted_range(n, values, make) for n in numbers]
-    return [replace(number, low=low, high=high) for number, (low, high) in zip(numbers, ends, strict=True)]
+    bounded = []
+    for number in numbers:
+        low, high = ranges[number.name] if number.name in ranges else _accepted_range(number, values, make)
+        bounded.append(replace(number, low=low, high=high))
+    return bounded
 
 
 def _leaves(value: ParameterValue, name: str) -> Iterator[tuple[str, float]]:

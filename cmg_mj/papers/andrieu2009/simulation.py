@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.signal import detrend
@@ -138,15 +138,30 @@ def replay(kind: str, run: Run, model: Bioreactor, *, p: float = P, b: float = B
         x1, x2 = model.limit(y[0], x[0])
         return (x1,), (x2,)
 
+    def Omega(u: Any, y: Signals, x: Signals) -> Any:
+        if kind == CONSTANT:
+            return 0.0 * y[0]
+        if kind == UPDATED:
+            return model.Omega1(u, y[0], x[0])
+        return model.Omega2(u, y[0], x[0], P)
+
     f = (lambda u, y, x: -u * y[0], lambda u, y, x: model.f2(u, y[0], x[0]))
-    linear, phi = BiLimitCorrection((L1, L2)), (PHI1, PHI2, PHI3)
-    constant_L = PHI2 + PHI3 / PHI1 * model.df2_max  # the gain to which (8) tends with df2_max for Omega
-    correction, Omega, b, phi = {
-        CONSTANT: (linear, lambda u, y, x: 0.0 * y[0], 1.0, (1.0, constant_L, 1.0)),
-        UPDATED: (linear, lambda u, y, x: model.Omega1(u, y[0], x[0]), 1.0, phi),
-        HOMOGENEOUS: (BiLimitCorrection((L1, L2), p), lambda u, y, x: model.Omega2(u, y[0], x[0], P), b, phi),
-    }[kind]
-    observer = UpdatedHighGain(float(run.t[1]), f, correction, Omega, b, *phi, saturate=saturate)
+    phi1, phi2, phi3 = PHI1, PHI2, PHI3
+    if kind == CONSTANT:  # L stays at the gain to which (8) tends with df2_max for Omega
+        phi1, phi2, phi3 = 1.0, PHI2 + PHI3 / PHI1 * model.df2_max, 1.0
+    if kind != HOMOGENEOUS:
+        p, b = 0.0, 1.0  # a linear correction
+    observer = UpdatedHighGain(
+        dt=float(run.t[1]),
+        f=f,
+        correction=BiLimitCorrection((L1, L2), p),
+        Omega=Omega,
+        b=b,
+        phi1=phi1,
+        phi2=phi2,
+        phi3=phi3,
+        saturate=saturate,
+    )
     _, x2 = model.limit(run.start[0], model.to_x2(*run.start))
     x, L = observer.follow((run.y,), (run.y[0], x2), run.u[:, 0].tolist())
     eta2_error = run.eta[1] - model.to_eta2(*model.limit(*x))
@@ -200,10 +215,11 @@ def study(seeds: int, seed: int = 0) -> Study:
     t, u, *whole_run = run_plant([*range(seed, seed + seeds)] * 2 + [seed], [NOISE] * seeds + [LOUD] * seeds + [0.0])
     model = Bioreactor(HBAR_OF_OBSERVERS)
     whole_replays = replays(Run(t, u, *whole_run), model)
-    nominal, loud, quiet = (
-        {kind: Replay(*(a[..., part] for a in whole)) for kind, whole in whole_replays.items()}
-        for part in (slice(seeds), slice(seeds, 2 * seeds), slice(2 * seeds, None))
-    )
+
+    def columns(part: slice) -> Replays:
+        return {kind: Replay(*(a[..., part] for a in whole)) for kind, whole in whole_replays.items()}
+
+    nominal, loud, quiet = columns(slice(seeds)), columns(slice(seeds, 2 * seeds)), columns(slice(2 * seeds, None))
     run = Run(t, u, *(a[..., :seeds] for a in whole_run))
     rate = model.f2_slope(u, *model.limit(run.eta[0], Bioreactor(HBAR).to_x2(*run.eta)))
     return Study(run, nominal, loud, quiet, replays(run, Bioreactor(HBAR)), rate)

@@ -96,9 +96,14 @@ def quotient_of_6(exponent: float, p: float, size: float) -> float:
 
 def exponent_of_6() -> Claim:
     """Judge the exponent in (6), (1 - d_inf (n - i))/(1 - d_inf (n - j)) as printed: for n = i = j = 2 it is 1."""
-    powers = (0.1, 0.5, 0.9)
-    quotients = {str(p): quotient_of_6(1.0 + p, p, 1e8) for p in powers}
-    printed = {str(p): [quotient_of_6(1.0, p, size) for size in (1e4, 1e8)] for p in powers}
+    n = i = j = 2
+    quotients, printed = {}, {}
+    for p in (0.1, 0.5, 0.9):
+        d_inf = p
+        exponent = (1.0 - d_inf * (n - i - 1)) / (1.0 - d_inf * (n - j))  # of section 2.1 and (28)
+        printed_exponent = (1.0 - d_inf * (n - i)) / (1.0 - d_inf * (n - j))
+        quotients[str(p)] = quotient_of_6(exponent, p, 1e8)
+        printed[str(p)] = [quotient_of_6(printed_exponent, p, size) for size in (1e4, 1e8)]
     corrected = (
         "With the exponent that section 2.1 and (28) have, (1 - d_inf (n - i - 1))/(1 - d_inf (n - j)). In the copy at "
         "hand (6) has n - i for n - i - 1. "

@@ -185,11 +185,13 @@ def order(key: str, numbers: Mapping[str, Numbers], pictures: Sequence[Picture] 
 
 def orders(results: Mapping[str, Mapping[str, Result]]) -> list[Claim]:
     """Judge the ranking by each measure; the picture is the first one's."""
-    measures = {
-        key: {angles: {name: r.values(key) for name, r in by_name.items()} for angles, by_name in results.items()}
-        for key in MEASURES
-    }
-    return [order(key, of, [_measures_picture(measures)] if key == JUDGED else []) for key, of in measures.items()]
+
+    def measured(key: str) -> dict[str, dict[str, np.ndarray]]:
+        return {angles: {name: r.values(key) for name, r in by_name.items()} for angles, by_name in results.items()}
+
+    measures = {key: measured(key) for key in MEASURES}
+    pictures = {JUDGED: [_measures_picture(measures)]}
+    return [order(key, numbers, pictures.get(key, [])) for key, numbers in measures.items()]
 
 
 def _measures_picture(measures: Mapping[str, Mapping[str, Numbers]]) -> Picture:

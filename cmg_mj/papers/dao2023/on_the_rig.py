@@ -108,10 +108,8 @@ def velocity(seed: int = 51_000, worlds: int = 5, biases: Sequence[float] = (0.0
         result = run(seed, np.repeat(biases, worlds).tolist(), f"observer.kind={name}")
         by_observer[name] = or_inf(result.values("velocity_rms_error_rad_s")).reshape(-1, worlds)
     intervals = {name: [mean_interval(row) for row in rows] for name, rows in by_observer.items()}
-    means, halves = (
-        {name: [getattr(interval, part) for interval in row] for name, row in intervals.items()}
-        for part in ("mean", "half")
-    )
+    means = {name: [interval.mean for interval in row] for name, row in intervals.items()}
+    halves = {name: [interval.half for interval in row] for name, row in intervals.items()}
     remark = (
         f"As above, {worlds} worlds a bias, the observer in the loop, no push. Without bias there "
         "is nothing to learn, and learning costs noise: there, homogeneous has "
