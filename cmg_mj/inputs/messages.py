@@ -54,7 +54,8 @@ def complaints(root: Any, errors: Iterable[Mapping[str, Any]], fields: Mapping[s
         if kind in ("extra_forbidden", "unexpected_keyword_argument"):
             elsewhere = {f"{section}_{name}": f"{section}.{name}" for section, name in _dotted(root)}
             name, known = str(location[-1]), _section(_type_at(root, location[:-1]))
-            guess = f"did you mean {elsewhere[name]}?" if name in elsewhere else nearest(name, known)
+            is_elsewhere = name in elsewhere and location[0] != "axes"
+            guess = f"did you mean {elsewhere[name]!r}?" if is_elsewhere else nearest(name, known)
             clause = f"no such field; {guess}"
         elif kind in ("missing", "missing_argument") and isinstance(detail["loc"][-1], str):
             clause = "missing"

@@ -37,7 +37,7 @@ def numbers(text: str, option: str, names: Collection[str]) -> dict[str, float]:
             raise InputError(f"{option} {name}: no such number; {nearest(name, names)}")
         if name in values:
             raise InputError(f"{option} {name}: given twice")
-        values[name] = _finite(value, f"{option} {name}")
+        values[name] = finite(value, f"{option} {name}")
     return values
 
 
@@ -70,7 +70,12 @@ def parameters_of(settings: Sequence[str]) -> dict[str, dict[str, ParameterValue
     return parameters
 
 
-def _finite(text: str, where: str) -> float:
+def finite(text: str, where: str) -> float:
+    """Read a finite number.
+
+    Raises:
+        InputError: It is none.
+    """
     try:
         value = float(text)
     except ValueError:

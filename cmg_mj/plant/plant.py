@@ -302,6 +302,11 @@ def load_plant(
         except ValidationError as error:
             wrong = complaints(PlantSettings, error.errors(), fields)
             raise InputError("; ".join(f"plant.{clause}" for clause in wrong)) from error
+    for name, section in sections.items():
+        if name not in entries("edit"):
+            raise InputError(f"sections: {name!r}: no such section; {nearest(name, entries('edit'))}")
+        if not isinstance(section, entries("section")[name]):
+            raise InputError(f"sections: {name}: must be a {entries('section')[name].__name__}")
     path = find("models", settings.model, ".xml", "plant.model =", beside)
     with set_control_callback(None):  # compiling a model runs it
         return Plant(build(path, settings, sections), settings, sections, axis_settings, grid)

@@ -358,6 +358,7 @@ def parse_scenario(fields: Mapping[str, Any], source: str = "") -> Scenario:
     Raises:
         InputError: A field is unknown or not allowed. All wrong fields are named, on one line.
     """
+    fields = _moved(fields)
     try:
         # By way of JSON, pydantic takes a list for a tuple and still no text or true for a number.
         scenario = Scenario.model_validate_json(json.dumps(fields, default=as_json), strict=True).with_source(source)
@@ -389,6 +390,19 @@ def _merged(common: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str
         if isinstance(common[name], Mapping) and isinstance(overrides[name], Mapping)
     }
     return {**common, **overrides, **both}
+
+
+def _moved(fields: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Move what a file written by a run of version 0.2.0 has in [plant] to the features' own sections: `bend_share`."""
+    plant, moved = fields.get("plant"), dict(fields)
+    if "versions" not in fields or not isinstance(plant, Mapping):
+        return fields
+    for section, cls in entries("section").items():
+        old = {f"{section}_{name}": name for name in fields_of(cls)}
+        if found := {old[name]: value for name, value in plant.items() if name in old}:
+            moved[section] = found
+            plant = {name: value for name, value in plant.items() if name not in old}
+    return {**moved, "plant": plant}
 
 
 def _clauses(wrong: Iterable[str]) -> str:

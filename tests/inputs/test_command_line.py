@@ -18,7 +18,7 @@ from tests.inputs.complaints import assert_in_order, table
     (
         "field of another section",
         ["--set", "plant.bend_share=1"],
-        "plant.bend_share: no such field; did you mean bend.share?",
+        "plant.bend_share: no such field; did you mean 'bend.share'?",
     ),
     ("unknown field", ["--set", "plant.modl=1"], "with --set plant.modl=1: plant.modl: no such field; did you mean"),
     ("text for a number", ["--set", "observer.k1=abc"], "with --set observer.k1=abc: observer.k1 = 'abc': "),

@@ -50,5 +50,6 @@ def build(command: Sequence[str | Path], what: str, folder: Path | None = None) 
     if process.returncode:
         lines = process.stderr.strip().splitlines() or [f"it ended with status {process.returncode}, silently"]
         reason = next((line for line in lines if "error" in line or "undefined" in line), lines[0])
-        raise InputError(f"{what} refuses it: {reason.strip()}")
+        hint = "; CC must name a compiler for this machine" if os.environ.get("CC") else ""
+        raise InputError(f"{what} refuses it: {reason.strip()}{hint}")
     return process.stdout

@@ -113,8 +113,11 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
     }
     if compiler is not None:
         with tempfile.TemporaryDirectory() as temporary:
-            for file, text in files.items():
-                write_text(Path(temporary, file), text)
+            try:
+                for file, text in files.items():
+                    write_text(Path(temporary, file), text)
+            except OSError as error:
+                raise InputError(f"temporary folder {temporary}: cannot be written: {error.strerror}") from error
             off_by = figures["c_off_by"] = check.check_c(Path(temporary), name, compiler)
         bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]

@@ -110,14 +110,14 @@ def log_options(command: Command) -> Command:
 
     @functools.wraps(command)
     def with_options(**given: Any) -> None:
-        from cmg_mj.features.replay.log import ROLES, ReadOptions, assignments
-        from cmg_mj.observers.parameter_options import numbers
+        from cmg_mj.features.replay.log import ReadOptions, assignments
+        from cmg_mj.observers.parameter_options import finite
 
         options = {field.name: given.pop(field.name) for field in fields(ReadOptions) if field.name in given}
-        for name in ("columns", "units"):
+        for name in ("columns", "units", "scale", "offset"):
             options[name] = assignments(options[name], f"--{name}")
         for name in ("scale", "offset"):
-            options[name] = numbers(",".join(options[name]), f"--{name}", ROLES) if options[name] else {}
+            options[name] = {role: finite(text, f"--{name} {role}") for role, text in options[name].items()}
         if options["radii_m"] is not None:
             options["radii_m"] = _pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
         if options["time_range_s"] is not None:

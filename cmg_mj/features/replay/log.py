@@ -368,7 +368,9 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
             else:
                 read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False)
                 parse = pacsv.ParseOptions(delimiter=options.delimiter)
-                table = pacsv.read_csv(file, read, parse, pacsv.ConvertOptions(decimal_point=options.decimal))
+                kinds = {column.name: pa.float64() for role, column in columns.items() if role != "time"}
+                convert = pacsv.ConvertOptions(decimal_point=options.decimal, column_types=kinds)
+                table = pacsv.read_csv(file, read, parse, convert)
         headings = [heading.strip() for heading in table.column_names]
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
         text = shortened(" ".join(str(error).split()))

@@ -135,6 +135,8 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
             f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; save one of them "
             f"from Python: Trajectory.load(path).along({trajectory.axes[0]!r}).save(...)"
         )
+    if len(trajectory) < 2:
+        raise InputError(f"{path}: a run that ended before its second tick")
     given = [field for field in options.as_toml() if field != "windows_s"]
     if given:
         raise InputError(f"{path}: {given[0]} is for other logs than a run's own recording; read it with --columns")

@@ -14,6 +14,8 @@ import numpy as np
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.outside import Outside
 from cmg_mj.features.studio.settings import FieldValues, changed_fields
+from cmg_mj.inputs.messages import LARGEST
+from cmg_mj.inputs.types import MAX_TIME_S
 from cmg_mj.plant.mjcf import set_control_callback
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.tilt_line import apply_torques
@@ -279,6 +281,9 @@ class StudioSession:
     def push(self, torque: float, duration_s: float, axis: int = 0) -> None:
         """Push from now on: torque about a tilt axis by its index [N m], duration [s]."""
         step, dt = self.sync_to_time(), self.timestep
+        if not (abs(torque) <= LARGEST and 0.0 < duration_s <= MAX_TIME_S):
+            self.note = f"a push of {torque:g} N m for {duration_s:g} s: must be numbers, and at most {MAX_TIME_S:g} s"
+            return
         duration_s = max(1, round(duration_s / dt)) * dt
         self._users_pushes.append(Push(step * dt, duration_s, torque, self.plant.axis_names[axis]))
         self._start_pushes(step)

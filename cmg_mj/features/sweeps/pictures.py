@@ -25,6 +25,9 @@ TRUE_RATE = "true"
 """Name of the true rate in the loop, as baselines' trials have it, in a map."""
 COLUMNS, MAX_TICKS = 3, 6
 """Panels of a map beside each other; marked values of an axis."""
+MAX_NUMBERS = 8
+"""Cells of a row or column up to which a map's cells have their numbers."""
+LABEL = {"facecolor": "w", "alpha": 0.6, "edgecolor": "none", "pad": 1.0}
 NOBODY, EMPTY = "none, or several alike", (232, 232, 232)
 """Name and colour of a cell without a best."""
 UNKNOWN = (math.nan, math.nan, math.nan)
@@ -198,7 +201,9 @@ def draw_map(a_map: Map, observers: Sequence[str], across: VariedField, up: Vari
     for style, shares, label in (("--", a_map.falls, half), (":", a_map.ahead, ahead)):
         for name, share in shares.items():
             if (share < 0.5).any() and (share > 0.5).any():
-                best.contour(np.ma.masked_invalid(share), [0.5], colors=color[name], linestyles=style)
+                edges = [[-0.5, *range(size), size - 0.5] for size in share.shape]  # to the map's border
+                wide = np.ma.masked_invalid(np.pad(share, 1, mode="edge"))
+                best.contour(edges[1], edges[0], wide, [0.5], colors=color[name], linestyles=style)
                 handles += best.plot([], [], style, color=color[name], label=label.format(name))
     values = np.stack(list(a_map.each.values()))
     known = values[np.isfinite(values)]
@@ -206,14 +211,19 @@ def draw_map(a_map: Map, observers: Sequence[str], across: VariedField, up: Vari
     for axes, (name, own) in zip(others, a_map.each.items(), strict=False):
         axes.imshow(np.ma.masked_invalid(own), **image, **limits)
         axes.set_title(name)
+        for (row, step), value in np.ndenumerate(own) if max(own.shape) <= MAX_NUMBERS else ():
+            if math.isfinite(value):
+                axes.text(step, row, f"{value:.3g}", ha="center", va="center", fontsize=7, color="0.1", bbox=LABEL)
     figure.colorbar(others[0].images[0], ax=grid, label=a_map.label)
     for axis, varied in ((best.xaxis, across), (best.yaxis, up)):
         marks = sorted(varied.values)
         step = -(-len(marks) // MAX_TICKS)
         axis.set_ticks(range(0, len(marks), step), [f"{mark:g}" for mark in marks[::step]])
-    grid[-1, 0].set_xlabel(across.field)
+    for axes in grid.flat:
+        axes.tick_params(labelbottom=True)  # a hidden panel below would take the labels with it
+    figure.supxlabel(across.field)
     figure.supylabel(up.field)
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    figure.legend(handles=handles, loc="outside upper right", ncols=3)
     return figure
 
 

@@ -19,7 +19,7 @@ from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.summary_keys import section
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
-from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from tests.features.plugin.made import assert_same_run, needs_compiler
 
 SENSORS = ("accelerometer_inner", "accelerometer_outer", "fog")
@@ -241,3 +241,16 @@ def test_one_axis_of_two_may_bend() -> None:
     assert experiment.plant.joint_names.count(BEND_JOINT) == 1
     angles, _ = ring(experiment.plant)
     assert frequency(angles, experiment.plant.timestep) == pytest.approx(20.0, rel=1e-3)
+
+
+def test_a_run_of_0_2_0_which_had_the_bend_in_plant_runs_again() -> None:
+    written = {"versions": {"cmg_mj": "0.2.0"}, "plant": {"bend_frequency_hz": 20.0, "bend_share": 0.1}}
+    assert parse_scenario(written).section("bend") == Bend(20.0, share=0.1)
+    with pytest.raises(InputError, match=r"plant\.bend_share: no such field; did you mean 'bend\.share'"):
+        parse_scenario({"plant": {"bend_share": 0.1}})
+
+
+@pytest.mark.parametrize(("sections", "words"), [({"bent": 1}, "no such section"), ({"bend": {}}, "must be a Bend")])
+def test_sections_of_a_plant_are_checked(sections: dict, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        load_plant(sections=sections)
