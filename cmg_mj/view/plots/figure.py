@@ -179,7 +179,9 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     palette = {name: hexadecimal(rgb) for name, rgb in colours(names).items()}
     for line in panel.lines:
         color = f"C{line.color}" if isinstance(line.color, int) else palette.get(line.color or "", line.color)
-        style = {"linewidth": line.width, "label": line.label or None, "color": color}
+        style = {"linewidth": line.width, "label": line.label or None}
+        if color is not None:  # the format may have one
+            style["color"] = color
         (curve,) = axes.plot(line.x, line.y, line.style, markersize=4, **style)
         if line.spread is not None:
             below, above = np.broadcast_to(line.spread, (2, len(line.y)))
