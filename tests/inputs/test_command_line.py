@@ -15,11 +15,6 @@ from tests.inputs.complaints import assert_in_order, table
     ("no name", ["--set", "=3"], "--set '=3': write section.field=value"),
     ("two dots", ["--set", "plant..x=1"], "--set 'plant..x=1': write section.field=value"),
     ("unknown section", ["--set", "plnt.x=1"], "with --set plnt.x=1: plnt: no such field; did you mean 'plant'?"),
-    (
-        "field of another section",
-        ["--set", "plant.bend_share=1"],
-        "plant.bend_share: no such field; did you mean 'bend.share'?",
-    ),
     ("unknown field", ["--set", "plant.modl=1"], "with --set plant.modl=1: plant.modl: no such field; did you mean"),
     ("text for a number", ["--set", "observer.k1=abc"], "with --set observer.k1=abc: observer.k1 = 'abc': "),
     ("no value", ["--set", "observer.k1="], "observer.k1 = '': "),

@@ -83,14 +83,3 @@ def test_only_visual_geoms_differ(scenario: str) -> None:
         for name, value in stepped_arrays.items()
         if not name.startswith(visual)
     )
-
-
-def test_a_frame_that_bends_is_drawn_as_it_is_stepped() -> None:
-    settings = ("bend.frequency_hz=20", "bend.damping_ratio=0.01", "bend.share=0.2")
-    plant = prepare(load_scenario("push_recovery", (*settings, "bend.beyond=sensors"))).plant
-    drawn = drawn_plant(plant)
-    one, other = plant.new_data(), drawn.new_data()
-    mujoco.mj_step(plant.model, one, 20)
-    mujoco.mj_step(drawn.model, other, 20)
-    np.testing.assert_array_equal(one.qpos, other.qpos)
-    assert drawn.model.nv == experiment("push_recovery").plant.model.nv + 1

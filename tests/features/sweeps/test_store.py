@@ -27,7 +27,6 @@ from tests.features.sweeps.synthetic_trials import BIAS, VELOCITY, make_study
 
 SWEEP = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--worlds", "2", "--set", "push=[]"]
 SWEEP += ["--set", "duration_s=0.2", "--observers", "linear,gyro_free,high_gain", "--out"]
-MOTIONS = "pivot=[{{kind='track', file='{}'}}],[{{kind='track', file='{}', scale=2.0}}]"
 
 
 def study(values: str = "0:1:20", *settings: str, worlds: int = 2) -> SweepStudy:
@@ -132,19 +131,6 @@ def test_an_edited_model_is_another_sweeps(tmp_path: Path, name: str) -> None:
     with pytest.raises(RunStopped, match="has changed since it began"):
         run(store, store.left())
     assert Store.open(tmp_path / "out", sweep).left() == [0, 1]
-
-
-@pytest.mark.parametrize("varied", ["", "pivot.0.file={},{}", MOTIONS], ids=["of the scenario", "varied", "motions"])
-def test_an_edited_track_is_another(tmp_path: Path, varied: str) -> None:
-    first, track = tmp_path / "first.csv", tmp_path / "track.csv"
-    for file in (first, track):
-        file.write_text("t,a\n0,0.1\n1,0.2\n", encoding="utf-8")
-    field, _, values = (varied or f"{BIAS}=0,1").format(first, track).partition("=")
-    settings = (f"pivot=[{{kind='track', file='{first if varied else track}'}}]",)
-    sweep = make_study({field: values}, settings=settings)
-    before = hash_of(sweep, {})
-    track.write_text("t,a\n0,0.1\n1,0.3\n", encoding="utf-8")
-    assert hash_of(sweep, {}) != before
 
 
 def test_another_study_takes_the_next_number(whole: Store) -> None:
