@@ -184,8 +184,8 @@ def actuator_torques(model: mujoco.MjModel, run: Motion, command: np.ndarray) ->
         _, stiffness, damping = model.actuator_biasprm[actuator, :3]
         torque = model.actuator_gainprm[actuator, 0] * setpoints
         torque = torque + stiffness * run.qpos[..., joint] + damping * run.qvel[..., joint]
-        limits = model.actuator_forcerange[actuator] if model.actuator_forcelimited[actuator] else (-np.inf, np.inf)
-        torques[..., joint] = np.clip(torque, *limits)
+        low, high = model.actuator_forcerange[actuator] if model.actuator_forcelimited[actuator] else (-np.inf, np.inf)
+        torques[..., joint] = np.clip(torque, low, high)
     return torques
 
 
