@@ -18,7 +18,7 @@ class Command(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """What a feature says of a scenario."""
+    """A feature's words on a scenario."""
 
     rows: Sequence[tuple[str, str]] = ()
     """Rows of `cmg-mj check`: label, text."""

@@ -96,11 +96,11 @@ Mark = TypeVar("Mark")
 
 
 class Section:
-    """Settings of a feature or a disturbance in a scenario. What one has no use for stays as it is here."""
+    """Settings of a feature or a disturbance in a scenario; by default without files and unmodelled effects."""
 
     @property
     def unmodelled(self) -> str:
-        """What the reduced model knows nothing of, in words; empty if it leaves nothing out."""
+        """Words for an effect that the reduced model lacks; empty if it lacks none."""
         return ""
 
     @property

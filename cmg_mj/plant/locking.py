@@ -39,7 +39,7 @@ def lock_axes(spec: mujoco.MjSpec, rig: ResolvedModel, settings: PlantSettings) 
         settings: Which axes to lock.
 
     Returns:
-        What is to be done to the compiled model: nothing.
+        A finish that leaves the compiled model as it is.
 
     Raises:
         InputError: There is no such axis, it tilts about no hinge, or no axis is left.

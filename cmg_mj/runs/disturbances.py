@@ -1,4 +1,4 @@
-"""What acts on a rig from outside: torques about its axes, and what features add. The one place that lists it."""
+"""Disturbances from outside: torques about the axes, and those of features. The one place that lists them."""
 
 from __future__ import annotations
 

@@ -43,8 +43,7 @@ def bend_frame(
         section: The mode.
 
     Returns:
-        What gives the compiled model, and the joint of the parsed one, the spring and the damper; None for a rigid
-        frame.
+        A finish that gives the compiled model, and the parsed joint, the spring and the damper; None for a rigid frame.
 
     Raises:
         InputError: The rig has several axes or does not tilt about a hinge of its frame, the frame has not so much
