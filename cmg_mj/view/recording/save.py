@@ -7,8 +7,10 @@ import importlib
 import io
 import os
 import re
+import shutil
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent import futures
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +28,7 @@ from cmg_mj.view.recording.signals import Lines, Series, log_phases, log_styles,
 
 MAX_LIST = 120
 """Longest list of runs in an application's name [characters]."""
+MAX_READ = 1 << 20
 LOG_TIMELINE = "time"
 """Name of the timeline of a log, whose time is not simulated."""
 MAIN = (
@@ -155,24 +158,53 @@ def _written(
     strict = rr.strict_mode()
     rr.set_strict_mode(True)  # rerun would only warn
     try:
-        with rr.RecordingStream(_application_name(names, branches)) as rec:
+        with (
+            whole_file(path) as temporary,
+            pipe_into(temporary) as pipe,
+            rr.RecordingStream(_application_name(names, branches)) as rec,
+        ):
             require_enabled(rec)
-            memory = rec.memory_recording()  # of a file by itself rerun hides a full disk, or waits for ever
-            try:
-                rec.send_blueprint(blueprint, make_active=False, make_default=True)
-                set_up(rec, title)
-                for branch in branches:
-                    log_styles(rec, branch)
-                    log_values(rec, branch)
-                for name, text in texts.items():
-                    rec.log(name, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
-                yield rec
-            finally:
-                recorded = memory.drain_as_bytes()  # rerun complains of data that nobody takes
+            rec.save(pipe)
+            rec.send_blueprint(blueprint, make_active=False, make_default=True)
+            set_up(rec, title)
+            for branch in branches:
+                log_styles(rec, branch)
+                log_values(rec, branch)
+            for name, text in texts.items():
+                rec.log(name, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+            yield rec
     finally:
         rr.set_strict_mode(strict)
-    with whole_file(path) as temporary:
-        temporary.write_bytes(recorded)
+
+
+@contextlib.contextmanager
+def pipe_into(path: Path) -> Iterator[str]:
+    """Make a pipe whose bytes go into a file: by itself rerun hides a full disk, or waits for ever.
+
+    Yields:
+        The pipe's path.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    source, sink = os.pipe()
+
+    def copy() -> None:
+        with open(source, "rb") as pipe:
+            try:
+                with path.open("wb") as file:
+                    shutil.copyfileobj(pipe, file)
+            finally:
+                while pipe.read(MAX_READ):  # whoever writes waits until all has been taken
+                    pass
+
+    with futures.ThreadPoolExecutor(1) as pool:
+        copied = pool.submit(copy)
+        try:
+            yield f"/dev/fd/{sink}"
+        finally:
+            os.close(sink)
+        copied.result()
 
 
 def require_enabled(rec: rr.RecordingStream) -> None:

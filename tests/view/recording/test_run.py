@@ -28,6 +28,7 @@ from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push
 from cmg_mj.view.recording import RecordingHeader, Run, write_recording
 from cmg_mj.view.recording.run import phases
+from cmg_mj.view.recording.save import pipe_into
 from cmg_mj.view.recording.scene import FLYWHEEL_SLOWDOWN, POSE_RATE_HZ
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1", 'open_loop_observers=["linear"]')
@@ -380,3 +381,8 @@ def test_a_viewer_receives_the_run_while_it_goes_on(name: str, tmp_path: Path, m
         np.testing.assert_allclose(times, columns["time_s"], atol=1e-9)
         assert len(column(path, f"{branch}/rig/frame", "Transform3D:translation")[0]) > 10
     assert all(np.array_equal(trajectory[name], alone[name]) for name in trajectory.columns)
+
+
+def test_a_full_disk_is_an_error_and_nobody_waits() -> None:
+    with pytest.raises(OSError, match="No space left"), pipe_into(Path("/dev/full")) as pipe:
+        Path(pipe).write_bytes(bytes(10_000_000))
