@@ -168,23 +168,21 @@ class SampledSensor(Generic[Reading]):
         self._take, self._stages = take, stages
         self._latency = steps_until(latency_s, site.timestep)
         self._on_the_way: deque[tuple[int, Reading]] = deque()
-        self._has_begun = self._has_delivered = False
+        self._is_first, self._has_delivered = True, False
 
     def sample(self, step: int, ideal: IdealReading) -> None:
         """Take what is due, at a physics step that is a multiple of `steps_per_sample`, or at the first one."""
         for watch in self._watches:
             watch(step, self._raw, ideal)
-        is_first = not self._has_begun
-        if is_first:
-            self._has_begun = True
-            for _ in range(self._settle):  # before the start the rig stood still
-                self._measure(ideal)
-        elif step % self._raw:
+        is_first, self._is_first = self._is_first, False
+        if step % self._raw and not is_first:
             return
+        for _ in range(self._settle if is_first else 0):  # before the start the rig stood still
+            self._measure(ideal)
         signal = self._take(ideal)
         for stage in self._stages:
             signal = stage(signal, ideal)
-        if is_first or step % self.period == 0:
+        if step % self.period == 0 or is_first:
             self._newest = signal
             if self._latency:
                 self._on_the_way.append((step + self._latency, signal))

@@ -32,9 +32,9 @@ from cmg_mj.plant.settings import apply, place_accelerometers
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.turning import turning
 from cmg_mj.scenario.design import PlantNumbers
-from cmg_mj.scenario.plant_settings import MIN_STEP_S, NEEDS_COMPILING, PlantSettings
+from cmg_mj.scenario.plant_settings import MIN_STEP_S, PlantSettings
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.scenario.time_grid import TimeGrid, time_grid
+from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.stages.backlash import ARCMIN_A_DEGREE, backlash
 from cmg_mj.stages.turning import YawCoupling
@@ -88,21 +88,6 @@ class Plant:
                 f"{self._error_source}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, "
                 "damping and servos must be of sizes that go together"
             )
-
-    def can_reuse(self, settings: PlantSettings, sections: Mapping[str, Any]) -> bool:
-        """Return whether a plant with these settings has the same compiled file, locks and edits."""
-        same = all(getattr(self.settings, name) == getattr(settings, name) for name in NEEDS_COMPILING)
-        return same and self.sections == sections
-
-    def with_settings(
-        self,
-        settings: PlantSettings,
-        axis_settings: Mapping[str, PlantSettings] = MappingProxyType({}),
-        grid: TimeGrid | None = None,
-    ) -> Plant:
-        """Return the rig with other settings, without compiling its file again: see `can_reuse`."""
-        with set_control_callback(None):
-            return Plant(self.filed, settings, self.sections, axis_settings, grid)
 
     @property
     def _error_source(self) -> str:
@@ -313,27 +298,27 @@ def load_plant(
 
 
 @quiet()
-def load_scenario_plant(scenario: Scenario, reuse: Plant | None = None, grid: TimeGrid | None = None) -> Plant:
+def load_scenario_plant(scenario: Scenario, grid: TimeGrid, like: Plant | None = None) -> Plant:
     """Load a scenario's plant, with the axes that the scenario names.
 
     Args:
         scenario: The scenario.
-        reuse: A plant that may be of the same model file, which then is not compiled again.
-        grid: The grid of the scenario's times, if it is known.
+        grid: The grid of its times.
+        like: A plant that may have the same compiled file, locks and edits, which then is not compiled again.
 
     Raises:
-        InputError: The scenario's times fit no physics step, or `load_plant` refuses the plant; the scenario is named.
+        InputError: No physics step fits the grid, or `load_plant` refuses the plant.
     """
-    with scenario.named_in_errors():
-        settings, grid = scenario.plant, grid or time_grid(scenario)
-        axis_settings = {name: part.plant for name, part in scenario.axis_scenarios.items()}
-        sections = {name: scenario.section(name) for name in entries("edit")}
-        if reuse is not None and reuse.can_reuse(settings, sections):
-            return reuse.with_settings(settings, axis_settings, grid)
-        plant = load_plant(settings, None, grid, axis_settings, sections)
-        if plant.path.resolve().parent != folder("models").resolve():
-            _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
-        return plant
+    settings, axes = scenario.plant, scenario.axis_scenarios
+    sections = {name: scenario.section(name) for name in entries("edit")}
+    path = find("models", settings.model, ".xml", "plant.model =")
+    same = like is not None and like.sections == sections and like.settings.compiled_alike(settings)
+    with set_control_callback(None):  # compiling a model runs it
+        filed = like.filed if like and same else build(path, settings, sections)
+        plant = Plant(filed, settings, sections, {name: axis.plant for name, axis in axes.items()}, grid)
+    if not same and path.resolve().parent != folder("models").resolve():
+        _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
+    return plant
 
 
 def check_axes(scenario: Scenario, plant: Plant) -> None:

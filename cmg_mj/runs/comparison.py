@@ -17,6 +17,7 @@ from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import KEYS, NESTED, Summary, as_table, finite, open_loop_figures, section
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.schema import CompareSettings, Scenario
+from cmg_mj.scenario.time_grid import time_grid
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -86,7 +87,8 @@ def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Exp
     Raises:
         InputError: An observer does not exist, or something does not fit.
     """
-    plant = load_scenario_plant(scenario)
+    with scenario.named_in_errors():
+        plant = load_scenario_plant(scenario, time_grid(scenario))
     return [prepare(_untrimmed(scenario.with_observer(kind), plant), plant) for kind in observers]
 
 

@@ -20,8 +20,6 @@ from cmg_mj.core.loop import ControlLoop
 from cmg_mj.inputs.features import DRIVERS, entries
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.laws import Law
-from cmg_mj.linear.loop import linear_closed_loop
-from cmg_mj.linear.verdict import hints
 from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant, check_axes, load_scenario_plant
 from cmg_mj.results.folder import whole_file
@@ -41,7 +39,6 @@ from cmg_mj.runs.batch import (
 from cmg_mj.runs.disturbances import Outsides, outsides
 from cmg_mj.runs.simulate import SimulationOptions, simulate
 from cmg_mj.scenario.design import Design, design
-from cmg_mj.scenario.loading import base_of
 from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.time_grid import time_grid
@@ -326,6 +323,8 @@ class Experiment:
         Raises:
             InputError: Something in the loop is not linear, or not covered; the message names it.
         """
+        from cmg_mj.linear.loop import linear_closed_loop  # no run needs it
+
         part = self.require_single_axis("linear_closed_loop")
         with part.scenario.named_in_errors():
             return linear_closed_loop(part.design, part.plant, plant)
@@ -333,6 +332,8 @@ class Experiment:
     @property
     def hints(self) -> list[str]:
         """Clauses on what is no mistake and yet likely to make the plant fall."""
+        from cmg_mj.linear.verdict import hints  # as above
+
         if not self.axes:
             of_features = [judge(self.design, self.plant).hints for judge in entries("judge").values()]
             return [*hints(self.design, self.plant), *itertools.chain(*of_features)]
@@ -348,6 +349,8 @@ class Experiment:
 
         Title, seed and observer are ignored; a scenario of the user's own differs from none.
         """
+        from cmg_mj.scenario.loading import base_of
+
         base = base_of(self.scenario)
         if base is None:
             return {}
@@ -388,16 +391,19 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
     """
     with scenario.named_in_errors():
         grid = time_grid(scenario)
-    plant = plant or load_scenario_plant(scenario, like, grid)
-    with scenario.named_in_errors():
+        plant = plant or load_scenario_plant(scenario, grid, like)
         check_axes(scenario, plant)
         for check in entries("check").values():
             check(scenario, plant)
-    if len(plant.axes) == 1 and not scenario.axes:
-        return Experiment(scenario, plant, design(scenario, plant.parameters))
-    parts = [(scenario.axis_scenario(name), plant.single_axis(name)) for name in plant.axis_names]
-    axes = tuple(Experiment(part, rig, design(part, rig.parameters)) for part, rig in parts)
-    return Experiment(scenario, plant, axes[0].design, axes)
+        parts = [(scenario, plant)]
+        if len(plant.axes) > 1 or scenario.axes:
+            parts = [(scenario.axis_scenario(name), plant.single_axis(name)) for name in plant.axis_names]
+    axes = []
+    for part, rig in parts:
+        with part.named_in_errors():
+            axes.append(Experiment(part, rig, design(part, rig.parameters)))
+    first = axes[0]
+    return first if first.scenario is scenario else Experiment(scenario, plant, first.design, tuple(axes))
 
 
 def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:

@@ -116,12 +116,11 @@ def design(scenario: Scenario, rig: PlantNumbers) -> Design:
     Raises:
         InputError: Something in the scenario does not fit.
     """
-    with scenario.named_in_errors():
-        _check(scenario)
-        controller = scenario.controller
-        result = Design(scenario, rig, controller.law(rig.reduced, rig.noise(scenario.sensors)))
-        result.open_loop_observers()
-        integrator_trim(controller.bias_trim_s, result.law, extra_signals(result.observer()))
+    _check(scenario)
+    controller = scenario.controller
+    result = Design(scenario, rig, controller.law(rig.reduced, rig.noise(scenario.sensors)))
+    result.open_loop_observers()
+    integrator_trim(controller.bias_trim_s, result.law, extra_signals(result.observer()))
     return result
 
 

@@ -92,6 +92,10 @@ class PlantSettings:
             if not name.startswith("accelerometer") and name != "gimbal_backlash_arcmin"
         }
 
+    def compiled_alike(self, other: PlantSettings) -> bool:
+        """Return whether the same model is compiled with these settings and others."""
+        return all(getattr(self, name) == getattr(other, name) for name in NEEDS_COMPILING)
+
     @property
     def has_misplaced(self) -> bool:
         """True if an accelerometer sits elsewhere than the tilt estimate knows."""

@@ -303,7 +303,8 @@ def observer_inputs(
         return ObserverInputs(model, noise_of(log, noises), parameters)
     scenario = parse_scenario(dict(log.scenario), log.name)
     plant, loop = _plant_of(scenario), scenario.observer
-    _, run_model, noise = design(scenario, plant).constructor_arguments
+    with scenario.named_in_errors():
+        _, run_model, noise = design(scenario, plant).constructor_arguments
     if "accelerometer" in noises:  # the sensors' other errors stay
         if len(noises) > 1:
             raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")

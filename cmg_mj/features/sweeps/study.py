@@ -24,12 +24,13 @@ from cmg_mj.inputs.messages import complaints
 from cmg_mj.inputs.overrides import assign, override
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.plant.plant import load_scenario_plant
+from cmg_mj.plant.plant import Plant, load_scenario_plant
 from cmg_mj.results.baselines import RATES
 from cmg_mj.runs.batch import UNUSED, can_vary_in_batch
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import find_files, find_model, load_scenario
 from cmg_mj.scenario.schema import ObserverSettings, Scenario, parse_scenario
+from cmg_mj.scenario.time_grid import time_grid
 
 # --- varied fields
 
@@ -442,7 +443,7 @@ def check_values(study: SweepStudy) -> None:
     Raises:
         InputError: An observer cannot run, or a field or value does not fit.
     """
-    plant = load_scenario_plant(study.scenario)
+    plant = _plant(study.scenario)
     base = study.scenario.model_copy(update={"open_loop_observers": []})
     for observer in study.observers:
         prepare(study.scenario_with(observer), plant)
@@ -459,13 +460,19 @@ def check_values(study: SweepStudy) -> None:
             if "plant.model" in axis.fields:
                 find("models", str(value), ".xml", f"--vary {axis.option}: plant.model =")
             alone = len(study.axes) == 1 and (i < MAX_ALONE or i == len(values) - 1)
-            changed_plant = load_scenario_plant(scenario, plant) if alone else plant
+            changed_plant = _plant(scenario, plant) if alone else plant
             for observer in study.observers if parameters else study.observers[: int(alone)]:
                 settings = scenario.observer
                 kind = BASELINE_LOOP if observer in RATES else observer
                 if kind != base.observer.kind:
                     settings = ObserverSettings.model_validate({"kind": kind, **dict.fromkeys(parameters, value)})
                 prepare(scenario.model_copy(update={"observer": settings}), changed_plant)
+
+
+def _plant(scenario: Scenario, like: Plant | None = None) -> Plant:
+    """Load the plant of a scenario that may be wrong."""
+    with scenario.named_in_errors():
+        return load_scenario_plant(scenario, time_grid(scenario), like)
 
 
 # --- its file
