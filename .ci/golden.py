@@ -90,6 +90,23 @@ CART = """
   </worldbody>
 </mujoco>"""
 
+LOG = "examples/data/stepper_encoder_gyro.csv"
+LOG_COLUMNS = "time=time_s,tilt=encoder_rad,rate=gyr_y_rad_s"
+COMMANDS = {
+    "compare": "compare push_recovery --observers homogeneous,adaptive,gyro_free --worlds 3 --set duration_s=3",
+    "compare two axes": "compare two_axes --observers homogeneous,gyro_free --worlds 2 --set duration_s=7",
+    "sweep": "sweep push_recovery --vary plant.equilibrium_bias_deg=0,1 --vary push.0.torque_n_m=1,6 --worlds 2"
+    " --observers linear,zero --set duration_s=3",
+    "sweep of a design": "sweep push_recovery --vary plant.equilibrium_bias_deg=0:1 --sample 3 --worlds 2"
+    " --set duration_s=3",
+    "tune": "tune push_recovery --observer linear --parameters tau --worlds 2 --set duration_s=3",
+    "replay": f"replay {LOG} --columns {LOG_COLUMNS} --observers linear_high_gain,finite_difference",
+    "mount": "mount examples/robots/torso.xml --body torso --axis x --scale 1.21 --quick -o FOLDER/balanced.xml",
+}
+"""Name of a case -> command line, whose figures are compared."""
+OF_TIME = ("seconds", "cpu", "took", "elapsed", "path", "folder", "written")
+"""Words in the names of figures that no two runs have alike."""
+
 
 def cases() -> dict[str, tuple[str, dict, dict]]:
     """Name -> bundled scenario, its fields that are set otherwise, keyword arguments."""
@@ -194,6 +211,31 @@ def figures(scenario: str, settings: dict, options: dict, folder: str) -> dict[s
     return found
 
 
+def printed(name: str, line: str, folder: str) -> dict[str, object]:
+    """Run a command in the tree that this process imports: each of the numbers that it prints."""
+    call = "from cmg_mj.cli import main; main()"
+    arguments = [*line.replace("FOLDER", folder).split(), "--json"]
+    if arguments[0] != "mount":
+        arguments += ["--out", f"{folder}/{name}"]
+    done = subprocess.run([sys.executable, "-c", call, *arguments], capture_output=True, text=True, check=False)
+    if done.returncode:
+        return {"refused": done.stderr}
+    found: dict[str, object] = {}
+
+    def collect(name: str, value: object) -> None:
+        if isinstance(value, dict):
+            for key, item in value.items():
+                collect(f"{name}.{key}", item)
+        elif isinstance(value, list):
+            for i, item in enumerate(value):
+                collect(f"{name}.{i}", item)
+        elif isinstance(value, (int, float)) and not any(word in name for word in OF_TIME):
+            found[name] = repr(value)
+
+    collect("", json.loads(done.stdout))
+    return found
+
+
 def run_all(pattern: str) -> None:
     """Print a JSON line for each case."""
     with tempfile.TemporaryDirectory() as folder:
@@ -205,6 +247,9 @@ def run_all(pattern: str) -> None:
                     except ValueError as error:
                         found = {"refused": str(error)}
                 print(json.dumps([name, found]), flush=True)
+        for name, line in COMMANDS.items():
+            if pattern in name:
+                print(json.dumps([name, printed(name, line, folder)]), flush=True)
 
 
 def of_tree(tree: str, pattern: str) -> dict[str, dict[str, object]]:
