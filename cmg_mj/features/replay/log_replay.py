@@ -16,7 +16,7 @@ from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import extra_signals, needs
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.noise import noise_of
-from cmg_mj.features.replay.reference import Alignment, alignment_of, model_misfit
+from cmg_mj.features.replay.reference import Alignment, alignment_of
 from cmg_mj.features.replay.scores import Figures, ZeroPhase, rms, scores, zero_phase
 from cmg_mj.inputs.users_line import users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
@@ -70,7 +70,6 @@ class ReplayResult(NamedColumns):
         noise: The sensors' noise that observers assumed; also the noise of the noise gain.
         parameters: Parameters that were set.
         zero_phase: Figures of a smoother that sees the future, which is no observer; None without a reference.
-        misfit: How badly the model predicts the log, from `model_misfit`; None without a model.
     """
 
     log: Log
@@ -82,7 +81,6 @@ class ReplayResult(NamedColumns):
     noise: MeasurementNoise
     parameters: Parameters = field(default_factory=dict)
     zero_phase: ZeroPhase | None = None
-    misfit: float | None = None
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -169,15 +167,7 @@ def replay_log(
         noise,
         parameters,
         zero_phase(log, scored) if "reference" in log.has else None,
-        misfit_of(log, model),
     )
-
-
-def misfit_of(log: Log, model: ReducedModel | None) -> float | None:
-    """Return the model's misfit; None without a model, or where its gimbals are not in the log."""
-    if model is None or (_gimbals_matter(model) and "gimbals" not in log.has):
-        return None
-    return model_misfit(log, model)
 
 
 def _gimbals_matter(model: ReducedModel | None) -> bool:

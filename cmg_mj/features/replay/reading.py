@@ -153,14 +153,13 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
     )
 
 
-def check_distinct_logs(paths: Sequence[str]) -> None:
-    """Refuse a log that is named twice: it would count twice in means and intervals."""
-    known: set[str] = set()
-    for name in paths:
-        path = os.path.realpath(name).removesuffix("/trajectory.parquet")
-        if path in known:
-            raise InputError(f"{name}: this log is given twice")
-        known.add(path)
+def read_logs(paths: Sequence[str], options: ReadOptions) -> list[Log]:
+    """Read logs, and refuse one that is named twice: it would count twice in means and intervals."""
+    files = [os.path.realpath(path).removesuffix("/trajectory.parquet") for path in paths]
+    for i, path in enumerate(paths):
+        if files[i] in files[:i]:
+            raise InputError(f"{path}: this log is given twice")
+    return [read_log(path, options) for path in paths]
 
 
 def _geometry(columns: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:

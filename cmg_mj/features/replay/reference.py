@@ -1,4 +1,4 @@
-"""The reference beside the tilt: its lag, scale and offset, and whether a model can be that of the log."""
+"""The reference beside the tilt: its lag, scale and offset."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.replay.log import REFERENCE, UNITS, Log, WhiteNoise
 from cmg_mj.features.replay.noise import noise_in
 from cmg_mj.features.replay.scores import STRETCHES, Piece, jackknife_error, jackknife_stretches, lag_with_error
@@ -34,15 +33,6 @@ FINE = 0.01
 AGREES = 0.95
 """Correlation at the best lag, of either sign, from which a cure is offered. If the tilt freezes half-way, neither lag
 nor scale is meaningful."""
-RATE_SPAN_S = 0.04
-"""Time over which increments of the tilt give the rate in the model's damping term [s]."""
-WIDTH_S = 0.25
-"""Length of a stretch for the tilt's second derivative [s], of at least `MIN_SAMPLES` samples."""
-MIN_SAMPLES = 12
-MIN_STRETCHES = 20
-"""Fewest stretches for a comparison."""
-MISFIT = 1.5
-"""Misfit from which a model is doubted. Right models have at most 1.15: docs/studies/model_misfit.py."""
 
 
 class Alignment(NamedTuple):
@@ -224,59 +214,3 @@ def _is_noise(log: Log, residual: float | None) -> bool:
 def _with_interval(value: float, error: float) -> str:
     value, low, high = (round(number, 4) + 0.0 for number in (value, value - error, value + error))  # no -0.0000
     return f"{value:.4f} ({low:.4f} to {high:.4f})" if math.isfinite(error) else f"{value:.4f}"
-
-
-def model_misfit(log: Log, model: ReducedModel) -> float | None:
-    """Compare the model's tilt acceleration with the tilt's second derivative.
-
-    Both are weighted over stretches of a quarter of a second, by w = (1 - s^2)^4, which ends smoothly: with
-    b = sum(y w'') and a = sum(a w) no noisy samples are subtracted. With the spread s of a set of sums (median of the
-    deviations from the median, which neither an offset of the tilt nor pushes move), the misfit is
-    s(predicted - measured)/s(measured), by what it is for white noise of the tilt alone. A model that says nothing has
-    1, a right one less or, where all is noise, 1 too.
-
-    Args:
-        log: The log; without gimbals y2 and u are zero.
-        model: The pendulum.
-
-    Returns:
-        The misfit; None for too few stretches, or if nothing moves.
-    """
-    half = max(MIN_SAMPLES // 2, round(WIDTH_S / 2.0 / log.dt))
-    s = np.arange(-half, half + 1) / (half + 1.0)
-    weights = (1.0 - s**2) ** 4
-    second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * log.dt) ** 2
-    second = second - second.mean()
-    m = max(1, round(RATE_SPAN_S / 2.0 / log.dt))
-    differences, measured = [np.zeros(0)], [np.zeros(0)]
-    for part in log.parts:
-        tilt = log["y1_rad"][part]
-        rate = np.zeros(len(tilt))
-        rate[m:-m] = (tilt[2 * m :] - tilt[: -2 * m]) / (2 * m * log.dt)
-        predicted = model.tilt_acceleration(tilt, rate, log["y2_rad"][part], log["u_rad_s"][part])
-        if len(tilt) >= len(weights):
-            derived = np.convolve(tilt, second, mode="valid")[::half]
-            smoothed = np.convolve(np.broadcast_to(predicted, tilt.shape), weights, mode="valid")[::half]
-            differences.append(smoothed - derived)
-            measured.append(derived)
-    size = _spread(np.concatenate(measured))
-    if sum(map(len, measured)) < MIN_STRETCHES or not size > 0.0:
-        return None
-    stiffness = model.gravity_torque / model.J1
-    of_noise = float(np.linalg.norm(stiffness * weights - second) / np.linalg.norm(second))
-    return _spread(np.concatenate(differences)) / size / of_noise
-
-
-def _spread(values: np.ndarray) -> float:
-    return float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
-
-
-def model_remark(misfit: float | None) -> str | None:
-    """Doubt a model, or say nothing."""
-    if misfit is None or not misfit > MISFIT:
-        return None
-    return (
-        f"Can the model be that of this log? The tilt acceleration that it predicts misses the tilt's own by "
-        f"{misfit:.3g} times as much as one of zero would (of right models at most 1.15): look at --model, the tilt's "
-        "unit, sign and zero, or for large torques that the model does not know."
-    )

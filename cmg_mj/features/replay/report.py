@@ -10,7 +10,7 @@ from rich.text import Text
 
 from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.noise import noise_figures, noise_remarks
-from cmg_mj.features.replay.reference import model_remark, remarks_on
+from cmg_mj.features.replay.reference import remarks_on
 from cmg_mj.features.replay.scores import RECONSTRUCTED_S, ZERO_PHASE, Figures
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.intervals import Interval, format_interval, known_interval
@@ -69,8 +69,6 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
     if smoother is not None:
         more = {"best_cutoff_hz": smoother.best_cutoff_hz, "best_rms_error_rad_s": smoother.best_rms_error_rad_s}
         figures[ZERO_PHASE] = {**smoother.figures, "cutoff_hz": smoother.cutoff_hz, **more}
-    if replayed.misfit is not None:
-        figures["model_misfit"] = replayed.misfit
     return {**figures, "left_out": dict(replayed.left_out)}
 
 
@@ -164,8 +162,6 @@ def remarks(replayed: ReplayResult) -> list[str]:
             f"{smoother.cutoff_hz:.3g} Hz, chosen by the tilt alone; with {smoother.best_cutoff_hz:.3g} Hz, the best "
             f"for the reference, its error is {best} rad/s."
         )
-    if doubt := model_remark(replayed.misfit):
-        lines.append(doubt)
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
         reasons.setdefault(reason, []).append(name)

@@ -1,23 +1,20 @@
-"""Replay of several logs on request, as `cmg-mj replay` runs it, and the files that it writes."""
+"""The files that `cmg-mj replay` writes: signals, plots, a recording and the figures."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import tomli_w
 
-from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import BIAS
-from cmg_mj.features.replay.log import REFERENCE, Log, ReadOptions
-from cmg_mj.features.replay.log_replay import ReplayResult, model_of, replay_prepared
-from cmg_mj.features.replay.reading import check_distinct_logs, read_log
+from cmg_mj.features.replay.log import REFERENCE, Log
+from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.report import figure_text, log_figures, replay_figures, replay_markdown, shown_first
-from cmg_mj.observers.parameter_options import Parameters
 from cmg_mj.results.folder import RunFolder, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.scenario.resolve import safe_name
@@ -37,17 +34,17 @@ def liveliest_span(log: Log) -> tuple[float, float]:
     """Return the ends of the span of `DETAIL_S` in which the tilt accelerates most [s]."""
     length = max(2, round(DETAIL_S / log.dt))
     rise = max(1, length // 20)
-    best, span = -1.0, (0.0, 0.0)
+    spans = []
     for part in log.parts:
         time, tilt = log["time_s"][part], log["y1_rad"][part]
         bend = np.zeros(len(tilt))
         bend[rise:-rise] = (tilt[2 * rise :] - 2.0 * tilt[rise:-rise] + tilt[: -2 * rise]) ** 2
         sums = np.concatenate([[0.0], np.cumsum(bend)])
         n = min(length, len(tilt))
-        start = int(np.argmax(sums[n:] - sums[:-n]))
-        if sums[start + n] - sums[start] > best:
-            best, span = sums[start + n] - sums[start], (float(time[start]), float(time[start + n - 1]))
-    return span
+        bends = sums[n:] - sums[:-n]
+        start = int(np.argmax(bends))
+        spans.append((float(bends[start]), (float(time[start]), float(time[start + n - 1]))))
+    return max(spans, key=itemgetter(0))[1]
 
 
 def plot_replay(path: Path, replayed: ReplayResult) -> None:
@@ -112,33 +109,6 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     save_figure(path, figure, log.title, dpi=110)
 
 
-def write_recording(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:
-    """Write the replays of some logs as one recording; whole or not at all.
-
-    Args:
-        path: The file, `recording.rrd`.
-        replays: The replays; each has a branch of its own.
-        names: Their names, no two alike.
-        settings_toml: The request, as TOML.
-
-    Raises:
-        InputError: The environment turns rerun off.
-        OSError: The file cannot be written.
-    """
-    from cmg_mj.view.recording.save import LogSeries, write_logs  # 0.4 s of import, needed only here
-
-    title = f"Replay: {', '.join(names)}"
-    logs = [
-        LogSeries(name, list(series(replayed)), shown_first(replayed))
-        for name, replayed in zip(names, replays, strict=True)
-    ]
-    texts = {
-        "Summary": f"# {title}\n\n{replay_markdown(replays)}\n",
-        "Settings": f"# Settings\n\n```toml\n{settings_toml.strip()}\n```\n",
-    }
-    write_logs(path, title, logs, texts)
-
-
 def series(replayed: ReplayResult) -> Iterator[Series]:
     """Make all time series of one log, one by one: angles in degrees, rates in rad/s."""
     from cmg_mj.view.recording.run import numbered_parts
@@ -172,107 +142,44 @@ def series(replayed: ReplayResult) -> Iterator[Series]:
         yield row("gimbal/y2", "measured", np.degrees(log["y2_rad"]), MODULES[0])
 
 
-@dataclass
-class LogReplays:
-    """Request to replay some logs, and the replays that are done. The logs are read at once.
+def save_replays(
+    folder: RunFolder, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str, *, complete: bool
+) -> Path:
+    """Write summary.json, replay.toml, recording.rrd, and of every log its signals and plot, at once.
 
-    Attributes:
-        paths: The logs' files.
-        observers: Names of the observers.
-        options: Options with which all logs are read.
-        model: The pendulum as `model_of` takes it.
-        noises: Noises from `noise_numbers`.
-        parameters: Observer -> parameter -> value, where not the default.
-        settle_s: Time at the start of each part that is not scored [s]; None for `replay_prepared`'s.
-        logs: The logs.
-        names: Their names in file names.
-        results: The replays that are done.
+    Args:
+        folder: The folder.
+        replays: The replays.
+        names: Names of all requested logs in the files, no two alike.
+        settings_toml: The request, as TOML.
+        complete: Whether all logs have been replayed.
+
+    Returns:
+        The folder of the files: see `RunFolder.write`.
     """
+    from cmg_mj.view.recording.save import LogSeries, write_logs  # 0.4 s of import, needed only here
 
-    paths: Sequence[str]
-    observers: Sequence[str]
-    options: ReadOptions
-    model: str | None
-    noises: Mapping[str, float]
-    parameters: Parameters
-    settle_s: float | None
-
-    def __post_init__(self) -> None:
-        for kind in self.parameters:
-            if kind not in self.observers:
-                raise InputError(f"--set {kind}: is not among --observers {','.join(self.observers)}")
-        self._model = None if self.model is None else model_of(self.model)
-        check_distinct_logs(self.paths)
-        self.logs: list[Log] = [read_log(path, self.options) for path in self.paths]
-        self.names = _distinct_names([log.name for log in self.logs])
-        self.results: list[ReplayResult] = []
-
-    def _as_toml(self) -> str:
-        """Return the request as TOML."""
-        parts = {
-            "logs": list(self.paths),
-            "log": self.options.as_toml(),
-            "replay": {
-                "observers": list(self.observers),
-                "model": self.model,
-                "parameters": self.parameters,
-                "noise": self.noises,
-                "settle_s": self.settle_s,
-            },
-        }
-        parts["replay"] = {name: value for name, value in parts["replay"].items() if value not in (None, {})}
-        return tomli_w.dumps({name: part for name, part in parts.items() if part})
-
-    @property
-    def complete(self) -> bool:
-        """Return whether all logs have been replayed."""
-        return len(self.results) == len(self.logs)
-
-    @property
-    def folder_name(self) -> str:
-        """Name of the folder of the files by default."""
-        return f"replay-{self.names[0]}" + (f"-and-{len(self.logs) - 1}-more" if len(self.logs) > 1 else "")
-
-    def run(self, on_progress: Callable[[float, str], None]) -> None:
-        """Replay the logs.
-
-        Args:
-            on_progress: Called with the logs done so far, parts of one included, and the current one's name. It may
-                raise `KeyboardInterrupt`; the results until then are kept.
-        """
-        for i, log in enumerate(self.logs):
-            self.results.append(
-                replay_prepared(
-                    log,
-                    self.observers,
-                    model=self._model,
-                    noises=self.noises,
-                    parameters=self.parameters,
-                    settle_s=self.settle_s,
-                    on_share=lambda share, i=i, log=log: on_progress(i + share, f"Replay {log.name}"),
-                )
-            )
-
-    def save(self, folder: RunFolder) -> Path:
-        """Write summary.json, replay.toml, recording.rrd, and of every log that is done its signals and plot, at once.
-
-        Returns the folder of the files: see `RunFolder.write`.
-        """
-        names, toml = self.names[: len(self.results)], self._as_toml()
-        files: dict[str, Callable[[Path], None]] = {
-            "summary.json": lambda path: write_text(path, json.dumps(finite(replay_figures(self.results)), indent=2)),
-            "replay.toml": lambda path: write_text(path, toml),
-            "recording.rrd": lambda path: write_recording(path, self.results, names, toml),
-        }
-        for name, replayed in zip(names, self.results, strict=True):
-            suffix = f"-{name}" if len(names) > 1 else ""
-            signals = replace(replayed.trajectory, metadata={"replay": finite(log_figures(replayed))})
-            files[f"signals{suffix}.parquet"] = signals.save
-            files[f"plot{suffix}.png"] = lambda path, replayed=replayed: plot_replay(path, replayed)
-        return folder.write(files, complete=self.complete)
+    named = dict(zip(names, replays, strict=False))
+    title = f"Replay: {', '.join(named)}"
+    logs = [LogSeries(name, list(series(replayed)), shown_first(replayed)) for name, replayed in named.items()]
+    texts = {
+        "Summary": f"# {title}\n\n{replay_markdown(replays)}\n",
+        "Settings": f"# Settings\n\n```toml\n{settings_toml.strip()}\n```\n",
+    }
+    files: dict[str, Callable[[Path], None]] = {
+        "summary.json": lambda path: write_text(path, json.dumps(finite(replay_figures(replays)), indent=2)),
+        "replay.toml": lambda path: write_text(path, settings_toml),
+        "recording.rrd": lambda path: write_logs(path, title, logs, texts),
+    }
+    for name, replayed in named.items():
+        suffix = f"-{name}" if len(named) > 1 else ""
+        signals = replace(replayed.trajectory, metadata={"replay": finite(log_figures(replayed))})
+        files[f"signals{suffix}.parquet"] = signals.save
+        files[f"plot{suffix}.png"] = lambda path, replayed=replayed: plot_replay(path, replayed)
+    return folder.write(files, complete=complete)
 
 
-def _distinct_names(names: Sequence[str]) -> list[str]:
+def distinct_names(names: Iterable[str]) -> list[str]:
     """Return logs' names as parts of file names, the repeated ones numbered."""
     distinct: list[str] = []
     for name in map(safe_name, names):

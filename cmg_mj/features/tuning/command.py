@@ -173,7 +173,7 @@ def tune_log(
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.features.replay.log_replay import model_of
     from cmg_mj.features.replay.noise import noise_numbers
-    from cmg_mj.features.replay.reading import check_distinct_logs, read_log
+    from cmg_mj.features.replay.reading import read_logs
     from cmg_mj.features.tuning.logs import loop_scenario, tune_on_logs
     from cmg_mj.features.tuning.save import figures_of, save_study, study_table
     from cmg_mj.observers.parameter_options import parameters_of
@@ -185,8 +185,7 @@ def tune_log(
             raise InputError(f"--set {setting}: write observer.PARAMETER=VALUE")
     start_parameters = parameters_of([observer + setting.removeprefix("observer") for setting in settings])
     noises = noise_numbers(noise)
-    check_distinct_logs(logs)
-    recordings = [read_log(path, options) for path in logs]
+    recordings = read_logs(logs, options)
     pendulum = None if model is None else model_of(model)
     loop = loop_scenario(closed_loop, recordings[0])
     folder = claim_output(out, f"tune-{file_name(observer)}-{safe_name(recordings[0].name)}")

@@ -16,9 +16,9 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.features.replay.log import REFERENCE, Log
-from cmg_mj.features.replay.log_replay import NO_MODEL, ObserverInputs, misfit_of, observer_inputs, replay_log
+from cmg_mj.features.replay.log_replay import NO_MODEL, ObserverInputs, observer_inputs, replay_log
 from cmg_mj.features.replay.noise import noise_figures, noise_remarks
-from cmg_mj.features.replay.reference import Alignment, alignment_of, model_remark, remarks_on
+from cmg_mj.features.replay.reference import Alignment, alignment_of, remarks_on
 from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit
 from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, plain
 from cmg_mj.observers import Observer, make_observer
@@ -393,10 +393,7 @@ def tune_on_logs(
 def _evidence(log: Log, inputs: ObserverInputs) -> LogEvidence:
     alignment = alignment_of(log)
     remarks = [*remarks_on(log, alignment), *noise_remarks(log, inputs.noise)]
-    doubt = model_remark(misfit_of(log, inputs.model))
-    return LogEvidence(
-        log.name, inputs.noise, noise_figures(log, inputs.noise), alignment, [*remarks, *([doubt] if doubt else [])]
-    )
+    return LogEvidence(log.name, inputs.noise, noise_figures(log, inputs.noise), alignment, remarks)
 
 
 def _common_period(logs: Sequence[Log]) -> float:
