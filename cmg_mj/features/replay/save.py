@@ -18,12 +18,11 @@ from cmg_mj.features.replay.report import figure_text, log_figures, replay_figur
 from cmg_mj.results.folder import RunFolder, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.scenario.resolve import safe_name
-from cmg_mj.view.plots.figure import pyplot, save_figure
+from cmg_mj.view.plots.figure import Line, Panel, Picture, Span, draw
 from cmg_mj.view.plots.run_plot import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_COLUMNS, SMALL_HEIGHT
-from cmg_mj.view.plots.style import BASELINE_COLOURS, Colour, colours, hexadecimal, short_names, thinned
+from cmg_mj.view.plots.style import BASELINE_COLOURS, Colour, colours, short_names, thinned
 
 if TYPE_CHECKING:
-    from cmg_mj.view.plots.figure import Axes
     from cmg_mj.view.recording.signals import Series
 
 DETAIL_S = 2.0
@@ -56,57 +55,53 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     """
     log, few, key = replayed.log, shown_first(replayed), "velocity_rms_error_rad_s"
     rates = {name: estimates["x2_rad_s"] for name, estimates in replayed.estimates.items()}
-    palette = {name: hexadecimal(rgb) for name, rgb in colours(rates).items()}
     labels = {name: label.lstrip("_") for name, label in short_names(list(rates)).items()}
-    titles = {name: f"{label} {figure_text(key, replayed.summaries[name].get(key))}" for name, label in labels.items()}
     reference = [log[REFERENCE]] if "reference" in log.has else []
-    others = [name for name in rates if name not in few]
-    tall, rows = 3 + len(reference), -(-len(others) // SMALL_COLUMNS)
-    heights = [PANEL_HEIGHT] * tall + [SMALL_HEIGHT] * rows
-    figure = pyplot().figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
-    grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
-    panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
-    small = [figure.add_subplot(grid[tall + i // SMALL_COLUMNS, i % SMALL_COLUMNS]) for i in range(len(others))]
+    if reference:
+        titles = {n: f"{label} {figure_text(key, replayed.summaries[n].get(key))}" for n, label in labels.items()}
+    else:
+        titles = labels
     span, time = liveliest_span(log), log.broken_time()
-    detail = slice(*np.searchsorted(time, span).tolist())
+    whole, detail = slice(None), slice(*np.searchsorted(time, span).tolist())
 
-    def line(axes: Axes, values: np.ndarray, color: str, width: float, label: str | None = None) -> None:
-        rows = slice(None) if axes in panels[:-1] else detail
-        axes.plot(*thinned(time[rows], log.broken(values)[rows]), color=color, linewidth=width, label=label)
+    def line(values: np.ndarray, label: str, color: str, width: float = 0.8, rows: slice = whole) -> Line:
+        return Line(*thinned(time[rows], log.broken(values)[rows]), label, color=color, width=width)
 
-    line(panels[0], np.degrees(log["y1_rad"]), MEASURED, 0.8, "measured")
-    panels[0].set_ylabel("tilt [deg]")
-    for axes in (panels[1], panels[-1]):
-        for values in reference:
-            line(axes, values, INK, 1.6, "reference")
-        for name in few:
-            line(axes, rates[name], palette[name], 0.8, labels[name])
-        axes.set_ylabel("tilt rate\n[rad/s]")
+    def rate_lines(names: Sequence[str], rows: slice) -> list[Line]:
+        lines = [line(true, "reference", INK, 1.6, rows) for true in reference]
+        return lines + [line(rates[name], labels[name], name, rows=rows) for name in names]
+
+    shown = [*reference, *(rates[name] for name in few)]
+    top = 1.05 * max((float(np.nanmax(np.abs(values))) for values in shown), default=0.0)
+    y_range = (-top, top) if top else None
+    shaded = [Span(*span, color="0.5")]
+    panels = [
+        Panel("tilt [deg]", [line(np.degrees(log["y1_rad"]), "measured", MEASURED)], shaded=shaded),
+        Panel("tilt rate\n[rad/s]", rate_lines(few, whole), y_range=y_range, shaded=shaded),
+    ]
     for true in reference:
-        panels[2].plot([], [], " ", label="RMS:")
-        for name in few:
-            line(panels[2], rates[name] - true, palette[name], 0.6, titles[name])
-        panels[2].set_ylabel("estimate less\nreference [rad/s]")
-    for axes in panels[:-1]:
-        axes.axvspan(*span, color="0.5", alpha=0.15, linewidth=0, zorder=0)
-        axes.set_xlim(log["time_s"][0], log["time_s"][-1])
-    for axes, name in zip(small, others, strict=True):
-        line(axes, rates[name], palette[name], 0.7)
-        for values in reference:
-            line(axes, values, INK, 0.8)
-        title = titles[name] if reference else labels[name]
-        axes.set_title(title, loc="left", fontsize="small", parse_math=False, pad=2.0)
-        axes.tick_params(labelsize="small")
-        axes.set_ylim(*panels[1].get_ylim())
-    for axes in (panels[-1], *small):
-        axes.set_xlim(*span)
-    for axes in panels:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=6, frameon=False, borderpad=0)
-    for axes in (*panels, *small):
-        axes.grid(alpha=0.3)
-    panels[-1].set_xlabel(f"time [s], {DETAIL_S:g} s in detail")
-    figure.align_ylabels(panels)
-    save_figure(path, figure, log.title, dpi=110)
+        errors = [line(rates[name] - true, titles[name], name, 0.6) for name in few]
+        errors.insert(0, Line([], [], "RMS:", " "))
+        panels.append(Panel("estimate less\nreference [rad/s]", errors, shaded=shaded))
+    x_label = f"time [s], {DETAIL_S:g} s in detail"
+    panels.append(Panel("tilt rate\n[rad/s]", rate_lines(few, detail), x_label=x_label, y_range=y_range))
+    n_first = len(panels)
+    for name in rates:
+        if name not in few:
+            lines = [replace(line, label="") for line in rate_lines([name], detail)]
+            panels.append(Panel("tilt rate [rad/s]", lines, titles[name], y_range=y_range))
+    page = Picture(
+        "plot",
+        log.title,
+        panels,
+        share_x=False,
+        columns=SMALL_COLUMNS,
+        panel_height=SMALL_HEIGHT,
+        panel_width=PAGE[0] / SMALL_COLUMNS,
+        first_height=PANEL_HEIGHT,
+        n_first=n_first,
+    )
+    draw(path, page)
 
 
 def series(replayed: ReplayResult) -> Iterator[Series]:
