@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -308,17 +308,14 @@ def replay_prepared(
     log: Log,
     observers: Sequence[str] | None = None,
     *,
-    model: ReducedModel | None = None,
-    noises: Mapping[str, float] | None = None,
-    parameters: Parameters | None = None,
     settle_s: float | None = None,
     on_share: OnShare | None = None,
+    **given: Any,
 ) -> ReplayResult:
-    """Replay observers on a log with the inputs of `observer_inputs`, whose arguments it takes.
+    """Replay observers on a log with the inputs of `observer_inputs`, which takes the given ones.
 
     The others are those of `replay_log`; by default a run's recording is scored from its start.
     """
-    inputs = observer_inputs(log, model=model, noises=noises, parameters=parameters)
     if settle_s is None:
         settle_s = SETTLE_S if log.scenario is None else 0.0
-    return replay_log(log, observers, **inputs._asdict(), settle_s=settle_s, on_share=on_share)
+    return replay_log(log, observers, **observer_inputs(log, **given)._asdict(), settle_s=settle_s, on_share=on_share)

@@ -75,14 +75,13 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
     lag_s, lag_error = lag_with_error([partial(_travelled, rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
     sums, middle = _pair_sums([partial(_travelled, rate, span, dt, lag_s or 0.0) for _, rate in pieces], rises)
     whole = sums.sum(axis=0)
-    line = _line(whole, middle)
+    line = _line(whole, middle, span * dt)
     if line is None:
         return Alignment(lag_s, None, None, None)
-    others = [_line(whole - stretch, middle) for stretch in sums if stretch[0, 0]]
-    errors = jackknife_error([other and (other.slope, other.start / (span * dt)) for other in others])
-    scale_error, offset_error = (None, None) if errors is None else errors.tolist()
-    offset = line.start / (span * dt)
-    return Alignment(lag_s, line.slope, offset, line.correlation, lag_error, scale_error, offset_error, line.residual)
+    errors = jackknife_error([_line(whole - stretch, middle, span * dt) for stretch in sums if stretch[0, 0]])
+    scale_error, offset_error = (None, None) if errors is None else errors[:2].tolist()
+    scale, offset, correlation, residual = line
+    return Alignment(lag_s, scale, offset, correlation, lag_error, scale_error, offset_error, residual)
 
 
 def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float, rows: slice) -> np.ndarray:
@@ -121,17 +120,17 @@ def _pair_sums(travels: Sequence[Piece], rises: Sequence[np.ndarray]) -> tuple[n
     return sums, middle
 
 
-class _Line(NamedTuple):
-    """A fitted line, rise = start + slope travel, and the RMS of the rises less the line."""
+def _line(sums: np.ndarray, middle: np.ndarray, length: float) -> tuple[float, float, float, float] | None:
+    """Fit a line, rise = start + slope travel, to sums of pairs.
 
-    slope: float
-    start: float
-    correlation: float
-    residual: float
+    Args:
+        sums: Sums, (3, 3).
+        middle: Numbers that were subtracted, (3,).
+        length: Time over which the tilt rises [s].
 
-
-def _line(sums: np.ndarray, middle: np.ndarray) -> _Line | None:
-    """Fit a line to sums of pairs, (3, 3); None if there is too little motion."""
+    Returns:
+        Slope, start by the length, correlation, and RMS of the rises less the line; None if there is too little motion.
+    """
     n = sums[0, 0]
     if n < 3:
         return None
@@ -143,7 +142,7 @@ def _line(sums: np.ndarray, middle: np.ndarray) -> _Line | None:
     slope = xy / xx
     start = (means[1] + middle[2]) - slope * (means[0] + middle[1])
     residual = math.sqrt(max(0.0, yy - slope * xy) / n)
-    return _Line(float(slope), float(start), float(xy / math.sqrt(xx * yy)), residual)
+    return float(slope), float(start) / length, float(xy / math.sqrt(xx * yy)), residual
 
 
 def alignment_of(log: Log) -> Alignment | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmg_mj.features.replay.log import REFERENCE, Log
+from cmg_mj.features.replay.log import REFERENCE, Log, evenly
 from cmg_mj.results.metrics import finite_or_none, fit
 from cmg_mj.stages.push import inside
 
@@ -265,7 +265,7 @@ def zero_phase(log: Log, scored: np.ndarray) -> ZeroPhase | None:
     if not blocks:
         return None
     if sum(block.stop - block.start for block in blocks) > BLOCK * BLOCKS:
-        blocks = [blocks[i] for i in np.unique(np.linspace(0, len(blocks) - 1, BLOCKS).round().astype(int))]
+        blocks = evenly(blocks, BLOCKS)
     longest = max(min(part.stop - part.start, BLOCK) for part in log.parts) * log.dt
     cutoffs = np.geomspace(min(MIN_PERIODS / longest, 0.25 / log.dt), 0.5 / log.dt, CUTOFFS)
     frequencies, powers, squares = [], [], np.zeros(len(cutoffs))
