@@ -231,17 +231,18 @@ class LogSegments:
 
 
 class LogEvidence(NamedTuple):
-    """Evidence of a log beside its errors."""
+    """A log beside its errors."""
 
-    name: str
+    log: Log
     noise: MeasurementNoise
     """Sensor noise that the observer assumed."""
-    noise_by_the_log: Mapping[str, SummaryValue]
-    """White noise that the log shows, as `--json` prints it."""
     alignment: Alignment | None
     """Lag, scale and offset of the reference."""
-    remarks: Sequence[str]
-    """Remarks as in a replay."""
+
+    @property
+    def remarks(self) -> list[str]:
+        """Remarks as in a replay."""
+        return [*remarks_on(self.log, self.alignment), *noise_remarks(self.log, self.noise)]
 
 
 @dataclass(frozen=True)
@@ -294,7 +295,7 @@ class LogStudy:
     def figures(self) -> dict[str, SummaryValue]:
         """Return the figures that `cmg-mj tune-log --json` prints."""
         return {
-            "logs": [log.name for log in self.logs],
+            "logs": [one.log.name for one in self.logs],
             "observer": self.kind,
             "split": self.split,
             "given_parameters": plain(self.start_parameters),
@@ -302,15 +303,15 @@ class LogStudy:
             "idle": list(self.insensitive_parameters),
             "noise": [
                 {
-                    "tilt_rad": log.noise.tilt,
-                    "acceleration_rad_s2": log.noise.acceleration,
-                    "correlation": log.noise.correlation,
-                    **log.noise_by_the_log,
+                    "tilt_rad": noise.tilt,
+                    "acceleration_rad_s2": noise.acceleration,
+                    "correlation": noise.correlation,
+                    **noise_figures(log, noise),
                 }
-                for log in self.logs
+                for log, noise, _ in self.logs
             ],
-            "notes": [list(log.remarks) for log in self.logs],
-            "reference": [log.alignment and log.alignment._asdict() for log in self.logs],
+            "notes": [one.remarks for one in self.logs],
+            "reference": [one.alignment and one.alignment._asdict() for one in self.logs],
             "held_out_stretches": len(self.level.rms),
             "held_out_stretch_s": self.stretch_s,
             **self.level.figures(),
@@ -376,7 +377,7 @@ def tune_on_logs(
 
     fit = ParameterFit(kind, makers[0], given, parameters, ranges, starts)
     level = fit.level(one_per_log, fitted, held_out, on_share)
-    evidence = [_evidence(*log_and_inputs) for log_and_inputs in zip(logs, inputs, strict=True)]
+    evidence = [LogEvidence(log, own.noise, alignment_of(log)) for log, own in zip(logs, inputs, strict=True)]
     return LogStudy(
         kind,
         fit.start_parameters,
@@ -388,12 +389,6 @@ def tune_on_logs(
         held_out.shortest_s,
         closed_loop and compare_in_loop(closed_loop, kind, fit.start_parameters, level.parameters),
     )
-
-
-def _evidence(log: Log, inputs: ObserverInputs) -> LogEvidence:
-    alignment = alignment_of(log)
-    remarks = [*remarks_on(log, alignment), *noise_remarks(log, inputs.noise)]
-    return LogEvidence(log.name, inputs.noise, noise_figures(log, inputs.noise), alignment, remarks)
 
 
 def _common_period(logs: Sequence[Log]) -> float:

@@ -37,7 +37,7 @@ def study_table(study: Study) -> Group:
         )
         names, verdicts = [f"{level.noise_ug_rthz:g}" for level in levels], [level.verdict for level in levels]
     else:
-        title, first = f"{', '.join(log.name for log in study.logs)}: {study.kind}", "observer"
+        title, first = f"{', '.join(one.log.name for one in study.logs)}: {study.kind}", "observer"
         names, verdicts = [study.kind], [study.verdict]
     rows = []
     for name, level, verdict in zip(names, levels, verdicts, strict=True):
@@ -85,9 +85,9 @@ def _lines(study: Study, levels: Sequence[NoiseLevelResult]) -> Iterator[str]:
         if not study.scenario.push:
             yield "There is no push: the window is the whole run, where an estimate of zero may do best."
     else:
-        for log in study.logs:
-            for remark in log.remarks:
-                yield f"{log.name}: {remark}" if len(study.logs) > 1 else remark
+        for one in study.logs:
+            for remark in one.remarks:
+                yield f"{one.log.name}: {remark}" if len(study.logs) > 1 else remark
         share = f"{study.split:.0%} of each log, scored on the rest, in {len(study.level.rms)} stretches"
         yield f"RMS of the estimated rate less the reference. Fitted on the first {share}."
     zero = [f"{level.zero_rms:.4f}" for level in levels]
