@@ -11,7 +11,6 @@ import click
 
 from cmg_mj.cli.arguments import (
     Command,
-    Decorator,
     all_of,
     claim_output,
     json_option,
@@ -84,25 +83,19 @@ _OPTIONS = (
 )
 
 
-def pendulum_option() -> Decorator:
-    """Make the option `--model`, the pendulum of logs."""
-    return click.option(
-        "--model",
-        metavar="MJCF|NUMBERS",
-        help="Your pendulum: an MJCF file, or inertia=,gravity_torque= [kg m^2, N m], with gimbals also momentum=,"
-        "gimbal_inertia= [N m s, kg m^2].",
-    )
-
-
-def noise_option() -> Decorator:
-    """Make the option `--noise`, the sensor noise of logs."""
-    return click.option(
-        "--noise",
-        default="",
-        metavar="NAME=VALUE,...",
-        help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of "
-        "one sample.  [default: from the log, or else accelerometer=400, or tilt=0.1,acceleration=1]",
-    )
+pendulum_option = click.option(
+    "--model",
+    metavar="MJCF|NUMBERS",
+    help="Your pendulum: an MJCF file, or inertia=,gravity_torque= [kg m^2, N m], with gimbals also momentum=,"
+    "gimbal_inertia= [N m s, kg m^2].",
+)
+noise_option = click.option(
+    "--noise",
+    default="",
+    metavar="NAME=VALUE,...",
+    help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of "
+    "one sample.  [default: from the log, or else accelerometer=400, or tilt=0.1,acceleration=1]",
+)
 
 
 def log_options(command: Command) -> Command:
@@ -114,10 +107,11 @@ def log_options(command: Command) -> Command:
         from cmg_mj.observers.parameter_options import finite
 
         options = {field.name: given.pop(field.name) for field in fields(ReadOptions) if field.name in given}
-        for name in ("columns", "units", "scale", "offset"):
+        for name in ("columns", "units"):
             options[name] = assignments(options[name], f"--{name}")
         for name in ("scale", "offset"):
-            options[name] = {role: finite(text, f"--{name} {role}") for role, text in options[name].items()}
+            texts = assignments(options[name], f"--{name}")
+            options[name] = {role: finite(text, f"--{name} {role}") for role, text in texts.items()}
         if options["radii_m"] is not None:
             options["radii_m"] = _pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
         if options["time_range_s"] is not None:
@@ -150,10 +144,10 @@ def span(text: str, option: str) -> tuple[float, float]:
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
 @log_options
 @click.option("--window", "windows", multiple=True, metavar="START:END", help="Also score this part separately [s].")
-@pendulum_option()
+@pendulum_option
 @observers_option()
 @settings_option("Set an observer's parameter.", "OBSERVER.NAME=VALUE")
-@noise_option()
+@noise_option
 @click.option(
     "--settle-s",
     type=float,

@@ -170,16 +170,15 @@ def replay_log(
     )
 
 
-def _gimbals_matter(model: ReducedModel | None) -> bool:
-    """Return whether gimbals move the tilt; in the model of a pendulum without any, J2 = J_d omega_d = 0."""
-    return model is None or model.J2 != 0.0 or model.J_d * model.omega_d != 0.0
-
-
 def _ready(
     log: Log, names: Iterable[str], model: ReducedModel | None, noise: MeasurementNoise, parameters: Parameters
 ) -> tuple[dict[str, Observer], dict[str, str]]:
     """Make the observers that can take part, and say why the others cannot."""
-    available = {*log.has, *(["model"] if model else []), *([] if _gimbals_matter(model) else ["gimbals"])}
+    available = set(log.has)
+    if model:
+        available.add("model")
+        if model.J2 == model.J_d * model.omega_d == 0.0:
+            available.add("gimbals")  # a pendulum without any: they do not move its tilt
     ready: dict[str, Observer] = {}
     left_out: dict[str, str] = {}
     for name in dict.fromkeys(names):

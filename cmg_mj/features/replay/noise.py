@@ -7,7 +7,7 @@ row rate. White noise has the same density in all; a filter, a fusion or a quant
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -80,7 +80,11 @@ def white_noise_of(segments: Sequence[Segment], period: float) -> LogNoise:
     names = [name for name in ("y1_rad", "acceleration_rad_s2") if name in segments[0].rows]
     residuals: list[np.ndarray] = []
     steps, sizes = [], []
-    for places, values in _blocks(segments, period):
+    blocks = [(one, start) for one in segments for start in range(0, len(one.placed), BLOCK)]
+    for segment, start in evenly(blocks, MAX_BLOCKS):
+        rows = slice(start, start + BLOCK)
+        places = (segment.placed[rows] - segment.placed[start]) / period
+        values = {name: column[rows] for name, column in segment.rows.items()}
         steps.append([_smallest_step(values[name]) for name in names])
         sizes.append([float(np.std(values[name])) for name in names])
         if len(names) > 1 and "u_rad_s" in values:
@@ -96,15 +100,6 @@ def white_noise_of(segments: Sequence[Segment], period: float) -> LogNoise:
     acceleration = others[0] if others else None
     known = isinstance(tilt, WhiteNoise) and isinstance(acceleration, WhiteNoise)
     return LogNoise(tilt, acceleration, _correlation(spectra) if known else 0.0)
-
-
-def _blocks(segments: Sequence[Segment], period: float) -> Iterator[tuple[np.ndarray, Values]]:
-    """Yield blocks of successive rows: their places in periods, and their values."""
-    blocks = [(one, start) for one in segments for start in range(0, len(one.placed), BLOCK)]
-    for segment, start in evenly(blocks, MAX_BLOCKS):
-        rows = slice(start, start + BLOCK)
-        placed = segment.placed[rows]
-        yield (placed - placed[0]) / period, {name: values[rows] for name, values in segment.rows.items()}
 
 
 def _smallest_step(values: np.ndarray) -> float:

@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.features.replay.log import REFERENCE, UNITS, Log, WhiteNoise
-from cmg_mj.features.replay.noise import noise_in
+from cmg_mj.features.replay.noise import noise_in, noise_remarks
 from cmg_mj.features.replay.scores import STRETCHES, Piece, jackknife_error, jackknife_stretches, lag_with_error
 
 SPAN_S = 0.2
@@ -163,9 +164,10 @@ def judge(log: Log, aligned: Alignment) -> str:
     lag, scale, offset, correlation = aligned[:4]
     if scale is None or offset is None or correlation is None:
         return "The reference cannot be compared with the tilt: too little motion, or too short."
-    errors = (aligned.lag_error_s, aligned.scale_error, aligned.offset_error_rad_s)
+    *errors, residual = aligned[4:]
     lag_error, scale_error, offset_error = (math.inf if error is None else CLEAR * error for error in errors)
-    noisy, options = _is_noise(log, aligned.residual_rad), log.options
+    noise, options = noise_in(log).tilt, log.options
+    noisy = residual is not None and isinstance(noise, WhiteNoise) and residual <= NOISE * math.sqrt(2.0) * noise.high
     scale_set, offset_set = options.scale.get("rate", 1.0), options.offset.get("rate", 0.0)
     period = max(log.dt, log.row_period_s or 0.0)
     motion = math.sqrt(float(np.nanmean(log[REFERENCE] ** 2)))
@@ -198,16 +200,10 @@ def judge(log: Log, aligned: Alignment) -> str:
     return f"Beside the tilt {comes}{fits} (to take it out: {' '.join(cures)})."
 
 
-def remarks_on(log: Log, aligned: Alignment | None) -> list[str]:
-    """Describe the changes to a log, and its reference, in sentences."""
+def remarks_on(log: Log, aligned: Alignment | None, noise: MeasurementNoise) -> list[str]:
+    """Describe the changes to a log, its reference, and the noise that observers assume, in sentences."""
     lines = [f"{note[:1].upper()}{note[1:]}." for note in log.notes]
-    return lines if aligned is None else [*lines, judge(log, aligned)]
-
-
-def _is_noise(log: Log, residual: float | None) -> bool:
-    """Return whether the tilt's noise explains all by which its increments differ from the reference's."""
-    noise = noise_in(log).tilt
-    return residual is not None and isinstance(noise, WhiteNoise) and residual <= NOISE * math.sqrt(2.0) * noise.high
+    return lines + ([] if aligned is None else [judge(log, aligned)]) + noise_remarks(log, noise)
 
 
 def _with_interval(value: float, error: float) -> str:

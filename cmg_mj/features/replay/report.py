@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.text import Text
 
 from cmg_mj.features.replay.log_replay import ReplayResult
-from cmg_mj.features.replay.noise import noise_figures, noise_remarks
+from cmg_mj.features.replay.noise import noise_figures
 from cmg_mj.features.replay.reference import remarks_on
 from cmg_mj.features.replay.scores import RECONSTRUCTED_S, ZERO_PHASE, Figures
 from cmg_mj.results.baselines import ZERO
@@ -120,8 +120,6 @@ def _table(title: str, figures: Mapping[str, Row], replays: Sequence[ReplayResul
 
 def _entry(row: Row, key: str) -> str:
     match row.get(key):
-        case str() as name:
-            return name
         case {"mean": float() as mean, "interval": [float() as low, float() as high]}:
             interval = Interval(*(_in_unit(key, value) for value in (mean, low, high)))
             return "\n".join([figure_text(key, mean), *format_interval(FIGURES[key].pattern, interval)])
@@ -154,7 +152,7 @@ def replay_markdown(replays: Sequence[ReplayResult]) -> str:
 
 def remarks(replayed: ReplayResult) -> list[str]:
     """Return the remarks on a log and its reference, and the observers left out."""
-    lines = remarks_on(replayed.log, replayed.alignment) + noise_remarks(replayed.log, replayed.noise)
+    lines = remarks_on(replayed.log, replayed.alignment, replayed.noise)
     if (smoother := replayed.zero_phase) is not None:
         best = "-" if smoother.best_rms_error_rad_s is None else f"{smoother.best_rms_error_rad_s:.4f}"
         lines.append(

@@ -95,9 +95,9 @@ def _against_tilt(log: Log, rate: np.ndarray, scored: np.ndarray, pieces: Sequen
             travelled = np.concatenate([[0.0], np.cumsum(r[part][1:] + r[part][:-1])]) * (log.dt / 2.0)
             error = travelled - y[part]
             errors.append(error - error.mean())
-    rough = rms(np.concatenate(second)) if second else None
+    off, rough = (rms(np.concatenate([*parts, []])) for parts in (errors, second))
     return {
-        "reconstruction_rms_deg": finite_or_none(math.degrees(rms(np.concatenate(errors)) or 0.0)) if errors else None,
+        "reconstruction_rms_deg": None if off is None else math.degrees(off),
         "roughness_rad_s": None if rough is None else rough / math.sqrt(6.0),
     }
 

@@ -17,14 +17,14 @@ from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.log_replay import NO_MODEL, ObserverInputs, observer_inputs, replay_log
-from cmg_mj.features.replay.noise import noise_figures, noise_remarks
+from cmg_mj.features.replay.noise import noise_figures
 from cmg_mj.features.replay.reference import Alignment, alignment_of, remarks_on
 from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit
 from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, plain
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, paired_verdict, ratio_interval
-from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.results.summary_keys import Summary, SummaryValue, finite
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay
 from cmg_mj.runs.side_by_side import run_jobs, run_of
@@ -242,7 +242,7 @@ class LogEvidence(NamedTuple):
     @property
     def remarks(self) -> list[str]:
         """Remarks as in a replay."""
-        return [*remarks_on(self.log, self.alignment), *noise_remarks(self.log, self.noise)]
+        return remarks_on(self.log, self.alignment, self.noise)
 
 
 @dataclass(frozen=True)
@@ -292,9 +292,9 @@ class LogStudy:
         tuned = plain({number.parameter: self.level.parameters[number.parameter] for number in self.numbers})
         return [f"{self.kind}.{name}={json.dumps(value)}" for name, value in tuned.items()]
 
-    def figures(self) -> dict[str, SummaryValue]:
+    def figures(self) -> Summary:
         """Return the figures that `cmg-mj tune-log --json` prints."""
-        return {
+        figures: dict[str, SummaryValue] = {
             "logs": [one.log.name for one in self.logs],
             "observer": self.kind,
             "split": self.split,
@@ -319,6 +319,7 @@ class LogStudy:
             "verdict": self.verdict,
             **({"closed_loop": self.loop.figures()} if self.loop else {}),
         }
+        return finite(figures)
 
 
 def tune_on_logs(

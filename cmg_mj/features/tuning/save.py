@@ -15,16 +15,10 @@ from cmg_mj.features.tuning.logs import MIN_STRETCH_S, RELEVANT, LogStudy
 from cmg_mj.features.tuning.simulations import TuningResult, best_noise, tuned_scenario, windows_of
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.intervals import Interval
-from cmg_mj.results.summary_keys import Summary, finite
 from cmg_mj.results.tables import Row, Table
 from cmg_mj.runs.experiment import prepare
 
 Study = TuningResult | LogStudy
-
-
-def figures_of(study: Study) -> Summary:
-    """Return the figures that `cmg-mj tune --json` and `tune-log --json` print."""
-    return finite(study.figures())
 
 
 def study_table(study: Study) -> Group:
@@ -151,7 +145,7 @@ def save_study(folder: RunFolder | Path, study: Study, *, complete: bool = True)
     Raises:
         InputError: A file cannot be written.
     """
-    writers = {"tuned.json": lambda path: write_text(path, json.dumps(figures_of(study), indent=2))}
+    writers = {"tuned.json": lambda path: write_text(path, json.dumps(study.figures(), indent=2))}
     if isinstance(study, TuningResult):
         for level in study.levels:
             name = f"scenario-{level.noise_ug_rthz:g}.toml" if len(study.levels) > 1 else "scenario.toml"

@@ -16,7 +16,7 @@ from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, 
 from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, crossing, plain
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import Observer, make_observer
-from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.results.summary_keys import Summary, SummaryValue, finite
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay
@@ -197,7 +197,7 @@ class TuningResult:
         """Start and end of the scored time [s]."""
         return window_of(self.scenario)
 
-    def figures(self) -> dict[str, SummaryValue]:
+    def figures(self) -> Summary:
         """Return the figures that `cmg-mj tune --json` prints."""
         best = best_noise(self)
         levels = [
@@ -209,7 +209,7 @@ class TuningResult:
             }
             for level in self.levels
         ]
-        return {
+        figures: dict[str, SummaryValue] = {
             "scenario": self.scenario.title,
             "observer": self.kind,
             "seed": self.scenario.seed,
@@ -223,6 +223,7 @@ class TuningResult:
             "given_best_at_noise_density_ug_rthz": best.noise_ug_rthz,
             **({"given_best_noise_is": best.where} if len(levels) > 1 else {}),
         }
+        return finite(figures)
 
 
 def tune(
