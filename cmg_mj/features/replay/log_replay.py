@@ -25,9 +25,8 @@ from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.trajectory import ESTIMATES, Layout, NamedColumns, Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay_all
-from cmg_mj.scenario.design import PlantNumbers, design
+from cmg_mj.scenario.design import design
 from cmg_mj.scenario.loading import parse_scenario
-from cmg_mj.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -242,7 +241,9 @@ def model_of(text: str) -> ReducedModel:
         InputError: There is no such file, or a number is missing or impossible.
     """
     if "=" not in text:
-        return _plant_of(parse_scenario({"plant": {"model": text}}, f"--model {text}")).reduced
+        experiment = prepare(parse_scenario({"plant": {"model": text}}, f"--model {text}"))
+        experiment.require_single_axis("replay")
+        return experiment.plant.reduced
     values = numbers(text, "--model", NUMBERS)
     for name in ("inertia", "gravity_torque"):
         if name not in values:
@@ -251,12 +252,6 @@ def model_of(text: str) -> ReducedModel:
     if not inertia > 0.0 or not inertia + added > 0.0:
         raise InputError("--model: inertia, and inertia + gimbal_inertia, must be greater than 0 [kg m^2]")
     return ReducedModel(inertia, added, values.get("momentum", 0.0), 1.0, values["gravity_torque"])
-
-
-def _plant_of(scenario: Scenario) -> PlantNumbers:
-    experiment = prepare(scenario)
-    experiment.require_single_axis("replay")
-    return experiment.plant.parameters
 
 
 class ObserverInputs(NamedTuple):
@@ -291,7 +286,7 @@ def observer_inputs(
     if log.scenario is None:
         return ObserverInputs(model, noise_of(log, noises), parameters)
     scenario = parse_scenario(dict(log.scenario), log.name)
-    plant, loop = _plant_of(scenario), scenario.observer
+    plant, loop = prepare(scenario).plant.parameters, scenario.observer
     _, run_model, noise = design(scenario, plant).constructor_arguments
     if "accelerometer" in noises:  # the sensors' other errors stay
         if len(noises) > 1:

@@ -361,29 +361,28 @@ def tune_on_logs(
     """
     if not 0.0 < split < 1.0:
         raise InputError(f"--split {split:g}: must be between 0 and 1, the share that is fitted")
-    dt = _common_period(logs)
     inputs = [
         observer_inputs(log, model=model, noises=noises, parameters={kind: start_parameters or {}}) for log in logs
     ]
-    given = _common_parameters(kind, logs, inputs)
+    _check_alike(kind, logs, inputs)
     halves = [[log.cut(slice(0, end)), log.cut(slice(end, None))] for log in logs for end in [round(split * len(log))]]
     for log_halves, log_inputs in zip(halves, inputs, strict=True):
         for half in log_halves:  # an observer that cannot take part is refused, with the reason
             replay_log(half, [kind], **log_inputs._asdict(), settle_s=settle_s)
     fitted, held_out = (LogSegments(segments, settle_s) for segments in zip(*halves, strict=True))
-    makers = [partial(make_observer, kind, dt, own.model or NO_MODEL, own.noise) for own in inputs]
+    makers = [partial(make_observer, kind, logs[0].dt, own.model or NO_MODEL, own.noise) for own in inputs]
 
     def one_per_log(**candidate: ParameterValue) -> list[Observer]:
         return [make(**candidate) for make in makers]
 
-    fit = ParameterFit(kind, makers[0], given, parameters, ranges, starts)
+    fit = ParameterFit(kind, makers[0], inputs[0].parameters[kind], parameters, ranges, starts)
     level = fit.level(one_per_log, fitted, held_out, on_share)
     evidence = [LogEvidence(log, own.noise, alignment_of(log)) for log, own in zip(logs, inputs, strict=True)]
     return LogStudy(
         kind,
         fit.start_parameters,
         fit.numbers,
-        fit.insensitive_parameters or (),
+        fit.insensitive_parameters,
         evidence,
         split,
         level,
@@ -392,24 +391,16 @@ def tune_on_logs(
     )
 
 
-def _common_period(logs: Sequence[Log]) -> float:
-    """Return the sample period of logs that all have a reference [s]."""
-    dt = logs[0].dt
-    for log in logs:
+def _check_alike(kind: str, logs: Sequence[Log], inputs: Sequence[ObserverInputs]) -> None:
+    """Refuse logs without a reference, and logs that differ in the sample period or the observer's parameters."""
+    first, parameters = logs[0], inputs[0].parameters[kind]
+    for log, own in zip(logs, inputs, strict=True):
         if "reference" not in log.has:
             raise InputError(f"{log.name}: no reference to tune to: name it, --columns rate=...")
-        if abs(log.dt / dt - 1.0) > 1e-3:
-            raise InputError(f"{log.name}: {1.0 / log.dt:g} Hz, {logs[0].name} {1.0 / dt:g} Hz: give --rate HZ")
-    return dt
-
-
-def _common_parameters(kind: str, logs: Sequence[Log], inputs: Sequence[ObserverInputs]) -> ParameterValues:
-    """Return the observer's parameters, which must be the same in all logs."""
-    parameters = dict(inputs[0].parameters[kind])
-    for log, log_inputs in zip(logs, inputs, strict=True):
-        if log_inputs.parameters[kind] != parameters:
+        if abs(log.dt / first.dt - 1.0) > 1e-3:
+            raise InputError(f"{log.name}: {1.0 / log.dt:g} Hz, {first.name} {1.0 / first.dt:g} Hz: give --rate HZ")
+        if own.parameters[kind] != parameters:
             raise InputError(
-                f"{logs[0].name} and {log.name} ran with different parameters of {kind}: say with which to begin, "
+                f"{first.name} and {log.name} ran with different parameters of {kind}: say with which to begin, "
                 "--set observer.NAME=VALUE"
             )
-    return parameters

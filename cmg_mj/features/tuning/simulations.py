@@ -289,8 +289,7 @@ def tune(
             if not levels:
                 raise
             break
-    insensitive = fit.insensitive_parameters or ()
-    return TuningResult(scenario, kind, fit.start_parameters, fit.numbers, insensitive, worlds, levels)
+    return TuningResult(scenario, kind, fit.start_parameters, fit.numbers, fit.insensitive_parameters, worlds, levels)
 
 
 class BestNoise(NamedTuple):
