@@ -164,7 +164,7 @@ def record(scenario: Scenario, worlds: range, noise_ug_rthz: float | None = None
     return recorder(scenario, [(worlds, noise_ug_rthz)])(worlds, noise_ug_rthz)
 
 
-def halves(worlds: int, noise_ug_rthz: Sequence[float]) -> list[RecordingRequest]:
+def halves(worlds: int, noise_ug_rthz: Sequence[float]) -> list[tuple[range, float]]:
     """Return the requests of `tune`: worlds to fit and as many held out, at every noise."""
     spans = range(worlds), range(worlds, 2 * worlds)
     return [(span, density) for density in noise_ug_rthz for span in spans]
