@@ -94,7 +94,7 @@ def _means(replays: Sequence[ReplayResult]) -> dict[str, dict[str, SummaryValue]
             interval = known_interval(values, FIGURES[key].positive)
             means[name][key] = {
                 "mean": sum(values) / len(values) if values else None,
-                "interval": [interval.low, interval.high] if interval and math.isfinite(interval.low) else None,
+                "interval": [interval.low, interval.high] if interval else None,
                 "logs": len(values),
             }
     return means

@@ -63,8 +63,8 @@ def scores(log: Log, rate: np.ndarray, scored: np.ndarray, noise_gain: float | N
 def _against(log: Log, rate: np.ndarray, scored: np.ndarray, pieces: Sequence[slice]) -> Figures:
     true = log[REFERENCE]
     counted = scored & np.isfinite(true)
-    error, motion = rms((rate - true)[counted]), rms(true[counted])
     behind, ahead = np.where(scored & np.isfinite(rate), rate, np.nan), np.where(scored, true, np.nan)
+    error, motion = rms((rate - true)[counted]), rms(true[counted])
     figures = {
         "velocity_rms_error_rad_s": error,
         "velocity_rms_rad_s": motion,
@@ -259,9 +259,11 @@ def zero_phase(log: Log, scored: np.ndarray) -> ZeroPhase | None:
     Returns:
         Its figures; None if all parts are shorter than four samples.
     """
-    starts = [(part, start) for part in log.parts for start in range(part.start, part.stop, BLOCK)]
-    blocks = [slice(start, min(start + BLOCK, part.stop)) for part, start in starts]
-    blocks = [block for block in blocks if block.stop - block.start >= 4]
+    blocks = [
+        slice(start, min(start + BLOCK, part.stop))
+        for part in log.parts
+        for start in range(part.start, part.stop - 3, BLOCK)
+    ]
     if not blocks:
         return None
     if sum(block.stop - block.start for block in blocks) > BLOCK * BLOCKS:
