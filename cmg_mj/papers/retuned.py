@@ -38,14 +38,10 @@ def tune_all(
     Returns:
         What came out of each of them.
     """
-    recordings = [
-        half
-        for settings, noises in pushes.values()
-        for half in halves(scenario_of(next(iter(parameters)), settings), worlds, noises)
-    ]
-    recorded = recorder(recordings, warm_up_s=WARM_UP_S)
     studies: dict[str, dict[str, Sequence[NoiseLevelResult]]] = {}
     for i, (push, (settings, noises)) in enumerate(pushes.items()):
+        shared = scenario_of(next(iter(parameters)), settings)
+        recorded = recorder(shared, halves(worlds, noises), warm_up_s=WARM_UP_S)
         studies[push] = {}
         for name, numbers in parameters.items():
             studies[push][name] = tune(

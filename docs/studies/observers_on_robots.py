@@ -29,6 +29,7 @@ from cmg_mj.core.reduced_model import hold_matrices
 from cmg_mj.features.mounting.limits import prospects, push_margin
 from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.features.tuning import Recorded, halves, recorder, tune
+from cmg_mj.features.tuning.simulations import window_of
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.observers.scaling import scaled_names, scaled_parameters, scales_of
 from cmg_mj.results.floors import FLOOR_Y1, TiltFloor, acceleration_floor
@@ -78,12 +79,13 @@ def model_floor(experiment: Experiment, window_s: float) -> float:
 def floors(experiment: Experiment, held: Recorded) -> dict[str, float]:
     """Fits that the floors leave, from the push on."""
     trajectory, dt = held.trajectory, experiment.law.dt
-    pushed = np.repeat((trajectory["time_s"] >= held.window[0] - 1e-9)[:, None], held.worlds, axis=1)
+    start, end = window_of(experiment.scenario)
+    pushed = np.repeat((trajectory["time_s"] >= start - 1e-9)[:, None], held.worlds, axis=1)
     tilt = TiltFloor(dt, held.worlds)
     tilt.add(trajectory["y1_rad"], trajectory["x2_rad_s"], np.ones_like(pushed), pushed)
     y1 = [tilt.errors(world)[1] or math.nan for world in range(held.worlds)]
     noise = experiment.design.constructor_arguments[2]
-    errors = float(np.mean(y1)), model_floor(experiment, held.window[1] - held.window[0]), acceleration_floor(noise, dt)
+    errors = float(np.mean(y1)), model_floor(experiment, end - start), acceleration_floor(noise, dt)
     return {name: 1.0 - error / held.zero_rms for name, error in zip(FLOORS, errors, strict=True)}
 
 
@@ -167,14 +169,13 @@ class OnRobot:
     def recorded(self) -> Callable[..., Recorded]:
         """The recordings that `tune` asks for."""
         scenario = self.experiment.scenario
-        return recorder(halves(scenario, WORLDS, [scenario.sensors.accelerometer.noise_density_ug_rthz]))
+        return recorder(scenario, halves(WORLDS, [scenario.sensors.accelerometer.noise_density_ug_rthz]))
 
     @cached_property
     def held(self) -> Recorded:
         """Worlds that nothing is tuned on."""
-        scenario, worlds = self.experiment.scenario, range(WORLDS, 2 * WORLDS)
-        density = scenario.sensors.accelerometer.noise_density_ug_rthz
-        return self.recorded(scenario, worlds, density)
+        density = self.experiment.scenario.sensors.accelerometer.noise_density_ug_rthz
+        return self.recorded(range(WORLDS, 2 * WORLDS), density)
 
     def row(self, kind: str, part: str) -> dict:
         """Compute a row."""

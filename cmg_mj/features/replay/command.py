@@ -11,7 +11,6 @@ import click
 
 from cmg_mj.cli.arguments import (
     Command,
-    Decorator,
     all_of,
     claim_output,
     json_option,
@@ -84,25 +83,19 @@ _OPTIONS = (
 )
 
 
-def pendulum_option() -> Decorator:
-    """Make the option `--model`, the pendulum of logs."""
-    return click.option(
-        "--model",
-        metavar="MJCF|NUMBERS",
-        help="Your pendulum: an MJCF file, or inertia=,gravity_torque= [kg m^2, N m], with gimbals also momentum=,"
-        "gimbal_inertia= [N m s, kg m^2].",
-    )
-
-
-def noise_option() -> Decorator:
-    """Make the option `--noise`, the sensor noise of logs."""
-    return click.option(
-        "--noise",
-        default="",
-        metavar="NAME=VALUE,...",
-        help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of "
-        "one sample.  [default: from the log, or else accelerometer=400, or tilt=0.1,acceleration=1]",
-    )
+pendulum_option = click.option(
+    "--model",
+    metavar="MJCF|NUMBERS",
+    help="Your pendulum: an MJCF file, or inertia=,gravity_torque= [kg m^2, N m], with gimbals also momentum=,"
+    "gimbal_inertia= [N m s, kg m^2].",
+)
+noise_option = click.option(
+    "--noise",
+    default="",
+    metavar="NAME=VALUE,...",
+    help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of "
+    "one sample.  [default: from the log, or else accelerometer=400, or tilt=0.1,acceleration=1]",
+)
 
 
 def log_options(command: Command) -> Command:
@@ -114,10 +107,11 @@ def log_options(command: Command) -> Command:
         from cmg_mj.observers.parameter_options import finite
 
         options = {field.name: given.pop(field.name) for field in fields(ReadOptions) if field.name in given}
-        for name in ("columns", "units", "scale", "offset"):
+        for name in ("columns", "units"):
             options[name] = assignments(options[name], f"--{name}")
         for name in ("scale", "offset"):
-            options[name] = {role: finite(text, f"--{name} {role}") for role, text in options[name].items()}
+            texts = assignments(options[name], f"--{name}")
+            options[name] = {role: finite(text, f"--{name} {role}") for role, text in texts.items()}
         if options["radii_m"] is not None:
             options["radii_m"] = _pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
         if options["time_range_s"] is not None:
@@ -150,10 +144,10 @@ def span(text: str, option: str) -> tuple[float, float]:
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
 @log_options
 @click.option("--window", "windows", multiple=True, metavar="START:END", help="Also score this part separately [s].")
-@pendulum_option()
+@pendulum_option
 @observers_option()
 @settings_option("Set an observer's parameter.", "OBSERVER.NAME=VALUE")
-@noise_option()
+@noise_option
 @click.option(
     "--settle-s",
     type=float,
@@ -188,28 +182,52 @@ def replay(
     Observers that need a model take part only with --model. A run's recording replays to the figures of the run.
     docs/replay.md has the details.
     """  # noqa: D301  (click wants the character itself)
+    import tomli_w
+
     from cmg_mj.features.replay import report
+    from cmg_mj.features.replay.log_replay import ReplayResult, model_of, replay_prepared
     from cmg_mj.features.replay.noise import noise_numbers
-    from cmg_mj.features.replay.save import LogReplays
+    from cmg_mj.features.replay.reading import read_logs
+    from cmg_mj.features.replay.save import distinct_names, save_replays
     from cmg_mj.observers.parameter_options import parameters_of
 
     options = replace(options, windows_s=tuple(span(text, "--window") for text in windows))
-    replays = LogReplays(logs, observers, options, model, noise_numbers(noise), parameters_of(settings), settle_s)
-    folder = claim_output(out, replays.folder_name)
-    total = len(replays.logs)
+    noises, parameters = noise_numbers(noise), parameters_of(settings)
+    for kind in parameters:
+        if kind not in observers:
+            raise InputError(f"--set {kind}: is not among --observers {','.join(observers)}")
+    pendulum = None if model is None else model_of(model)
+    recordings = read_logs(logs, options)
+    names, total = distinct_names(log.name for log in recordings), len(recordings)
+    request = {"observers": observers, "model": model, "parameters": parameters, "noise": noises, "settle_s": settle_s}
+    request = {name: value for name, value in request.items() if value not in (None, {})}
+    log_options = options.as_toml()
+    settings_toml = tomli_w.dumps({"logs": logs, **({"log": log_options} if log_options else {}), "replay": request})
+    folder = claim_output(out, f"replay-{names[0]}" + (f"-and-{total - 1}-more" if total > 1 else ""))
+    results: list[ReplayResult] = []
     with CtrlC() as ctrl_c:
         try:
             with progress("Replay", float(total), ctrl_c) as on_progress:
-                replays.run(on_progress)
+                for i, log in enumerate(recordings):
+                    results.append(
+                        replay_prepared(
+                            log,
+                            observers,
+                            model=pendulum,
+                            noises=noises,
+                            parameters=parameters,
+                            settle_s=settle_s,
+                            on_share=lambda share, i=i, log=log: on_progress(i + share, f"Replay {log.name}"),
+                        )
+                    )
         except KeyboardInterrupt:
-            if not replays.results:
+            if not results:
                 end_interrupted("interrupted before the first log was done; nothing was written")
         try:
-            place = replays.save(folder)
+            place = save_replays(folder, results, names, settings_toml, complete=len(results) == total)
         finally:
-            results = replays.results
             table = report.replay_markdown(results) if markdown else report.replay_tables(results)
             show(finite(report.replay_figures(results)), table, as_json)
     say_written(folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", as_json)
-    if ctrl_c.noted or not replays.complete:
-        end_interrupted(f"interrupted; {len(replays.results)} of {total} logs are in {final_path(folder, place)}")
+    if ctrl_c.noted or len(results) < total:
+        end_interrupted(f"interrupted; {len(results)} of {total} logs are in {final_path(folder, place)}")

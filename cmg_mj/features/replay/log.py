@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ EVEN = 0.02
 
 Values = Mapping[str, np.ndarray]
 """Name -> (n_rows,)."""
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,11 @@ class Segment:
         inside = np.interp(stamps, self.stamps, self.placed)
         inside = np.where(stamps > self.stamps[-1], stamps - after, inside)
         return np.where(stamps < self.stamps[0], stamps - before, inside)
+
+
+def evenly(items: Sequence[Item], most: int) -> list[Item]:
+    """Select items, evenly spread from the first to the last, if there are more than the most."""
+    return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, min(len(items), most)).round().astype(int))]
 
 
 class WhiteNoise(NamedTuple):

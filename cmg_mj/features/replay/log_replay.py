@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import extra_signals, needs
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.noise import noise_of
-from cmg_mj.features.replay.reference import Alignment, alignment_of, model_misfit
+from cmg_mj.features.replay.reference import Alignment, alignment_of
 from cmg_mj.features.replay.scores import Figures, ZeroPhase, rms, scores, zero_phase
 from cmg_mj.inputs.users_line import users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
@@ -25,9 +25,8 @@ from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.trajectory import ESTIMATES, Layout, NamedColumns, Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay_all
-from cmg_mj.scenario.design import PlantNumbers, design
+from cmg_mj.scenario.design import design
 from cmg_mj.scenario.loading import parse_scenario
-from cmg_mj.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,7 +69,6 @@ class ReplayResult(NamedColumns):
         noise: The sensors' noise that observers assumed; also the noise of the noise gain.
         parameters: Parameters that were set.
         zero_phase: Figures of a smoother that sees the future, which is no observer; None without a reference.
-        misfit: How badly the model predicts the log, from `model_misfit`; None without a model.
     """
 
     log: Log
@@ -82,7 +80,6 @@ class ReplayResult(NamedColumns):
     noise: MeasurementNoise
     parameters: Parameters = field(default_factory=dict)
     zero_phase: ZeroPhase | None = None
-    misfit: float | None = None
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -169,27 +166,18 @@ def replay_log(
         noise,
         parameters,
         zero_phase(log, scored) if "reference" in log.has else None,
-        misfit_of(log, model),
     )
-
-
-def misfit_of(log: Log, model: ReducedModel | None) -> float | None:
-    """Return the model's misfit; None without a model, or where its gimbals are not in the log."""
-    if model is None or (_gimbals_matter(model) and "gimbals" not in log.has):
-        return None
-    return model_misfit(log, model)
-
-
-def _gimbals_matter(model: ReducedModel | None) -> bool:
-    """Return whether gimbals move the tilt; in the model of a pendulum without any, J2 = J_d omega_d = 0."""
-    return model is None or model.J2 != 0.0 or model.J_d * model.omega_d != 0.0
 
 
 def _ready(
     log: Log, names: Iterable[str], model: ReducedModel | None, noise: MeasurementNoise, parameters: Parameters
 ) -> tuple[dict[str, Observer], dict[str, str]]:
     """Make the observers that can take part, and say why the others cannot."""
-    available = {*log.has, *(["model"] if model else []), *([] if _gimbals_matter(model) else ["gimbals"])}
+    available = set(log.has)
+    if model:
+        available.add("model")
+        if model.J2 == model.J_d * model.omega_d == 0.0:
+            available.add("gimbals")  # a pendulum without any: they do not move its tilt
     ready: dict[str, Observer] = {}
     left_out: dict[str, str] = {}
     for name in dict.fromkeys(names):
@@ -253,7 +241,9 @@ def model_of(text: str) -> ReducedModel:
         InputError: There is no such file, or a number is missing or impossible.
     """
     if "=" not in text:
-        return _plant_of(parse_scenario({"plant": {"model": text}}, f"--model {text}")).reduced
+        experiment = prepare(parse_scenario({"plant": {"model": text}}, f"--model {text}"))
+        experiment.require_single_axis("replay")
+        return experiment.plant.reduced
     values = numbers(text, "--model", NUMBERS)
     for name in ("inertia", "gravity_torque"):
         if name not in values:
@@ -262,12 +252,6 @@ def model_of(text: str) -> ReducedModel:
     if not inertia > 0.0 or not inertia + added > 0.0:
         raise InputError("--model: inertia, and inertia + gimbal_inertia, must be greater than 0 [kg m^2]")
     return ReducedModel(inertia, added, values.get("momentum", 0.0), 1.0, values["gravity_torque"])
-
-
-def _plant_of(scenario: Scenario) -> PlantNumbers:
-    experiment = prepare(scenario)
-    experiment.require_single_axis("replay")
-    return experiment.plant.parameters
 
 
 class ObserverInputs(NamedTuple):
@@ -302,9 +286,8 @@ def observer_inputs(
     if log.scenario is None:
         return ObserverInputs(model, noise_of(log, noises), parameters)
     scenario = parse_scenario(dict(log.scenario), log.name)
-    plant, loop = _plant_of(scenario), scenario.observer
-    with scenario.named_in_errors():
-        _, run_model, noise = design(scenario, plant).constructor_arguments
+    plant, loop = prepare(scenario).plant.parameters, scenario.observer
+    _, run_model, noise = design(scenario, plant).constructor_arguments
     if "accelerometer" in noises:  # the sensors' other errors stay
         if len(noises) > 1:
             raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
@@ -319,17 +302,14 @@ def replay_prepared(
     log: Log,
     observers: Sequence[str] | None = None,
     *,
-    model: ReducedModel | None = None,
-    noises: Mapping[str, float] | None = None,
-    parameters: Parameters | None = None,
     settle_s: float | None = None,
     on_share: OnShare | None = None,
+    **given: Any,
 ) -> ReplayResult:
-    """Replay observers on a log with the inputs of `observer_inputs`, whose arguments it takes.
+    """Replay observers on a log with the inputs of `observer_inputs`, which takes the given ones.
 
     The others are those of `replay_log`; by default a run's recording is scored from its start.
     """
-    inputs = observer_inputs(log, model=model, noises=noises, parameters=parameters)
     if settle_s is None:
         settle_s = SETTLE_S if log.scenario is None else 0.0
-    return replay_log(log, observers, **inputs._asdict(), settle_s=settle_s, on_share=on_share)
+    return replay_log(log, observers, **observer_inputs(log, **given)._asdict(), settle_s=settle_s, on_share=on_share)

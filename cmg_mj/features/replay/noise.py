@@ -7,16 +7,15 @@ row rate. White noise has the same density in all; a filter, a fusion or a quant
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import STANDARD_GRAVITY
-from cmg_mj.features.replay.log import EVEN, Log, LogNoise, Segment, Values, WhiteNoise
+from cmg_mj.features.replay.log import EVEN, Log, LogNoise, Segment, Values, WhiteNoise, evenly
 from cmg_mj.observers.parameter_options import numbers
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
@@ -81,7 +80,11 @@ def white_noise_of(segments: Sequence[Segment], period: float) -> LogNoise:
     names = [name for name in ("y1_rad", "acceleration_rad_s2") if name in segments[0].rows]
     residuals: list[np.ndarray] = []
     steps, sizes = [], []
-    for places, values in _blocks(segments, period):
+    blocks = [(one, start) for one in segments for start in range(0, len(one.placed), BLOCK)]
+    for segment, start in evenly(blocks, MAX_BLOCKS):
+        rows = slice(start, start + BLOCK)
+        places = (segment.placed[rows] - segment.placed[start]) / period
+        values = {name: column[rows] for name, column in segment.rows.items()}
         steps.append([_smallest_step(values[name]) for name in names])
         sizes.append([float(np.std(values[name])) for name in names])
         if len(names) > 1 and "u_rad_s" in values:
@@ -97,16 +100,6 @@ def white_noise_of(segments: Sequence[Segment], period: float) -> LogNoise:
     acceleration = others[0] if others else None
     known = isinstance(tilt, WhiteNoise) and isinstance(acceleration, WhiteNoise)
     return LogNoise(tilt, acceleration, _correlation(spectra) if known else 0.0)
-
-
-def _blocks(segments: Sequence[Segment], period: float) -> Iterator[tuple[np.ndarray, Values]]:
-    """Yield blocks of successive rows: their places in periods, and their values."""
-    blocks = [(one, start) for one in segments for start in range(0, len(one.placed), BLOCK)]
-    for i in np.unique(np.linspace(0, len(blocks) - 1, min(len(blocks), MAX_BLOCKS)).round().astype(int)):
-        segment, start = blocks[i]
-        rows = slice(start, start + BLOCK)
-        placed = segment.placed[rows]
-        yield (placed - placed[0]) / period, {name: values[rows] for name, values in segment.rows.items()}
 
 
 def _smallest_step(values: np.ndarray) -> float:
@@ -245,27 +238,22 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> Measurement
         InputError: A noise belongs to another sensor than the log's.
     """
     noises, shown, gimbal = noises or {}, noise_in(log), Encoder().sample_sigma
-    tilt, acceleration = (
-        noise.sigma if isinstance(noise, WhiteNoise) else None for noise in (shown.tilt, shown.acceleration)
-    )
+    own = {name: noise.sigma for name, noise in shown._asdict().items() if isinstance(noise, WhiteNoise)}
     if log.tilt is None:
         if "accelerometer" in noises:
             raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
-        if tilt is None or "tilt" in noises:
-            tilt = math.radians(noises.get("tilt", TILT_NOISE_DEG))
-        if acceleration is None or "acceleration" in noises:
-            acceleration = noises.get("acceleration", ACCELERATION_NOISE_RAD_S2)
-        correlation = 0.0 if {"tilt", "acceleration"} <= noises.keys() else shown.correlation
-        return MeasurementNoise(tilt, acceleration, correlation, gimbal)
+        given = {name: math.radians(size) if name == "tilt" else size for name, size in noises.items()}
+        sizes = {"tilt": math.radians(TILT_NOISE_DEG), "acceleration": ACCELERATION_NOISE_RAD_S2, **own, **given}
+        return MeasurementNoise(**sizes, correlation=0.0 if len(given) > 1 else shown.correlation, gimbal=gimbal)
     if noises.keys() - {"accelerometer"}:
         raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")
-    if tilt is None or noises:
+    if "tilt" not in own or noises:
         density = noises.get("accelerometer", NOISE_DENSITY_UG_RTHZ)
         sigma = Accelerometer(rate_hz=_sampling_rate(log), noise_density_ug_rthz=density).sample_sigma
-    elif acceleration is None:
-        sigma = tilt / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
+    elif "acceleration" not in own:
+        sigma = own["tilt"] / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
     else:
-        return MeasurementNoise(tilt, acceleration, shown.correlation, gimbal)
+        return MeasurementNoise(**own, correlation=shown.correlation, gimbal=gimbal)
     return replace(log.tilt.noise(sigma, STANDARD_GRAVITY), gimbal=gimbal)
 
 
@@ -285,14 +273,8 @@ def noise_in(log: Log) -> LogNoise:
     if noise is None:
         return LogNoise("the sensors are known", None, 0.0)
     factor = math.sqrt(max(1.0, (log.row_period_s or log.dt) / log.dt))
-    return LogNoise(_scaled(noise.tilt, factor), _scaled(noise.acceleration, factor), noise.correlation)
-
-
-Other = TypeVar("Other")
-
-
-def _scaled(noise: WhiteNoise | Other, factor: float) -> WhiteNoise | Other:
-    return WhiteNoise(*(factor * size for size in noise)) if isinstance(noise, WhiteNoise) else noise
+    parts = {name: part for name, part in noise._asdict().items() if isinstance(part, WhiteNoise)}
+    return noise._replace(**{name: WhiteNoise(*(factor * size for size in part)) for name, part in parts.items()})
 
 
 def noise_numbers(text: str) -> dict[str, float]:

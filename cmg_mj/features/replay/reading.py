@@ -96,9 +96,16 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     measured = _measured(signals, geometry, notes)
     period, dt, segments = _sample(path, time, measured, options, unit_known, notes)
     joined = _join(segments)
+    tilt = joined["y1_rad"]
+    if np.ptp(tilt) == 0.0:
+        raise InputError(f"{path}: the tilt is {tilt[0]:g} rad in every row: nothing moves")
     if "rate" in signals:
-        joined[REFERENCE] = _reference(segments, time, signals["rate"], options.delay_s)
-    _check_motion(path, joined, "rate" in signals)
+        reference = joined[REFERENCE] = _reference(segments, time, signals["rate"], options.delay_s)
+        known = reference[np.isfinite(reference)]
+        if not len(known):
+            raise InputError(f"{path}: the reference has no number where the tilt has one")
+        if np.ptp(known) == 0.0:
+            raise InputError(f"{path}: the reference is {known[0]:g} rad/s in every row: leave it out")
     notes += _gravity_remarks(columns, signals, options.scale)
     if "ax" in signals:
         notes.append("the tilt is atan2(-ax, az): an acceleration of the sensor by 0.1 g puts it off by 5.7 deg")
@@ -153,14 +160,13 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
     )
 
 
-def check_distinct_logs(paths: Sequence[str]) -> None:
-    """Refuse a log that is named twice: it would count twice in means and intervals."""
-    known: set[str] = set()
-    for name in paths:
-        path = os.path.realpath(name).removesuffix("/trajectory.parquet")
-        if path in known:
-            raise InputError(f"{name}: this log is given twice")
-        known.add(path)
+def read_logs(paths: Sequence[str], options: ReadOptions) -> list[Log]:
+    """Read logs, and refuse one that is named twice: it would count twice in means and intervals."""
+    files = [os.path.realpath(path).removesuffix("/trajectory.parquet") for path in paths]
+    for i, path in enumerate(paths):
+        if files[i] in files[:i]:
+            raise InputError(f"{path}: this log is given twice")
+    return [read_log(path, options) for path in paths]
 
 
 def _geometry(columns: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:
@@ -430,17 +436,6 @@ def _reference(segments: Sequence[Segment], time: np.ndarray, reference: np.ndar
         values = _resample(np.clip(grid, stamps[0], stamps[-1]), stamps, reference, gap)
         sampled.append(np.where(known, values, np.nan))
     return np.concatenate(sampled)
-
-
-def _check_motion(path: Path, columns: Values, has_reference: bool) -> None:
-    """Refuse a log without motion."""
-    tilt, known = columns["y1_rad"], columns[REFERENCE][np.isfinite(columns[REFERENCE])]
-    if np.ptp(tilt) == 0.0:
-        raise InputError(f"{path}: the tilt is {tilt[0]:g} rad in every row: nothing moves")
-    if has_reference and not len(known):
-        raise InputError(f"{path}: the reference has no number where the tilt has one")
-    if has_reference and np.ptp(known) == 0.0:
-        raise InputError(f"{path}: the reference is {known[0]:g} rad/s in every row: leave it out")
 
 
 def _gravity_remarks(columns: Mapping[str, Column], signals: Values, scale: Mapping[str, float]) -> list[str]:

@@ -1,4 +1,4 @@
-"""The reference beside the tilt: its lag, scale and offset, and whether a model can be that of the log."""
+"""The reference beside the tilt: its lag, scale and offset."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.features.replay.log import REFERENCE, UNITS, Log, WhiteNoise
-from cmg_mj.features.replay.noise import noise_in
+from cmg_mj.features.replay.noise import noise_in, noise_remarks
 from cmg_mj.features.replay.scores import STRETCHES, Piece, jackknife_error, jackknife_stretches, lag_with_error
 
 SPAN_S = 0.2
@@ -34,15 +34,6 @@ FINE = 0.01
 AGREES = 0.95
 """Correlation at the best lag, of either sign, from which a cure is offered. If the tilt freezes half-way, neither lag
 nor scale is meaningful."""
-RATE_SPAN_S = 0.04
-"""Time over which increments of the tilt give the rate in the model's damping term [s]."""
-WIDTH_S = 0.25
-"""Length of a stretch for the tilt's second derivative [s], of at least `MIN_SAMPLES` samples."""
-MIN_SAMPLES = 12
-MIN_STRETCHES = 20
-"""Fewest stretches for a comparison."""
-MISFIT = 1.5
-"""Misfit from which a model is doubted. Right models have at most 1.15: docs/studies/model_misfit.py."""
 
 
 class Alignment(NamedTuple):
@@ -85,14 +76,13 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
     lag_s, lag_error = lag_with_error([partial(_travelled, rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
     sums, middle = _pair_sums([partial(_travelled, rate, span, dt, lag_s or 0.0) for _, rate in pieces], rises)
     whole = sums.sum(axis=0)
-    line = _line(whole, middle)
+    line = _line(whole, middle, span * dt)
     if line is None:
         return Alignment(lag_s, None, None, None)
-    others = [_line(whole - stretch, middle) for stretch in sums if stretch[0, 0]]
-    errors = jackknife_error([other and (other.slope, other.start / (span * dt)) for other in others])
-    scale_error, offset_error = (None, None) if errors is None else errors.tolist()
-    offset = line.start / (span * dt)
-    return Alignment(lag_s, line.slope, offset, line.correlation, lag_error, scale_error, offset_error, line.residual)
+    errors = jackknife_error([_line(whole - stretch, middle, span * dt) for stretch in sums if stretch[0, 0]])
+    scale_error, offset_error = (None, None) if errors is None else errors[:2].tolist()
+    scale, offset, correlation, residual = line
+    return Alignment(lag_s, scale, offset, correlation, lag_error, scale_error, offset_error, residual)
 
 
 def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float, rows: slice) -> np.ndarray:
@@ -131,17 +121,17 @@ def _pair_sums(travels: Sequence[Piece], rises: Sequence[np.ndarray]) -> tuple[n
     return sums, middle
 
 
-class _Line(NamedTuple):
-    """A fitted line, rise = start + slope travel, and the RMS of the rises less the line."""
+def _line(sums: np.ndarray, middle: np.ndarray, length: float) -> tuple[float, float, float, float] | None:
+    """Fit a line, rise = start + slope travel, to sums of pairs.
 
-    slope: float
-    start: float
-    correlation: float
-    residual: float
+    Args:
+        sums: Sums, (3, 3).
+        middle: Numbers that were subtracted, (3,).
+        length: Time over which the tilt rises [s].
 
-
-def _line(sums: np.ndarray, middle: np.ndarray) -> _Line | None:
-    """Fit a line to sums of pairs, (3, 3); None if there is too little motion."""
+    Returns:
+        Slope, start by the length, correlation, and RMS of the rises less the line; None if there is too little motion.
+    """
     n = sums[0, 0]
     if n < 3:
         return None
@@ -153,7 +143,7 @@ def _line(sums: np.ndarray, middle: np.ndarray) -> _Line | None:
     slope = xy / xx
     start = (means[1] + middle[2]) - slope * (means[0] + middle[1])
     residual = math.sqrt(max(0.0, yy - slope * xy) / n)
-    return _Line(float(slope), float(start), float(xy / math.sqrt(xx * yy)), residual)
+    return float(slope), float(start) / length, float(xy / math.sqrt(xx * yy)), residual
 
 
 def alignment_of(log: Log) -> Alignment | None:
@@ -174,9 +164,10 @@ def judge(log: Log, aligned: Alignment) -> str:
     lag, scale, offset, correlation = aligned[:4]
     if scale is None or offset is None or correlation is None:
         return "The reference cannot be compared with the tilt: too little motion, or too short."
-    errors = (aligned.lag_error_s, aligned.scale_error, aligned.offset_error_rad_s)
+    *errors, residual = aligned[4:]
     lag_error, scale_error, offset_error = (math.inf if error is None else CLEAR * error for error in errors)
-    noisy, options = _is_noise(log, aligned.residual_rad), log.options
+    noise, options = noise_in(log).tilt, log.options
+    noisy = residual is not None and isinstance(noise, WhiteNoise) and residual <= NOISE * math.sqrt(2.0) * noise.high
     scale_set, offset_set = options.scale.get("rate", 1.0), options.offset.get("rate", 0.0)
     period = max(log.dt, log.row_period_s or 0.0)
     motion = math.sqrt(float(np.nanmean(log[REFERENCE] ** 2)))
@@ -209,74 +200,12 @@ def judge(log: Log, aligned: Alignment) -> str:
     return f"Beside the tilt {comes}{fits} (to take it out: {' '.join(cures)})."
 
 
-def remarks_on(log: Log, aligned: Alignment | None) -> list[str]:
-    """Describe the changes to a log, and its reference, in sentences."""
+def remarks_on(log: Log, aligned: Alignment | None, noise: MeasurementNoise) -> list[str]:
+    """Describe the changes to a log, its reference, and the noise that observers assume, in sentences."""
     lines = [f"{note[:1].upper()}{note[1:]}." for note in log.notes]
-    return lines if aligned is None else [*lines, judge(log, aligned)]
-
-
-def _is_noise(log: Log, residual: float | None) -> bool:
-    """Return whether the tilt's noise explains all by which its increments differ from the reference's."""
-    noise = noise_in(log).tilt
-    return residual is not None and isinstance(noise, WhiteNoise) and residual <= NOISE * math.sqrt(2.0) * noise.high
+    return lines + ([] if aligned is None else [judge(log, aligned)]) + noise_remarks(log, noise)
 
 
 def _with_interval(value: float, error: float) -> str:
     value, low, high = (round(number, 4) + 0.0 for number in (value, value - error, value + error))  # no -0.0000
     return f"{value:.4f} ({low:.4f} to {high:.4f})" if math.isfinite(error) else f"{value:.4f}"
-
-
-def model_misfit(log: Log, model: ReducedModel) -> float | None:
-    """Compare the model's tilt acceleration with the tilt's second derivative.
-
-    Both are weighted over stretches of a quarter of a second, by w = (1 - s^2)^4, which ends smoothly: with
-    b = sum(y w'') and a = sum(a w) no noisy samples are subtracted. With the spread s of a set of sums (median of the
-    deviations from the median, which neither an offset of the tilt nor pushes move), the misfit is
-    s(predicted - measured)/s(measured), by what it is for white noise of the tilt alone. A model that says nothing has
-    1, a right one less or, where all is noise, 1 too.
-
-    Args:
-        log: The log; without gimbals y2 and u are zero.
-        model: The pendulum.
-
-    Returns:
-        The misfit; None for too few stretches, or if nothing moves.
-    """
-    half = max(MIN_SAMPLES // 2, round(WIDTH_S / 2.0 / log.dt))
-    s = np.arange(-half, half + 1) / (half + 1.0)
-    weights = (1.0 - s**2) ** 4
-    second = 8.0 * (1.0 - s**2) ** 2 * (7.0 * s**2 - 1.0) / ((half + 1.0) * log.dt) ** 2
-    second = second - second.mean()
-    m = max(1, round(RATE_SPAN_S / 2.0 / log.dt))
-    differences, measured = [np.zeros(0)], [np.zeros(0)]
-    for part in log.parts:
-        tilt = log["y1_rad"][part]
-        rate = np.zeros(len(tilt))
-        rate[m:-m] = (tilt[2 * m :] - tilt[: -2 * m]) / (2 * m * log.dt)
-        predicted = model.tilt_acceleration(tilt, rate, log["y2_rad"][part], log["u_rad_s"][part])
-        if len(tilt) >= len(weights):
-            derived = np.convolve(tilt, second, mode="valid")[::half]
-            smoothed = np.convolve(np.broadcast_to(predicted, tilt.shape), weights, mode="valid")[::half]
-            differences.append(smoothed - derived)
-            measured.append(derived)
-    size = _spread(np.concatenate(measured))
-    if sum(map(len, measured)) < MIN_STRETCHES or not size > 0.0:
-        return None
-    stiffness = model.gravity_torque / model.J1
-    of_noise = float(np.linalg.norm(stiffness * weights - second) / np.linalg.norm(second))
-    return _spread(np.concatenate(differences)) / size / of_noise
-
-
-def _spread(values: np.ndarray) -> float:
-    return float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
-
-
-def model_remark(misfit: float | None) -> str | None:
-    """Doubt a model, or say nothing."""
-    if misfit is None or not misfit > MISFIT:
-        return None
-    return (
-        f"Can the model be that of this log? The tilt acceleration that it predicts misses the tilt's own by "
-        f"{misfit:.3g} times as much as one of zero would (of right models at most 1.15): look at --model, the tilt's "
-        "unit, sign and zero, or for large torques that the model does not know."
-    )

@@ -9,8 +9,8 @@ from rich.console import Group
 from rich.text import Text
 
 from cmg_mj.features.replay.log_replay import ReplayResult
-from cmg_mj.features.replay.noise import noise_figures, noise_remarks
-from cmg_mj.features.replay.reference import model_remark, remarks_on
+from cmg_mj.features.replay.noise import noise_figures
+from cmg_mj.features.replay.reference import remarks_on
 from cmg_mj.features.replay.scores import RECONSTRUCTED_S, ZERO_PHASE, Figures
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.intervals import Interval, format_interval, known_interval
@@ -69,8 +69,6 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
     if smoother is not None:
         more = {"best_cutoff_hz": smoother.best_cutoff_hz, "best_rms_error_rad_s": smoother.best_rms_error_rad_s}
         figures[ZERO_PHASE] = {**smoother.figures, "cutoff_hz": smoother.cutoff_hz, **more}
-    if replayed.misfit is not None:
-        figures["model_misfit"] = replayed.misfit
     return {**figures, "left_out": dict(replayed.left_out)}
 
 
@@ -96,7 +94,7 @@ def _means(replays: Sequence[ReplayResult]) -> dict[str, dict[str, SummaryValue]
             interval = known_interval(values, FIGURES[key].positive)
             means[name][key] = {
                 "mean": sum(values) / len(values) if values else None,
-                "interval": [interval.low, interval.high] if interval and math.isfinite(interval.low) else None,
+                "interval": [interval.low, interval.high] if interval else None,
                 "logs": len(values),
             }
     return means
@@ -122,8 +120,6 @@ def _table(title: str, figures: Mapping[str, Row], replays: Sequence[ReplayResul
 
 def _entry(row: Row, key: str) -> str:
     match row.get(key):
-        case str() as name:
-            return name
         case {"mean": float() as mean, "interval": [float() as low, float() as high]}:
             interval = Interval(*(_in_unit(key, value) for value in (mean, low, high)))
             return "\n".join([figure_text(key, mean), *format_interval(FIGURES[key].pattern, interval)])
@@ -156,7 +152,7 @@ def replay_markdown(replays: Sequence[ReplayResult]) -> str:
 
 def remarks(replayed: ReplayResult) -> list[str]:
     """Return the remarks on a log and its reference, and the observers left out."""
-    lines = remarks_on(replayed.log, replayed.alignment) + noise_remarks(replayed.log, replayed.noise)
+    lines = remarks_on(replayed.log, replayed.alignment, replayed.noise)
     if (smoother := replayed.zero_phase) is not None:
         best = "-" if smoother.best_rms_error_rad_s is None else f"{smoother.best_rms_error_rad_s:.4f}"
         lines.append(
@@ -164,8 +160,6 @@ def remarks(replayed: ReplayResult) -> list[str]:
             f"{smoother.cutoff_hz:.3g} Hz, chosen by the tilt alone; with {smoother.best_cutoff_hz:.3g} Hz, the best "
             f"for the reference, its error is {best} rad/s."
         )
-    if doubt := model_remark(replayed.misfit):
-        lines.append(doubt)
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
         reasons.setdefault(reason, []).append(name)

@@ -1,32 +1,28 @@
-"""Replay of several logs on request, as `cmg-mj replay` runs it, and the files that it writes."""
+"""The files that `cmg-mj replay` writes: signals, plots, a recording and the figures."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import tomli_w
 
-from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import BIAS
-from cmg_mj.features.replay.log import REFERENCE, Log, ReadOptions
-from cmg_mj.features.replay.log_replay import ReplayResult, model_of, replay_prepared
-from cmg_mj.features.replay.reading import check_distinct_logs, read_log
+from cmg_mj.features.replay.log import REFERENCE, Log
+from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.report import figure_text, log_figures, replay_figures, replay_markdown, shown_first
-from cmg_mj.observers.parameter_options import Parameters
 from cmg_mj.results.folder import RunFolder, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.scenario.resolve import safe_name
-from cmg_mj.view.plots.figure import pyplot, save_figure
+from cmg_mj.view.plots.figure import Line, Panel, Picture, Span, draw
 from cmg_mj.view.plots.run_plot import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_COLUMNS, SMALL_HEIGHT
-from cmg_mj.view.plots.style import BASELINE_COLOURS, Colour, colours, hexadecimal, short_names, thinned
+from cmg_mj.view.plots.style import BASELINE_COLOURS, Colour, colours, short_names, thinned
 
 if TYPE_CHECKING:
-    from cmg_mj.view.plots.figure import Axes
     from cmg_mj.view.recording.signals import Series
 
 DETAIL_S = 2.0
@@ -37,17 +33,17 @@ def liveliest_span(log: Log) -> tuple[float, float]:
     """Return the ends of the span of `DETAIL_S` in which the tilt accelerates most [s]."""
     length = max(2, round(DETAIL_S / log.dt))
     rise = max(1, length // 20)
-    best, span = -1.0, (0.0, 0.0)
+    spans = []
     for part in log.parts:
         time, tilt = log["time_s"][part], log["y1_rad"][part]
         bend = np.zeros(len(tilt))
         bend[rise:-rise] = (tilt[2 * rise :] - 2.0 * tilt[rise:-rise] + tilt[: -2 * rise]) ** 2
         sums = np.concatenate([[0.0], np.cumsum(bend)])
         n = min(length, len(tilt))
-        start = int(np.argmax(sums[n:] - sums[:-n]))
-        if sums[start + n] - sums[start] > best:
-            best, span = sums[start + n] - sums[start], (float(time[start]), float(time[start + n - 1]))
-    return span
+        bends = sums[n:] - sums[:-n]
+        start = int(np.argmax(bends))
+        spans.append((float(bends[start]), (float(time[start]), float(time[start + n - 1]))))
+    return max(spans, key=itemgetter(0))[1]
 
 
 def plot_replay(path: Path, replayed: ReplayResult) -> None:
@@ -59,84 +55,53 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     """
     log, few, key = replayed.log, shown_first(replayed), "velocity_rms_error_rad_s"
     rates = {name: estimates["x2_rad_s"] for name, estimates in replayed.estimates.items()}
-    palette = {name: hexadecimal(rgb) for name, rgb in colours(rates).items()}
     labels = {name: label.lstrip("_") for name, label in short_names(list(rates)).items()}
-    titles = {name: f"{label} {figure_text(key, replayed.summaries[name].get(key))}" for name, label in labels.items()}
     reference = [log[REFERENCE]] if "reference" in log.has else []
-    others = [name for name in rates if name not in few]
-    tall, rows = 3 + len(reference), -(-len(others) // SMALL_COLUMNS)
-    heights = [PANEL_HEIGHT] * tall + [SMALL_HEIGHT] * rows
-    figure = pyplot().figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
-    grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
-    panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
-    small = [figure.add_subplot(grid[tall + i // SMALL_COLUMNS, i % SMALL_COLUMNS]) for i in range(len(others))]
+    if reference:
+        titles = {n: f"{label} {figure_text(key, replayed.summaries[n].get(key))}" for n, label in labels.items()}
+    else:
+        titles = labels
     span, time = liveliest_span(log), log.broken_time()
-    detail = slice(*np.searchsorted(time, span).tolist())
+    whole, detail = slice(None), slice(*np.searchsorted(time, span).tolist())
 
-    def line(axes: Axes, values: np.ndarray, color: str, width: float, label: str | None = None) -> None:
-        rows = slice(None) if axes in panels[:-1] else detail
-        axes.plot(*thinned(time[rows], log.broken(values)[rows]), color=color, linewidth=width, label=label)
+    def line(values: np.ndarray, label: str, color: str, width: float = 0.8, rows: slice = whole) -> Line:
+        return Line(*thinned(time[rows], log.broken(values)[rows]), label, color=color, width=width)
 
-    line(panels[0], np.degrees(log["y1_rad"]), MEASURED, 0.8, "measured")
-    panels[0].set_ylabel("tilt [deg]")
-    for axes in (panels[1], panels[-1]):
-        for values in reference:
-            line(axes, values, INK, 1.6, "reference")
-        for name in few:
-            line(axes, rates[name], palette[name], 0.8, labels[name])
-        axes.set_ylabel("tilt rate\n[rad/s]")
-    for true in reference:
-        panels[2].plot([], [], " ", label="RMS:")
-        for name in few:
-            line(panels[2], rates[name] - true, palette[name], 0.6, titles[name])
-        panels[2].set_ylabel("estimate less\nreference [rad/s]")
-    for axes in panels[:-1]:
-        axes.axvspan(*span, color="0.5", alpha=0.15, linewidth=0, zorder=0)
-        axes.set_xlim(log["time_s"][0], log["time_s"][-1])
-    for axes, name in zip(small, others, strict=True):
-        line(axes, rates[name], palette[name], 0.7)
-        for values in reference:
-            line(axes, values, INK, 0.8)
-        title = titles[name] if reference else labels[name]
-        axes.set_title(title, loc="left", fontsize="small", parse_math=False, pad=2.0)
-        axes.tick_params(labelsize="small")
-        axes.set_ylim(*panels[1].get_ylim())
-    for axes in (panels[-1], *small):
-        axes.set_xlim(*span)
-    for axes in panels:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=6, frameon=False, borderpad=0)
-    for axes in (*panels, *small):
-        axes.grid(alpha=0.3)
-    panels[-1].set_xlabel(f"time [s], {DETAIL_S:g} s in detail")
-    figure.align_ylabels(panels)
-    save_figure(path, figure, log.title, dpi=110)
+    def rate_lines(names: Sequence[str], rows: slice) -> list[Line]:
+        lines = [line(true, "reference", INK, 1.6, rows) for true in reference]
+        return lines + [line(rates[name], labels[name], name, rows=rows) for name in names]
 
-
-def write_recording(path: Path, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str) -> None:
-    """Write the replays of some logs as one recording; whole or not at all.
-
-    Args:
-        path: The file, `recording.rrd`.
-        replays: The replays; each has a branch of its own.
-        names: Their names, no two alike.
-        settings_toml: The request, as TOML.
-
-    Raises:
-        InputError: The environment turns rerun off.
-        OSError: The file cannot be written.
-    """
-    from cmg_mj.view.recording.save import LogSeries, write_logs  # 0.4 s of import, needed only here
-
-    title = f"Replay: {', '.join(names)}"
-    logs = [
-        LogSeries(name, list(series(replayed)), shown_first(replayed))
-        for name, replayed in zip(names, replays, strict=True)
+    shown = [*reference, *(rates[name] for name in few)]
+    top = 1.05 * max((float(np.nanmax(np.abs(values))) for values in shown), default=0.0)
+    y_range = (-top, top) if top else None
+    shaded = [Span(*span, color="0.5")]
+    panels = [
+        Panel("tilt [deg]", [line(np.degrees(log["y1_rad"]), "measured", MEASURED)], shaded=shaded),
+        Panel("tilt rate\n[rad/s]", rate_lines(few, whole), y_range=y_range, shaded=shaded),
     ]
-    texts = {
-        "Summary": f"# {title}\n\n{replay_markdown(replays)}\n",
-        "Settings": f"# Settings\n\n```toml\n{settings_toml.strip()}\n```\n",
-    }
-    write_logs(path, title, logs, texts)
+    for true in reference:
+        errors = [line(rates[name] - true, titles[name], name, 0.6) for name in few]
+        errors.insert(0, Line([], [], "RMS:", " "))
+        panels.append(Panel("estimate less\nreference [rad/s]", errors, shaded=shaded))
+    x_label = f"time [s], {DETAIL_S:g} s in detail"
+    panels.append(Panel("tilt rate\n[rad/s]", rate_lines(few, detail), x_label=x_label, y_range=y_range))
+    n_first = len(panels)
+    for name in rates:
+        if name not in few:
+            lines = [replace(line, label="") for line in rate_lines([name], detail)]
+            panels.append(Panel("tilt rate [rad/s]", lines, titles[name], y_range=y_range))
+    page = Picture(
+        "plot",
+        log.title,
+        panels,
+        share_x=False,
+        columns=SMALL_COLUMNS,
+        panel_height=SMALL_HEIGHT,
+        panel_width=PAGE[0] / SMALL_COLUMNS,
+        first_height=PANEL_HEIGHT,
+        n_first=n_first,
+    )
+    draw(path, page)
 
 
 def series(replayed: ReplayResult) -> Iterator[Series]:
@@ -172,107 +137,44 @@ def series(replayed: ReplayResult) -> Iterator[Series]:
         yield row("gimbal/y2", "measured", np.degrees(log["y2_rad"]), MODULES[0])
 
 
-@dataclass
-class LogReplays:
-    """Request to replay some logs, and the replays that are done. The logs are read at once.
+def save_replays(
+    folder: RunFolder, replays: Sequence[ReplayResult], names: Sequence[str], settings_toml: str, *, complete: bool
+) -> Path:
+    """Write summary.json, replay.toml, recording.rrd, and of every log its signals and plot, at once.
 
-    Attributes:
-        paths: The logs' files.
-        observers: Names of the observers.
-        options: Options with which all logs are read.
-        model: The pendulum as `model_of` takes it.
-        noises: Noises from `noise_numbers`.
-        parameters: Observer -> parameter -> value, where not the default.
-        settle_s: Time at the start of each part that is not scored [s]; None for `replay_prepared`'s.
-        logs: The logs.
-        names: Their names in file names.
-        results: The replays that are done.
+    Args:
+        folder: The folder.
+        replays: The replays.
+        names: Names of all requested logs in the files, no two alike.
+        settings_toml: The request, as TOML.
+        complete: Whether all logs have been replayed.
+
+    Returns:
+        The folder of the files: see `RunFolder.write`.
     """
+    from cmg_mj.view.recording.save import LogSeries, write_logs  # 0.4 s of import, needed only here
 
-    paths: Sequence[str]
-    observers: Sequence[str]
-    options: ReadOptions
-    model: str | None
-    noises: Mapping[str, float]
-    parameters: Parameters
-    settle_s: float | None
-
-    def __post_init__(self) -> None:
-        for kind in self.parameters:
-            if kind not in self.observers:
-                raise InputError(f"--set {kind}: is not among --observers {','.join(self.observers)}")
-        self._model = None if self.model is None else model_of(self.model)
-        check_distinct_logs(self.paths)
-        self.logs: list[Log] = [read_log(path, self.options) for path in self.paths]
-        self.names = _distinct_names([log.name for log in self.logs])
-        self.results: list[ReplayResult] = []
-
-    def _as_toml(self) -> str:
-        """Return the request as TOML."""
-        parts = {
-            "logs": list(self.paths),
-            "log": self.options.as_toml(),
-            "replay": {
-                "observers": list(self.observers),
-                "model": self.model,
-                "parameters": self.parameters,
-                "noise": self.noises,
-                "settle_s": self.settle_s,
-            },
-        }
-        parts["replay"] = {name: value for name, value in parts["replay"].items() if value not in (None, {})}
-        return tomli_w.dumps({name: part for name, part in parts.items() if part})
-
-    @property
-    def complete(self) -> bool:
-        """Return whether all logs have been replayed."""
-        return len(self.results) == len(self.logs)
-
-    @property
-    def folder_name(self) -> str:
-        """Name of the folder of the files by default."""
-        return f"replay-{self.names[0]}" + (f"-and-{len(self.logs) - 1}-more" if len(self.logs) > 1 else "")
-
-    def run(self, on_progress: Callable[[float, str], None]) -> None:
-        """Replay the logs.
-
-        Args:
-            on_progress: Called with the logs done so far, parts of one included, and the current one's name. It may
-                raise `KeyboardInterrupt`; the results until then are kept.
-        """
-        for i, log in enumerate(self.logs):
-            self.results.append(
-                replay_prepared(
-                    log,
-                    self.observers,
-                    model=self._model,
-                    noises=self.noises,
-                    parameters=self.parameters,
-                    settle_s=self.settle_s,
-                    on_share=lambda share, i=i, log=log: on_progress(i + share, f"Replay {log.name}"),
-                )
-            )
-
-    def save(self, folder: RunFolder) -> Path:
-        """Write summary.json, replay.toml, recording.rrd, and of every log that is done its signals and plot, at once.
-
-        Returns the folder of the files: see `RunFolder.write`.
-        """
-        names, toml = self.names[: len(self.results)], self._as_toml()
-        files: dict[str, Callable[[Path], None]] = {
-            "summary.json": lambda path: write_text(path, json.dumps(finite(replay_figures(self.results)), indent=2)),
-            "replay.toml": lambda path: write_text(path, toml),
-            "recording.rrd": lambda path: write_recording(path, self.results, names, toml),
-        }
-        for name, replayed in zip(names, self.results, strict=True):
-            suffix = f"-{name}" if len(names) > 1 else ""
-            signals = replace(replayed.trajectory, metadata={"replay": finite(log_figures(replayed))})
-            files[f"signals{suffix}.parquet"] = signals.save
-            files[f"plot{suffix}.png"] = lambda path, replayed=replayed: plot_replay(path, replayed)
-        return folder.write(files, complete=self.complete)
+    named = dict(zip(names, replays, strict=False))
+    title = f"Replay: {', '.join(named)}"
+    logs = [LogSeries(name, list(series(replayed)), shown_first(replayed)) for name, replayed in named.items()]
+    texts = {
+        "Summary": f"# {title}\n\n{replay_markdown(replays)}\n",
+        "Settings": f"# Settings\n\n```toml\n{settings_toml.strip()}\n```\n",
+    }
+    files: dict[str, Callable[[Path], None]] = {
+        "summary.json": lambda path: write_text(path, json.dumps(finite(replay_figures(replays)), indent=2)),
+        "replay.toml": lambda path: write_text(path, settings_toml),
+        "recording.rrd": lambda path: write_logs(path, title, logs, texts),
+    }
+    for name, replayed in named.items():
+        suffix = f"-{name}" if len(named) > 1 else ""
+        signals = replace(replayed.trajectory, metadata={"replay": finite(log_figures(replayed))})
+        files[f"signals{suffix}.parquet"] = signals.save
+        files[f"plot{suffix}.png"] = lambda path, replayed=replayed: plot_replay(path, replayed)
+    return folder.write(files, complete=complete)
 
 
-def _distinct_names(names: Sequence[str]) -> list[str]:
+def distinct_names(names: Iterable[str]) -> list[str]:
     """Return logs' names as parts of file names, the repeated ones numbered."""
     distinct: list[str] = []
     for name in map(safe_name, names):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmg_mj.features.replay.log import REFERENCE, Log
+from cmg_mj.features.replay.log import REFERENCE, Log, evenly
 from cmg_mj.results.metrics import finite_or_none, fit
 from cmg_mj.stages.push import inside
 
@@ -63,8 +63,8 @@ def scores(log: Log, rate: np.ndarray, scored: np.ndarray, noise_gain: float | N
 def _against(log: Log, rate: np.ndarray, scored: np.ndarray, pieces: Sequence[slice]) -> Figures:
     true = log[REFERENCE]
     counted = scored & np.isfinite(true)
-    error, motion = rms((rate - true)[counted]), rms(true[counted])
     behind, ahead = np.where(scored & np.isfinite(rate), rate, np.nan), np.where(scored, true, np.nan)
+    error, motion = rms((rate - true)[counted]), rms(true[counted])
     figures = {
         "velocity_rms_error_rad_s": error,
         "velocity_rms_rad_s": motion,
@@ -95,9 +95,9 @@ def _against_tilt(log: Log, rate: np.ndarray, scored: np.ndarray, pieces: Sequen
             travelled = np.concatenate([[0.0], np.cumsum(r[part][1:] + r[part][:-1])]) * (log.dt / 2.0)
             error = travelled - y[part]
             errors.append(error - error.mean())
-    rough = rms(np.concatenate(second)) if second else None
+    off, rough = (rms(np.concatenate([*parts, []])) for parts in (errors, second))
     return {
-        "reconstruction_rms_deg": finite_or_none(math.degrees(rms(np.concatenate(errors)) or 0.0)) if errors else None,
+        "reconstruction_rms_deg": None if off is None else math.degrees(off),
         "roughness_rad_s": None if rough is None else rough / math.sqrt(6.0),
     }
 
@@ -259,13 +259,15 @@ def zero_phase(log: Log, scored: np.ndarray) -> ZeroPhase | None:
     Returns:
         Its figures; None if all parts are shorter than four samples.
     """
-    starts = [(part, start) for part in log.parts for start in range(part.start, part.stop, BLOCK)]
-    blocks = [slice(start, min(start + BLOCK, part.stop)) for part, start in starts]
-    blocks = [block for block in blocks if block.stop - block.start >= 4]
+    blocks = [
+        slice(start, min(start + BLOCK, part.stop))
+        for part in log.parts
+        for start in range(part.start, part.stop - 3, BLOCK)
+    ]
     if not blocks:
         return None
     if sum(block.stop - block.start for block in blocks) > BLOCK * BLOCKS:
-        blocks = [blocks[i] for i in np.unique(np.linspace(0, len(blocks) - 1, BLOCKS).round().astype(int))]
+        blocks = evenly(blocks, BLOCKS)
     longest = max(min(part.stop - part.start, BLOCK) for part in log.parts) * log.dt
     cutoffs = np.geomspace(min(MIN_PERIODS / longest, 0.25 / log.dt), 0.5 / log.dt, CUTOFFS)
     frequencies, powers, squares = [], [], np.zeros(len(cutoffs))

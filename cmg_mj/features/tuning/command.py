@@ -86,7 +86,7 @@ def tune(
     Writes a folder: tuned.json, and scenario.toml, which runs with the tuned observer.
     """
     from cmg_mj.features.tuning import tune as fit
-    from cmg_mj.features.tuning.save import figures_of, save_study, study_table
+    from cmg_mj.features.tuning.save import save_study, study_table
     from cmg_mj.runs.save import file_name
 
     scenario = arguments.scenario(observer)
@@ -103,7 +103,7 @@ def tune(
                 noise_ug_rthz=densities,
                 on_share=on_progress,
             )
-        show(figures_of(study), study_table(study), arguments.as_json)
+        show(study.figures(), study_table(study), arguments.as_json)
         total = len(densities) or 1
         files = save_study(folder, study, complete=len(study.levels) == total)
     place = files[0].parent
@@ -141,8 +141,8 @@ def tune(
     help="Scenario in whose closed loop the tuned parameters are compared with the given ones; none for no loop.  "
     "[default: push_recovery, or that of a run's recording]",
 )
-@pendulum_option()
-@noise_option()
+@pendulum_option
+@noise_option
 @settings_option("Set a parameter to start from and to compare with.", "observer.NAME=VALUE")
 @out_option()
 @json_option()
@@ -173,9 +173,9 @@ def tune_log(
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.features.replay.log_replay import model_of
     from cmg_mj.features.replay.noise import noise_numbers
-    from cmg_mj.features.replay.reading import check_distinct_logs, read_log
+    from cmg_mj.features.replay.reading import read_logs
     from cmg_mj.features.tuning.logs import loop_scenario, tune_on_logs
-    from cmg_mj.features.tuning.save import figures_of, save_study, study_table
+    from cmg_mj.features.tuning.save import save_study, study_table
     from cmg_mj.observers.parameter_options import parameters_of
     from cmg_mj.runs.save import file_name
     from cmg_mj.scenario.resolve import safe_name
@@ -185,8 +185,7 @@ def tune_log(
             raise InputError(f"--set {setting}: write observer.PARAMETER=VALUE")
     start_parameters = parameters_of([observer + setting.removeprefix("observer") for setting in settings])
     noises = noise_numbers(noise)
-    check_distinct_logs(logs)
-    recordings = [read_log(path, options) for path in logs]
+    recordings = read_logs(logs, options)
     pendulum = None if model is None else model_of(model)
     loop = loop_scenario(closed_loop, recordings[0])
     folder = claim_output(out, f"tune-{file_name(observer)}-{safe_name(recordings[0].name)}")
@@ -205,7 +204,7 @@ def tune_log(
                 closed_loop=loop,
                 on_share=on_progress,
             )
-        show(figures_of(study), study_table(study), as_json)
+        show(study.figures(), study_table(study), as_json)
         (file,) = save_study(folder, study)
     tuned = " ".join(f"--set '{setting}'" for setting in study.settings())
     say_written(folder, file.parent, f"Replay it tuned: {tuned}", as_json)

@@ -176,7 +176,7 @@ class ParameterFit:
         self.kind, self._starts, self._stop, self._stopped = kind, starts, stop, False
         self.start_parameters = parameters_of(kind, make(**given), given)
         self.numbers = numbers_of(kind, self.start_parameters, make, chosen, ranges or {})
-        self.insensitive_parameters: list[str] | None = None
+        self.insensitive_parameters: list[str] = []
         self._best: Mapping[str, float] = {}
 
     def level(
@@ -226,7 +226,7 @@ class ParameterFit:
             return mean_error(replaced(self.start_parameters, self._named(sizes)))
 
         given_loss = mean_error(self.start_parameters)
-        if self.insensitive_parameters is None:
+        if not self._best:
             self._discard_insensitive(loss, given_loss)
         count, expected = 0, evaluations(len(self.numbers))
         # The best values at the noise before are near the best at this one.

@@ -16,15 +16,15 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.features.replay.log import REFERENCE, Log
-from cmg_mj.features.replay.log_replay import NO_MODEL, ObserverInputs, misfit_of, observer_inputs, replay_log
-from cmg_mj.features.replay.noise import noise_figures, noise_remarks
-from cmg_mj.features.replay.reference import Alignment, alignment_of, model_remark, remarks_on
+from cmg_mj.features.replay.log_replay import NO_MODEL, ObserverInputs, observer_inputs, replay_log
+from cmg_mj.features.replay.noise import noise_figures
+from cmg_mj.features.replay.reference import Alignment, alignment_of, remarks_on
 from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit
 from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, plain
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, paired_verdict, ratio_interval
-from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.results.summary_keys import Summary, SummaryValue, finite
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay
 from cmg_mj.runs.side_by_side import run_jobs, run_of
@@ -231,17 +231,18 @@ class LogSegments:
 
 
 class LogEvidence(NamedTuple):
-    """Evidence of a log beside its errors."""
+    """A log beside its errors."""
 
-    name: str
+    log: Log
     noise: MeasurementNoise
     """Sensor noise that the observer assumed."""
-    noise_by_the_log: Mapping[str, SummaryValue]
-    """White noise that the log shows, as `--json` prints it."""
     alignment: Alignment | None
     """Lag, scale and offset of the reference."""
-    remarks: Sequence[str]
-    """Remarks as in a replay."""
+
+    @property
+    def remarks(self) -> list[str]:
+        """Remarks as in a replay."""
+        return remarks_on(self.log, self.alignment, self.noise)
 
 
 @dataclass(frozen=True)
@@ -291,10 +292,10 @@ class LogStudy:
         tuned = plain({number.parameter: self.level.parameters[number.parameter] for number in self.numbers})
         return [f"{self.kind}.{name}={json.dumps(value)}" for name, value in tuned.items()]
 
-    def figures(self) -> dict[str, SummaryValue]:
+    def figures(self) -> Summary:
         """Return the figures that `cmg-mj tune-log --json` prints."""
-        return {
-            "logs": [log.name for log in self.logs],
+        figures: dict[str, SummaryValue] = {
+            "logs": [one.log.name for one in self.logs],
             "observer": self.kind,
             "split": self.split,
             "given_parameters": plain(self.start_parameters),
@@ -302,15 +303,15 @@ class LogStudy:
             "idle": list(self.insensitive_parameters),
             "noise": [
                 {
-                    "tilt_rad": log.noise.tilt,
-                    "acceleration_rad_s2": log.noise.acceleration,
-                    "correlation": log.noise.correlation,
-                    **log.noise_by_the_log,
+                    "tilt_rad": noise.tilt,
+                    "acceleration_rad_s2": noise.acceleration,
+                    "correlation": noise.correlation,
+                    **noise_figures(log, noise),
                 }
-                for log in self.logs
+                for log, noise, _ in self.logs
             ],
-            "notes": [list(log.remarks) for log in self.logs],
-            "reference": [log.alignment and log.alignment._asdict() for log in self.logs],
+            "notes": [one.remarks for one in self.logs],
+            "reference": [one.alignment and one.alignment._asdict() for one in self.logs],
             "held_out_stretches": len(self.level.rms),
             "held_out_stretch_s": self.stretch_s,
             **self.level.figures(),
@@ -318,6 +319,7 @@ class LogStudy:
             "verdict": self.verdict,
             **({"closed_loop": self.loop.figures()} if self.loop else {}),
         }
+        return finite(figures)
 
 
 def tune_on_logs(
@@ -359,29 +361,28 @@ def tune_on_logs(
     """
     if not 0.0 < split < 1.0:
         raise InputError(f"--split {split:g}: must be between 0 and 1, the share that is fitted")
-    dt = _common_period(logs)
     inputs = [
         observer_inputs(log, model=model, noises=noises, parameters={kind: start_parameters or {}}) for log in logs
     ]
-    given = _common_parameters(kind, logs, inputs)
+    _check_alike(kind, logs, inputs)
     halves = [[log.cut(slice(0, end)), log.cut(slice(end, None))] for log in logs for end in [round(split * len(log))]]
     for log_halves, log_inputs in zip(halves, inputs, strict=True):
         for half in log_halves:  # an observer that cannot take part is refused, with the reason
             replay_log(half, [kind], **log_inputs._asdict(), settle_s=settle_s)
     fitted, held_out = (LogSegments(segments, settle_s) for segments in zip(*halves, strict=True))
-    makers = [partial(make_observer, kind, dt, own.model or NO_MODEL, own.noise) for own in inputs]
+    makers = [partial(make_observer, kind, logs[0].dt, own.model or NO_MODEL, own.noise) for own in inputs]
 
     def one_per_log(**candidate: ParameterValue) -> list[Observer]:
         return [make(**candidate) for make in makers]
 
-    fit = ParameterFit(kind, makers[0], given, parameters, ranges, starts)
+    fit = ParameterFit(kind, makers[0], inputs[0].parameters[kind], parameters, ranges, starts)
     level = fit.level(one_per_log, fitted, held_out, on_share)
-    evidence = [_evidence(*log_and_inputs) for log_and_inputs in zip(logs, inputs, strict=True)]
+    evidence = [LogEvidence(log, own.noise, alignment_of(log)) for log, own in zip(logs, inputs, strict=True)]
     return LogStudy(
         kind,
         fit.start_parameters,
         fit.numbers,
-        fit.insensitive_parameters or (),
+        fit.insensitive_parameters,
         evidence,
         split,
         level,
@@ -390,33 +391,16 @@ def tune_on_logs(
     )
 
 
-def _evidence(log: Log, inputs: ObserverInputs) -> LogEvidence:
-    alignment = alignment_of(log)
-    remarks = [*remarks_on(log, alignment), *noise_remarks(log, inputs.noise)]
-    doubt = model_remark(misfit_of(log, inputs.model))
-    return LogEvidence(
-        log.name, inputs.noise, noise_figures(log, inputs.noise), alignment, [*remarks, *([doubt] if doubt else [])]
-    )
-
-
-def _common_period(logs: Sequence[Log]) -> float:
-    """Return the sample period of logs that all have a reference [s]."""
-    dt = logs[0].dt
-    for log in logs:
+def _check_alike(kind: str, logs: Sequence[Log], inputs: Sequence[ObserverInputs]) -> None:
+    """Refuse logs without a reference, and logs that differ in the sample period or the observer's parameters."""
+    first, parameters = logs[0], inputs[0].parameters[kind]
+    for log, own in zip(logs, inputs, strict=True):
         if "reference" not in log.has:
             raise InputError(f"{log.name}: no reference to tune to: name it, --columns rate=...")
-        if abs(log.dt / dt - 1.0) > 1e-3:
-            raise InputError(f"{log.name}: {1.0 / log.dt:g} Hz, {logs[0].name} {1.0 / dt:g} Hz: give --rate HZ")
-    return dt
-
-
-def _common_parameters(kind: str, logs: Sequence[Log], inputs: Sequence[ObserverInputs]) -> ParameterValues:
-    """Return the observer's parameters, which must be the same in all logs."""
-    parameters = dict(inputs[0].parameters[kind])
-    for log, log_inputs in zip(logs, inputs, strict=True):
-        if log_inputs.parameters[kind] != parameters:
+        if abs(log.dt / first.dt - 1.0) > 1e-3:
+            raise InputError(f"{log.name}: {1.0 / log.dt:g} Hz, {first.name} {1.0 / first.dt:g} Hz: give --rate HZ")
+        if own.parameters[kind] != parameters:
             raise InputError(
-                f"{logs[0].name} and {log.name} ran with different parameters of {kind}: say with which to begin, "
+                f"{first.name} and {log.name} ran with different parameters of {kind}: say with which to begin, "
                 "--set observer.NAME=VALUE"
             )
-    return parameters

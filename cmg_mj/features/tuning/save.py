@@ -15,16 +15,10 @@ from cmg_mj.features.tuning.logs import MIN_STRETCH_S, RELEVANT, LogStudy
 from cmg_mj.features.tuning.simulations import TuningResult, best_noise, tuned_scenario, windows_of
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.intervals import Interval
-from cmg_mj.results.summary_keys import Summary, finite
 from cmg_mj.results.tables import Row, Table
 from cmg_mj.runs.experiment import prepare
 
 Study = TuningResult | LogStudy
-
-
-def figures_of(study: Study) -> Summary:
-    """Return the figures that `cmg-mj tune --json` and `tune-log --json` print."""
-    return finite(study.figures())
 
 
 def study_table(study: Study) -> Group:
@@ -37,7 +31,7 @@ def study_table(study: Study) -> Group:
         )
         names, verdicts = [f"{level.noise_ug_rthz:g}" for level in levels], [level.verdict for level in levels]
     else:
-        title, first = f"{', '.join(log.name for log in study.logs)}: {study.kind}", "observer"
+        title, first = f"{', '.join(one.log.name for one in study.logs)}: {study.kind}", "observer"
         names, verdicts = [study.kind], [study.verdict]
     rows = []
     for name, level, verdict in zip(names, levels, verdicts, strict=True):
@@ -85,9 +79,9 @@ def _lines(study: Study, levels: Sequence[NoiseLevelResult]) -> Iterator[str]:
         if not study.scenario.push:
             yield "There is no push: the window is the whole run, where an estimate of zero may do best."
     else:
-        for log in study.logs:
-            for remark in log.remarks:
-                yield f"{log.name}: {remark}" if len(study.logs) > 1 else remark
+        for one in study.logs:
+            for remark in one.remarks:
+                yield f"{one.log.name}: {remark}" if len(study.logs) > 1 else remark
         share = f"{study.split:.0%} of each log, scored on the rest, in {len(study.level.rms)} stretches"
         yield f"RMS of the estimated rate less the reference. Fitted on the first {share}."
     zero = [f"{level.zero_rms:.4f}" for level in levels]
@@ -151,7 +145,7 @@ def save_study(folder: RunFolder | Path, study: Study, *, complete: bool = True)
     Raises:
         InputError: A file cannot be written.
     """
-    writers = {"tuned.json": lambda path: write_text(path, json.dumps(figures_of(study), indent=2))}
+    writers = {"tuned.json": lambda path: write_text(path, json.dumps(study.figures(), indent=2))}
     if isinstance(study, TuningResult):
         for level in study.levels:
             name = f"scenario-{level.noise_ug_rthz:g}.toml" if len(study.levels) > 1 else "scenario.toml"

@@ -239,48 +239,48 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
         return value
 
     with suppress(StopSearch):
-        if len(numbers) == 1:
-            _search_line(height, float(low[0]), float(high[0]))
+        if len(numbers) > 1:
+            for first in _starts(height, low, high, start, starts):
+                steps = np.where(first + FIRST_STEP <= high, FIRST_STEP, -np.minimum(FIRST_STEP, first - low))
+                corners = np.vstack([first, first + np.diag(steps)])
+                minimize(
+                    height,
+                    first,
+                    method="Nelder-Mead",
+                    bounds=list(zip(low, high, strict=True)),
+                    options={
+                        "initial_simplex": corners,
+                        "xatol": TOLERANCE,
+                        "fatol": 1e-5,
+                        "maxfev": 120 * len(numbers),
+                    },
+                )
         else:
-            _search_simplex(height, low, high, start, starts)
+            points = np.linspace(low, high, GRID)
+            heights = [height(point) for point in points]
+            lowest = int(np.argmin(heights))
+            # The search fits parabolas: where there is no loss it is told a number.
+            top = max(filter(math.isfinite, heights), default=0.0) + 1.0
+            minimize_scalar(
+                lambda point: min(height(np.array([point])), top),
+                bounds=(points[max(lowest - 1, 0), 0], points[min(lowest + 1, GRID - 1), 0]),
+                method="bounded",
+                options={"xatol": TOLERANCE / 2.0},
+            )
     return [float(size) for size in np.exp(np.clip(best[1], low, high))], math.exp(best[0])
 
 
-def _search_line(height: Height, low: float, high: float) -> None:
-    points = np.linspace(low, high, GRID)
-    heights = [height(point[None]) for point in points]
-    lowest = int(np.argmin(heights))
-    # The search fits parabolas: where there is no loss it is told a number.
-    top = max(filter(math.isfinite, heights), default=0.0) + 1.0
-    minimize_scalar(
-        lambda point: min(height(np.array([point])), top),
-        bounds=(points[max(lowest - 1, 0)], points[min(lowest + 1, GRID - 1)]),
-        method="bounded",
-        options={"xatol": TOLERANCE / 2.0},
-    )
-
-
-def _search_simplex(height: Height, low: np.ndarray, high: np.ndarray, given: np.ndarray, starts: int) -> None:
-    n = len(given)
-    first = [given]
-    if starts > 1:
-        reach = math.log(SCATTER_FACTOR)
-        floor, ceiling = np.maximum(low, given - reach), np.minimum(high, given + reach)
-        # `seed` is what every scipy takes; the name `rng` is known from 1.15 on.
-        cube = qmc.LatinHypercube(n, seed=np.random.default_rng(0))  # pyright: ignore[reportCallIssue]
-        scattered = floor + cube.random(SCATTER * n) * (ceiling - floor)
-        order = np.argsort([height(point) for point in scattered], kind="stable")
-        first += [scattered[i] for i in order[: starts - 1]]
-    for start in first:
-        steps = np.where(start + FIRST_STEP <= high, FIRST_STEP, -np.minimum(FIRST_STEP, start - low))
-        corners = np.vstack([start, start + np.diag(steps)])
-        minimize(
-            height,
-            start,
-            method="Nelder-Mead",
-            bounds=list(zip(low, high, strict=True)),
-            options={"initial_simplex": corners, "xatol": TOLERANCE, "fatol": 1e-5, "maxfev": 120 * n},
-        )
+def _starts(height: Height, low: np.ndarray, high: np.ndarray, given: np.ndarray, starts: int) -> list[np.ndarray]:
+    """Return the given point, and the lowest of points scattered around it."""
+    if starts < 2:
+        return [given]
+    reach = math.log(SCATTER_FACTOR)
+    floor, ceiling = np.maximum(low, given - reach), np.minimum(high, given + reach)
+    # `seed` is what every scipy takes; the name `rng` is known from 1.15 on.
+    cube = qmc.LatinHypercube(len(given), seed=np.random.default_rng(0))  # pyright: ignore[reportCallIssue]
+    scattered = floor + cube.random(SCATTER * len(given)) * (ceiling - floor)
+    order = np.argsort([height(point) for point in scattered], kind="stable")
+    return [given, *(scattered[i] for i in order[: starts - 1])]
 
 
 def crossing(x: Sequence[float], y: Sequence[float]) -> float | None:

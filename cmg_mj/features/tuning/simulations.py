@@ -16,10 +16,9 @@ from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, 
 from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, crossing, plain
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import Observer, make_observer
-from cmg_mj.results.result import Result
-from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.results.summary_keys import Summary, SummaryValue, finite
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay
 from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
@@ -60,11 +59,6 @@ class Recorded:
     trajectory: Trajectory
     windows: Sequence[Window]
     fell: int = 0
-
-    @property
-    def window(self) -> Window:
-        """Start and end of the scored times [s]."""
-        return self.windows[0][0], self.windows[-1][1]
 
     @property
     def worlds(self) -> int:
@@ -125,73 +119,55 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     )
 
 
-RecordingRequest = tuple[Scenario, Sequence[int], float | None]
-"""A scenario, the worlds' numbers, and another noise density of the accelerometers [ug/sqrt(Hz)]."""
+RecordingRequest = tuple[range, float | None]
+"""The worlds' numbers, and another noise density of the accelerometers [ug/sqrt(Hz)]."""
 
 
-def recorder(requests: Sequence[RecordingRequest], *, warm_up_s: float = WARM_UP_S) -> Callable[..., Recorded]:
-    """Make the recordings of one call of `tune` or of several at once, in one batch where possible.
+def recorder(
+    scenario: Scenario, requests: Sequence[RecordingRequest], *, warm_up_s: float = WARM_UP_S
+) -> Callable[[range, float | None], Recorded]:
+    """Make the recordings of one scenario, in one batch where possible.
 
     Args:
-        requests: The recordings; `tuning_scenario` changes their scenarios, and the observer takes no part.
+        scenario: The scenario, which `tuning_scenario` changes; its observer takes no part.
+        requests: The recordings.
         warm_up_s: Time before the window that is kept [s].
 
     Returns:
-        A function of a request that returns its worlds that stood, the `recorded` of `tune`.
+        A function of a request's two values that returns the worlds that stood, the `recorded` of `tune`.
 
     Raises:
         InputError: Fewer than two worlds of a request stood.
         KeyboardInterrupt: The user interrupted.
     """
-    distinct = {_key(*request): request for request in requests}
-    jobs = [
-        BatchJob([prepare(tuning_scenario(scenario, noise))] * len(worlds), worlds)
-        for scenario, worlds, noise in distinct.values()
-    ]
-    recordings = {
-        key: _recorded(request[0], job.experiments[0], result, warm_up_s)
-        for (key, request), job, result in zip(distinct.items(), jobs, run_jobs(jobs), strict=True)
-    }
+    experiments = [prepare(tuning_scenario(scenario, noise)) for _, noise in requests]
+    jobs = [BatchJob([one] * len(worlds), worlds) for one, (worlds, _) in zip(experiments, requests, strict=True)]
+    windows, recordings = windows_of(scenario), {}
+    for request, experiment, result in zip(requests, experiments, run_jobs(jobs), strict=True):
+        if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+            raise KeyboardInterrupt
+        loop, stood = experiment.scenario, result.stood
+        if stood.sum() < 2:
+            raise InputError(
+                f"{scenario.title or 'the scenario'}: with the law fed by the {loop.controller.feedback}, "
+                f"{len(stood) - stood.sum()} of {len(stood)} worlds fell before {loop.duration_s:g} s: there is "
+                "nothing to tune on"
+            )
+        assert result.trajectory is not None
+        trajectory = result.trajectory.of_worlds(stood).between(windows[0][0] - warm_up_s, windows[-1][1])
+        recordings[request] = Recorded(trajectory, windows, int((~stood).sum()))
+    return lambda worlds, noise_ug_rthz: recordings[worlds, noise_ug_rthz]
 
-    def recorded(scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None = None) -> Recorded:
-        return recordings[_key(scenario, worlds, noise_ug_rthz)]
 
-    return recorded
-
-
-def record(
-    scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None = None, warm_up_s: float = WARM_UP_S
-) -> Recorded:
+def record(scenario: Scenario, worlds: range, noise_ug_rthz: float | None = None) -> Recorded:
     """Run one tuning experiment; see `recorder`."""
-    return recorder([(scenario, worlds, noise_ug_rthz)], warm_up_s=warm_up_s)(scenario, worlds, noise_ug_rthz)
+    return recorder(scenario, [(worlds, noise_ug_rthz)])(worlds, noise_ug_rthz)
 
 
-def _recorded(scenario: Scenario, experiment: Experiment, result: Result, warm_up_s: float) -> Recorded:
-    loop = experiment.scenario
-    if any(outcome.kind == "interrupted" for outcome in result.outcomes):
-        raise KeyboardInterrupt
-    stood = result.stood
-    if stood.sum() < 2:
-        raise InputError(
-            f"{scenario.title or 'the scenario'}: with the law fed by the {loop.controller.feedback}, "
-            f"{len(stood) - stood.sum()} of {len(stood)} worlds fell before {loop.duration_s:g} s: there is nothing "
-            "to tune on"
-        )
-    start, end = window_of(scenario)
-    assert result.trajectory is not None
-    trajectory = result.trajectory.of_worlds(stood).between(start - warm_up_s, end)
-    return Recorded(trajectory, windows_of(scenario), int((~stood).sum()))
-
-
-def halves(scenario: Scenario, worlds: int, noise_ug_rthz: Sequence[float]) -> list[RecordingRequest]:
+def halves(worlds: int, noise_ug_rthz: Sequence[float]) -> list[tuple[range, float]]:
     """Return the requests of `tune`: worlds to fit and as many held out, at every noise."""
     spans = range(worlds), range(worlds, 2 * worlds)
-    return [(scenario, span, density) for density in noise_ug_rthz for span in spans]
-
-
-def _key(scenario: Scenario, worlds: Sequence[int], noise_ug_rthz: float | None) -> tuple:
-    """Return what a recording depends on: the whole recorded scenario, and the worlds."""
-    return tuple(worlds), repr(tuning_scenario(scenario, noise_ug_rthz))
+    return [(span, density) for density in noise_ug_rthz for span in spans]
 
 
 @dataclass(frozen=True)
@@ -205,7 +181,6 @@ class TuningResult:
         numbers: The tuned numbers.
         insensitive_parameters: Names of numbers that are not tuned, since the estimated rate does not depend on them.
         worlds: Number of worlds to fit; as many are held out for scoring.
-        window: Start and end of the scored time [s].
         levels: Results by sensor noise, in ascending order.
     """
 
@@ -215,10 +190,14 @@ class TuningResult:
     numbers: Sequence[TunedScalar]
     insensitive_parameters: Sequence[str]
     worlds: int
-    window: Window
     levels: Sequence[NoiseLevelResult]
 
-    def figures(self) -> dict[str, SummaryValue]:
+    @property
+    def window(self) -> Window:
+        """Start and end of the scored time [s]."""
+        return window_of(self.scenario)
+
+    def figures(self) -> Summary:
         """Return the figures that `cmg-mj tune --json` prints."""
         best = best_noise(self)
         levels = [
@@ -230,7 +209,7 @@ class TuningResult:
             }
             for level in self.levels
         ]
-        return {
+        figures: dict[str, SummaryValue] = {
             "scenario": self.scenario.title,
             "observer": self.kind,
             "seed": self.scenario.seed,
@@ -244,6 +223,7 @@ class TuningResult:
             "given_best_at_noise_density_ug_rthz": best.noise_ug_rthz,
             **({"given_best_noise_is": best.where} if len(levels) > 1 else {}),
         }
+        return finite(figures)
 
 
 def tune(
@@ -255,7 +235,7 @@ def tune(
     noise_ug_rthz: Sequence[float] = (),
     warm_up_s: float = WARM_UP_S,
     starts: int = 2,
-    recorded: Callable[..., Recorded] | None = None,
+    recorded: Callable[[range, float], Recorded] | None = None,
     on_share: OnShare | None = None,
     stop: Stop = lambda: False,
 ) -> TuningResult:
@@ -291,18 +271,16 @@ def tune(
     dt, model, noise = experiment.design.constructor_arguments
     make = partial(make_observer, kind, dt, model, noise)
     fit = ParameterFit(kind, make, scenario.observer.parameters, parameters, ranges, starts, stop)
-    recorded = recorded or recorder(halves(scenario, worlds, densities), warm_up_s=warm_up_s)
+    recorded = recorded or recorder(scenario, halves(worlds, densities), warm_up_s=warm_up_s)
 
     levels: list[NoiseLevelResult] = []
-    window: Window = (0.0, 0.0)
     for i, density in enumerate(densities):
 
         def share(done: float, i: int = i) -> None:
             if on_share:
                 on_share((i + done) / len(densities))
 
-        fitted, held_out = (recorded(*half) for half in halves(scenario, worlds, [density]))
-        window = fitted.window
+        fitted, held_out = (recorded(*half) for half in halves(worlds, [density]))
         noise = experiment.plant.parameters.noise(sensors.with_noise_density(density))
         try:
             levels.append(fit.level(partial(make_observer, kind, dt, model, noise), fitted, held_out, share, density))
@@ -311,8 +289,7 @@ def tune(
             if not levels:
                 raise
             break
-    insensitive = fit.insensitive_parameters or ()
-    return TuningResult(scenario, kind, fit.start_parameters, fit.numbers, insensitive, worlds, window, levels)
+    return TuningResult(scenario, kind, fit.start_parameters, fit.numbers, fit.insensitive_parameters, worlds, levels)
 
 
 class BestNoise(NamedTuple):

@@ -11,7 +11,7 @@ import pytest
 
 from cmg_mj.features.replay.log import Log, LogNoise, ReadOptions, WhiteNoise
 from cmg_mj.features.replay.reading import read_log
-from cmg_mj.features.replay.reference import AGREES, SURE, alignment, alignment_of, remarks_on
+from cmg_mj.features.replay.reference import AGREES, SURE, alignment, alignment_of, judge
 from tests.command import ROOT
 from tests.features.replay.motion import DT, N, read, sine
 
@@ -25,7 +25,9 @@ def noise(seed: int = 0) -> np.ndarray:
 
 
 def last_remark(log: Log) -> str:
-    return remarks_on(log, alignment_of(log))[-1]
+    aligned = alignment_of(log)
+    assert aligned is not None
+    return judge(log, aligned)
 
 
 def remark(folder: Path, tilt: np.ndarray = TILT, rate: np.ndarray = RATE, **options: Any) -> str:

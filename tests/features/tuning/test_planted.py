@@ -16,7 +16,6 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.scenario.schema import Scenario
 from tests.features.tuning.user_observer import USER_OBSERVER
 from tests.observers.reference import DT
 
@@ -44,7 +43,7 @@ def recorder(
 ) -> Callable[..., Recorded]:
     """Recordings with parameters that depend on the noise and on whether the worlds are held out."""
 
-    def record_planted(scenario: Scenario, worlds: range, noise_ug_rthz: float) -> Recorded:
+    def record_planted(worlds: range, noise_ug_rthz: float) -> Recorded:
         return plant_parameters(kind, truth(noise_ug_rthz, worlds.start > 0), worlds.start, gyro_noise)
 
     return record_planted
