@@ -91,14 +91,13 @@ def copy_physics_numbers(model: mujoco.MjModel, reference: mujoco.MjModel) -> No
 
 
 class PlottedTick(NamedTuple):
-    """A control tick of one axis in the plots: x1, the true and the estimated rate, u, the push."""
+    """A control tick of one axis in the plots: x1, the true and the estimated rate, u."""
 
     time_s: float
     tilt_deg: float
     rate_rad_s: float
     estimate_rad_s: float
     command_rad_s: float
-    push_n_m: float
 
 
 class StudioSession:
@@ -235,15 +234,15 @@ class StudioSession:
             self._stop(str(error))
             return False
         if ticked:
-            self.ticks.append(tuple(self._plotted_tick(*pair) for pair in enumerate(self._torques)))
+            self.ticks.append(tuple(map(self._plotted_tick, range(len(self._lines)))))
         return ticked
 
-    def _plotted_tick(self, axis: int, torque: float) -> PlottedTick:
+    def _plotted_tick(self, axis: int) -> PlottedTick:
         """Return the last tick of an axis."""
-        data, line, tick = self.data, self.plant.axes[axis].line, self.controller.parts[axis].tick
+        data, line, tick = self.data, self._lines[axis], self.controller.parts[axis].tick
         assert tick is not None
         x1 = math.degrees(float(line.lean(data.qpos)) + self.now.plant.axes[axis].bias)
-        return PlottedTick(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u, torque)
+        return PlottedTick(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u)
 
     def _stop(self, why: str) -> None:
         self.stopped = why
