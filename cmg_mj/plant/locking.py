@@ -11,9 +11,9 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.plant.axis import ResolvedModel
-from cmg_mj.plant.elements import ON_A_JOINT, TILT_ELEMENT, element_id, joint_sizes
+from cmg_mj.plant.elements import ON_A_JOINT, TILT_ELEMENT, joint_sizes
 from cmg_mj.plant.mjcf import data_at_keyframe
-from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
+from cmg_mj.plant.tilt_line import HingeLine, line_named
 from cmg_mj.scenario.plant_settings import PlantSettings
 
 YAW = "yaw"
@@ -70,10 +70,7 @@ def _hinges_of(
             names = nearest(axis, known, "its axes") if any(known) else "its only one has no name"
             raise InputError(f"{setting} has no axis {axis!r}; {names}")
         name = f"{axis}/{TILT_ELEMENT}".lstrip("/")
-        joint = element_id(model, "joint", name)
-        line: Line | None = line_of_joint(model, joint, key) if joint >= 0 else None
-        if line is None:
-            line = line_at_site(model, data, element_id(model, "site", name), key)
+        line = line_named(model, data, name, key)
         if not isinstance(line, HingeLine):
             raise InputError(f"{setting} tilts about {name!r} as a free body does; only a hinge can be locked")
         hinges.append(line)
