@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -162,10 +162,12 @@ class Plant:
         """Coupling of the axes in a turn about the vertical."""
         return turning(self.filed.model, self.key, self.axes)
 
-    def largest_tilt(self, qpos: Addressed) -> Scalar:
-        """Return the tilt from the keyframe of the axis that is farthest from it [rad]."""
-        if len(self.axes) == 1:
-            return self.axis.line.lean(qpos)
+    @property
+    def largest_tilt(self) -> Callable[[Addressed], Scalar]:
+        """Function of qpos: the tilt from the keyframe of the axis that is farthest from it [rad]."""
+        return self.axis.line.lean if len(self.axes) == 1 else self._farthest_lean
+
+    def _farthest_lean(self, qpos: Addressed) -> Scalar:
         leans = np.array([axis.line.lean(qpos) for axis in self.axes])
         farthest = np.argmax(np.where(np.isnan(leans), np.inf, np.abs(leans)), axis=0)
         lean = np.take_along_axis(leans, farthest[None], axis=0)[0]
@@ -208,10 +210,12 @@ class Plant:
             raise InputError(f"{self.path}: tilts about no hinge of its own at one address; use plant.axis.line")
         return line
 
-    def ideal_readings(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> Any:
-        """Return the readings of perfect sensors: of the axis (see `Axis.ideal`), or `MultiAxisReading` of several."""
-        if len(self.axes) == 1:
-            return self.axis.ideal(sensordata, qvel)
+    @property
+    def ideal_readings(self) -> Callable[[list[float] | np.ndarray, Addressed], Any]:
+        """Function of sensordata and qvel: readings of perfect sensors (see `Axis.ideal`), or `MultiAxisReading`."""
+        return self.axis.ideal if len(self.axes) == 1 else self._readings_of_axes
+
+    def _readings_of_axes(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> MultiAxisReading:
         upward = sensordata[self.axis.gyro + 1]
         return MultiAxisReading([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
 
@@ -342,12 +346,8 @@ def check_axes(scenario: Scenario, plant: Plant) -> None:
     Raises:
         InputError: There is such a name, or such a torque.
     """
-    known = [*plant.axis_names, *plant.settings.locked_axes]
     for name in scenario.axes:
-        if known == [""]:
-            raise InputError(f"axes.{name}: the rig has one axis, without a name; set its values in [plant], ...")
-        if name not in known:
-            raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
+        check_axis("axes", name, plant)
     for section in ("push", "swing"):
         for i, torque in enumerate(scenario.section(section)):
             check_axis(f"{section}.{i}.axis", torque.axis, plant)
