@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest, shortened
-from cmg_mj.core.sensor import steps_until, whole_steps
+from cmg_mj.core.sensor import steps_until
 from cmg_mj.core.types import extra_signals
 from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
 from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes
@@ -82,28 +82,20 @@ def linear_closed_loop(design: Design, plant: Plant, model: str = "rig") -> cont
     Raises:
         InputError: Something in the loop is not linear, or not covered.
     """
+    settings, dt, cure = design.scenario.plant, design.law.dt, 'take linear_closed_loop(plant="rig")'
     if model not in MODELS:
         raise InputError(f"linear_closed_loop: plant = {shortened(repr(model))}: {nearest(str(model), MODELS)}")
     if model == "rig":
         linear = linearise_alone(plant)
+    elif plant.bends:
+        raise InputError(f"bend: the reduced model is rigid; {cure}, or set bend.frequency_hz=0")
+    elif plant.reduced.pivot_arm:
+        raise InputError(f"plant.model = {settings.model!r}: its pivot slides; {cure}")
     else:
-        settings, cure = plant.settings, 'take linear_closed_loop(plant="rig")'
-        if plant.bends:
-            raise InputError(f"bend: the reduced model is rigid; {cure}, or set bend.frequency_hz=0")
-        if plant.reduced.pivot_arm:
-            raise InputError(f"plant.model = {settings.model!r}: its pivot slides; {cure}")
         linear = linear_reduced(plant.reduced)
-    _require_covered(design)
-    return ClosedLoop(design, linear).system()
-
-
-def _require_covered(design: Design) -> None:
-    """Refuse what a linear system of one control period does not cover."""
-    plant, dt = design.scenario.plant, design.law.dt
-    if plant.gimbal_backlash_arcmin:
+    if backlash := settings.gimbal_backlash_arcmin:
         raise InputError(
-            f"plant.gimbal_backlash_arcmin = {plant.gimbal_backlash_arcmin:g}: backlash is not linear; set "
-            "plant.gimbal_backlash_arcmin=0"
+            f"plant.gimbal_backlash_arcmin = {backlash:g}: backlash is not linear; set plant.gimbal_backlash_arcmin=0"
         )
     for name in sensors_used(design):
         rate = getattr(design.scenario.sensors, name).rate_hz
@@ -112,6 +104,7 @@ def _require_covered(design: Design) -> None:
                 f"sensors.{name}.rate_hz = {rate:g}: linear_closed_loop takes the control rate, {1.0 / dt:g} Hz, or a "
                 "whole multiple of it"
             )
+    return ClosedLoop(design, linear).system()
 
 
 def sensors_used(design: Design) -> list[str]:
@@ -142,7 +135,7 @@ class ClosedLoop:
         law, controller, self._timestep = design.law, design.scenario.controller, design.rig.timestep
         self._estimating, self._deciding, self._extra = _slopes(design, true_state)
         self._channels = _channels(design, true_state)
-        control_steps = whole_steps(law.dt, self._timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
+        control_steps = round(law.dt / self._timestep)  # whole, as the time grid has it
         self._steps = math.lcm(control_steps, *(channel.period for channel in self._channels))
         self._tick_steps = range(0, self._steps, control_steps)
         self.ticks, self.period = len(self._tick_steps), self._steps * self._timestep
@@ -202,7 +195,7 @@ class ClosedLoop:
         hold = cache(lambda steps: plant.hold(steps * self._timestep))
         latched: dict[tuple[str, int], np.ndarray] = {}
         shown, commands = [], []
-        rate_noises = [name for name in self.inputs if name.startswith(INPUTS[-1])]  # one a tick
+        rate_noises = self.inputs[len(INPUTS) - 1 :]  # one a tick
         for step, after in zip(sorted(instants), [*sorted(instants)[1:], self._steps], strict=True):
             motion = plant.C @ x + plant.D @ np.array([turned, push])
             ideal = self._ideal(motion)
@@ -321,20 +314,16 @@ def _channels(design: Design, true_state: bool) -> list[_Channel]:
     timestep, sensors, channels = design.rig.timestep, design.scenario.sensors, []
     for name in sensors_used(design):
         sensor = getattr(sensors, name)
-        period = whole_steps(1.0 / sensor.rate_hz, timestep, f"sensors.{name}.rate_hz", f"{sensor.rate_hz:g} Hz")
-        times = period, steps_until(sensor.latency_s, timestep)
+        times = round(1.0 / sensor.rate_hz / timestep), steps_until(sensor.latency_s, timestep)
         if name != "accelerometer":
             channels.append(_Channel(name, *times))
         elif true_state:
             is_estimated = design.scenario.controller.feedback == "observer"
             channels += [_Channel(signal, *times) for signal in ("tilt", *(["rate"] if is_estimated else []))]
         else:
-            pair = sensors.accelerometer
-            inside = f"{pair.bandwidth_hz:g} Hz, sampled at {INSIDE_HZ:g} Hz inside the part"
-            where = "sensors.accelerometer"
-            raw = whole_steps(1.0 / INSIDE_HZ, timestep, f"{where}.bandwidth_hz", inside) if pair.bandwidth_hz else 0
-            skew = whole_steps(pair.skew_s, timestep, f"{where}.skew_s", f"{pair.skew_s:g} s")
-            channels += [_Channel("inner", *times, raw), _Channel("outer", *times, raw, skew)]
+            raw = round(1.0 / INSIDE_HZ / timestep) if sensor.bandwidth_hz else 0
+            channels.append(_Channel("inner", *times, raw))
+            channels.append(_Channel("outer", *times, raw, round(sensor.skew_s / timestep)))
     return channels
 
 
