@@ -9,6 +9,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, shown
 from cmg_mj.core.reduced_model import MARGIN, ReducedModel, hold_matrices, is_hurwitz
+from cmg_mj.core.types import Law
 from cmg_mj.inputs.features import FEATURES
 from cmg_mj.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.linear.loop import ClosedLoop, sensors_used
@@ -350,18 +351,20 @@ def omissions(scenario: Scenario) -> dict[str, str]:
     return clauses
 
 
-def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:
+def require_stable_period(law: Law, model: ReducedModel) -> None:
     """Refuse a control period so long that the loop is unstable, where a shorter one would do.
 
     Gains that suit no period are not its business: `hints` names them.
 
     Args:
-        law: The law, fed by the true state without delay.
+        law: The law, fed by the true state without delay; one that is no `StateFeedback` is not judged.
         model: The plant's reduced model.
 
     Raises:
         InputError: The loop sampled so seldom is unstable; the message has the lowest stable rate.
     """
+    if not isinstance(law, StateFeedback):
+        return
     pole = _sampled_pole(law, model, law.dt)
     if pole < MARGIN or not is_hurwitz(closed_loop_poles(model, law.gains)):
         return

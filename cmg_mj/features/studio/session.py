@@ -122,6 +122,7 @@ class StudioSession:
         self.plant = drawn_plant(experiment.plant)
         self.timestep = self.plant.timestep
         self._lines = [axis.line for axis in self.plant.axes]
+        self._nothing = Outside([0.0] * len(self._lines))
         self._users_pushes: list[Push] = []
         others = {name: parts for name, parts in outsides(experiment.scenario).items() if name != "push"}
         self._others = disturbances(others, [self.plant], experiment.scenario.seed, 0)
@@ -187,10 +188,6 @@ class StudioSession:
         self._torques = outside.torques
         if outside.acceleration is not None:
             self.model.opt.gravity[:] = self._gravity - outside.acceleration
-
-    @property
-    def _nothing(self) -> Outside:
-        return Outside([0.0] * len(self._lines))
 
     def sync_to_time(self) -> int:
         """Begin again at the state's time, if someone has moved the state; return the step."""
