@@ -42,6 +42,9 @@ WITH_A_SLOPE = (
 """Observers of the package that have a slope at rest."""
 
 
+NO_SLOPES = Slopes((), *np.zeros((4, 0, 0)))
+
+
 class _Channel(NamedTuple):
     """A measurement on its way to the controller, in physics steps.
 
@@ -133,7 +136,23 @@ class ClosedLoop:
     def __init__(self, design: Design, plant: LinearPlant, *, true_state: bool = False) -> None:
         self._design, self._plant, self._true_state = design, plant, true_state
         law, controller, self._timestep = design.law, design.scenario.controller, design.rig.timestep
-        self._estimating, self._deciding, self._extra = _slopes(design, true_state)
+        self._estimating, self._extra, kind = NO_SLOPES, (), design.scenario.observer.kind
+        if not true_state:
+            observer = design.observer()
+            self._extra = extra_signals(observer)
+            try:
+                self._estimating = observer_slopes(observer)
+            except InputError as error:
+                raise InputError(
+                    f"observer.kind = {kind!r}: {error}; linear_closed_loop takes {', '.join(WITH_A_SLOPE)}, or one of "
+                    "your own"
+                ) from error
+        try:
+            self._deciding = law_slopes(design.fresh_law(), len(self._extra))
+        except InputError as error:
+            raise InputError(
+                f"controller.kind = {controller.kind!r}: {error}; linear_closed_loop takes state_feedback"
+            ) from error
         self._channels = _channels(design, true_state)
         control_steps = round(law.dt / self._timestep)  # whole, as the time grid has it
         self._steps = math.lcm(control_steps, *(channel.period for channel in self._channels))
@@ -279,29 +298,6 @@ class ClosedLoop:
         state = np.array([self._rows[name] for name in names]).reshape(-1, width)
         self._rows |= dict(zip(names, slopes.A @ state + slopes.B @ np.array(inputs), strict=True))
         return slopes.C @ state + slopes.D @ np.array(inputs)
-
-
-NO_SLOPES = Slopes((), *np.zeros((4, 0, 0)))
-
-
-def _slopes(design: Design, true_state: bool) -> tuple[Slopes, Slopes, Sequence[str]]:
-    """Find the slopes of observer and law, and the names of the observer's extra signals."""
-    kind, law_kind = design.scenario.observer.kind, design.scenario.controller.kind
-    estimating, extra = NO_SLOPES, ()
-    if not true_state:
-        observer = design.observer()
-        extra = extra_signals(observer)
-        try:
-            estimating = observer_slopes(observer)
-        except InputError as error:
-            raise InputError(
-                f"observer.kind = {kind!r}: {error}; linear_closed_loop takes {', '.join(WITH_A_SLOPE)}, or one of "
-                "your own"
-            ) from error
-    try:
-        return estimating, law_slopes(design.fresh_law(), len(extra)), extra
-    except InputError as error:
-        raise InputError(f"controller.kind = {law_kind!r}: {error}; linear_closed_loop takes state_feedback") from error
 
 
 def _prefixed(owner: str, slopes: Slopes) -> list[str]:

@@ -21,7 +21,6 @@ from cmg_mj.plant.elements import EQUILIBRIUM_KEY, TILT_ELEMENT, Module, element
 from cmg_mj.plant.inertia import inertia_about
 from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_named
-from cmg_mj.sensors.accelerometer import Accelerometer
 
 _new = tuple.__new__  # a named tuple's own takes twice as long
 
@@ -126,20 +125,6 @@ class Axis:
         for gimbal, share, zero in self._gimbals:
             angle = angle + share * (qpos[gimbal] - zero)
         return angle
-
-    def apparent_bias(self, accelerometer: Accelerometer, gravity: float) -> float:
-        """Return the bias an observer should find: e less the tilt made by the accelerometers' constant errors.
-
-        Since y1 = x1 - e + offset, no observer can separate the two.
-
-        Args:
-            accelerometer: The sensors of the tilt.
-            gravity: [m/s^2].
-
-        Returns:
-            The bias at the equilibrium [rad].
-        """
-        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.constant_errors(), gravity)
 
 
 class ResolvedModel(NamedTuple):

@@ -15,7 +15,7 @@ from cmg_mj.plant.axis import ResolvedModel, find_axis, resolve
 from cmg_mj.plant.checks import RigChecker, invalid_numbers
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, REQUIRED_ELEMENTS, axis_modules, element_id, missing_elements
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
-from cmg_mj.plant.mjcf import compile_model, parse, parse_without_plugins
+from cmg_mj.plant.mjcf import compile_model, parse_without_plugins
 from cmg_mj.scenario.plant_settings import PlantSettings
 
 _HAS_PLUGIN = "the model has the plugin {}, which is left out here: the scenario's own controller takes its place"
@@ -85,20 +85,6 @@ def edit(
             rig = resolve(rig.path, compile_model(spec, rig.path), rig.modules, settings.locked_axes)
             finish(rig.model)
     return rig
-
-
-def drawn_spec(rig: ResolvedModel, settings: PlantSettings, sections: Mapping[str, Any]) -> mujoco.MjSpec:
-    """Parse a rig with all that is only seen, and edit it as `build` does.
-
-    Raises:
-        InputError: MuJoCo's compiler refuses it, because of a mesh that cannot be read.
-    """
-    spec = parse(rig.path)
-    if settings.lock_thrust_bearing:
-        lock_thrust_bearing(spec, rig.path)
-    if settings.locked_axes or any(section.unmodelled for section in sections.values()):
-        edit(spec, resolve(rig.path, compile_model(spec, rig.path), rig.modules), settings, sections)
-    return spec
 
 
 def check_rig(path: Path, name: Path) -> None:

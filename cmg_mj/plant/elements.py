@@ -25,9 +25,6 @@ REQUIRED_ELEMENTS = (
 ON_A_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 """Transmissions of an actuator that drives a joint."""
 _OF_A_MODULE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
-JOINT_KINDS = {
-    int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name for name in ("hinge", "slide", "ball", "free")
-}
 
 
 @dataclass(frozen=True)

@@ -23,11 +23,12 @@ from cmg_mj.core.types import MultiAxisReading
 from cmg_mj.inputs.features import entries
 from cmg_mj.inputs.files import find, folder
 from cmg_mj.inputs.messages import complaints
-from cmg_mj.plant.axis import Axis, ResolvedModel
-from cmg_mj.plant.build import build, drawn_spec
+from cmg_mj.plant.axis import Axis, ResolvedModel, resolve
+from cmg_mj.plant.build import build, edit
 from cmg_mj.plant.checks import survives_first_steps
-from cmg_mj.plant.elements import BEND_JOINT, JOINT_KINDS, element_id
-from cmg_mj.plant.mjcf import compile_model, quiet, set_control_callback
+from cmg_mj.plant.elements import BEND_JOINT, element_id
+from cmg_mj.plant.locking import lock_thrust_bearing
+from cmg_mj.plant.mjcf import compile_model, parse, quiet, set_control_callback
 from cmg_mj.plant.settings import apply, place_accelerometers
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.turning import turning
@@ -120,8 +121,17 @@ class Plant:
         return model
 
     def drawn_spec(self) -> mujoco.MjSpec:
-        """Parse the model's file, with all that is only seen, edited as the settings say."""
-        return drawn_spec(self.filed, self.settings, self.sections)
+        """Parse the model's file, with all that is only seen, edited as the settings say.
+
+        Raises:
+            InputError: MuJoCo's compiler refuses it, because of a mesh that cannot be read.
+        """
+        path, settings, spec = self.path, self.settings, parse(self.path)
+        if settings.lock_thrust_bearing:
+            lock_thrust_bearing(spec, path)
+        if settings.locked_axes or any(section.unmodelled for section in self.sections.values()):
+            edit(spec, resolve(path, compile_model(spec, path), self.filed.modules), settings, self.sections)
+        return spec
 
     def with_own_model(self) -> Plant:
         """Copy the plant onto a model of its own, whose gravity may be shifted while it runs."""
@@ -220,8 +230,17 @@ class Plant:
         return MultiAxisReading([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
 
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
-        """Return the bias that an observer should find: see `Axis.apparent_bias`."""
-        return self.axis.apparent_bias(accelerometer, self.gravity)
+        """Return the bias an observer should find: e less the tilt made by the accelerometers' constant errors.
+
+        Since y1 = x1 - e + offset, no observer can separate the two.
+
+        Args:
+            accelerometer: The sensors of the tilt.
+
+        Returns:
+            The bias at the equilibrium [rad].
+        """
+        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.constant_errors(), self.gravity)
 
     @property
     def interface(self) -> KnownPlant:
@@ -269,7 +288,7 @@ class Plant:
     @cached_property
     def joint_kinds(self) -> tuple[str, ...]:
         """Kind of each joint: `hinge`, `slide`, `ball` or `free`; empty if all are hinges."""
-        kinds = tuple(JOINT_KINDS[int(kind)] for kind in self.model.jnt_type)
+        kinds = tuple(mujoco.mjtJoint(kind).name.removeprefix("mjJNT_").lower() for kind in self.model.jnt_type)
         return () if set(kinds) == {"hinge"} else kinds
 
 
