@@ -136,7 +136,7 @@ def _frames_around(element: Framed) -> list[mujoco.MjsFrame]:
 
 
 def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, drawn: mujoco.MjModel, plant: Plant) -> None:
-    """Give a parsed model what the plant's settings change: see `plant.variations`.
+    """Give a parsed model what the plant's settings change: see `plant.settings`.
 
     Args:
         spec: The model, which is changed; of what was written it has read `filed`.

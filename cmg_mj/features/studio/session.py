@@ -52,7 +52,7 @@ PHYSICS_ARRAYS = (
     "site_sameframe",
     "tendon_invweight0",
 )
-"""Arrays of a model that `plant.variations` changes or `mj_setConst` derives from them; none is indexed by geoms."""
+"""Arrays of a model that `plant.settings` changes or `mj_setConst` derives from them; none is indexed by geoms."""
 
 MUJOCO_VIEW = (90.0, -45.0)
 STUDIO_VIEW = (125.0, -20.0)
