@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest, shortened
-from cmg_mj.core.sensor import steps_until, whole_steps
+from cmg_mj.core.sensor import steps_until
 from cmg_mj.core.types import extra_signals
 from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
 from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes
@@ -40,6 +40,9 @@ WITH_A_SLOPE = (
     *("linear_high_gain", "ltv", "luenberger"),
 )
 """Observers of the package that have a slope at rest."""
+
+
+NO_SLOPES = Slopes((), *np.zeros((4, 0, 0)))
 
 
 class _Channel(NamedTuple):
@@ -82,28 +85,20 @@ def linear_closed_loop(design: Design, plant: Plant, model: str = "rig") -> cont
     Raises:
         InputError: Something in the loop is not linear, or not covered.
     """
+    settings, dt, cure = design.scenario.plant, design.law.dt, 'take linear_closed_loop(plant="rig")'
     if model not in MODELS:
         raise InputError(f"linear_closed_loop: plant = {shortened(repr(model))}: {nearest(str(model), MODELS)}")
     if model == "rig":
         linear = linearise_alone(plant)
+    elif plant.bends:
+        raise InputError(f"bend: the reduced model is rigid; {cure}, or set bend.frequency_hz=0")
+    elif plant.reduced.pivot_arm:
+        raise InputError(f"plant.model = {settings.model!r}: its pivot slides; {cure}")
     else:
-        settings, cure = plant.settings, 'take linear_closed_loop(plant="rig")'
-        if plant.bends:
-            raise InputError(f"bend: the reduced model is rigid; {cure}, or set bend.frequency_hz=0")
-        if plant.reduced.pivot_arm:
-            raise InputError(f"plant.model = {settings.model!r}: its pivot slides; {cure}")
         linear = linear_reduced(plant.reduced)
-    _require_covered(design)
-    return ClosedLoop(design, linear).system()
-
-
-def _require_covered(design: Design) -> None:
-    """Refuse what a linear system of one control period does not cover."""
-    plant, dt = design.scenario.plant, design.law.dt
-    if plant.gimbal_backlash_arcmin:
+    if backlash := settings.gimbal_backlash_arcmin:
         raise InputError(
-            f"plant.gimbal_backlash_arcmin = {plant.gimbal_backlash_arcmin:g}: backlash is not linear; set "
-            "plant.gimbal_backlash_arcmin=0"
+            f"plant.gimbal_backlash_arcmin = {backlash:g}: backlash is not linear; set plant.gimbal_backlash_arcmin=0"
         )
     for name in sensors_used(design):
         rate = getattr(design.scenario.sensors, name).rate_hz
@@ -112,6 +107,7 @@ def _require_covered(design: Design) -> None:
                 f"sensors.{name}.rate_hz = {rate:g}: linear_closed_loop takes the control rate, {1.0 / dt:g} Hz, or a "
                 "whole multiple of it"
             )
+    return ClosedLoop(design, linear).system()
 
 
 def sensors_used(design: Design) -> list[str]:
@@ -140,9 +136,25 @@ class ClosedLoop:
     def __init__(self, design: Design, plant: LinearPlant, *, true_state: bool = False) -> None:
         self._design, self._plant, self._true_state = design, plant, true_state
         law, controller, self._timestep = design.law, design.scenario.controller, design.rig.timestep
-        self._estimating, self._deciding, self._extra = _slopes(design, true_state)
+        self._estimating, self._extra, kind = NO_SLOPES, (), design.scenario.observer.kind
+        if not true_state:
+            observer = design.observer()
+            self._extra = extra_signals(observer)
+            try:
+                self._estimating = observer_slopes(observer)
+            except InputError as error:
+                raise InputError(
+                    f"observer.kind = {kind!r}: {error}; linear_closed_loop takes {', '.join(WITH_A_SLOPE)}, or one of "
+                    "your own"
+                ) from error
+        try:
+            self._deciding = law_slopes(design.fresh_law(), len(self._extra))
+        except InputError as error:
+            raise InputError(
+                f"controller.kind = {controller.kind!r}: {error}; linear_closed_loop takes state_feedback"
+            ) from error
         self._channels = _channels(design, true_state)
-        control_steps = whole_steps(law.dt, self._timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
+        control_steps = round(law.dt / self._timestep)  # whole, as the time grid has it
         self._steps = math.lcm(control_steps, *(channel.period for channel in self._channels))
         self._tick_steps = range(0, self._steps, control_steps)
         self.ticks, self.period = len(self._tick_steps), self._steps * self._timestep
@@ -202,7 +214,7 @@ class ClosedLoop:
         hold = cache(lambda steps: plant.hold(steps * self._timestep))
         latched: dict[tuple[str, int], np.ndarray] = {}
         shown, commands = [], []
-        rate_noises = [name for name in self.inputs if name.startswith(INPUTS[-1])]  # one a tick
+        rate_noises = self.inputs[len(INPUTS) - 1 :]  # one a tick
         for step, after in zip(sorted(instants), [*sorted(instants)[1:], self._steps], strict=True):
             motion = plant.C @ x + plant.D @ np.array([turned, push])
             ideal = self._ideal(motion)
@@ -288,29 +300,6 @@ class ClosedLoop:
         return slopes.C @ state + slopes.D @ np.array(inputs)
 
 
-NO_SLOPES = Slopes((), *np.zeros((4, 0, 0)))
-
-
-def _slopes(design: Design, true_state: bool) -> tuple[Slopes, Slopes, Sequence[str]]:
-    """Find the slopes of observer and law, and the names of the observer's extra signals."""
-    kind, law_kind = design.scenario.observer.kind, design.scenario.controller.kind
-    estimating, extra = NO_SLOPES, ()
-    if not true_state:
-        observer = design.observer()
-        extra = extra_signals(observer)
-        try:
-            estimating = observer_slopes(observer)
-        except InputError as error:
-            raise InputError(
-                f"observer.kind = {kind!r}: {error}; linear_closed_loop takes {', '.join(WITH_A_SLOPE)}, or one of "
-                "your own"
-            ) from error
-    try:
-        return estimating, law_slopes(design.fresh_law(), len(extra)), extra
-    except InputError as error:
-        raise InputError(f"controller.kind = {law_kind!r}: {error}; linear_closed_loop takes state_feedback") from error
-
-
 def _prefixed(owner: str, slopes: Slopes) -> list[str]:
     """Name the states of the observer or the law; one that is a single number has the owner's name."""
     return [f"{owner}_{name}" if name else owner for name in slopes.names]
@@ -321,20 +310,16 @@ def _channels(design: Design, true_state: bool) -> list[_Channel]:
     timestep, sensors, channels = design.rig.timestep, design.scenario.sensors, []
     for name in sensors_used(design):
         sensor = getattr(sensors, name)
-        period = whole_steps(1.0 / sensor.rate_hz, timestep, f"sensors.{name}.rate_hz", f"{sensor.rate_hz:g} Hz")
-        times = period, steps_until(sensor.latency_s, timestep)
+        times = round(1.0 / sensor.rate_hz / timestep), steps_until(sensor.latency_s, timestep)
         if name != "accelerometer":
             channels.append(_Channel(name, *times))
         elif true_state:
             is_estimated = design.scenario.controller.feedback == "observer"
             channels += [_Channel(signal, *times) for signal in ("tilt", *(["rate"] if is_estimated else []))]
         else:
-            pair = sensors.accelerometer
-            inside = f"{pair.bandwidth_hz:g} Hz, sampled at {INSIDE_HZ:g} Hz inside the part"
-            where = "sensors.accelerometer"
-            raw = whole_steps(1.0 / INSIDE_HZ, timestep, f"{where}.bandwidth_hz", inside) if pair.bandwidth_hz else 0
-            skew = whole_steps(pair.skew_s, timestep, f"{where}.skew_s", f"{pair.skew_s:g} s")
-            channels += [_Channel("inner", *times, raw), _Channel("outer", *times, raw, skew)]
+            raw = round(1.0 / INSIDE_HZ / timestep) if sensor.bandwidth_hz else 0
+            channels.append(_Channel("inner", *times, raw))
+            channels.append(_Channel("outer", *times, raw, round(sensor.skew_s / timestep)))
     return channels
 
 

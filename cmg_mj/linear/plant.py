@@ -9,8 +9,8 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
-from cmg_mj.plant.axis import Axis, pivot_rows
-from cmg_mj.plant.elements import BEND_JOINT, TILT_ELEMENT, element_id
+from cmg_mj.plant.axis import pivot_rows
+from cmg_mj.plant.elements import BEND_JOINT, element_id
 from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.step_limit import input_column, state_matrix
@@ -93,13 +93,13 @@ def linearise_alone(plant: Plant) -> LinearPlant:
     Raises:
         InputError: The plant stands freely on contacts, or tilts about other axes too.
     """
-    model, axis = plant.model, plant.axis
+    axis = plant.axis
     if not isinstance(axis.line, HingeLine):
         raise InputError(
             f"plant.model = {plant.settings.model!r}: it stands freely, on contacts, which are not linear; take "
             'linear_closed_loop(plant="reduced")'
         )
-    if others := sorted(_other_axes(model, axis) - set(plant.settings.locked_axes)):
+    if others := sorted({*plant.filed.modules} - {axis.name, *plant.settings.locked_axes}):
         raise InputError(
             f"{axis.name}: the rig tilts about {', '.join(others)} too, which the loop of one axis does not hold up; "
             'take linear_closed_loop(plant="reduced"), or lock the others'
@@ -148,7 +148,8 @@ def _outputs(plant: Plant, whole: np.ndarray, height: float) -> np.ndarray:
     angle, rate, acceleration = columns[:nv], columns[nv : 2 * nv], whole[nv : 2 * nv]
     modules = axis.line.motion(model, data_at_keyframe(model, key))
     sensors, gimbals = modules.copy(), np.zeros(nv)
-    if _sensors_bend(plant):
+    site = int(model.sensor_objid[element_id(model, "sensor", f"{axis.prefix}fog")])
+    if int(model.site_bodyid[site]) == element_id(model, "body", BEND_JOINT):  # on the part beyond the bend
         sensors[int(model.joint(BEND_JOINT).dofadr[0])] = 1.0
     for module in axis.modules:
         gimbals[module.gimbal_dof] = module.direction / len(axis.modules)
@@ -157,13 +158,6 @@ def _outputs(plant: Plant, whole: np.ndarray, height: float) -> np.ndarray:
         across, _ = pivot_rows(model, key, axis)
         y1 = y1 - (across + height * sensors) @ acceleration / plant.gravity
     return np.array([modules @ angle, modules @ rate, gimbals @ angle, y1, sensors @ acceleration, sensors @ rate])
-
-
-def _other_axes(model: mujoco.MjModel, axis: Axis) -> set[str]:
-    """Return the names of the axes that a model has besides, locked or not."""
-    elements = [model.joint(i).name for i in range(model.njnt)] + [model.site(i).name for i in range(model.nsite)]
-    names = {name.removesuffix(TILT_ELEMENT) for name in elements if f"/{name}".endswith(f"/{TILT_ELEMENT}")}
-    return {name.rstrip("/") for name in names - {axis.prefix}}
 
 
 def _reached(A: np.ndarray, B: np.ndarray) -> np.ndarray:
@@ -182,10 +176,3 @@ def _reached(A: np.ndarray, B: np.ndarray) -> np.ndarray:
             basis = np.column_stack([basis, part / np.linalg.norm(part)])
             waiting.append(F @ basis[:, -1])
     return basis
-
-
-def _sensors_bend(plant: Plant) -> bool:
-    """Return whether the sensors are on the part of the frame that a bend adds."""
-    model = plant.model
-    site = int(model.sensor_objid[element_id(model, "sensor", f"{plant.axis.prefix}fog")])
-    return plant.bends and int(model.site_bodyid[site]) == element_id(model, "body", BEND_JOINT)

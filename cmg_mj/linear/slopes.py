@@ -114,9 +114,7 @@ def _slopes(part: Observer | Law, step: Step, inputs: int) -> Slopes:
             rest = _rest(part.init(Measurement(0.0, 0.0, 0.0)), step, inputs)
             names = ["_".join(filter(None, leaf.path)) for leaf in _floats(rest)]
             sides = [(_one_sided(rest, step, inputs, share), share_off) for share, share_off in STEPS.items()]
-        except InputError:
-            raise
-        except KeyboardInterrupt:
+        except (InputError, KeyboardInterrupt):
             raise
         except BaseException as error:  # whatever a user's code raises
             raise InputError(f"fails near rest: {raised(error)}") from error

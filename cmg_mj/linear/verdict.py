@@ -9,6 +9,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, shown
 from cmg_mj.core.reduced_model import MARGIN, ReducedModel, hold_matrices, is_hurwitz
+from cmg_mj.core.types import Law
 from cmg_mj.inputs.features import FEATURES
 from cmg_mj.laws.state_feedback import StateFeedback, closed_loop_poles
 from cmg_mj.linear.loop import ClosedLoop, sensors_used
@@ -95,7 +96,7 @@ def judge(loop: ClosedLoop, lag: float = 0.0) -> Verdict:
 
     A, B, C, D, _, outputs = loop.matrices()
     ticks = loop.ticks
-    rates = [i for i, name in enumerate(loop.inputs) if name.startswith("gimbal_rate_noise")]
+    rates = range(len(loop.inputs) - ticks, len(loop.inputs))
     commands = [i for i, name in enumerate(outputs) if name.startswith("u_rad_s")]
     triangle, basis = schur(A, output="complex")[:2]
     shown, driven = C[commands] @ basis, basis.conj().T @ B[:, rates]
@@ -171,18 +172,16 @@ class GainsVerdict(NamedTuple):
         late = f", {self.delay:g} s late" if self.delay else ""
         where = f"on this rig's reduced model, sampled every {self.period:g} s{late}"
         if self.loop.slowest >= MARGIN:
-            return f"controller: the closed loop is unstable {where} (pole at {self.loop.slowest:.3g} 1/s); {remedy}"
-        if self.loop.damping < POOR_DAMPING:
-            return (
-                f"controller: the closed loop is poorly damped {where} (damping ratio {self.loop.damping:.2f}, good is "
-                f"{POOR_DAMPING:g} or more); {remedy}"
-            )
-        if self.loop.distance < POOR_DISTANCE:
-            return (
-                f"controller: the closed loop has little margin {where} (its transfer comes within "
-                f"{self.loop.distance:.2f} of -1, good is {POOR_DISTANCE:g} or more); {remedy}"
-            )
-        return None
+            fault, figure = "is unstable", f"pole at {self.loop.slowest:.3g} 1/s"
+        elif self.loop.damping < POOR_DAMPING:
+            fault = "is poorly damped"
+            figure = f"damping ratio {self.loop.damping:.2f}, good is {POOR_DAMPING:g} or more"
+        elif self.loop.distance < POOR_DISTANCE:
+            fault = "has little margin"
+            figure = f"its transfer comes within {self.loop.distance:.2f} of -1, good is {POOR_DISTANCE:g} or more"
+        else:
+            return None
+        return f"controller: the closed loop {fault} {where} ({figure}); {remedy}"
 
 
 def judge_gains(design: Design) -> GainsVerdict:
@@ -352,18 +351,20 @@ def omissions(scenario: Scenario) -> dict[str, str]:
     return clauses
 
 
-def require_stable_period(law: StateFeedback, model: ReducedModel) -> None:
+def require_stable_period(law: Law, model: ReducedModel) -> None:
     """Refuse a control period so long that the loop is unstable, where a shorter one would do.
 
     Gains that suit no period are not its business: `hints` names them.
 
     Args:
-        law: The law, fed by the true state without delay.
+        law: The law, fed by the true state without delay; one that is no `StateFeedback` is not judged.
         model: The plant's reduced model.
 
     Raises:
         InputError: The loop sampled so seldom is unstable; the message has the lowest stable rate.
     """
+    if not isinstance(law, StateFeedback):
+        return
     pole = _sampled_pole(law, model, law.dt)
     if pole < MARGIN or not is_hurwitz(closed_loop_poles(model, law.gains)):
         return

@@ -20,8 +20,7 @@ from cmg_mj.core.types import IdealReading
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.inertia import inertia_about
 from cmg_mj.plant.mjcf import data_at_keyframe
-from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_at_site, line_of_joint
-from cmg_mj.sensors.accelerometer import Accelerometer
+from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_named
 
 _new = tuple.__new__  # a named tuple's own takes twice as long
 
@@ -127,20 +126,6 @@ class Axis:
             angle = angle + share * (qpos[gimbal] - zero)
         return angle
 
-    def apparent_bias(self, accelerometer: Accelerometer, gravity: float) -> float:
-        """Return the bias an observer should find: e less the tilt made by the accelerometers' constant errors.
-
-        Since y1 = x1 - e + offset, no observer can separate the two.
-
-        Args:
-            accelerometer: The sensors of the tilt.
-            gravity: [m/s^2].
-
-        Returns:
-            The bias at the equilibrium [rad].
-        """
-        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.constant_errors(), gravity)
-
 
 class ResolvedModel(NamedTuple):
     """A compiled rig as its file has it, with its names resolved.
@@ -177,7 +162,7 @@ def resolve(
     """
     key = element_id(model, "key", EQUILIBRIUM_KEY)
     axes = tuple(find_axis(model, key, name, modules[name]) for name in modules if name not in locked)
-    held = tuple(module for name in locked for module in find_locked_modules(model, key, modules[name]))
+    held = tuple(_find_module(model, key, None, module) for name in locked for module in modules[name])
     return ResolvedModel(path, model, key, modules, axes, held)
 
 
@@ -192,18 +177,20 @@ def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]
 
     Returns:
         The axis, without bias.
+
+    Raises:
+        InputError: It tilts about no hinge and no free body.
     """
     prefix = f"{name}/" if name else ""
     data = data_at_keyframe(model, key)
-    joint, site = element_id(model, "joint", prefix + TILT_ELEMENT), element_id(model, "site", prefix + TILT_ELEMENT)
-    if joint >= 0:
-        line: Line | None = line_of_joint(model, joint, key)
+    line = line_named(model, data, prefix + TILT_ELEMENT, key)
+    site = element_id(model, "site", prefix + TILT_ELEMENT)
+    if element_id(model, "joint", prefix + TILT_ELEMENT) >= 0:
+        joint = line.joint
         frame, point, direction = int(model.jnt_bodyid[joint]), model.jnt_pos[joint], model.jnt_axis[joint]
     else:
-        line = line_at_site(model, data, site, key)
         frame, point = int(model.site_bodyid[site]), model.site_pos[site]
         direction = data.xmat[frame].reshape(3, 3).T @ data.site_xmat[site].reshape(3, 3)[:, 1]
-    assert line is not None  # `RigChecker` has looked
     addresses, radii = [], []
     for which in ("inner", "outer"):
         sensor = element_id(model, "sensor", f"{prefix}accelerometer_{which}")
@@ -224,11 +211,6 @@ def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]
         int(model.sensor_adr[element_id(model, "sensor", f"{prefix}fog")]) + 1,  # its y axis
     )
     return replace(axis, reduced=read_reduced(model, key, axis))
-
-
-def find_locked_modules(model: mujoco.MjModel, key: int, modules: Sequence[str]) -> tuple[Module, ...]:
-    """Resolve the names of modules of a locked axis, whose gimbals get no share of u."""
-    return tuple(_find_module(model, key, None, module) for module in modules)
 
 
 def _find_module(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Module:

@@ -11,11 +11,11 @@ import mujoco
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.features import entries
-from cmg_mj.plant.axis import ResolvedModel, resolve
+from cmg_mj.plant.axis import ResolvedModel, find_axis, resolve
 from cmg_mj.plant.checks import RigChecker, invalid_numbers
-from cmg_mj.plant.elements import REQUIRED_ELEMENTS, axis_modules, missing_elements
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, REQUIRED_ELEMENTS, axis_modules, element_id, missing_elements
 from cmg_mj.plant.locking import lock_axes, lock_thrust_bearing
-from cmg_mj.plant.mjcf import compile_model, parse, parse_without_plugins
+from cmg_mj.plant.mjcf import compile_model, parse_without_plugins
 from cmg_mj.scenario.plant_settings import PlantSettings
 
 _HAS_PLUGIN = "the model has the plugin {}, which is left out here: the scenario's own controller takes its place"
@@ -36,31 +36,29 @@ def build(path: Path, settings: PlantSettings, sections: Mapping[str, Any]) -> R
         The rig.
 
     Raises:
-        InputError: The file holds no rig. All that is missing or wrong is named.
+        InputError: The file holds no rig. All that is missing is named, or else all that is wrong.
     """
     spec, plugins = parse_without_plugins(path)
-    missing = missing_elements(spec)
-    if settings.lock_thrust_bearing and not missing:
+    if missing := missing_elements(spec):
+        raise InputError(f"{path}: {'; '.join([*missing, REQUIRED_ELEMENTS])}")
+    if settings.lock_thrust_bearing:
         lock_thrust_bearing(spec, path)
     spec.compiler.discardvisual = True
-    hints, wrong, modules = [], list(missing), {}
-    model = None
-    try:
-        model = compile_model(spec, path)
-    except InputError as error:
-        if not missing:
-            raise
-        if "keyframe" not in str(error):  # whose sizes are wrong because something is missing
-            wrong.append(str(error).removeprefix(f"{path}: "))
-    else:
-        modules, numbers = axis_modules(model), invalid_numbers(model)
-        placement = None if numbers else RigChecker(model, modules)
-        wrong += numbers if placement is None else placement.wrong
-        hints = [] if placement is None else placement.hints
-    if wrong or model is None:
-        raise InputError("; ".join([f"{path}: {wrong[0]}", *wrong[1:], *([REQUIRED_ELEMENTS] if missing else [])]))
-    rig = edit(spec, resolve(path, model, modules), settings, sections)
-    return rig._replace(hints=(*hints, *(_HAS_PLUGIN.format(name) for name in plugins)))
+    model = compile_model(spec, path)
+    if wrong := invalid_numbers(model):
+        raise InputError(f"{path}: {'; '.join(wrong)}")
+    lost, modules, key = {}, axis_modules(model), element_id(model, "key", EQUILIBRIUM_KEY)
+    for name in modules:
+        try:
+            find_axis(model, key, name, modules[name])
+        except InputError as error:
+            lost[name] = str(error)
+    rig = resolve(path, model, modules, list(lost))
+    checker = RigChecker(rig)
+    if wrong := [*lost.values(), *checker.wrong]:
+        raise InputError(f"{path}: {'; '.join(wrong)}")
+    rig = edit(spec, rig, settings, sections)
+    return rig._replace(hints=(*checker.hints, *(_HAS_PLUGIN.format(name) for name in plugins)))
 
 
 def edit(
@@ -87,20 +85,6 @@ def edit(
             rig = resolve(rig.path, compile_model(spec, rig.path), rig.modules, settings.locked_axes)
             finish(rig.model)
     return rig
-
-
-def drawn_spec(rig: ResolvedModel, settings: PlantSettings, sections: Mapping[str, Any]) -> mujoco.MjSpec:
-    """Parse a rig with all that is only seen, and edit it as `build` does.
-
-    Raises:
-        InputError: MuJoCo's compiler refuses it, because of a mesh that cannot be read.
-    """
-    spec = parse(rig.path)
-    if settings.lock_thrust_bearing:
-        lock_thrust_bearing(spec, rig.path)
-    if settings.locked_axes or any(section.unmodelled for section in sections.values()):
-        edit(spec, resolve(rig.path, compile_model(spec, rig.path), rig.modules), settings, sections)
-    return spec
 
 
 def check_rig(path: Path, name: Path) -> None:

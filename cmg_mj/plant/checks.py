@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import shown
 from cmg_mj.inputs.messages import LARGEST
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, element_id
+from cmg_mj.plant.axis import Axis, ResolvedModel
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.inertia import wheel_momentum
 from cmg_mj.plant.mjcf import data_at_keyframe
-from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
+from cmg_mj.plant.tilt_line import UP, HingeLine
 
 TRUE_DEG = 0.05
 """A keyframe that is off by more is no equilibrium: a tenth of the bias that observers are tried with [deg]."""
@@ -56,125 +57,79 @@ def invalid_numbers(model: mujoco.MjModel) -> list[str]:
 
 
 class RigChecker:
-    """A compiled model at its keyframe: what stands where it must not. What is missing is not looked at.
+    """A compiled model at its keyframe: what stands where it must not.
 
     Args:
-        model: The model, as its file has it, all its numbers finite.
-        axes: The names of its axes, each with those of its modules.
+        rig: The model, as its file has it, all its numbers finite.
 
     Attributes:
         wrong: Clauses for an error message.
         hints: What is right and yet not what the reduced model takes it for, in clauses.
     """
 
-    def __init__(self, model: mujoco.MjModel, axes: Mapping[str, Sequence[str]]) -> None:
+    def __init__(self, rig: ResolvedModel) -> None:
+        self.model, self.data = rig.model, data_at_keyframe(rig.model, rig.key)
         self.hints: list[str] = []
-        self.wrong: list[str] = []
-        self.key = element_id(model, "key", EQUILIBRIUM_KEY)
-        if self.key < 0:
-            return
-        self.model, self.data = model, data_at_keyframe(model, self.key)
-        complete = {
-            name: [module for module in modules if min(self._addresses(module)) >= 0] for name, modules in axes.items()
-        }
-        for name, modules in complete.items():
-            self.wrong += self._axis(name, modules)
-        self.wrong += self._rest()
-        if element_id(model, "joint", "yaw") >= 0:
-            self._momentum([module for modules in complete.values() for module in modules])
+        self.wrong = [*(clause for axis in rig.axes for clause in self._axis(axis)), *self._rest()]
+        if element_id(rig.model, "joint", "yaw") >= 0:
+            self._momentum([module for axis in rig.axes for module in axis.modules])
 
-    def _axis(self, name: str, modules: Sequence[str]) -> Iterator[str]:
-        """Check all of one axis."""
-        model, data = self.model, self.data
-        self.prefix = f"{name}/" if name else ""
-        self.what = what = self.prefix + TILT_ELEMENT
-        joint, site = element_id(model, "joint", what), element_id(model, "site", what)
-        if max(joint, site) < 0:
-            return
-        if joint >= 0:
-            if int(model.jnt_type[joint]) != int(mujoco.mjtJoint.mjJNT_HINGE):
-                return
-            self.frame, self.axis, self.pivot = int(model.jnt_bodyid[joint]), data.xaxis[joint], data.xanchor[joint]
-            self.tilt: Line | None = line_of_joint(model, joint, self.key)
+    def _axis(self, axis: Axis) -> Iterator[str]:
+        """Check that the mass of all that tilts is above the tilt axis, which is horizontal; then the axis' parts."""
+        data, what = self.data, axis.prefix + TILT_ELEMENT
+        turn = data.xmat[axis.frame].reshape(3, 3)
+        along, pivot, radial = turn @ axis.direction, data.xpos[axis.frame] + turn @ axis.point, UP
+        if abs(_degrees_between(along, UP) - 90.0) > MOUNTED_DEG:
+            yield f"{what!r} must lie along a horizontal axis"
         else:
-            self.frame, self.pivot = int(model.site_bodyid[site]), data.site_xpos[site]
-            self.axis = data.site_xmat[site].reshape(3, 3)[:, 1]
-            self.tilt = line_at_site(model, data, site, self.key)
-        if self.tilt is None:
-            yield (
-                f"site {what!r} lies on no hinge that its body hangs on, along its y axis, and that body is not free: "
-                "about what it tilts cannot be told"
-            )
-            return
-        self.line = np.array([0.0, 0.0, 1.0])
-        yield from self._upright()
-        for module in modules:
-            yield from self._module(module)
-        yield from self._sensors()
+            centre = data.subtree_com[self.model.jnt_bodyid[axis.line.joint]] - pivot
+            radial = centre - (centre @ along) * along
+            lean = math.atan2(float(centre @ np.cross(along, UP)), float(centre[2]))
+            if abs(math.degrees(lean)) > TRUE_DEG or not centre[2] > 0.0:
+                cure = ""
+                if isinstance(axis.line, HingeLine):
+                    angle = math.remainder(axis.line.zero - axis.line.sign * lean, 2.0 * math.pi)
+                    cure = f" ({self.model.joint(axis.line.joint).name!r} = {angle:.6g} would be upright)"
+                yield (
+                    f"at the keyframe {EQUILIBRIUM_KEY!r} the rig must stand upright, its mass above the tilt axis; it "
+                    f"leans by {math.degrees(lean):.3g} deg{cure}"
+                )
+        for module in axis.modules:
+            yield from self._module(module, along)
+        yield from self._sensors(axis, along, pivot, radial)
 
-    def _addresses(self, module: str) -> tuple[int, int, int, int]:
-        """Return the addresses of gimbal, flywheel, servo and motor; negative for one that is missing."""
-        gimbal, flywheel = (element_id(self.model, "joint", f"{module}/{name}") for name in ("gimbal", "flywheel"))
-        servo, motor = (
-            element_id(self.model, "actuator", f"{module}/{name}") for name in ("gimbal_servo", "flywheel_motor")
-        )
-        return gimbal, flywheel, servo, motor
-
-    def _upright(self) -> Iterator[str]:
-        """Check that the centre of mass of all that tilts lies above the tilt axis, which is horizontal."""
-        assert self.tilt is not None
-        if abs(_degrees_between(self.axis, np.array([0.0, 0.0, 1.0])) - 90.0) > MOUNTED_DEG:
-            yield f"{self.what!r} must lie along a horizontal axis"
-            return
-        centre = self.data.subtree_com[self.model.jnt_bodyid[self.tilt.joint]] - self.pivot
-        self.line = centre - (centre @ self.axis) * self.axis
-        side = np.cross(self.axis, (0.0, 0.0, 1.0))
-        lean = math.atan2(float(centre @ side), float(centre[2]))
-        if abs(math.degrees(lean)) > TRUE_DEG or not centre[2] > 0.0:
-            cure = ""
-            if isinstance(self.tilt, HingeLine):
-                angle = math.remainder(self.tilt.zero - self.tilt.sign * lean, 2.0 * math.pi)
-                cure = f" ({self.model.joint(self.tilt.joint).name!r} = {angle:.6g} would be upright)"
-            yield (
-                f"at the keyframe {EQUILIBRIUM_KEY!r} the rig must stand upright, its mass above the tilt axis; it "
-                f"leans by {math.degrees(lean):.3g} deg{cure}"
-            )
-
-    def _module(self, module: str) -> Iterator[str]:
+    def _module(self, module: Module, along: np.ndarray) -> Iterator[str]:
         """Check a module: its axes are at right angles, its flywheel turns, its servo holds where it stands."""
-        model, data = self.model, self.data
-        gimbal, flywheel, servo, motor = self._addresses(module)
-        turns, spins = data.xaxis[gimbal], data.xaxis[flywheel]
-        angle = float(data.qpos[model.jnt_qposadr[gimbal]])
-        place = f"at the keyframe {EQUILIBRIUM_KEY!r}"
-        if not (_is_square(turns, self.axis) and _is_square(spins, turns)):
+        model, data, name = self.model, self.data, module.name
+        turns, spins = (data.xaxis[model.dof_jntid[dof]] for dof in (module.gimbal_dof, module.flywheel_dof))
+        angle, speed, start = module.gimbal_zero, module.speed, float(data.qvel[module.flywheel_dof])
+        if not (_is_square(turns, along) and _is_square(spins, turns)):
             yield (
-                f"the axes of '{module}/gimbal' and the tilt, and of '{module}/flywheel' and its gimbal, must be at "
-                "right angles"
+                f"the axes of '{name}/gimbal' and the tilt, and of '{name}/flywheel' and its gimbal, must be at right "
+                "angles"
             )
         else:
             # Both lie in the plane that the gimbal turns in: by how much it must turn to part them by a quarter turn.
-            apart = math.atan2(float(np.cross(spins, self.axis) @ turns), float(spins @ self.axis))
+            apart = math.atan2(float(np.cross(spins, along) @ turns), float(spins @ along))
             off = apart - math.copysign(math.pi / 2.0, apart)
             if abs(math.degrees(off)) > TRUE_DEG:
                 yield (
-                    f"{place} the axis of '{module}/flywheel' must be at right angles to the tilt's; it is "
-                    f"{abs(math.degrees(off)):.3g} deg off ('{module}/gimbal' = {angle + off:.6g} would be "
+                    f"at the keyframe {EQUILIBRIUM_KEY!r} the axis of '{name}/flywheel' must be at right angles to the "
+                    f"tilt's; it is {abs(math.degrees(off)):.3g} deg off ('{name}/gimbal' = {angle + off:.6g} would be "
                     "right)"
                 )
-        speed, start = float(data.ctrl[motor]), float(data.qvel[model.jnt_dofadr[flywheel]])
         if speed == 0.0:
-            yield f"keyframe {EQUILIBRIUM_KEY!r} must give '{module}/flywheel_motor' a speed (in ctrl)"
+            yield f"keyframe {EQUILIBRIUM_KEY!r} must give '{name}/flywheel_motor' a speed (in ctrl)"
         elif abs(start - speed) > 0.01 * abs(speed):
             yield (
-                f"keyframe {EQUILIBRIUM_KEY!r} must start '{module}/flywheel' at its motor's speed: qvel says "
+                f"keyframe {EQUILIBRIUM_KEY!r} must start '{name}/flywheel' at its motor's speed: qvel says "
                 f"{start:g}, ctrl {speed:g}"
             )
-        if model.actuator_dyntype[servo] == mujoco.mjtDyn.mjDYN_INTEGRATOR:
-            setpoint = float(data.act[model.actuator_actadr[servo]])
+        if model.actuator_dyntype[module.servo] == mujoco.mjtDyn.mjDYN_INTEGRATOR:
+            setpoint = float(data.act[model.actuator_actadr[module.servo]])
             if abs(math.degrees(setpoint - angle)) > TRUE_DEG:
                 yield (
-                    f"keyframe {EQUILIBRIUM_KEY!r} must have the setpoint (act) of '{module}/gimbal_servo' where its "
+                    f"keyframe {EQUILIBRIUM_KEY!r} must have the setpoint (act) of '{name}/gimbal_servo' where its "
                     f"gimbal stands: {angle:.6g}, not {setpoint:.6g}"
                 )
 
@@ -188,33 +143,26 @@ class RigChecker:
         if moving:
             yield f"at the keyframe {EQUILIBRIUM_KEY!r} only flywheels may turn, not {', '.join(moving)}"
 
-    def _sensors(self) -> Iterator[str]:
-        """They sit on the frame, the accelerometers on the radial line, upright."""
+    def _sensors(self, axis: Axis, along: np.ndarray, pivot: np.ndarray, line: np.ndarray) -> Iterator[str]:
+        """Check that they sit on the frame, the accelerometers on the radial line, upright."""
         model, data = self.model, self.data
-        radii = {}
-        for name, kind in SENSORS.items():
-            name = self.prefix + name
-            sensor = element_id(model, "sensor", name)
-            if sensor < 0 or model.sensor_objtype[sensor] != mujoco.mjtObj.mjOBJ_SITE:
-                continue
-            site = int(model.sensor_objid[sensor])
-            if model.site_bodyid[site] != self.frame:
-                yield f"sensor {name!r} must be at a site of the body with {self.what!r}"
+        for sensor, kind in SENSORS.items():
+            name, beside, away = axis.prefix + sensor, 0.0, ""
+            site = int(model.sensor_objid[element_id(model, "sensor", name)])
+            if model.site_bodyid[site] != axis.frame:
+                yield f"sensor {name!r} must be at a site of the body with {axis.prefix + TILT_ELEMENT!r}"
                 continue
             axes = data.site_xmat[site].reshape(3, 3)
-            off = _degrees_between(axes[:, 1], self.axis)
-            arm = data.site_xpos[site] - self.pivot
+            off = _degrees_between(axes[:, 1], along)
             if kind == "accelerometer":
-                radial = arm - (arm @ self.axis) * self.axis
-                radii[name] = float(np.linalg.norm(radial))
-                off = max(off, _degrees_between(axes[:, 2], radial) if radii[name] else 180.0)
+                arm = data.site_xpos[site] - pivot
+                off = max(off, _degrees_between(axes[:, 2], arm - (arm @ along) * along))
+                beside, away = _degrees_between(arm, line), " and its z axis pointing away from it"
             if off > MOUNTED_DEG:
-                away = " and its z axis pointing away from it" if kind == "accelerometer" else ""
                 yield (
                     f"the site of sensor {name!r} must have its y axis along the tilt axis{away}; it is {off:.3g} deg "
                     "off"
                 )
-            beside = _degrees_between(arm, self.line) if kind == "accelerometer" and radii[name] else 0.0
             if beside > MOUNTED_DEG:
                 yield (
                     f"the site of sensor {name!r} must lie on the radial line, from the tilt axis through the centre "
@@ -225,18 +173,17 @@ class RigChecker:
                     f"the site of sensor {name!r} is {max(off, beside):.2g} deg off its place, which counts as an "
                     "inaccuracy of the rig"
                 )
-        inner, outer = (radii.get(self.prefix + name) for name in list(SENSORS)[:2])
-        if inner is not None and outer is not None and not 0.0 < inner < outer:
-            names = [self.prefix + name for name in SENSORS]
-            yield f"{names[1]} must lie farther from the tilt axis than {names[0]}"
+        if not 0.0 < axis.radial_tilt.r_inner < axis.radial_tilt.r_outer:
+            inner, outer, _ = (axis.prefix + sensor for sensor in SENSORS)
+            yield f"{outer} must lie farther from the tilt axis than {inner}"
 
-    def _momentum(self, modules: list[str]) -> None:
+    def _momentum(self, modules: Sequence[Module]) -> None:
         """Check that the flywheels' momenta cancel on a free thrust bearing; else the rig turns with every tilt."""
         model, data = self.model, self.data
-        momenta = []
-        for module in modules:
-            _, flywheel, _, _ = self._addresses(module)
-            momenta.append(wheel_momentum(model, data, flywheel, data.qvel[model.jnt_dofadr[flywheel]]))
+        momenta = [
+            wheel_momentum(model, data, int(model.dof_jntid[dof]), data.qvel[dof])
+            for dof in (module.flywheel_dof for module in modules)
+        ]
         left = float(np.linalg.norm(np.sum(momenta, axis=0)))
         if left > 0.01 * sum(float(np.linalg.norm(momentum)) for momentum in momenta):
             self.hints.append(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,9 +25,6 @@ REQUIRED_ELEMENTS = (
 ON_A_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 """Transmissions of an actuator that drives a joint."""
 _OF_A_MODULE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
-JOINT_KINDS = {
-    int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name for name in ("hinge", "slide", "ball", "free")
-}
 
 
 @dataclass(frozen=True)
@@ -75,7 +72,7 @@ def missing_elements(spec: mujoco.MjSpec) -> list[str]:
     Returns:
         Clauses for an error message.
     """
-    elements = {
+    elements: dict[str, dict[str, Any]] = {
         "joint": {joint.name: joint for joint in spec.joints},
         "actuator": {actuator.name: actuator for actuator in spec.actuators},
         "sensor": {sensor.name: sensor for sensor in spec.sensors},
@@ -84,39 +81,44 @@ def missing_elements(spec: mujoco.MjSpec) -> list[str]:
     missing: dict[str, list[str]] = {kind: [] for kind in elements}
     wrong = []
 
-    def check(kind: str, name: str, is_right: Callable[[Any], bool], what: str) -> None:
-        if name not in elements[kind]:
-            missing[kind] += [] if name in missing[kind] else [name]
-        elif not is_right(elements[kind][name]):
-            wrong.append(what)
+    def check(kind: str, name: str, words: str = "", **right: object) -> None:
+        element = elements[kind].get(name)
+        if element is None:
+            missing[kind].append(name)
+        elif any(getattr(element, field) != value for field, value in right.items()):
+            wrong.append(f"{kind} {name!r} must {words}")
 
     for joint in spec.joints:
         if not joint.name:
             wrong.append(f"the joint of body {joint.parent.name!r} has no name")
+    hinge = mujoco.mjtJoint.mjJNT_HINGE
     if "yaw" in elements["joint"]:
-        check("joint", "yaw", _is_hinge, "joint 'yaw' must be a hinge")
+        check("joint", "yaw", "be a hinge", type=hinge)
     names = [name for kind in elements.values() for name in kind]
     sites = {site.name for site in spec.sites}
     for axis in axes_in([*names, *sites]) or [""]:
         prefix = f"{axis}/" if axis else ""
-        if prefix + TILT_ELEMENT not in sites:
-            check(
-                "joint",
-                prefix + TILT_ELEMENT,
-                _turns_about_y,
-                f'joint {prefix + TILT_ELEMENT!r} must turn about y (axis="0 1 0")',
-            )
-            check("joint", prefix + TILT_ELEMENT, _is_hinge, f"joint {prefix + TILT_ELEMENT!r} must be a hinge")
+        tilt = prefix + TILT_ELEMENT
+        if tilt not in sites:
+            check("joint", tilt, "be a hinge", type=hinge)
+            x, y, z = elements["joint"][tilt].axis if tilt in elements["joint"] else (0.0, 1.0, 0.0)
+            if x or z or y <= 0.0:
+                wrong.append(f'joint {tilt!r} must turn about y (axis="0 1 0")')
         for module in modules_in(names, axis) or [f"{prefix}cube1"]:
-            for name, actuator in (("gimbal", "gimbal_servo"), ("flywheel", "flywheel_motor")):
-                joint, drive = f"{module}/{name}", f"{module}/{actuator}"
-                check("joint", joint, _is_hinge, f"joint {joint!r} must be a hinge")
-                check("actuator", drive, _drives(joint), f"actuator {drive!r} must drive the joint {joint!r}")
-            joint, encoder = f"{module}/gimbal", f"{module}/gimbal_encoder"
-            check("sensor", encoder, _reads(joint), f"sensor {encoder!r} must be the jointpos of {joint!r}")
+            gimbal, flywheel = f"{module}/gimbal", f"{module}/flywheel"
+            for joint, drive in ((gimbal, f"{gimbal}_servo"), (flywheel, f"{flywheel}_motor")):
+                check("joint", joint, "be a hinge", type=hinge)
+                check("actuator", drive, f"drive the joint {joint!r}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+            encodes = {"objname": gimbal, "type": mujoco.mjtSensor.mjSENS_JOINTPOS}
+            check("sensor", f"{gimbal}_encoder", f"be the jointpos of {gimbal!r}", **encodes)
         for name, kind in SENSORS.items():
-            check("sensor", prefix + name, _is_a(kind), f"sensor {prefix + name!r} must be of the kind {kind!r}")
-    check("keyframe", EQUILIBRIUM_KEY, lambda _: True, "")
+            check(
+                "sensor",
+                prefix + name,
+                f"be of the kind {kind!r}",
+                type=getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"),
+            )
+    check("keyframe", EQUILIBRIUM_KEY)
     return [_missing(kind, names, list(elements[kind])) for kind, names in missing.items() if names] + wrong
 
 
@@ -157,24 +159,3 @@ def _missing(kind: str, names: list[str], known: list[str]) -> str:
     listing = hints[0].rpartition("? ")[2]
     guess = f"did you mean {', '.join(dict.fromkeys(meant))}? " if meant else ""
     return f"the model has no {kind} {', '.join(map(repr, names))}; {guess}{listing}"
-
-
-def _is_hinge(joint: Any) -> bool:
-    return int(joint.type) == int(mujoco.mjtJoint.mjJNT_HINGE)
-
-
-def _turns_about_y(joint: Any) -> bool:
-    x, y, z = joint.axis
-    return y > 0.0 and x == z == 0.0
-
-
-def _drives(joint: str) -> Callable[[Any], bool]:
-    return lambda drive: drive.target == joint and int(drive.trntype) == int(mujoco.mjtTrn.mjTRN_JOINT)
-
-
-def _reads(joint: str) -> Callable[[Any], bool]:
-    return lambda sensor: sensor.objname == joint and int(sensor.type) == int(mujoco.mjtSensor.mjSENS_JOINTPOS)
-
-
-def _is_a(kind: str) -> Callable[[Any], bool]:
-    return lambda sensor: int(sensor.type) == int(getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"))

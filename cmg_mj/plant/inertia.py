@@ -58,16 +58,12 @@ def inertia_about(model: mujoco.MjModel, key: int, line: Line, angles: dict[int,
     loose = _free_dofs(model, data) if isinstance(line, HingeLine) else []
     loose = [dof for dof in loose if not motion[dof]]
     if loose:
-        gives, inertia = row[loose], dense[np.ix_(loose, loose)]
-        held = np.concatenate([_contacts(model, data), _weld_jacobian(model, data)])[:, loose]
-        ways = None
-        if held.size:
-            ways = _null_space(held)
-            gives, inertia = gives @ ways, ways.T @ inertia @ ways
-        way = np.linalg.solve(inertia, gives)
+        ways = _ways(model, data, loose)
+        gives = row[loose] @ ways
+        way = np.linalg.solve(ways.T @ dense[np.ix_(loose, loose)] @ ways, gives)
         line_inertia = line_inertia - gives @ way
         rates = motion.copy()
-        rates[loose] -= way if ways is None else ways @ way
+        rates[loose] -= ways @ way
     return Inertia(row, float(line_inertia), rates)
 
 
@@ -83,9 +79,7 @@ def free_motions(model: mujoco.MjModel, data: mujoco.MjData, dofs: Sequence[int]
         A basis, (nv, n).
     """
     moving = sorted({*dofs, *_free_dofs(model, data)})
-    basis = np.eye(model.nv)[:, moving]
-    constraints = np.concatenate([_contacts(model, data), _weld_jacobian(model, data)]) @ basis
-    return basis @ _null_space(constraints) if constraints.size else basis
+    return np.eye(model.nv)[:, moving] @ _ways(model, data, moving)
 
 
 def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, joint: int, speed: float) -> np.ndarray:
@@ -136,8 +130,11 @@ def _contacts(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return np.concatenate(rows) if rows else np.zeros((0, model.nv))
 
 
-def _null_space(matrix: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis of the null space of a matrix (m, n), (n, k)."""
-    _, sizes, directions = np.linalg.svd(matrix)
+def _ways(model: mujoco.MjModel, data: mujoco.MjData, dofs: Sequence[int]) -> np.ndarray:
+    """Return an orthonormal basis of the motions of some degrees of freedom that contacts and welds leave, (n, k)."""
+    held = np.concatenate([_contacts(model, data), _weld_jacobian(model, data)])[:, dofs]
+    if not held.size:
+        return np.eye(len(dofs))
+    _, sizes, directions = np.linalg.svd(held)
     rank = int(np.sum(sizes > SMALL * sizes[0])) if sizes[0] > 0.0 else 0
     return directions[rank:].T

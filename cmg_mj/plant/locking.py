@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,9 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.plant.axis import ResolvedModel
-from cmg_mj.plant.elements import ON_A_JOINT, TILT_ELEMENT, element_id, joint_sizes
+from cmg_mj.plant.elements import ON_A_JOINT, TILT_ELEMENT, joint_sizes
 from cmg_mj.plant.mjcf import data_at_keyframe
-from cmg_mj.plant.tilt_line import HingeLine, Line, line_at_site, line_of_joint
+from cmg_mj.plant.tilt_line import HingeLine, line_named
 from cmg_mj.scenario.plant_settings import PlantSettings
 
 YAW = "yaw"
@@ -44,47 +44,32 @@ def lock_axes(spec: mujoco.MjSpec, rig: ResolvedModel, settings: PlantSettings) 
     Raises:
         InputError: There is no such axis, it tilts about no hinge, or no axis is left.
     """
-    axes, path, model = settings.locked_axes, rig.path, rig.model
-    for line in _hinges_of(model, rig.key, axes, rig.modules, path):
-        name = model.joint(line.joint).name
-        angle = line.zero - float(model.qpos0[line.angle])
-        if angle:
-            if line.joint != int(model.body_jntadr[model.jnt_bodyid[line.joint]]):
-                raise InputError(
-                    f"{_setting(axes, path)}: hinge {name!r} stands at {angle:g} rad at the keyframe, behind another "
-                    "joint of its body; give it a body of its own"
-                )
-            _turn(spec.joint(name), angle)
-        remove_hinge(spec, name)
-    return lambda _: None
-
-
-def _hinges_of(
-    model: mujoco.MjModel, key: int, axes: Sequence[str], known: Collection[str], path: Path
-) -> list[HingeLine]:
-    setting = _setting(axes, path)
-    data = data_at_keyframe(model, key)
-    hinges = []
+    axes, path, model, known = settings.locked_axes, rig.path, rig.model, rig.modules
+    setting, data, hinges = f"plant.locked_axes = {shown(list(axes))}: {path}", data_at_keyframe(model, rig.key), []
     for axis in dict.fromkeys(axes):
         if axis not in known:
             names = nearest(axis, known, "its axes") if any(known) else "its only one has no name"
             raise InputError(f"{setting} has no axis {axis!r}; {names}")
         name = f"{axis}/{TILT_ELEMENT}".lstrip("/")
-        joint = element_id(model, "joint", name)
-        line: Line | None = line_of_joint(model, joint, key) if joint >= 0 else None
-        if line is None:
-            line = line_at_site(model, data, element_id(model, "site", name), key)
+        line = line_named(model, data, name, rig.key)
         if not isinstance(line, HingeLine):
             raise InputError(f"{setting} tilts about {name!r} as a free body does; only a hinge can be locked")
         hinges.append(line)
     if len(hinges) == len(known):
         leave = f"; leave one of {', '.join(map(repr, known))}" if len(known) > 1 else ""
         raise InputError(f"{setting} would have no axis left to tilt about{leave}")
-    return hinges
-
-
-def _setting(axes: Sequence[str], path: Path) -> str:
-    return f"plant.locked_axes = {shown(list(axes))}: {path}"
+    for line in hinges:
+        name = model.joint(line.joint).name
+        angle = line.zero - float(model.qpos0[line.angle])
+        if angle:
+            if line.joint != int(model.body_jntadr[model.jnt_bodyid[line.joint]]):
+                raise InputError(
+                    f"{setting}: hinge {name!r} stands at {angle:g} rad at the keyframe, behind another joint of its "
+                    "body; give it a body of its own"
+                )
+            _turn(spec.joint(name), angle)
+        remove_hinge(spec, name)
+    return lambda _: None
 
 
 def _turn(hinge: Any, angle: float) -> None:
@@ -117,7 +102,7 @@ def remove_hinge(spec: mujoco.MjSpec, name: str) -> None:
     before = spec.joints[: [joint.name for joint in spec.joints].index(name)]
     of_joints = [sum(joint_sizes(int(joint.type))[i] for joint in before) for i in (0, 1)]
     drives = list(spec.actuators)
-    gone = [i for i, drive in enumerate(drives) if _drives(drive, name)]
+    gone = [i for i, drive in enumerate(drives) if drive.target == name and int(drive.trntype) in ON_A_JOINT]
     starts = np.cumsum([0, *map(_states, drives)])
     states = [state for i in gone for state in range(starts[i], starts[i + 1])]
     hinge = int(mujoco.mjtObj.mjOBJ_JOINT)
@@ -131,10 +116,6 @@ def remove_hinge(spec: mujoco.MjSpec, name: str) -> None:
         key.qpos, key.qvel, key.act, key.ctrl = (
             np.delete(entries, at if len(entries) else []) for entries, at in values
         )
-
-
-def _drives(drive: Any, joint: str) -> bool:
-    return drive.target == joint and int(drive.trntype) in ON_A_JOINT
 
 
 def _states(drive: Any) -> int:

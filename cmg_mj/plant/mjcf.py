@@ -68,7 +68,7 @@ def parse_without_plugins(path: Path) -> tuple[mujoco.MjSpec, list[str]]:
         with mujoco.MjVfs() as files:
             if own:  # MuJoCo takes this before the file of that name
                 files[str(path)] = ElementTree.tostring(root, "unicode").encode()
-            spec = mujoco.MjSpec.from_file(str(path), vfs=files) if own else mujoco.MjSpec.from_file(str(path))
+            spec = mujoco.MjSpec.from_file(str(path), vfs=files)
     except _REFUSALS as error:
         raise InputError(f"{path}: not a model MuJoCo can read: {_one_line(error)}") from error
     return spec, [plugin.get("plugin", "") for plugin in own]

@@ -35,10 +35,7 @@ class OneWorld:
         self._servos = [list(zip(axis.servos, axis.directions, strict=True)) for axis in plant.axes]
         self._lines = [axis.line for axis in plant.axes]
         self.axis_names = plant.axis_names
-        # Those of the only axis without a detour: they are asked for at every sampling instant.
-        single = len(plant.axes) == 1
-        self.tilt = plant.axis.line.lean if single else plant.largest_tilt
-        self._ideal = plant.axis.ideal if single else plant.ideal_readings
+        self.tilt, self._ideal = plant.largest_tilt, plant.ideal_readings
 
     def state(self) -> State:
         """Read joint angles and rates as floats."""
@@ -107,9 +104,7 @@ class ManyWorlds:
         self._servos = [axis.servos for axis in first.axes]
         self._directions = [np.array(axis.directions) for axis in first.axes]
         self._pushes = [axis.line.push for axis in first.axes]
-        single = len(first.axes) == 1
-        self.tilt = first.axis.line.lean if single else first.largest_tilt
-        self._ideal = first.axis.ideal if single else first.ideal_readings
+        self.tilt, self._ideal = first.largest_tilt, first.ideal_readings
         self.running: np.ndarray = np.ones(len(plants), dtype=bool)
         self.any_running = self._all_running = True
 

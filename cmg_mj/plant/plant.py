@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -23,11 +23,12 @@ from cmg_mj.core.types import MultiAxisReading
 from cmg_mj.inputs.features import entries
 from cmg_mj.inputs.files import find, folder
 from cmg_mj.inputs.messages import complaints
-from cmg_mj.plant.axis import Axis, ResolvedModel
-from cmg_mj.plant.build import build, drawn_spec
+from cmg_mj.plant.axis import Axis, ResolvedModel, resolve
+from cmg_mj.plant.build import build, edit
 from cmg_mj.plant.checks import survives_first_steps
-from cmg_mj.plant.elements import BEND_JOINT, JOINT_KINDS, element_id
-from cmg_mj.plant.mjcf import compile_model, quiet, set_control_callback
+from cmg_mj.plant.elements import BEND_JOINT, element_id
+from cmg_mj.plant.locking import lock_thrust_bearing
+from cmg_mj.plant.mjcf import compile_model, parse, quiet, set_control_callback
 from cmg_mj.plant.settings import apply, place_accelerometers
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
 from cmg_mj.plant.turning import turning
@@ -105,8 +106,17 @@ class Plant:
         return model
 
     def drawn_spec(self) -> mujoco.MjSpec:
-        """Parse the model's file, with all that is only seen, edited as the settings say."""
-        return drawn_spec(self.filed, self.settings, self.sections)
+        """Parse the model's file, with all that is only seen, edited as the settings say.
+
+        Raises:
+            InputError: MuJoCo's compiler refuses it, because of a mesh that cannot be read.
+        """
+        path, settings, spec = self.path, self.settings, parse(self.path)
+        if settings.lock_thrust_bearing:
+            lock_thrust_bearing(spec, path)
+        if settings.locked_axes or any(section.unmodelled for section in self.sections.values()):
+            edit(spec, resolve(path, compile_model(spec, path), self.filed.modules), settings, self.sections)
+        return spec
 
     def with_own_model(self) -> Plant:
         """Copy the plant onto a model of its own, whose gravity may be shifted while it runs."""
@@ -147,10 +157,12 @@ class Plant:
         """Coupling of the axes in a turn about the vertical."""
         return turning(self.filed.model, self.key, self.axes)
 
-    def largest_tilt(self, qpos: Addressed) -> Scalar:
-        """Return the tilt from the keyframe of the axis that is farthest from it [rad]."""
-        if len(self.axes) == 1:
-            return self.axis.line.lean(qpos)
+    @property
+    def largest_tilt(self) -> Callable[[Addressed], Scalar]:
+        """Function of qpos: the tilt from the keyframe of the axis that is farthest from it [rad]."""
+        return self.axis.line.lean if len(self.axes) == 1 else self._farthest_lean
+
+    def _farthest_lean(self, qpos: Addressed) -> Scalar:
         leans = np.array([axis.line.lean(qpos) for axis in self.axes])
         farthest = np.argmax(np.where(np.isnan(leans), np.inf, np.abs(leans)), axis=0)
         lean = np.take_along_axis(leans, farthest[None], axis=0)[0]
@@ -193,16 +205,27 @@ class Plant:
             raise InputError(f"{self.path}: tilts about no hinge of its own at one address; use plant.axis.line")
         return line
 
-    def ideal_readings(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> Any:
-        """Return the readings of perfect sensors: of the axis (see `Axis.ideal`), or `MultiAxisReading` of several."""
-        if len(self.axes) == 1:
-            return self.axis.ideal(sensordata, qvel)
+    @property
+    def ideal_readings(self) -> Callable[[list[float] | np.ndarray, Addressed], Any]:
+        """Function of sensordata and qvel: readings of perfect sensors (see `Axis.ideal`), or `MultiAxisReading`."""
+        return self.axis.ideal if len(self.axes) == 1 else self._readings_of_axes
+
+    def _readings_of_axes(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> MultiAxisReading:
         upward = sensordata[self.axis.gyro + 1]
         return MultiAxisReading([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
 
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
-        """Return the bias that an observer should find: see `Axis.apparent_bias`."""
-        return self.axis.apparent_bias(accelerometer, self.gravity)
+        """Return the bias an observer should find: e less the tilt made by the accelerometers' constant errors.
+
+        Since y1 = x1 - e + offset, no observer can separate the two.
+
+        Args:
+            accelerometer: The sensors of the tilt.
+
+        Returns:
+            The bias at the equilibrium [rad].
+        """
+        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.constant_errors(), self.gravity)
 
     @property
     def interface(self) -> KnownPlant:
@@ -250,7 +273,7 @@ class Plant:
     @cached_property
     def joint_kinds(self) -> tuple[str, ...]:
         """Kind of each joint: `hinge`, `slide`, `ball` or `free`; empty if all are hinges."""
-        kinds = tuple(JOINT_KINDS[int(kind)] for kind in self.model.jnt_type)
+        kinds = tuple(mujoco.mjtJoint(kind).name.removeprefix("mjJNT_").lower() for kind in self.model.jnt_type)
         return () if set(kinds) == {"hinge"} else kinds
 
 
@@ -327,12 +350,8 @@ def check_axes(scenario: Scenario, plant: Plant) -> None:
     Raises:
         InputError: There is such a name, or such a torque.
     """
-    known = [*plant.axis_names, *plant.settings.locked_axes]
     for name in scenario.axes:
-        if known == [""]:
-            raise InputError(f"axes.{name}: the rig has one axis, without a name; set its values in [plant], ...")
-        if name not in known:
-            raise InputError(f"axes.{name}: the rig has no such axis; {nearest(name, known)}")
+        check_axis("axes", name, plant)
     for section in ("push", "swing"):
         for i, torque in enumerate(scenario.section(section)):
             check_axis(f"{section}.{i}.axis", torque.axis, plant)

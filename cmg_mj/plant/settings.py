@@ -106,7 +106,7 @@ def _vary_masses_and_friction(
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    gimbals = [module.gimbal_dof for module in modules]
+    gimbals, hinges = [module.gimbal_dof for module in modules], [axis.line for axis in axes]
     for field, value in (
         (model.dof_armature, settings.gimbal_armature_kg_m2),
         (model.dof_frictionloss, settings.gimbal_friction_n_m),
@@ -119,7 +119,9 @@ def _vary_masses_and_friction(
         (model.dof_damping, settings.tilt_damping_n_m_s),
     ):
         if value is not None:
-            field[[_hinge(axis, path) for axis in axes]] = value
+            if not all(isinstance(line, HingeLine) for line in hinges):
+                raise InputError(f"plant.tilt_friction_n_m, plant.tilt_damping_n_m_s: {path} tilts about no hinge")
+            field[[line.dof for line in hinges]] = value
     _vary_servos(model, settings, path, modules)
     biased = [axis for axis in axes if axis.bias]
     shifts = [bias_shift(model, axis, axis.bias, path) for axis in biased]
@@ -138,12 +140,7 @@ def _set_flywheel_speed(
     result = []
     for module in modules:
         signed = math.copysign(speed, module.speed)
-        low, high = model.actuator_ctrlrange[module.motor]
-        if model.actuator_ctrllimited[module.motor] and not low <= signed <= high:
-            raise InputError(
-                f"plant.flywheel_speed_rad_s = {speed:g}: {path}: actuator '{module.name}/flywheel_motor' takes only "
-                f"{low:g} to {high:g} rad/s (ctrlrange)"
-            )
+        _check_range(model, module.motor, signed, f"plant.flywheel_speed_rad_s = {speed:g}: {path}")
         model.key_qvel[key, module.flywheel_dof] = model.key_ctrl[key, module.motor] = signed
         result.append(replace(module, speed=signed))
     return tuple(result)
@@ -155,10 +152,16 @@ def _set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> 
     joint, servo = element_id(model, "joint", "yaw"), element_id(model, "actuator", YAW_SERVO)
     if joint < 0 or servo < 0 or int(model.actuator_trnid[servo, 0]) != joint:
         raise InputError(f"{prefix} has no actuator {YAW_SERVO!r} that drives a joint 'yaw', which alone holds a rate")
-    low, high = model.actuator_ctrlrange[servo]
-    if model.actuator_ctrllimited[servo] and not low <= rate <= high:
-        raise InputError(f"{prefix}: actuator {YAW_SERVO!r} takes only {low:g} to {high:g} rad/s (ctrlrange)")
+    _check_range(model, servo, rate, prefix)
     model.key_qvel[key, model.jnt_dofadr[joint]] = model.key_ctrl[key, servo] = rate
+
+
+def _check_range(model: mujoco.MjModel, actuator: int, rate: float, prefix: str) -> None:
+    """Refuse a rate [rad/s] that an actuator does not take."""
+    low, high = model.actuator_ctrlrange[actuator]
+    if model.actuator_ctrllimited[actuator] and not low <= rate <= high:
+        name = model.actuator(actuator).name
+        raise InputError(f"{prefix}: actuator {name!r} takes only {low:g} to {high:g} rad/s (ctrlrange)")
 
 
 def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path) -> RadialTilt:
@@ -176,33 +179,24 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
     Raises:
         InputError: The outer one is no farther out than the inner one.
     """
-    as_filed = axis.radial_tilt
-    height = _rest_height(settings, axis, path)
-    distances = {
-        "accelerometer_inner": (settings.accelerometer_inner_m, as_filed.r_inner),
-        "accelerometer_outer": (settings.accelerometer_outer_m, as_filed.r_outer),
-    }
-    if all(to is None for to, _ in distances.values()) and not settings.has_misplaced:
-        return as_filed.about(height)
-    known = [was if to is None else to for to, was in distances.values()]
-    off = {
-        "accelerometer_inner": settings.accelerometer_inner_misplaced_mm,
-        "accelerometer_outer": settings.accelerometer_outer_misplaced_mm,
-    }
-    inner, outer = (at + 1e-3 * error for at, error in zip(known, off.values(), strict=True))
-    if not (known[0] < known[1] and 0.0 < inner < outer):
-        changes = {f"plant.{name}_m": to for name, (to, _) in distances.items() if to is not None}
-        changes |= {f"plant.{name}_misplaced_mm": error for name, error in off.items() if error}
-        changed = ", ".join(f"{name} = {value:g}" for name, value in changes.items())
+    filed, height = axis.radial_tilt, _rest_height(settings, axis, path)
+    known, places = [], {}
+    for which, was in (("inner", filed.r_inner), ("outer", filed.r_outer)):
+        set_to = getattr(settings, f"accelerometer_{which}_m")
+        known.append(was if set_to is None else set_to)
+        places[which] = known[-1] + 1e-3 * getattr(settings, f"accelerometer_{which}_misplaced_mm")
+    if not (known[0] < known[1] and 0.0 < places["inner"] < places["outer"]):
+        changes = {name: value for name, value in settings.changes().items() if name.startswith("accelerometer")}
         raise InputError(
-            f"{changed}: the inner accelerometer must lie nearer to the tilt axis than the outer one, and they are "
-            f"{inner:g} and {outer:g} m away ({path})"
+            f"{', '.join(f'plant.{name} = {value:g}' for name, value in changes.items())}: the inner accelerometer "
+            f"must lie nearer to the tilt axis than the outer one, and they are {places['inner']:g} and "
+            f"{places['outer']:g} m away ({path})"
         )
-    for (name, (set_to, was)), to in zip(distances.items(), (inner, outer), strict=True):
-        if set_to is not None or off[name]:
-            site = int(model.sensor_objid[element_id(model, "sensor", axis.prefix + name)])
+    for which, was in (("inner", filed.r_inner), ("outer", filed.r_outer)):
+        if places[which] != was:
+            site = int(model.sensor_objid[element_id(model, "sensor", f"{axis.prefix}accelerometer_{which}")])
             arm = model.site_pos[site] - axis.point
-            model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (to / was - 1.0)
+            model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (places[which] / was - 1.0)
             model.site_sameframe[site] = 0  # should it have stood where the body's frame does
     return RadialTilt(*known).about(height)
 
@@ -219,14 +213,10 @@ def _rest_height(settings: PlantSettings, axis: Axis, path: Path) -> float:
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:
     """Give the gimbals' servos another stiffness and damping: torque = kp (setpoint - angle) - kv rate."""
-    coefficients = {
-        "servo_stiffness_n_m_rad": settings.servo_stiffness_n_m_rad,
-        "servo_damping_n_m_s_rad": settings.servo_damping_n_m_s_rad,
-    }
-    names = [name for name, value in coefficients.items() if value is not None]
-    if not names:
+    stiffness, damping = settings.servo_stiffness_n_m_rad, settings.servo_damping_n_m_s_rad
+    if stiffness is None and damping is None:
         return
-    stiffness, damping = coefficients.values()
+    field = "servo_damping_n_m_s_rad" if stiffness is None else "servo_stiffness_n_m_rad"
     for module in modules:
         servo = module.servo
         gain, bias = model.actuator_gainprm[servo], model.actuator_biasprm[servo]
@@ -239,7 +229,7 @@ def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, mod
         )
         if not is_loop:
             raise InputError(
-                f"plant.{names[0]}: {path}: actuator '{module.name}/gimbal_servo' is no position loop whose setpoint "
+                f"plant.{field}: {path}: actuator '{module.name}/gimbal_servo' is no position loop whose setpoint "
                 "is the integral of its command (<intvelocity>), which alone has this stiffness and damping"
             )
         per_gear = 1.0 / float(model.actuator_gear[servo, 0]) ** 2  # they are those at the joint
@@ -286,10 +276,3 @@ def frame_bodies(model: mujoco.MjModel, axis: Axis) -> list[int]:
     """Return the frame, and the part of it beyond a bend if there is one."""
     part = element_id(model, "body", BEND_JOINT)
     return [axis.frame, *([part] if part >= 0 else [])]
-
-
-def _hinge(axis: Axis, path: Path) -> int:
-    """Return the degree of freedom that friction of the tilt acts on."""
-    if not isinstance(axis.line, HingeLine):
-        raise InputError(f"plant.tilt_friction_n_m, plant.tilt_damping_n_m_s: {path} tilts about no hinge")
-    return axis.line.dof

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -13,6 +14,7 @@ RK4_LIMIT = 1.5
 RK4 is stable up to 2.8. `docs/studies/steps.py` prints the table. A torque that swings so fast is integrated as by
 Simpson's rule, to 1.5^4/2880 = 0.18 %.
 """
+Vector = np.ndarray | float
 OTHERS_LIMIT_S = 0.001
 """Largest step of MuJoCo's other integrators; none is as accurate at any step that costs less [s]."""
 
@@ -60,31 +62,17 @@ def state_matrix(model: mujoco.MjModel, key: int) -> np.ndarray:
     Returns:
         A, (n, n), of the joints' angles from the keyframe (nv,), their rates (nv,) and the actuators' states.
     """
-    smooth = _without_dry_friction(model)
-    data = mujoco.MjData(smooth)
-    nv = smooth.nv
-
-    at = np.concatenate([np.zeros(nv), smooth.key_qvel[key], smooth.key_act[key]])
-    sizes = np.ones(len(at))  # of what the state is turned from, for the length of a difference
-    sizes[nv:] = np.maximum(1.0, np.abs(at[nv:]))
-    for joint in np.flatnonzero(smooth.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)):
-        sizes[smooth.jnt_dofadr[joint]] = max(1.0, abs(float(smooth.key_qpos[key, smooth.jnt_qposadr[joint]])))
-
-    def slope(state: np.ndarray) -> np.ndarray:
-        mujoco.mj_resetDataKeyframe(smooth, data, key)
-        mujoco.mj_integratePos(smooth, data.qpos, state[:nv], 1.0)
-        data.qvel[:], data.act[:] = state[nv : 2 * nv], state[2 * nv :]
-        mujoco.mj_forward(smooth, data)
-        return np.concatenate([data.qvel, data.qacc, data.act_dot])
-
-    columns = []
-    for direction, size in zip(np.eye(len(at)), sizes, strict=True):
-        h = 1e-5 * size
-        columns.append((slope(at + h * direction) - slope(at - h * direction)) / (2.0 * h))
+    nv, slope = model.nv, _slopes(model, key)
+    sizes = np.ones(2 * nv + model.na)  # of what the state is turned from, for the length of a difference
+    sizes[nv:] = np.maximum(1.0, np.abs([*model.key_qvel[key], *model.key_act[key]]))
+    for joint in np.flatnonzero(model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)):
+        sizes[model.jnt_dofadr[joint]] = max(1.0, abs(float(model.key_qpos[key, model.jnt_qposadr[joint]])))
+    h = 1e-5 * sizes
+    columns = [(slope(move) - slope(-move)) / (2.0 * length) for move, length in zip(np.diag(h), h, strict=True)]
     return np.array(columns).T
 
 
-def input_column(model: mujoco.MjModel, key: int, command: np.ndarray, forces: np.ndarray | float = 0.0) -> np.ndarray:
+def input_column(model: mujoco.MjModel, key: int, command: np.ndarray, forces: Vector = 0.0) -> np.ndarray:
     """Return the column of B for commands and forces in given proportions.
 
     Args:
@@ -96,21 +84,24 @@ def input_column(model: mujoco.MjModel, key: int, command: np.ndarray, forces: n
     Returns:
         The slope of the state of `state_matrix` by the command, (n,).
     """
-    smooth = _without_dry_friction(model)
-    data = mujoco.MjData(smooth)
-    h = 1e-5
+    slope, h = _slopes(model, key), 1e-5
+    return (slope(0.0, h * command, h * forces) - slope(0.0, -h * command, -h * forces)) / (2.0 * h)
 
-    def slope(size: float) -> np.ndarray:
+
+def _slopes(model: mujoco.MjModel, key: int) -> Callable[..., np.ndarray]:
+    """Return the derivative of the state as a function of moves from the keyframe; without dry friction."""
+    smooth = copy.copy(model)
+    smooth.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+    data, nv = mujoco.MjData(smooth), smooth.nv
+
+    def slope(move: Vector, command: Vector = 0.0, forces: Vector = 0.0) -> np.ndarray:
         mujoco.mj_resetDataKeyframe(smooth, data, key)
-        data.ctrl[:] += size * command
-        data.qfrc_applied[:] = size * forces
+        state = np.concatenate([np.zeros(nv), data.qvel, data.act]) + move
+        mujoco.mj_integratePos(smooth, data.qpos, state[:nv], 1.0)
+        data.qvel[:], data.act[:] = state[nv : 2 * nv], state[2 * nv :]
+        data.ctrl[:] += command
+        data.qfrc_applied[:] = forces
         mujoco.mj_forward(smooth, data)
         return np.concatenate([data.qvel, data.qacc, data.act_dot])
 
-    return (slope(h) - slope(-h)) / (2.0 * h)
-
-
-def _without_dry_friction(model: mujoco.MjModel) -> mujoco.MjModel:
-    smooth = copy.copy(model)
-    smooth.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
-    return smooth
+    return slope

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar, atan2
+from cmg_mj.core.errors import InputError
+from cmg_mj.plant.elements import element_id
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -81,30 +84,26 @@ class SupportLine:
     axes: np.ndarray
     point: np.ndarray
 
-    def __post_init__(self) -> None:
-        # Looked up at every tick, as floats.
-        object.__setattr__(self, "_x", self.axes[:, 0].tolist())
-        object.__setattr__(self, "_y", self.axes[:, 1].tolist())
-        object.__setattr__(self, "_z", self.axes[:, 2].tolist())
-
-    _x: Sequence[float] = ()
-    _y: Sequence[float] = ()
-    _z: Sequence[float] = ()
+    @cached_property
+    def _xyz(self) -> list[list[float]]:
+        """The axes as floats, which every tick looks up."""
+        return self.axes.T.tolist()
 
     def lean(self, qpos: Addressed) -> Scalar:
         """Tilt of the line's z axis from the vertical about the line, as accelerometers see it [rad]."""
         w, x, y, z = (qpos[self.angle + 3 + i] for i in range(4))
         up = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)  # in the body's axes
-        return atan2(-_dot(up, self._x), _dot(up, self._z))
+        across, _, upward = self._xyz
+        return atan2(-_dot(up, across), _dot(up, upward))
 
     def rate(self, qvel: Addressed) -> Scalar:
         """Angular velocity about the line [rad/s]."""
-        return _dot([qvel[self.dof + 3 + i] for i in range(3)], self._y)
+        return _dot([qvel[self.dof + 3 + i] for i in range(3)], self._xyz[1])
 
     @property
     def push(self) -> tuple[Sequence[int], Sequence[float]]:
         """Addresses in qfrc_applied, and what each gets of a torque about the line."""
-        return [self.dof + 3, self.dof + 4, self.dof + 5], self._y
+        return [self.dof + 3, self.dof + 4, self.dof + 5], self._xyz[1]
 
     def motion(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """Return the joints' rates of a tilt rate of 1 rad/s about the line, (nv,)."""
@@ -167,18 +166,24 @@ def line_of_joint(model: mujoco.MjModel, joint: int, key: int) -> HingeLine:
     return HingeLine(joint, angle, int(model.jnt_dofadr[joint]), float(model.key_qpos[key, angle]))
 
 
-def line_at_site(model: mujoco.MjModel, data: mujoco.MjData, site: int, key: int) -> Line | None:
-    """Return the line along a site's y axis: of the hinge there, or of the free body that carries it.
+def line_named(model: mujoco.MjModel, data: mujoco.MjData, name: str, key: int) -> Line:
+    """Return the hinge of a name; or the line along the y axis of a site of that name, a hinge's or a free body's.
 
     Args:
         model: The compiled model.
         data: The rig at the keyframe, after a forward pass.
-        site: The site's number.
+        name: The name.
         key: The keyframe.
 
     Returns:
-        The line; None if the body has no hinge along it and is not free.
+        The line.
+
+    Raises:
+        InputError: The site's body has no hinge along its y axis and is not free.
     """
+    joint, site = element_id(model, "joint", name), element_id(model, "site", name)
+    if joint >= 0:
+        return line_of_joint(model, joint, key)
     at, axes = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
     body = int(model.site_bodyid[site])
     while body:
@@ -198,7 +203,10 @@ def line_at_site(model: mujoco.MjModel, data: mujoco.MjData, site: int, key: int
             ):
                 return replace(line_of_joint(model, joint, key), sign=math.copysign(1.0, along))
         body = int(model.body_parentid[body])
-    return None
+    raise InputError(
+        f"site {name!r} lies on no hinge that its body hangs on, along its y axis, and that body is not free: about "
+        "what it tilts cannot be told"
+    )
 
 
 def _dot(a: Addressed, b: Sequence[float]) -> Scalar:

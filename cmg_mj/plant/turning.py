@@ -50,17 +50,12 @@ def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarr
     """Return the inertia of all that tilts about a point of the line, in the world (3, 3) [kg m^2]."""
     pivot = data.xpos[axis.frame] + data.xmat[axis.frame].reshape(3, 3) @ axis.point
     inertia = np.zeros((3, 3))
-    for body in _tilting(model, int(model.jnt_bodyid[axis.line.joint])):
+    tilting = {int(model.jnt_bodyid[axis.line.joint])}
+    for body in range(min(tilting), model.nbody):  # children come after their parents
+        if body not in tilting and int(model.body_parentid[body]) not in tilting:
+            continue
+        tilting.add(body)
         axes, arm = data.ximat[body].reshape(3, 3), data.xipos[body] - pivot
         inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
         inertia += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     return inertia
-
-
-def _tilting(model: mujoco.MjModel, root: int) -> list[int]:
-    """Return a body and its descendants."""
-    bodies = {root}
-    for body in range(root + 1, model.nbody):  # children come after their parents
-        if int(model.body_parentid[body]) in bodies:
-            bodies.add(body)
-    return sorted(bodies)

@@ -157,7 +157,7 @@ def test_the_command_prints_each_axis(run_outcome: CommandOutcome, run_summary: 
 @pytest.mark.parametrize(
     ("settings", "complaint"),
     [
-        (["axes.rol.plant.initial_tilt_deg=1"], "axes.rol: the rig has no such axis; did you mean 'roll'"),
+        (["axes.rol.plant.initial_tilt_deg=1"], "axes = 'rol': the rig has no such axis; did you mean 'roll'"),
         (["axes.roll.plant.modl=1"], "axes.roll.plant.modl: no such field; allowed: accelerometer_inner_m"),
         (["axes.roll.plant=3"], "axes.roll.plant = 3: must be a section"),
         (["axes.roll.controller.rate_hz=100"], "[axes.roll]: controller.rate_hz: is the same on all axes"),

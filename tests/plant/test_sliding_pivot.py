@@ -182,7 +182,7 @@ def test_a_pivot_at_rest_is_what_it_was(model: str) -> None:
     plant = load_plant(model=model)
     for axis, filed in zip(plant.axes, plant.filed.axes, strict=True):
         assert axis.reduced.pivot_arm == 0.0
-        assert axis.radial_tilt is filed.radial_tilt
+        assert axis.radial_tilt == filed.radial_tilt
         assert axis.reduced.measured_tilt(0.0, plant.gravity) == (1.0, 0.0)
     assert not plant.reduced.pivot_arm
     with pytest.raises(InputError, match=r"plant.pivot_slides = true: .*the pivot.* does not slide freely; leave it"):

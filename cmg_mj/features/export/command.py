@@ -55,15 +55,13 @@ def export(
     from cmg_mj.features.export import check_installed, generate_code, write_code
     from cmg_mj.features.export.names import name_of
     from cmg_mj.features.export.pipeline import export_table
-    from cmg_mj.laws import StateFeedback
     from cmg_mj.linear.verdict import require_stable_period
     from cmg_mj.runs.experiment import prepare
 
     check_installed()
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
     experiment.require_single_axis("export")
-    if isinstance(experiment.law, StateFeedback):
-        require_stable_period(experiment.law, experiment.plant.reduced)
+    require_stable_period(experiment.law, experiment.plant.reduced)
     note_hints(experiment.hints)
     controller = experiment.axis_controller()
     name = name_of(controller.observer, name)

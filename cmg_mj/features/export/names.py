@@ -119,26 +119,14 @@ def name_of(observer: Observer, user_name: str | None = None) -> str:
     for name, path in OBSERVERS.items():
         if path == f"{cls.__module__}:{cls.__qualname__}":
             return name
-    name = _class_in_c(cls.__name__)
-    if name is None:
+    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", spell_in_c(cls.__name__) or "")
+    name = re.sub(r"[^a-z0-9]+", "_", spaced.lower()).strip("_")
+    if not re.fullmatch(rf"[a-z].{{0,{LONGEST - 1}}}", name):
         raise InputError(
             f"the class's name {shown(cls.__name__)} makes none in C of 1 to {LONGEST} letters, digits and _: "
             "give one with --name"
         )
     return f"{name}_observer" if name in RESERVED else name
-
-
-def _class_in_c(name: str) -> str | None:
-    """Convert a class's name to C; None if that is impossible."""
-    letters = spell_in_c(name)
-    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", letters or "")
-    words = re.sub(r"[^a-z0-9]+", "_", spaced.lower()).strip("_")
-    return words if re.fullmatch(rf"[a-z].{{0,{LONGEST - 1}}}", words) else None
-
-
-def export_files(name: str) -> list[str]:
-    """Name the files of an export."""
-    return [f"{name}.h", f"{name}.c", f"{name}_example.c", f"{name}_test_vector.h"]
 
 
 def estimate_places(extra_signals: tuple[str, ...]) -> list[str]:

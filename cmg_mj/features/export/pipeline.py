@@ -7,25 +7,21 @@ import shlex
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, raised, shown
-from cmg_mj.core.types import Observer
 from cmg_mj.features.export import check
 from cmg_mj.features.export.c_code import Precision, operations
 from cmg_mj.features.export.c_files import CodePrinter, LawPrinter, format_example, format_test_vector
 from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.features.export.constants import class_path, constants_of
-from cmg_mj.features.export.names import export_files, name_of
+from cmg_mj.features.export.names import name_of
 from cmg_mj.features.export.symbol import LawNotExportable
 from cmg_mj.features.export.trace import trace
-from cmg_mj.laws import Law
 from cmg_mj.results.folder import write_text
 from cmg_mj.stages.notch import Notch
 from cmg_mj.stages.trim import Trim
-
-Part = TypeVar("Part", Observer, Law)
 
 
 class Code(NamedTuple):
@@ -73,7 +69,7 @@ def require_exportable(controller: Controller) -> None:
             raise InputError(f"{type(stage).__name__}: cannot be exported: C has no such stage")
 
 
-def _copied(part: Part, refusal: type[InputError]) -> Part:
+def _copied(part: Any, refusal: type[InputError]) -> Any:
     try:
         return copy.deepcopy(part)
     except Exception as error:  # a user's observer or law may hold anything
@@ -90,11 +86,13 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
     samples = check.signals(controller, 0, precision)
     expected = check.in_python(controller, samples)
     allowed = check.allowed(controller, samples, expected, precision)
-    other_files = (
-        format_example(name, precision, check.columns(controller)),
-        format_test_vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist()),
-    )
-    files = dict(zip(export_files(name), (printer.header(), printer.source(), *other_files), strict=True))
+    vector = format_test_vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist())
+    files = {
+        f"{name}.h": printer.header(),
+        f"{name}.c": printer.source(),
+        f"{name}_example.c": format_example(name, precision, check.columns(controller)),
+        f"{name}_test_vector.h": vector,
+    }
     compiler = find_compiler()
     figures: dict[str, Any] = {
         "observer": name,
@@ -113,11 +111,8 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
     }
     if compiler is not None:
         with tempfile.TemporaryDirectory() as temporary:
-            try:
-                for file, text in files.items():
-                    write_text(Path(temporary, file), text)
-            except OSError as error:
-                raise InputError(f"temporary folder {temporary}: cannot be written: {error.strerror}") from error
+            for file, text in files.items():
+                write_text(Path(temporary, file), text)
             off_by = figures["c_off_by"] = check.check_c(Path(temporary), name, compiler)
         bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]

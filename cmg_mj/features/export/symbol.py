@@ -222,9 +222,7 @@ def call_traced(name: str, function: Callable[[], Result]) -> Result:
     """Call a user's code with symbols."""
     try:
         return function()
-    except InputError:
-        raise
-    except KeyboardInterrupt:
+    except (InputError, KeyboardInterrupt):
         raise
     except BaseException as error:
         raise InputError(f"{name} raised {raised(error)} {raised_at(error)}") from error

@@ -110,10 +110,10 @@ def _record(part: Observer | Law, label: str, step: Callable[[Any], tuple[Any, S
     symbols = symbols_named([f"state {i}" for i in range(len(leaves))])
     before = rebuild(state, iter(symbols))
     after, outputs = call_traced(label, lambda: step(before))
-    recording = _Recording(first, state, leaves, symbols, [expression(leaf.value) for leaf in numbers(after)], [])
+    next_state = [expression(leaf.value) for leaf in numbers(after)]
     if form(after) != form(state):
         raise InputError("its step returns a state that is made otherwise than the one of init")
-    return recording._replace(outputs=[expression(output) for output in outputs])
+    return _Recording(first, state, leaves, symbols, next_state, [expression(output) for output in outputs])
 
 
 def _measure(constants: Constants) -> casadi.Function:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import ctypes
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -14,7 +13,7 @@ from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.runners import as_estimate
-from cmg_mj.features.plugin.model import INSTANCE
+from cmg_mj.features.plugin.model import INSTANCE, mujoco_library
 from cmg_mj.features.plugin.sensors import check_noise
 from cmg_mj.plant.mjcf import OWN
 from cmg_mj.plant.physics import OneWorld
@@ -121,6 +120,6 @@ class _Plugin(ctypes.Structure):
 
 def _plugin_names(model: mujoco.MjModel) -> list[str]:
     """Name the plugin of each instance of a model, which MuJoCo's Python package does not tell."""
-    library = ctypes.CDLL(str(Path(mujoco.__file__).with_name(f"libmujoco.so.{mujoco.__version__}")))
+    library = mujoco_library()
     library.mjp_getPluginAtSlot.restype = ctypes.POINTER(_Plugin)
     return [library.mjp_getPluginAtSlot(slot).contents.name.decode() for slot in model.plugin.tolist()]

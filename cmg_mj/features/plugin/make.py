@@ -21,7 +21,6 @@ from cmg_mj.features.plugin.driver import PluginLoop
 from cmg_mj.features.plugin.model import plugin_mjcf
 from cmg_mj.features.plugin.sensors import PluginAxis, PluginRig
 from cmg_mj.features.plugin.tables import PluginCode, check_platform, compile_plugin, generate_plugin, library_name
-from cmg_mj.laws import StateFeedback
 from cmg_mj.linear.verdict import SIMULATED, omissions, require_stable_period
 from cmg_mj.plant.mjcf import set_control_callback
 from cmg_mj.results.folder import RunFolder, claimed, write_text
@@ -99,12 +98,11 @@ def require_stable_periods(experiment: Experiment) -> None:
         InputError: An axis would fall.
     """
     for part in experiment.parts:
-        if isinstance(part.design.law, StateFeedback):
-            try:
-                require_stable_period(part.design.law, part.plant.reduced)
-            except InputError as error:
-                name = part.plant.axis.name
-                raise InputError(f"axis {name}: {error}" if name else str(error)) from error
+        try:
+            require_stable_period(part.design.law, part.plant.reduced)
+        except InputError as error:
+            name = part.plant.axis.name
+            raise InputError(f"axis {name}: {error}" if name else str(error)) from error
 
 
 def make_plugin(

@@ -85,10 +85,15 @@ def differences(plant: mujoco.MjModel, written: mujoco.MjModel) -> list[str]:
     return [name for name in names if not np.array_equal(getattr(plant, name), getattr(written, name))]
 
 
+def mujoco_library() -> ctypes.CDLL:
+    """Return the library of MuJoCo's Python package, for functions that this does not have."""
+    return ctypes.CDLL(str(Path(mujoco.__file__).with_name(f"libmujoco.so.{mujoco.__version__}")))
+
+
 @contextmanager
 def _exact_numbers() -> Iterator[None]:
     """Have MuJoCo write numbers with all their digits: it has a function for this, though no public one."""
-    library = ctypes.CDLL(str(Path(mujoco.__file__).parent / f"libmujoco.so.{mujoco.__version__}"))
+    library = mujoco_library()
     before = library._mjPRIVATE__get_xml_precision()
     library._mjPRIVATE__set_xml_precision(EXACT_DIGITS)
     try:
@@ -131,7 +136,7 @@ def _frames_around(element: Framed) -> list[mujoco.MjsFrame]:
 
 
 def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, drawn: mujoco.MjModel, plant: Plant) -> None:
-    """Give a parsed model what the plant's settings change: see `plant.variations`.
+    """Give a parsed model what the plant's settings change: see `plant.settings`.
 
     Args:
         spec: The model, which is changed; of what was written it has read `filed`.

@@ -49,8 +49,8 @@ def studio(
 ) -> None:
     """Open SCENARIO in MuJoCo Studio with its controller running. Close the viewer or press Ctrl-C to end.
 
-    Without user actions the trajectory equals that of cmg-mj run. A panel pushes the plant, switches the observer, the
-    gains and the feedback, and sets the bias and the accelerometers' noise (docs/studio.md).
+    Without user actions the trajectory equals that of cmg-mj run. A panel pushes the plant, switches the observer and
+    the feedback, and sets the bias and the accelerometers' noise (docs/studio.md).
     """
     from cmg_mj.runs.experiment import prepare
 

@@ -10,7 +10,7 @@ from mujoco.studio import messages, plugin
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
-from cmg_mj.features.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, Fields, FieldValues, Settings
+from cmg_mj.features.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, FieldValues, Settings
 
 TITLE = "Gyroscopic balance"
 PLOTTED_S = 6.0
@@ -57,11 +57,9 @@ class SessionState(messages.Snapshot):
         settings: The settings that can be changed; None before a scenario is loaded.
         observers: The observers to choose from.
         gains: Gains of a linear law on x1, x2, x3, x_e; empty for other laws.
-        laws: The laws to choose from: name -> fields.
-        law: Name of the law in use; empty if it is none of `laws`.
         stopped: The reason why the controller has stopped; empty while it runs.
         note: Result of the last change.
-        ticks: The plotted ticks, (n_ticks, 6), with the columns of `session.PlottedTick`.
+        ticks: The plotted ticks, (n_ticks, 5), with the columns of `session.PlottedTick`.
     """
 
     title: str = ""
@@ -71,11 +69,9 @@ class SessionState(messages.Snapshot):
     settings: Settings | None = None
     observers: tuple[str, ...] = ()
     gains: tuple[float, ...] = ()
-    laws: dict[str, Fields] = field(default_factory=dict)
-    law: str = ""
     stopped: str = ""
     note: str = ""
-    ticks: np.ndarray = field(default_factory=lambda: np.empty((0, 6)))
+    ticks: np.ndarray = field(default_factory=lambda: np.empty((0, 5)))
 
 
 class StudioPanel(plugin.ViewerPlugin):
@@ -141,8 +137,6 @@ class StudioPanel(plugin.ViewerPlugin):
         imgui.SeparatorText("Controller, on all axes" if several else "Controller")
         if observer := _new_choice("observer", settings.observer, now.observers):
             self._choose({OBSERVER: observer})
-        if law := _new_choice("law", now.law, now.laws):
-            self._choose(now.laws[law])
         if now.gains:
             imgui.TextUnformatted("K_e = " + ", ".join(f"{gain:.3g}" for gain in now.gains))
         if feedback := _new_choice("rate fed back", settings.feedback, FEEDBACKS, FEEDBACKS.values()):

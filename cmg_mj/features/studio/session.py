@@ -52,7 +52,7 @@ PHYSICS_ARRAYS = (
     "site_sameframe",
     "tendon_invweight0",
 )
-"""Arrays of a model that `plant.variations` changes or `mj_setConst` derives from them; none is indexed by geoms."""
+"""Arrays of a model that `plant.settings` changes or `mj_setConst` derives from them; none is indexed by geoms."""
 
 MUJOCO_VIEW = (90.0, -45.0)
 STUDIO_VIEW = (125.0, -20.0)
@@ -91,14 +91,13 @@ def copy_physics_numbers(model: mujoco.MjModel, reference: mujoco.MjModel) -> No
 
 
 class PlottedTick(NamedTuple):
-    """A control tick of one axis in the plots: x1, the true and the estimated rate, u, the push."""
+    """A control tick of one axis in the plots: x1, the true and the estimated rate, u."""
 
     time_s: float
     tilt_deg: float
     rate_rad_s: float
     estimate_rad_s: float
     command_rad_s: float
-    push_n_m: float
 
 
 class StudioSession:
@@ -123,6 +122,7 @@ class StudioSession:
         self.plant = drawn_plant(experiment.plant)
         self.timestep = self.plant.timestep
         self._lines = [axis.line for axis in self.plant.axes]
+        self._nothing = Outside([0.0] * len(self._lines))
         self._users_pushes: list[Push] = []
         others = {name: parts for name, parts in outsides(experiment.scenario).items() if name != "push"}
         self._others = disturbances(others, [self.plant], experiment.scenario.seed, 0)
@@ -189,10 +189,6 @@ class StudioSession:
         if outside.acceleration is not None:
             self.model.opt.gravity[:] = self._gravity - outside.acceleration
 
-    @property
-    def _nothing(self) -> Outside:
-        return Outside([0.0] * len(self._lines))
-
     def sync_to_time(self) -> int:
         """Begin again at the state's time, if someone has moved the state; return the step."""
         step = round(self.data.time / self.timestep)
@@ -235,15 +231,15 @@ class StudioSession:
             self._stop(str(error))
             return False
         if ticked:
-            self.ticks.append(tuple(self._plotted_tick(*pair) for pair in enumerate(self._torques)))
+            self.ticks.append(tuple(map(self._plotted_tick, range(len(self._lines)))))
         return ticked
 
-    def _plotted_tick(self, axis: int, torque: float) -> PlottedTick:
+    def _plotted_tick(self, axis: int) -> PlottedTick:
         """Return the last tick of an axis."""
-        data, line, tick = self.data, self.plant.axes[axis].line, self.controller.parts[axis].tick
+        data, line, tick = self.data, self._lines[axis], self.controller.parts[axis].tick
         assert tick is not None
         x1 = math.degrees(float(line.lean(data.qpos)) + self.now.plant.axes[axis].bias)
-        return PlottedTick(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u, torque)
+        return PlottedTick(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u)
 
     def _stop(self, why: str) -> None:
         self.stopped = why

@@ -16,7 +16,7 @@ from mujoco.studio import (
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.studio.panel import ChangeSettings, PushRequest, RestartController, SessionState, ShowAxis
 from cmg_mj.features.studio.session import StudioSession
-from cmg_mj.features.studio.settings import choosable_laws, choosable_observers, current_law, current_settings
+from cmg_mj.features.studio.settings import choosable_observers, current_settings
 from cmg_mj.runs.experiment import Experiment
 
 AFTER_STUDIO = 0
@@ -59,7 +59,7 @@ class Stepping(plugin.SimPlugin):
         self._complaint = ""
         self._axis = ""
         self._begin_pacing(0.0)
-        self.live: StudioSession | None = None
+        self.live = StudioSession(load(""))
 
     def _begin_pacing(self, time: float) -> None:
         """Go on in the clock's time from now, at a simulated time [s]."""
@@ -78,12 +78,11 @@ class Stepping(plugin.SimPlugin):
     def on_load_model(self, event: messages.LoadModelEvent) -> bool:
         """Load the scenario, or load it again; a model file dropped on the viewer replaces the scenario's."""
         try:
-            live = StudioSession(self._load(event.path))
+            self.live = live = StudioSession(self._load(event.path))
         except InputError as error:
             self._complain(str(error))
             return True
         self._complaint = ""
-        self.live = live
         self.handle.set_model(live.model, data=live.data)
         self._begin_pacing(live.data.time)
         return True
@@ -92,8 +91,6 @@ class Stepping(plugin.SimPlugin):
     def on_reset(self, event: messages.ResetEvent) -> None:
         """Begin again at the scenario's initial state, or at the user's keyframe."""
         live = self.live
-        if live is None:
-            return
         if event.key is None or not 0 <= event.key < live.model.nkey:
             live.start()
         else:
@@ -103,11 +100,7 @@ class Stepping(plugin.SimPlugin):
     @messages.handler
     def on_step(self, event: messages.StepEvent) -> bool:
         """Advance the physics steps that are due."""
-        live = self.live
-        if live is None:
-            self._sleep(REST_S)
-            return True
-        data = live.data
+        live, data = self.live, self.live.data
         if event.model.opt.timestep != live.timestep:
             event.model.opt.timestep = live.timestep
             self._complain(f"the physics step stays {live.timestep:g} s: samples and ticks fall on whole steps")
@@ -136,8 +129,7 @@ class Stepping(plugin.SimPlugin):
     def on_step_control(self, event: messages.StepControlSnapshot) -> bool:
         """Handle the user's pause, resumption, or speed."""
         self._pause, self._speed = event.pause_state, event.speed
-        if self.live is not None:
-            self._begin_pacing(self.live.data.time)
+        self._begin_pacing(self.live.data.time)
         if event.noise_scale:
             self._complain("Studio's noise on the controls is not applied: set the accelerometers' noise here")
         return True
@@ -158,31 +150,28 @@ class Stepping(plugin.SimPlugin):
     @messages.handler
     def on_choose(self, event: ChangeSettings) -> None:
         """Change settings of the scenario."""
-        if self.live is not None:
-            self._complaint = ""
-            self.live.choose(event.values)
+        self._complaint = ""
+        self.live.choose(event.values)
 
     @messages.handler
     def on_push(self, event: PushRequest) -> None:
         """Push about the axis shown."""
-        if self.live is not None:
-            self.live.push(event.torque_n_m, event.duration_s, self._axis_index(self.live))
+        self.live.push(event.torque_n_m, event.duration_s, self._axis_index())
 
     @messages.handler
     def on_show_axis(self, event: ShowAxis) -> None:
         """Show and push another axis from now on."""
         self._axis = event.axis
 
-    def _axis_index(self, live: StudioSession) -> int:
+    def _axis_index(self) -> int:
         """Return the index of the axis shown: the user's choice, or the first if the plant lacks the choice."""
-        names = live.plant.axis_names
+        names = self.live.plant.axis_names
         return names.index(self._axis) if self._axis in names else 0
 
     @messages.handler
     def on_start_again(self, _: RestartController) -> None:
         """Restart a controller that has stopped."""
-        if self.live is not None:
-            self.live.restart_controller()
+        self.live.restart_controller()
 
     def _complain(self, message: str) -> None:
         self._complaint = message
@@ -190,13 +179,10 @@ class Stepping(plugin.SimPlugin):
 
     def session_state(self) -> SessionState:
         """Describe the session for the panel."""
-        live = self.live
-        if live is None:
-            return SessionState(note=self._complaint)
+        live, axis = self.live, self._axis_index()
         now, data = live.now, live.data
-        axis = self._axis_index(live)
         part = now.parts[axis]
-        ticks = np.array([tick[axis] for tick in live.ticks if tick[axis].time_s < data.time - 1e-9]).reshape(-1, 6)
+        ticks = np.array([tick[axis] for tick in live.ticks if tick[axis].time_s < data.time - 1e-9]).reshape(-1, 5)
         return SessionState(
             title=now.scenario.title,
             time_s=data.time,
@@ -205,8 +191,6 @@ class Stepping(plugin.SimPlugin):
             settings=current_settings(part.scenario),
             observers=choosable_observers(live.base),
             gains=tuple(getattr(part.law, "gains", ())),
-            laws=choosable_laws(live.base),
-            law=current_law(live.base, now),
             stopped=live.stopped,
             note=self._complaint or live.note,
             ticks=ticks,

@@ -14,7 +14,7 @@ from mujoco.studio import (
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.features.studio.panel import ChangeSettings, PushRequest, RestartController
-from cmg_mj.features.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, choosable_laws
+from cmg_mj.features.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER
 from cmg_mj.inputs.files import folder
 from cmg_mj.observers import OBSERVERS, Estimate
 from tests.features.studio.session import Session, session
@@ -167,16 +167,9 @@ def test_every_observer_starts_from_the_present_state() -> None:
             assert not studio.live.stopped, kind
 
 
-def test_laws_and_feedback_are_the_runners() -> None:
+def test_the_rate_fed_back_is_the_runners() -> None:
     with session() as studio:
-        laws = choosable_laws(studio.live.base)
-        studio.send(ChangeSettings(laws["LQR"]), ChangeSettings({FEEDBACK: "truth"}))
+        studio.send(ChangeSettings({FEEDBACK: "truth"}))
         studio.run(1.0)
-        state = studio.session_state()
-        assert state.settings is not None
-        assert (state.law, state.settings.feedback) == ("LQR", "truth")
-        same(studio.rows, runner_rows("controller.lqr.state_cost=[1,1,1,1]", "controller.feedback=truth"))
-        studio.send(ChangeSettings({FEEDBACK: "observer"}), ChangeSettings(laws["LQG"]))
-        assert studio.session_state().law == "LQG"
-        studio.run(1.0)
-        assert not studio.live.stopped
+        assert studio.settings().feedback == "truth"
+        same(studio.rows, runner_rows("controller.feedback=truth"))

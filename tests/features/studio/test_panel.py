@@ -19,10 +19,8 @@ from cmg_mj.features.studio.panel import (
     ShowAxis,
     StudioPanel,
 )
-from cmg_mj.features.studio.settings import FEEDBACK, LAW, OBSERVER
+from cmg_mj.features.studio.settings import FEEDBACK, OBSERVER
 from tests.features.studio.session import session
-
-LQG = {"rate_hz": 200.0, "rate_limit_rad_s": 4.7, "angle_source": "measured", "bias_trim_s": 0.0, "kind": "lqg"}
 
 
 class Screen:
@@ -96,7 +94,6 @@ def test_it_is_drawn_from_the_first_frame_on(
         ("Button", press("Push -"), PushRequest(-1.0, 0.1)),
         ("Combo", pick("observer", "adaptive"), ChangeSettings({OBSERVER: "adaptive"})),
         ("Combo", pick("rate fed back", "the gyro's"), ChangeSettings({FEEDBACK: "fog"})),
-        ("Combo", pick("law", "LQG"), ChangeSettings({LAW: LQG})),
     ],
 )
 def test_what_is_pressed_is_sent(

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmg_mj import load_scenario, prepare
 from cmg_mj.features.studio.panel import ChangeSettings, PushRequest, ShowAxis
-from cmg_mj.features.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER, choosable_laws, current_law
-from tests.features.studio.session import SIGNALS, as_rows, session
+from cmg_mj.features.studio.settings import BIAS, FEEDBACK, NOISE, OBSERVER
+from tests.features.studio.session import SIGNALS, session
 from tests.features.studio.test_session import runner_rows, same
 
 ROLL, PITCH = 0, len(SIGNALS)
@@ -71,37 +70,19 @@ def test_a_push_by_button_is_about_the_axis_that_is_shown() -> None:
         np.testing.assert_array_equal(ticks[: len(rows), 2], rows[:, RATE + ROLL])
 
 
-def test_a_law_is_the_runners_on_both_axes_from_the_start() -> None:
-    settings = ("axes.pitch.controller.lqr.state_cost=[2,1,1,1]", "axes.pitch.controller.rate_limit_rad_s=3.0")
-    with session(*settings, scenario="two_axes") as studio:
-        laws = choosable_laws(studio.live.base)
-        assert current_law(studio.live.base, studio.live.now) == "the scenario's"
-        studio.send(ChangeSettings(laws["LQR"]), ChangeSettings({FEEDBACK: "truth"}))
-        assert current_law(studio.live.base, studio.live.now) == "LQR"
-        studio.run(1.0)
-        base = prepare(load_scenario("two_axes", ["axes.pitch.controller.rate_limit_rad_s=3.0", "push=[]"]))
-        law = {"lqr": {"state_cost": [1, 1, 1, 1]}, "feedback": "truth"}
-        trajectory = base.with_settings({"controller": law, "duration_s": 1.0}).run().trajectory
-        assert trajectory is not None
-        same(studio.rows[:200], as_rows(trajectory))
-
-
 def test_what_is_chosen_is_chosen_on_all_axes() -> None:
     settings_of_axes = ("axes.pitch.observer.k1=40.0", "axes.pitch.controller.feedback=truth", "observer.k1=50.0")
     with session(*settings_of_axes, scenario="two_axes") as studio:
         live = studio.live
         studio.run(0.5)
-        studio.send(ChangeSettings({OBSERVER: "linear"}), ChangeSettings(choosable_laws(live.base)["LQR"]))
+        studio.send(ChangeSettings({OBSERVER: "linear"}))
         scenarios = [part.scenario for part in live.now.parts]
         assert [scenario.observer.kind for scenario in scenarios] == ["linear", "linear"]
-        assert [scenario.controller.lqr is not None for scenario in scenarios] == [True, True]
         assert [scenario.controller.feedback for scenario in scenarios] == ["observer", "truth"]
-        assert studio.session_state().law == "LQR"
         studio.send(ChangeSettings({FEEDBACK: "fog"}), ChangeSettings({BIAS: 0.5}), ChangeSettings({NOISE: 0.0}))
         for scenario in (part.scenario for part in live.now.parts):
             assert (scenario.controller.feedback, scenario.plant.equilibrium_bias_deg) == ("fog", 0.5)
             assert scenario.sensors.accelerometer.noise_density_ug_rthz == 0.0
         np.testing.assert_array_equal(live.model.body_ipos, live.now.plant.model.body_ipos)
-        laws = choosable_laws(live.base)
-        studio.send(ChangeSettings({OBSERVER: "homogeneous"}), ChangeSettings(laws["the scenario's"]))
+        studio.send(ChangeSettings({OBSERVER: "homogeneous"}))
         assert [part.scenario.observer.parameters for part in live.now.parts] == [{"k1": 50.0}, {"k1": 40.0}]
