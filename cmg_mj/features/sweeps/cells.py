@@ -254,7 +254,7 @@ def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
     """Count the points at which each observer leads, and each baseline is ahead.
 
     Args:
-        trials: The trials. In a design for indices the rows A and B count, whose points are independent.
+        trials: The trials.
         key: The figure, less of which is better.
 
     Returns:
@@ -262,8 +262,6 @@ def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
     """
     study = trials.study
     figure = trials.figure(key)
-    if study.design == "sobol":
-        figure = figure[: 2 * study.n]
     best, sure, error = least_error(figure, study.contenders)
     ahead = baselines_ahead(study, figure, error)
     rows = []

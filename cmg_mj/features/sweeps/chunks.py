@@ -227,7 +227,7 @@ def _seconds(study: SweepStudy, observer: str, trials: Sequence[Trial]) -> float
 StudyFields: TypeAlias = dict[str, dict[str, Any]]
 """A study file's sections."""
 STUDY, CHUNKS, TRIALS, CELLS = "study.toml", "chunks", "trials.parquet", "cells.parquet"
-INDICES, REPORT = "indices.parquet", "report.md"
+REPORT = "report.md"
 PICTURES = ("map_velocity_error.png", "map_push_error.png", "map_falls.png", "curves.png")
 KEY = b"cmg_mj.chunk"
 """Key of a chunk's hash in its file's metadata."""
@@ -270,7 +270,7 @@ class Store:
             with whole_file(store.folder / STUDY) as temporary:
                 temporary.write_text(tomli_w.dumps(fields), encoding="utf-8")
             chunks = [f"{CHUNKS}/{store.path(number).name}" for number in range(study.n_chunks)]
-            names = [STUDY, TRIALS, CELLS, INDICES, REPORT, *PICTURES, *chunks]
+            names = [STUDY, TRIALS, CELLS, REPORT, *PICTURES, *chunks]
             write_marker(store.folder, names, complete=False)
         except OSError as error:
             raise InputError(f"--out {path}: cannot be written: {error.strerror or error}") from error

@@ -17,7 +17,7 @@ from cmg_mj.view.plots.figure import pyplot
 from cmg_mj.view.plots.style import colours, hexadecimal
 
 ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
-"""Figures that are drawn, and whose indices are shown, where a trial has them; tables show the first."""
+"""Figures that are drawn where a trial has them; tables show the first."""
 CURVES, FALLS = "curves", "map_falls"
 MAPS = {ERRORS[0]: "map_velocity_error", ERRORS[1]: "map_push_error"}
 """Figure -> its map."""
@@ -83,7 +83,7 @@ def pictures_of(trials: Trials) -> list[Picture]:
     title = f"{study.scenario.title or 'Sweep'}: "
     if not all(is_number(value) for axis in axes for value in axis.values):
         return []
-    if len(axes) == 1 and study.design != "sobol" and (trials.stood | trials.fell).any():
+    if len(axes) == 1 and (trials.stood | trials.fell).any():
         return [Picture(CURVES, title + worlds, partial(curves, trials, axes[0].field))]
     if len(axes) == 2 and study.design == "grid":
         across, up = axes
