@@ -120,6 +120,22 @@ def fell_interval(fell: int, trials: int) -> Interval:
     return Interval(fell / trials, float(ends.low), float(ends.high))
 
 
+def fall_shares(trials: Trials) -> np.ndarray:
+    """Compute the share of falls among those that fell or stood, and its interval's ends, (n_points, n_observers, 3).
+
+    NaN where all trials of a cell were refused or stopped.
+    """
+    fell, known = fall_counts(trials)
+    counts = zip(fell.ravel().tolist(), known.ravel().tolist(), strict=True)
+    rows = [fell_interval(*count) if count[1] else (math.nan,) * 3 for count in counts]
+    return np.reshape(rows, (*fell.shape, 3))
+
+
+def fall_counts(trials: Trials) -> tuple[np.ndarray, np.ndarray]:
+    """Count the worlds that fell, and those that fell or stood, (n_points, n_observers) each."""
+    return trials.fell.sum(axis=2), (trials.fell | trials.stood).sum(axis=2)
+
+
 def least(means: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.ndarray]:
     """Find the place of the least among some observers, -1 where there is none, (..., n_observers) -> (...) each.
 

@@ -17,11 +17,12 @@ from cmg_mj.features.sweeps.cells import (
     cells_in_blocks,
     cells_of,
     cells_schema,
+    fall_counts,
     fell_interval,
     lead_rows,
 )
 from cmg_mj.features.sweeps.chunks import CELLS, REPORT, RESUMES, TRIALS, Store, trials_schema
-from cmg_mj.features.sweeps.pictures import CURVES, ERRORS, Picture, fall_counts, pictures_of
+from cmg_mj.features.sweeps.pictures import CURVES, ERRORS, Picture, pictures_of
 from cmg_mj.features.sweeps.study import SweepStudy, VariedField, counted
 from cmg_mj.results.folder import whole_file, write_text
 from cmg_mj.results.intervals import finite_mean

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.features.sweeps.cells import Trials
+from cmg_mj.features.sweeps.cells import Trials, fall_shares
 from cmg_mj.features.sweeps.chunks import PICTURES
-from cmg_mj.features.sweeps.pictures import Map, error_curve, fall_curve, maps, pictures_of
+from cmg_mj.features.sweeps.pictures import Map, error_curve, maps, pictures_of
 from cmg_mj.features.sweeps.report import report, summary
 from cmg_mj.view.plots.figure import save_figure
 from tests.features.sweeps.synthetic_trials import BIAS, NOISE, RATE, VELOCITY, make_trials
@@ -129,7 +129,7 @@ def test_curves_have_intervals_and_say_where_some_worlds_fell() -> None:
     assert low == pytest.approx([0.1, 0.2, 0.2 * math.exp(-half_width / 0.2)], rel=1e-4)
     assert not is_part.any()
     assert error_curve(trials.figure(VELOCITY)[:, 1])[:, 3].all()
-    assert fall_curve(trials, 1)[0, :3] == pytest.approx((0.75, 0.3006, 0.9544), abs=1e-4)
+    assert fall_shares(trials)[0, 1] == pytest.approx((0.75, 0.3006, 0.9544), abs=1e-4)
 
 
 @pytest.mark.parametrize(
