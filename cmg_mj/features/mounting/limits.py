@@ -251,9 +251,6 @@ POLE_DIFFERENCE = 0.1
 NOISY = 0.75
 """Share of E. If the worst world of the reduced model recovers from less, the sensors' noise alone may fell a robot."""
 
-NOISE_HINT = "the pair is so small that the sensors' noise alone may fell the robot"
-"""Beginning of the hint that tells so."""
-
 
 @dataclass(frozen=True)
 class Prospects:
@@ -311,8 +308,8 @@ class Prospects:
         if self.noisy:
             share = self.push_margin.worst_impulse / self.push_margin.median_impulse
             hints.append(
-                f"{NOISE_HINT}; with other noise it may fall of smaller pushes than it stands here (its "
-                f"reduced model's worst world recovers from {share:.0%} of E)"
+                "the pair is so small that the sensors' noise alone may fell the robot (its reduced model's worst "
+                f"world recovers from {share:.0%} of E)"
             )
         if self.push_margin.median_impulse == 0.0:
             hints.append("with this controller it falls without a push")

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.features.mounting.hold import joint_held, unused_name
+from cmg_mj.features.mounting.hold import joint_held, relative_pose, unused_name
 from cmg_mj.inputs.files import expanded, require_file
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.checks import STEPS_S
@@ -197,18 +197,14 @@ def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> None:
                     "replaces: take it out of the file"
                 )
     model = compile_model(spec, path)
-    data = posed(model, model.qpos0)
-    place = data.body(root.name).xpos, data.body(root.name).xquat
+    stands = posed(model, model.qpos0).body(root.name)
     for element in (*joints, *spec.keys):  # keyframes have the joints that are gone
         spec.delete(element)
     root.add_freejoint(name=unused_name(f"{root.name}_free", {joint.name for joint in spec.joints}))
     # A child of the world is placed in world coordinates, whatever <frame> it is in.
     root.pos, root.quat, root.alt.type = np.zeros(3), [1.0, 0.0, 0.0, 0.0], mujoco.mjtOrientation.mjORIENTATION_QUAT
     frame = compile_model(spec, path).body(root.name)
-    back_pos, back_quat, inner_pos, inner_quat = np.empty(3), np.empty(4), np.empty(3), np.empty(4)
-    mujoco.mju_negPose(back_pos, back_quat, frame.pos, frame.quat)
-    mujoco.mju_mulPose(inner_pos, inner_quat, back_pos, back_quat, *place)
-    root.pos, root.quat = inner_pos, inner_quat
+    root.pos, root.quat = relative_pose(stands, frame.pos, frame.quat)
 
 
 def pose_of(model: mujoco.MjModel, keyframe: str | None) -> np.ndarray:

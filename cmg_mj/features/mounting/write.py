@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 import time
 import tomllib
@@ -19,7 +18,6 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.features.export.names import LONGEST, RESERVED
 from cmg_mj.features.mounting.limits import (
     LOW_LIMIT_DEG,
-    NOISE_HINT,
     PUSH_S,
     WORLDS,
     PairDemands,
@@ -28,19 +26,19 @@ from cmg_mj.features.mounting.limits import (
     prospects,
     push_margin,
 )
-from cmg_mj.features.mounting.mount import MountedRobot, check_target, mount, with_scenario
+from cmg_mj.features.mounting.mount import PLUGIN, MountedRobot, check_target, mount, with_scenario
 from cmg_mj.features.mounting.push import OutOfTimeError, SimulatedPush, TimeLimit, simulated_push, standing_unpushed
 from cmg_mj.features.mounting.request import SCALES, MountRequest
 from cmg_mj.features.plugin.make import Plugin, make_plugin, require_tools, write_plugin
 from cmg_mj.features.plugin.tables import NAMES_IN_USE
 from cmg_mj.features.tuning import NoiseLevelResult, TuningResult, tune, tuned_scenario
 from cmg_mj.features.tuning.search import plain
-from cmg_mj.inputs.files import expanded, model_files
+from cmg_mj.inputs.files import expanded
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.observers.scaling import Number, scaled_parameters
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.results.folder import RunFolder, is_own, signed, whole_file
+from cmg_mj.results.folder import RunFolder, signed, whole_file
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 
@@ -93,12 +91,6 @@ class MountResult:
         """The scenario's file."""
         return self.path.with_suffix(".toml")
 
-    @property
-    def hints(self) -> list[str]:
-        """Clauses on what is likely to make the robot fall; none on noise if it falls in MuJoCo anyway."""
-        falls = self.simulated is not None and self.simulated.falls
-        return [hint for hint in self.prospects.hints if not (falls and hint.startswith(NOISE_HINT))]
-
     def figures(self) -> dict[str, Any]:
         """Return the figures that `cmg-mj mount --json` prints."""
         simulated = self.simulated
@@ -150,10 +142,10 @@ def mount_and_write(
     """
     file, axis = expanded(target, "-o"), request.name
     OBSERVER_CLASSES.find(observer)
-    check_target(file, expanded(robot, "ROBOT"), overwrite=overwrite)
+    endings = [".xml", ".toml", *([PLUGIN] if with_plugin else [])]
+    check_target(file, expanded(robot, "ROBOT"), endings, overwrite=overwrite)
     if with_plugin:
         require_tools()
-        _check_plugin_folder(file, expanded(robot, "ROBOT"), overwrite=overwrite)
     mounted = mount(robot, **vars(request))
     simulated = sufficient = plugin = None
     with with_scenario(file) as model:
@@ -168,7 +160,7 @@ def mount_and_write(
         experiment = write_scenario(model, mounted.path, observer, limits, axis, simulated)
         if with_plugin:
             made = make_plugin(experiment, plugin_name(file), start="spinning")
-            with RunFolder(_plugin_folder(file), overwrite=True) as folder:
+            with RunFolder(file.with_name(file.stem + PLUGIN), overwrite=True) as folder:
                 plugin = write_plugin(made, folder)
     plant = experiment.plant.single_axis(axis)
     demands = pair_demands(plant, experiment.law.rate_limit, request.scale)
@@ -268,27 +260,12 @@ def _round(value: Number) -> Number:
     return tuple(map(_round, value)) if isinstance(value, tuple) else float(f"{value:.{DIGITS}g}")
 
 
-def _plugin_folder(target: Path) -> Path:
-    return target.with_name(f"{target.stem}_plugin")
-
-
 def plugin_name(target: Path) -> str:
     """Name a plugin after a model's file, in letters, digits and _: `my robot.xml` has my_robot."""
     words = re.sub(r"[^A-Za-z0-9]+", "_", target.stem, flags=re.ASCII).strip("_")
     name = words if words[:1].isalpha() else f"robot_{words}".rstrip("_")
     taken = {name, name.lower()} & (RESERVED | NAMES_IN_USE)
     return f"{name}_robot" if taken else name[:LONGEST]
-
-
-def _check_plugin_folder(target: Path, robot: Path, *, overwrite: bool) -> None:
-    """Check that the folder of a plugin may be written, by the rules that hold for the mounted model."""
-    folder = _plugin_folder(target)
-    if robot.is_file() and any(folder.resolve() in file.resolve().parents for file in model_files(robot)):
-        raise InputError(f"-o {target}: {folder} holds the robot's own file, or one that it names; give another name")
-    if os.path.lexists(folder) and not is_own(folder):
-        raise InputError(f"-o {target}: {folder} holds files that cmg-mj did not write; give another name")
-    if folder.exists() and not overwrite:
-        raise InputError(f"-o {target}: {folder} exists; give another name, or --overwrite")
 
 
 class MountTuning(NamedTuple):
