@@ -212,19 +212,22 @@ def write_scenario(
         The prepared experiment.
     """
     plant = load_plant(model=str(model))
-    settings: dict[str, dict[str, Any]] = {
-        "": {"model": model.name, "equilibrium_bias_deg": 0.0, "initial_tilt_deg": 0.0}
+    names = [each.name for each in plant.axes]
+    parts: dict[str, dict[str, Any]] = {name: {"plant": {}, "observer": {}} for name in names}
+    parts[""] = {
+        "plant": {"model": model.name, "equilibrium_bias_deg": 0.0, "initial_tilt_deg": 0.0},
+        "observer": {"kind": observer},
     }
-    settings.setdefault(axis, {})["initial_tilt_deg"] = limits.start_tilt_deg if limits else 0.0
+    parts[axis]["plant"]["initial_tilt_deg"] = limits.start_tilt_deg if limits else 0.0
+    parameters: dict[str, Number] = {}
     for each in plant.axes:
         if each.reduced.pivot_arm:
-            settings.setdefault(each.name, {})["pivot_slides"] = True
-    axes: dict[str, dict[str, Any]] = {name: {"plant": its} for name, its in settings.items() if name}
-    parameters = {each.name: scaled_parameters(observer, each.reduced) for each in plant.axes}
-    observers = {name: {key: _round(value) for key, value in its.items()} for name, its in parameters.items() if its}
-    if len(observers) > 1:
-        for name, its in observers.items():
-            axes.setdefault(name, {})["observer"] = its
+            parts[each.name]["plant"]["pivot_slides"] = True
+        parameters = {name: _round(value) for name, value in scaled_parameters(observer, each.reduced).items()}
+        parts[each.name if len(names) > 1 else ""]["observer"] |= parameters
+    common = parts.pop("")
+    axes = {name: {section: its for section, its in part.items() if its} for name, part in parts.items()}
+    axes = {name: part for name, part in axes.items() if part}
     largest = simulated.impulse if simulated else limits.push_margin.median_impulse if limits else 0.0
     push = {
         **({"axis": axis} if axis else {}),
@@ -235,15 +238,15 @@ def write_scenario(
     fields = {
         "title": f"{robot.stem}, balanced",
         "duration_s": DURATION_S,
-        "plant": settings[""],
+        "plant": common["plant"],
         "controller": {"gains": "scaled"},
-        "observer": {"kind": observer, **(next(iter(observers.values())) if len(observers) == 1 else {})},
+        "observer": common["observer"],
         **({"axes": axes} if axes else {}),
         **({"push": [push]} if largest else {}),
     }
-    header = "[axes" if len(observers) > 1 else "[observer]"
+    header = "[axes" if len(names) > 1 else "[observer]"
     path = model.with_suffix(".toml")
-    _write_signed(path, fields, SCALED_COMMENT if observers else "", header)
+    _write_signed(path, fields, SCALED_COMMENT if parameters else "", header)
     return prepare(load_scenario(str(path)), like=plant)
 
 
