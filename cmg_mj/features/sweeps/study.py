@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.core.types import law_needs
-from cmg_mj.inputs.files import bundled, find, whole_path
+from cmg_mj.inputs.files import find, whole_path
 from cmg_mj.inputs.messages import complaints
 from cmg_mj.inputs.overrides import assign, override
 from cmg_mj.laws import LAW_CLASSES
@@ -461,8 +461,6 @@ def read_study(name: str) -> StudyFile | None:
         InputError: The file is neither.
     """
     path = find("scenarios", name, ".toml", "scenario")
-    if path.stem in bundled("scenarios"):
-        return None
     try:
         fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
@@ -482,7 +480,7 @@ def scenario_of(name: str, file: StudyFile, settings: Sequence[str] = ()) -> Sce
     fields = {key: value for key, value in copy.deepcopy(file.scenario).items() if key != "versions"}
     for setting in settings:
         override(fields, setting)
-    scenario = parse_scenario(fields, " ".join([name, *(["with"] * bool(settings)), *(f"--set {s}" for s in settings)]))
+    scenario = parse_scenario(fields, name)
     beside = find("scenarios", name, ".toml", "scenario").parent
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in settings):
         scenario = find_model(scenario, beside)
@@ -501,15 +499,11 @@ def varied_tracks(axis: VariedField) -> list[str]:
     """List the tracks that an axis varies."""
     files: list[str] = []
 
-    def note(file: str) -> str:
-        files.append(file)
-        return file
-
-    _change_tracks(axis, note)
+    _change_tracks(axis, files.append)  # the changed axis is not needed
     return files
 
 
-def _change_tracks(axis: VariedField, change: Callable[[str], str]) -> VariedField:
+def _change_tracks(axis: VariedField, change: Callable[[str], str | None]) -> VariedField:
     def changed(value: Any) -> Any:
         """Change the paths in a value: of a file, of a motion, or of all motions."""
         if isinstance(value, str):
