@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
 import mujoco
@@ -231,11 +230,11 @@ def pose_of(model: mujoco.MjModel, keyframe: str | None) -> np.ndarray:
 class ExistingAxes(NamedTuple):
     """Axes that a robot has already."""
 
-    lines: Sequence[str] = ()
+    lines: Sequence[str]
     """The hinges that it tilts about."""
-    drives: Sequence[str] = ()
+    drives: Sequence[str]
     """The gimbal and flywheel joints of the modules."""
-    speeds: Mapping[str, float] = MappingProxyType({})
+    speeds: Mapping[str, float]
     """Flywheel joint -> speed [rad/s]."""
 
 
@@ -259,7 +258,7 @@ def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str) ->
     if not (names and is_key):
         if is_key:
             raise InputError(f"has a keyframe {EQUILIBRIUM_KEY!r} already, which a mounted pair brings: rename it")
-        return ExistingAxes()
+        return ExistingAxes([], [], {})
     missing = missing_elements(spec)
     if missing:
         raise InputError(f"the robot has an axis already, and yet {missing[0]}")

@@ -7,7 +7,6 @@ import re
 import time
 import tomllib
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -185,8 +184,7 @@ def _sufficient_scale(
         pass
     finally:
         for file in (trial, trial.with_suffix(".toml")):
-            with suppress(OSError):
-                file.unlink()
+            file.unlink(missing_ok=True)
     return None
 
 
@@ -348,7 +346,7 @@ def tune_mounted(
 
     study = tune(experiment.scenario, worlds=TUNED_WORLDS, starts=1, on_share=on_share, stop=over)
     tuned = prepare(tuned_scenario(study, study.levels[0]), experiment.plant)
-    margins = [push_margin(loop.scenario, loop.design).median_impulse for loop in (experiment, tuned)]
+    margins = [push_margin(loop.design).median_impulse for loop in (experiment, tuned)]
     result = MountTuning(study, *margins, whole=not stopped)
     if result.in_use:
         fields = tomllib.loads(path.read_text(encoding="utf-8"))
