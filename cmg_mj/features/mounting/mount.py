@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.mounting.attach import add_sensors, attach_modules, check_room, module_names
+from cmg_mj.features.mounting.attach import add_sensors, attach_modules, check_room
 from cmg_mj.features.mounting.hold import as_qpos, hold_joints, pop_keyframes, poses_of, write_keyframe
 from cmg_mj.features.mounting.request import AxisLike, Base, Hold, MountRequest, find_place
 from cmg_mj.features.mounting.robot import (
@@ -216,7 +216,7 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     check_chains(spec)
     if request.base == "free":
         free_base(spec, body, path)
-    names = module_names(request.prefix, request.modules)
+    names = [f"{request.prefix}cube{i + 1}" for i in range(request.modules)]
     model = compile_model(spec, path)
     existing = find_existing_axes(spec, model, request.name)
     sites = [request.prefix + name for name in (TILT_ELEMENT, *SENSORS)]
