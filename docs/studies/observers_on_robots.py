@@ -128,7 +128,7 @@ def margins(experiment: Experiment, kind: str, ceiling: float) -> dict:
     for name, parameters in models.items():
         if name == "papers" or scaled_names(kind):
             loop = prepare(with_parameters(experiment.scenario, kind, parameters), experiment.plant)
-            row[name] = push_margin(loop.scenario, loop.design).median_impulse / ceiling
+            row[name] = push_margin(loop.design).median_impulse / ceiling
     return row
 
 

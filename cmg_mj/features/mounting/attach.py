@@ -54,11 +54,6 @@ def scaled_module(scale: float) -> mujoco.MjSpec:
     return spec
 
 
-def module_names(prefix: str, modules: int) -> list[str]:
-    """Return the names of the modules of an axis, `cube1` and so on."""
-    return [f"{prefix}cube{i + 1}" for i in range(modules)]
-
-
 def attach_modules(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, names: Sequence[str], scale: float
 ) -> list[mujoco.MjsFrame]:
@@ -154,13 +149,12 @@ def check_room(model: mujoco.MjModel, data: mujoco.MjData, modules: Sequence[str
         InputError: A module has no room.
     """
 
-    def half(body: int) -> float:
-        """Half of a module's edge [m]: its frame's edges lie so far out."""
-        first = model.body_geomadr[body]
-        return np.abs(model.geom_pos[first : first + model.body_geomnum[body]]).max()
-
     def reach(body: int, normal: np.ndarray) -> float:
-        return half(body) * np.abs(normal @ data.xmat[body].reshape(3, 3)).sum()
+        first = model.body_geomadr[body]
+        half = np.abs(
+            model.geom_pos[first : first + model.body_geomnum[body]]
+        ).max()  # the frame's edges lie so far out
+        return half * np.abs(normal @ data.xmat[body].reshape(3, 3)).sum()
 
     new = [model.body(f"{module}{HALF}").id for module in modules]
     lowest = min(data.xpos[body][2] - reach(body, UP) for body in new)

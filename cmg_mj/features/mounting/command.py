@@ -127,7 +127,7 @@ def mount(
         interrupted = interrupted or ctrl_c.noted
     show(figures, "\n".join(lines), as_json)
     if not as_json:
-        note_hints(result.hints)
+        note_hints(result.prospects.hints)
         run_it = shell_command("cmg-mj", "run", result.scenario_path)
         note(f"wrote {result.path} and {result.scenario_path}; try: {run_it}")
         if result.plugin:

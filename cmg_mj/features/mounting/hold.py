@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.features.mounting.request import MountRequest
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, ON_A_JOINT, joint_sizes
+from cmg_mj.plant.elements import EQUILIBRIUM_KEY, ON_A_JOINT
 from cmg_mj.plant.mjcf import posed
 
 _INTEGRATOR = int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
@@ -103,7 +104,8 @@ def hold_joints(
     Raises:
         InputError: A joint to release does not exist, or the file holds a joint elsewhere.
     """
-    names = [model.joint(i).name for i in range(model.njnt)]
+    poses = poses_of(model, pose)
+    names = list(poses)
     for name in request.release:
         if name not in names:
             raise InputError(f"--release {name}: no such joint; {nearest(name, names, 'its joints')}")
@@ -113,14 +115,12 @@ def hold_joints(
     free = {*moving, *request.release}
     for name, tie in ties.items():
         if name not in free:
-            _check_stands(model, pose, name, tie)
+            _check_stands(model.joint(name).qpos0[0], poses[name][0], name, tie)
         elif tie.name.startswith(f"{name}_held"):  # the user's own is the user's
             spec.delete(tie)
     tie_names = {tie.name for tie in spec.equalities}
     held = [name for name in names if name not in {*free, *on_servos, *ties}]
-    data = mujoco.MjData(model)
-    data.qpos[:] = pose
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, pose)
     for name in held:
         kind = model.joint(name).type[0]
         if kind == int(mujoco.mjtJoint.mjJNT_FREE):
@@ -130,18 +130,16 @@ def hold_joints(
             tie = _weld_ball(spec, model, data, name)
         else:
             tie = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=name)
-            address = model.joint(name).qposadr[0]
             tie.data[:] = 0.0
-            tie.data[0] = pose[address] - model.qpos0[address]
+            tie.data[0] = data.joint(name).qpos[0] - model.joint(name).qpos0[0]
         tie.name, tie.active = unused_name(f"{name}_held", tie_names), True
         tie.solimp[:2] = IMPEDANCE
     return held
 
 
-def _check_stands(model: mujoco.MjModel, pose: np.ndarray, name: str, tie: mujoco.MjsEquality) -> None:
+def _check_stands(reference: float, stands: float, name: str, tie: mujoco.MjsEquality) -> None:
     """Check that a constraint of the file holds a joint where the robot is to stand."""
-    address = model.joint(name).qposadr[0]
-    target, stands = float(model.qpos0[address] + tie.data[0]), float(pose[address])
+    target = reference + tie.data[0]
     if tie.type == mujoco.mjtEq.mjEQ_JOINT and abs(target - stands) > SAME_PLACE:
         raise InputError(
             f"equality {tie.name!r} holds the joint {name!r} at {target:.4g}, and the robot is to stand with it at "
@@ -153,9 +151,7 @@ def _weld_ball(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, 
     """Weld a ball joint's body to its parent, as they stand."""
     body = model.joint(joint).bodyid[0]
     parent = model.body_parentid[body]
-    back_pos, back_quat, place, turn = np.empty(3), np.empty(4), np.empty(3), np.empty(4)
-    mujoco.mju_negPose(back_pos, back_quat, data.xpos[parent], data.xquat[parent])
-    mujoco.mju_mulPose(place, turn, back_pos, back_quat, data.xpos[body], data.xquat[body])
+    place, turn = relative_pose(data.body(body), data.xpos[parent], data.xquat[parent])
     tie = spec.add_equality(
         type=mujoco.mjtEq.mjEQ_WELD,
         objtype=mujoco.mjtObj.mjOBJ_BODY,
@@ -166,22 +162,27 @@ def _weld_ball(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, 
     return tie
 
 
+def relative_pose(body: Any, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the position and quaternion of a body's data in a frame of this position and quaternion."""
+    back_pos, back_quat, place, turn = np.empty(3), np.empty(4), np.empty(3), np.empty(4)
+    mujoco.mju_negPose(back_pos, back_quat, position, quaternion)
+    mujoco.mju_mulPose(place, turn, back_pos, back_quat, body.xpos, body.xquat)
+    return place, turn
+
+
 def poses_of(model: mujoco.MjModel, qpos: np.ndarray) -> dict[str, np.ndarray]:
     """Return the position of each joint of a compiled model, by its name."""
-    poses = {}
-    for i in range(model.njnt):
-        address = model.jnt_qposadr[i]
-        poses[model.joint(i).name] = qpos[address : address + joint_sizes(int(model.jnt_type[i]))[0]].copy()
-    return poses
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    return {model.joint(i).name: data.joint(i).qpos.copy() for i in range(model.njnt)}
 
 
 def as_qpos(model: mujoco.MjModel, poses: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return poses as a vector qpos, with the model's reference for joints that have none."""
-    qpos = model.qpos0.copy()
+    data = mujoco.MjData(model)
     for name, values in poses.items():
-        address = model.joint(name).qposadr[0]
-        qpos[address : address + len(values)] = values
-    return qpos
+        data.joint(name).qpos = values
+    return data.qpos.copy()
 
 
 def write_keyframe(

@@ -23,7 +23,6 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.runs.batch import stack_worlds
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.scenario.design import Design, PlantNumbers
-from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import common_period
 from cmg_mj.stages.push import Push, Pushes
 
@@ -108,30 +107,29 @@ class PushMargin(NamedTuple):
     """Largest impulse in the worst of the worlds [N m s]."""
 
 
-def push_margin(scenario: Scenario, design: Design) -> PushMargin:
+def push_margin(design: Design) -> PushMargin:
     """Find the largest push from which the law, the observer and the sensors of a scenario recover together.
 
     The plant is the reduced model (4), upright, its gimbals turning as commanded.
 
     Args:
-        scenario: For its sensors, its rates and its fall angle.
-        design: The law and the observer for the plant.
+        design: The scenario with its sensors, its rates and its fall angle; the law and the observer for the plant.
 
     Returns:
         The largest pushes.
     """
     high = 1.5 * ceiling(design.rig.reduced, design.law.rate_limit).push_impulse(PUSH_S)
-    coarse = _largest_push(scenario, design, np.linspace(0.0, high, LEVELS))
+    coarse = _largest_push(design, np.linspace(0.0, high, LEVELS))
     if coarse is None:
         return PushMargin(0.0, 0.0)
     step = high / (LEVELS - 1)
     least, most = max(coarse.worst_impulse - step, 0.0), coarse.median_impulse + step
-    return _largest_push(scenario, design, np.linspace(least, most, LEVELS)) or coarse
+    return _largest_push(design, np.linspace(least, most, LEVELS)) or coarse
 
 
-def _largest_push(scenario: Scenario, design: Design, impulses: np.ndarray) -> PushMargin | None:
+def _largest_push(design: Design, impulses: np.ndarray) -> PushMargin | None:
     """Find each world's largest push up to which it stood all; None if most fell with the first."""
-    stood = _stands(scenario, design, impulses)
+    stood = _stands(design, impulses)
     count = np.where(stood.all(axis=1), len(impulses), np.argmin(stood, axis=1)) - 1  # per world
     if np.median(count) < 0:
         return None
@@ -139,10 +137,9 @@ def _largest_push(scenario: Scenario, design: Design, impulses: np.ndarray) -> P
     return PushMargin(float(np.median(largest)), float(largest.min()))
 
 
-def _stands(scenario: Scenario, design: Design, impulses: np.ndarray) -> np.ndarray:
+def _stands(design: Design, impulses: np.ndarray) -> np.ndarray:
     """Find which worlds stand which pushes, (WORLDS, n_impulses)."""
-    plant = design.rig
-    model = plant.reduced
+    scenario, plant, model = design.scenario, design.rig, design.rig.reduced
     h = common_period(scenario.model_copy(update={"push": [], "duration_s": 1.0}))
     alone = dataclasses.replace(design, scenario=scenario.model_copy(update={"open_loop_observers": []}))
     gimbal_angle = GimbalAngle((1.0,) * model.gimbals, (0.0,) * model.gimbals)
@@ -251,9 +248,6 @@ POLE_DIFFERENCE = 0.1
 NOISY = 0.75
 """Share of E. If the worst world of the reduced model recovers from less, the sensors' noise alone may fell a robot."""
 
-NOISE_HINT = "the pair is so small that the sensors' noise alone may fell the robot"
-"""Beginning of the hint that tells so."""
-
 
 @dataclass(frozen=True)
 class Prospects:
@@ -311,8 +305,8 @@ class Prospects:
         if self.noisy:
             share = self.push_margin.worst_impulse / self.push_margin.median_impulse
             hints.append(
-                f"{NOISE_HINT}; with other noise it may fall of smaller pushes than it stands here (its "
-                f"reduced model's worst world recovers from {share:.0%} of E)"
+                "the pair is so small that the sensors' noise alone may fell the robot (its reduced model's worst "
+                f"world recovers from {share:.0%} of E)"
             )
         if self.push_margin.median_impulse == 0.0:
             hints.append("with this controller it falls without a push")
@@ -357,7 +351,7 @@ def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = Tru
     with set_control_callback(None), quiet():
         pole = simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias)
         touching = overlap(plant.model, plant.key, plant.axis.line, pole)
-    margin = push_margin(experiment.scenario, experiment.design) if with_margin else PushMargin(0.0, 0.0)
+    margin = push_margin(experiment.design) if with_margin else PushMargin(0.0, 0.0)
     poles = sliding_poles(experiment.law, plant)
     return Prospects(plant.reduced, limit, margin, pole, touching, poles)
 

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.mounting.attach import add_sensors, attach_modules, check_room, module_names
+from cmg_mj.features.mounting.attach import add_sensors, attach_modules, check_room
 from cmg_mj.features.mounting.hold import as_qpos, hold_joints, pop_keyframes, poses_of, write_keyframe
 from cmg_mj.features.mounting.request import AxisLike, Base, Hold, MountRequest, find_place
 from cmg_mj.features.mounting.robot import (
@@ -38,7 +38,10 @@ from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.build import check_rig
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, axis_modules
 from cmg_mj.plant.mjcf import as_mjcf, compile_model, parse, posed, quiet, set_control_callback
-from cmg_mj.results.folder import is_signed, signed, whole_file
+from cmg_mj.results.folder import is_own, is_signed, signed, whole_file
+
+PLUGIN = "_plugin"
+"""Ending of a plugin's folder, behind the stem of the model's file."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,7 @@ class MountedRobot:
                 one that no mount wrote.
         """
         target = expanded(path, "-o")
-        check_target(target, self.path, (".xml",))
+        check_target(target, self.path, [".xml"])
         spec = self.spec.copy()
         folder = Path(os.path.abspath(target.parent))
         for field in ("meshdir", "texturedir"):
@@ -88,16 +91,14 @@ class MountedRobot:
         return target
 
 
-def check_target(
-    target: Path, robot: Path, endings: Sequence[str] = (".xml", ".toml"), *, overwrite: bool = True
-) -> None:
+def check_target(target: Path, robot: Path, endings: Sequence[str], *, overwrite: bool = True) -> None:
     """Check that a mounted robot may be written to a file.
 
     Args:
-        target: The file to write.
+        target: The model's file.
         robot: The robot's own file, if there is one.
-        endings: Endings of the files that are written.
-        overwrite: Whether files that a mount has written may be replaced. Others never may.
+        endings: Endings, behind the target's stem, of the files and of the plugin's folder that are written.
+        overwrite: Whether those that a mount has written may be replaced. Others never may.
 
     Raises:
         InputError: The target is no .xml file, has no folder, or would replace what may not be replaced.
@@ -108,14 +109,14 @@ def check_target(
         )
     if not target.parent.is_dir():
         raise InputError(f"-o {target}: cannot be written: there is no folder {target.parent}")
-    originals = model_files(robot) if robot.is_file() else []
-    for path in map(target.with_suffix, endings):
-        if path.is_dir():
-            raise InputError(f"-o {target}: {path} is a folder")
-        if path.exists() and any(path.samefile(file) for file in originals):
+    originals = [file.resolve() for file in model_files(robot)] if robot.is_file() else []
+    for ending in endings:
+        path = target.with_name(target.stem + ending)
+        if any(path.resolve() in (file, *file.parents) for file in originals):
             raise InputError(f"-o {target}: {path} is the robot's own file, or one that it names; give another name")
-        if os.path.lexists(path) and not is_signed(path):
-            raise InputError(f"-o {target}: {path} is not a file of cmg-mj mount, and would be lost; give another name")
+        is_ours = is_own(path) if ending == PLUGIN else is_signed(path)
+        if os.path.lexists(path) and not is_ours:
+            raise InputError(f"-o {target}: {path} is not of cmg-mj mount, and would be lost; give another name")
         if path.exists() and not overwrite:
             raise InputError(f"-o {target}: {path} exists; give another name, or --overwrite")
 
@@ -215,7 +216,7 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     check_chains(spec)
     if request.base == "free":
         free_base(spec, body, path)
-    names = module_names(request.prefix, request.modules)
+    names = [f"{request.prefix}cube{i + 1}" for i in range(request.modules)]
     model = compile_model(spec, path)
     existing = find_existing_axes(spec, model, request.name)
     sites = [request.prefix + name for name in (TILT_ELEMENT, *SENSORS)]

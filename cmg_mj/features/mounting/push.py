@@ -93,8 +93,6 @@ class SimulatedPush(NamedTuple):
     """Largest torque of a gimbal servo that this push takes [N m]; None if that was not seen."""
     servo_rate: float | None = None
     """Largest rate of a gimbal that it takes [rad/s]."""
-    others_fell: bool = False
-    """True if the time ended after some of the twenty others had fallen with a larger push than `impulse`."""
     worlds: int = WORLDS
     """Worlds that were tried without a push: ten, and twenty others where it is `Prospects.noisy`."""
 
@@ -144,7 +142,7 @@ def simulated_push(
     def all_stand(impulse: float) -> bool:
         return attempt(impulse, range(WORLDS), after).all_stand
 
-    found, others_fell = 0.0, False
+    found = 0.0
     try:
         if all_stand(high):
             low, high = high, expected
@@ -158,10 +156,8 @@ def simulated_push(
             result = attempt(found, range(WORLDS, WORLDS + OTHER_WORLDS), longer)
             if result.all_stand:
                 return SimulatedPush(standing, found, True, result.servo_torque, result.servo_rate, worlds=worlds)
-            others_fell = True
     except OutOfTimeError:
-        found = found or (1.0 - MARGIN) * low
-        return SimulatedPush(standing, found, complete=False, others_fell=others_fell, worlds=worlds)
+        return SimulatedPush(standing, found or (1.0 - MARGIN) * low, complete=False, worlds=worlds)
     return SimulatedPush(standing, worlds=worlds)
 
 

@@ -91,13 +91,8 @@ def _simulated(simulated: SimulatedPush | None) -> str:
         if simulated.complete:
             reason = f"not even {MIN_SHARE:.0%} of any controller's push"
         return f"stands in MuJoCo only unpushed ({reason}); "
-    if simulated.complete:
-        more = f"and all of {OTHER_WORLDS} others"
-    elif simulated.others_fell:
-        more = f"some of {OTHER_WORLDS} others fell with a larger one, and {MAX_SEARCH_S:g} s did not suffice to try "
-        more += "this one"
-    else:
-        more = f"{MAX_SEARCH_S:g} s did not suffice for others"
+    others = f"and all of {OTHER_WORLDS} others"
+    more = others if simulated.complete else f"{MAX_SEARCH_S:g} s did not suffice for {OTHER_WORLDS} others"
     return (
         f"stands a push of {simulated.impulse / PUSH_S:.3g} N m for {PUSH_S:g} s either way (MuJoCo, all of {WORLDS} "
         f"worlds, less a tenth; {more}); "

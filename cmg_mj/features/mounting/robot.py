@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.features.mounting.hold import joint_held, unused_name
+from cmg_mj.features.mounting.hold import joint_held, relative_pose, unused_name
 from cmg_mj.inputs.files import expanded, require_file
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.checks import STEPS_S
@@ -197,18 +196,14 @@ def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> None:
                     "replaces: take it out of the file"
                 )
     model = compile_model(spec, path)
-    data = posed(model, model.qpos0)
-    place = data.body(root.name).xpos, data.body(root.name).xquat
+    stands = posed(model, model.qpos0).body(root.name)
     for element in (*joints, *spec.keys):  # keyframes have the joints that are gone
         spec.delete(element)
     root.add_freejoint(name=unused_name(f"{root.name}_free", {joint.name for joint in spec.joints}))
     # A child of the world is placed in world coordinates, whatever <frame> it is in.
     root.pos, root.quat, root.alt.type = np.zeros(3), [1.0, 0.0, 0.0, 0.0], mujoco.mjtOrientation.mjORIENTATION_QUAT
     frame = compile_model(spec, path).body(root.name)
-    back_pos, back_quat, inner_pos, inner_quat = np.empty(3), np.empty(4), np.empty(3), np.empty(4)
-    mujoco.mju_negPose(back_pos, back_quat, frame.pos, frame.quat)
-    mujoco.mju_mulPose(inner_pos, inner_quat, back_pos, back_quat, *place)
-    root.pos, root.quat = inner_pos, inner_quat
+    root.pos, root.quat = relative_pose(stands, frame.pos, frame.quat)
 
 
 def pose_of(model: mujoco.MjModel, keyframe: str | None) -> np.ndarray:
@@ -235,11 +230,11 @@ def pose_of(model: mujoco.MjModel, keyframe: str | None) -> np.ndarray:
 class ExistingAxes(NamedTuple):
     """Axes that a robot has already."""
 
-    lines: Sequence[str] = ()
+    lines: Sequence[str]
     """The hinges that it tilts about."""
-    drives: Sequence[str] = ()
+    drives: Sequence[str]
     """The gimbal and flywheel joints of the modules."""
-    speeds: Mapping[str, float] = MappingProxyType({})
+    speeds: Mapping[str, float]
     """Flywheel joint -> speed [rad/s]."""
 
 
@@ -263,7 +258,7 @@ def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str) ->
     if not (names and is_key):
         if is_key:
             raise InputError(f"has a keyframe {EQUILIBRIUM_KEY!r} already, which a mounted pair brings: rename it")
-        return ExistingAxes()
+        return ExistingAxes([], [], {})
     missing = missing_elements(spec)
     if missing:
         raise InputError(f"the robot has an axis already, and yet {missing[0]}")

@@ -65,13 +65,14 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
     data = posed(model, pose)
     data.act[:], data.ctrl[:] = rest_controls(model, data)  # servos keep the joints where they are
     mujoco.mj_forward(model, data)
-    _touch_down(model, data, joint)
+    tree = model.body_rootid == model.body_rootid[model.jnt_bodyid[joint]]
+    _touch_down(model, data, tree, model.jnt_qposadr[joint] + 2)
     leaned = 0.0
     for _ in range(MAX_ROUNDS):
         _rest(model, data, joint, direction)
-        point, direction = _support(model, data, joint, direction)
-        body = int(model.jnt_bodyid[joint])
-        arm = data.subtree_com[body] - point
+        mass = data.subtree_com[model.jnt_bodyid[joint]]
+        point, direction = _support(model, data, tree, float(mass[2]), direction)
+        arm = mass - point
         lean = math.atan2(float(arm @ np.cross(direction, UP)), float(arm[2]))
         leaned += lean
         if abs(math.degrees(leaned)) > MAX_LEAN_DEG:
@@ -81,18 +82,20 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
             )
         if abs(math.degrees(lean)) < UPRIGHT_DEG:
             return Support(data.qpos.copy(), point, direction)
-        _turn(model, data, joint, point, direction, lean)
+        # Turn the robot back about the line by this angle, and stop it.
+        pose = data.qpos[model.jnt_qposadr[joint] :]  # a view
+        quaternion, moved, turned = np.empty(4), np.empty(3), np.empty(4)
+        mujoco.mju_axisAngle2Quat(quaternion, direction, -lean)
+        mujoco.mju_rotVecQuat(moved, pose[:3] - point, quaternion)
+        mujoco.mju_mulQuat(turned, quaternion, pose[3:7])
+        pose[:3], pose[3:7] = point + moved, turned
+        data.qvel[:] = 0.0
+        mujoco.mj_forward(model, data)
     raise InputError("the robot does not come to stand upright; give a keyframe in which it stands")
 
 
-def _bodies_on(model: mujoco.MjModel, joint: int) -> np.ndarray:
-    """Return which bodies hang on a free joint, (nbody,)."""
-    return model.body_rootid == model.body_rootid[model.jnt_bodyid[joint]]
-
-
-def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> None:
-    """Lower or lift the robot until it touches the fixed world."""
-    tree = _bodies_on(model, joint)
+def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, height: int) -> None:
+    """Lower or lift the robot, whose height has this place in qpos, until it touches the fixed world."""
     robot = [geom for geom in range(model.ngeom) if tree[model.geom_bodyid[geom]]]
     floor = [geom for geom in range(model.ngeom) if model.body_weldid[model.geom_bodyid[geom]] == 0]
     gaps = [
@@ -107,7 +110,6 @@ def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> None:
             "the robot has nothing to stand on: no geom of the robot's collides with one of the world's; give it a "
             'floor (<geom type="plane" size="5 5 0.1"/> in the worldbody), and let contacts be on'
         )
-    height = model.jnt_qposadr[joint] + 2
     data.qpos[height] -= min(gaps)
     mujoco.mj_forward(model, data)
     # A contact with a margin already pushes at a distance: a robot let down farther is thrown up.
@@ -151,11 +153,10 @@ def _rest(model: mujoco.MjModel, data: mujoco.MjData, joint: int, direction: np.
 
 
 def _support(
-    model: mujoco.MjModel, data: mujoco.MjData, joint: int, direction: np.ndarray
+    model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, mass_height: float, direction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the middle of the contacts, (3,) [m], and the direction of their line, (3,)."""
-    tree, force = _bodies_on(model, joint), np.zeros(6)
-    points, loads = [], []
+    points, loads, force = [], [], np.zeros(6)
     for i, contact in enumerate(data.contact[: data.ncon]):
         mujoco.mj_contactForce(model, data, i, force)
         one, other = tree[model.geom_bodyid[[contact.geom1, contact.geom2]]]
@@ -174,27 +175,12 @@ def _support(
     if float(np.ptp(places @ along)) > LONG_M and float(along @ direction) > math.cos(math.radians(MAX_LEAN_DEG)):
         direction = along
     width = float(np.ptp(places @ np.cross(direction, UP)))
-    height = float(data.subtree_com[model.jnt_bodyid[joint]][2] - middle[2])
-    if math.degrees(math.atan2(0.5 * width, max(height, 1e-9))) > STANDS_DEG:
+    if math.degrees(math.atan2(0.5 * width, max(mass_height - middle[2], 1e-9))) > STANDS_DEG:
         raise InputError(
             f"the robot stands by itself: its support is {width:.3g} m wide across the axis; a pair balances a robot "
             "that stands on a line or a point (another --axis?)"
         )
     return middle, direction
-
-
-def _turn(
-    model: mujoco.MjModel, data: mujoco.MjData, joint: int, point: np.ndarray, direction: np.ndarray, lean: float
-) -> None:
-    """Turn the robot back about the line by the angle that its mass leans, and stop it."""
-    pose = data.qpos[model.jnt_qposadr[joint] :]  # a view
-    quaternion, moved, turned = np.empty(4), np.empty(3), np.empty(4)
-    mujoco.mju_axisAngle2Quat(quaternion, direction, -lean)
-    mujoco.mju_rotVecQuat(moved, pose[:3] - point, quaternion)
-    mujoco.mju_mulQuat(turned, quaternion, pose[3:7])
-    pose[:3], pose[3:7] = point + moved, turned
-    data.qvel[:] = 0.0
-    mujoco.mj_forward(model, data)
 
 
 MIN_HEIGHT_M = 1e-3

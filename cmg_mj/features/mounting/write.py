@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 import time
 import tomllib
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,7 +17,6 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.features.export.names import LONGEST, RESERVED
 from cmg_mj.features.mounting.limits import (
     LOW_LIMIT_DEG,
-    NOISE_HINT,
     PUSH_S,
     WORLDS,
     PairDemands,
@@ -28,19 +25,19 @@ from cmg_mj.features.mounting.limits import (
     prospects,
     push_margin,
 )
-from cmg_mj.features.mounting.mount import MountedRobot, check_target, mount, with_scenario
+from cmg_mj.features.mounting.mount import PLUGIN, MountedRobot, check_target, mount, with_scenario
 from cmg_mj.features.mounting.push import OutOfTimeError, SimulatedPush, TimeLimit, simulated_push, standing_unpushed
 from cmg_mj.features.mounting.request import SCALES, MountRequest
 from cmg_mj.features.plugin.make import Plugin, make_plugin, require_tools, write_plugin
 from cmg_mj.features.plugin.tables import NAMES_IN_USE
 from cmg_mj.features.tuning import NoiseLevelResult, TuningResult, tune, tuned_scenario
 from cmg_mj.features.tuning.search import plain
-from cmg_mj.inputs.files import expanded, model_files
+from cmg_mj.inputs.files import expanded
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.observers.scaling import Number, scaled_parameters
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.results.folder import RunFolder, is_own, signed, whole_file
+from cmg_mj.results.folder import RunFolder, signed, whole_file
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 
@@ -93,12 +90,6 @@ class MountResult:
         """The scenario's file."""
         return self.path.with_suffix(".toml")
 
-    @property
-    def hints(self) -> list[str]:
-        """Clauses on what is likely to make the robot fall; none on noise if it falls in MuJoCo anyway."""
-        falls = self.simulated is not None and self.simulated.falls
-        return [hint for hint in self.prospects.hints if not (falls and hint.startswith(NOISE_HINT))]
-
     def figures(self) -> dict[str, Any]:
         """Return the figures that `cmg-mj mount --json` prints."""
         simulated = self.simulated
@@ -150,10 +141,10 @@ def mount_and_write(
     """
     file, axis = expanded(target, "-o"), request.name
     OBSERVER_CLASSES.find(observer)
-    check_target(file, expanded(robot, "ROBOT"), overwrite=overwrite)
+    endings = [".xml", ".toml", *([PLUGIN] if with_plugin else [])]
+    check_target(file, expanded(robot, "ROBOT"), endings, overwrite=overwrite)
     if with_plugin:
         require_tools()
-        _check_plugin_folder(file, expanded(robot, "ROBOT"), overwrite=overwrite)
     mounted = mount(robot, **vars(request))
     simulated = sufficient = plugin = None
     with with_scenario(file) as model:
@@ -168,7 +159,7 @@ def mount_and_write(
         experiment = write_scenario(model, mounted.path, observer, limits, axis, simulated)
         if with_plugin:
             made = make_plugin(experiment, plugin_name(file), start="spinning")
-            with RunFolder(_plugin_folder(file), overwrite=True) as folder:
+            with RunFolder(file.with_name(file.stem + PLUGIN), overwrite=True) as folder:
                 plugin = write_plugin(made, folder)
     plant = experiment.plant.single_axis(axis)
     demands = pair_demands(plant, experiment.law.rate_limit, request.scale)
@@ -193,8 +184,7 @@ def _sufficient_scale(
         pass
     finally:
         for file in (trial, trial.with_suffix(".toml")):
-            with suppress(OSError):
-                file.unlink()
+            file.unlink(missing_ok=True)
     return None
 
 
@@ -220,19 +210,22 @@ def write_scenario(
         The prepared experiment.
     """
     plant = load_plant(model=str(model))
-    settings: dict[str, dict[str, Any]] = {
-        "": {"model": model.name, "equilibrium_bias_deg": 0.0, "initial_tilt_deg": 0.0}
+    names = [each.name for each in plant.axes]
+    parts: dict[str, dict[str, Any]] = {name: {"plant": {}, "observer": {}} for name in names}
+    parts[""] = {
+        "plant": {"model": model.name, "equilibrium_bias_deg": 0.0, "initial_tilt_deg": 0.0},
+        "observer": {"kind": observer},
     }
-    settings.setdefault(axis, {})["initial_tilt_deg"] = limits.start_tilt_deg if limits else 0.0
+    parts[axis]["plant"]["initial_tilt_deg"] = limits.start_tilt_deg if limits else 0.0
+    parameters: dict[str, Number] = {}
     for each in plant.axes:
         if each.reduced.pivot_arm:
-            settings.setdefault(each.name, {})["pivot_slides"] = True
-    axes: dict[str, dict[str, Any]] = {name: {"plant": its} for name, its in settings.items() if name}
-    parameters = {each.name: scaled_parameters(observer, each.reduced) for each in plant.axes}
-    observers = {name: {key: _round(value) for key, value in its.items()} for name, its in parameters.items() if its}
-    if len(observers) > 1:
-        for name, its in observers.items():
-            axes.setdefault(name, {})["observer"] = its
+            parts[each.name]["plant"]["pivot_slides"] = True
+        parameters = {name: _round(value) for name, value in scaled_parameters(observer, each.reduced).items()}
+        parts[each.name if len(names) > 1 else ""]["observer"] |= parameters
+    common = parts.pop("")
+    axes = {name: {section: its for section, its in part.items() if its} for name, part in parts.items()}
+    axes = {name: part for name, part in axes.items() if part}
     largest = simulated.impulse if simulated else limits.push_margin.median_impulse if limits else 0.0
     push = {
         **({"axis": axis} if axis else {}),
@@ -243,15 +236,15 @@ def write_scenario(
     fields = {
         "title": f"{robot.stem}, balanced",
         "duration_s": DURATION_S,
-        "plant": settings[""],
+        "plant": common["plant"],
         "controller": {"gains": "scaled"},
-        "observer": {"kind": observer, **(next(iter(observers.values())) if len(observers) == 1 else {})},
+        "observer": common["observer"],
         **({"axes": axes} if axes else {}),
         **({"push": [push]} if largest else {}),
     }
-    header = "[axes" if len(observers) > 1 else "[observer]"
+    header = "[axes" if len(names) > 1 else "[observer]"
     path = model.with_suffix(".toml")
-    _write_signed(path, fields, SCALED_COMMENT if observers else "", header)
+    _write_signed(path, fields, SCALED_COMMENT if parameters else "", header)
     return prepare(load_scenario(str(path)), like=plant)
 
 
@@ -268,27 +261,12 @@ def _round(value: Number) -> Number:
     return tuple(map(_round, value)) if isinstance(value, tuple) else float(f"{value:.{DIGITS}g}")
 
 
-def _plugin_folder(target: Path) -> Path:
-    return target.with_name(f"{target.stem}_plugin")
-
-
 def plugin_name(target: Path) -> str:
     """Name a plugin after a model's file, in letters, digits and _: `my robot.xml` has my_robot."""
     words = re.sub(r"[^A-Za-z0-9]+", "_", target.stem, flags=re.ASCII).strip("_")
     name = words if words[:1].isalpha() else f"robot_{words}".rstrip("_")
     taken = {name, name.lower()} & (RESERVED | NAMES_IN_USE)
     return f"{name}_robot" if taken else name[:LONGEST]
-
-
-def _check_plugin_folder(target: Path, robot: Path, *, overwrite: bool) -> None:
-    """Check that the folder of a plugin may be written, by the rules that hold for the mounted model."""
-    folder = _plugin_folder(target)
-    if robot.is_file() and any(folder.resolve() in file.resolve().parents for file in model_files(robot)):
-        raise InputError(f"-o {target}: {folder} holds the robot's own file, or one that it names; give another name")
-    if os.path.lexists(folder) and not is_own(folder):
-        raise InputError(f"-o {target}: {folder} holds files that cmg-mj did not write; give another name")
-    if folder.exists() and not overwrite:
-        raise InputError(f"-o {target}: {folder} exists; give another name, or --overwrite")
 
 
 class MountTuning(NamedTuple):
@@ -368,7 +346,7 @@ def tune_mounted(
 
     study = tune(experiment.scenario, worlds=TUNED_WORLDS, starts=1, on_share=on_share, stop=over)
     tuned = prepare(tuned_scenario(study, study.levels[0]), experiment.plant)
-    margins = [push_margin(loop.scenario, loop.design).median_impulse for loop in (experiment, tuned)]
+    margins = [push_margin(loop.design).median_impulse for loop in (experiment, tuned)]
     result = MountTuning(study, *margins, whole=not stopped)
     if result.in_use:
         fields = tomllib.loads(path.read_text(encoding="utf-8"))

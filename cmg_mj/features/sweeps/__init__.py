@@ -11,8 +11,7 @@ import pyarrow as pa
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.features.sweeps.cells import Trials, cells_in_blocks
 from cmg_mj.features.sweeps.chunks import compute, table_of, trials_schema
-from cmg_mj.features.sweeps.sobol import index_rows, index_table
-from cmg_mj.features.sweeps.study import WORLDS, SweepStudy, Variation, check_values, parse_axis, sampling
+from cmg_mj.features.sweeps.study import WORLDS, SweepStudy, Variation, check_values, parse_axis
 from cmg_mj.results.trajectory import frame_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
@@ -30,17 +29,15 @@ class SweepResult:
         trials: A row a trial: its point, what is varied, observer, world, outcome, and the figures of its run.
         cells: A row a point and observer: means with 95 % intervals, the share of falls with Wilson's interval, and the
             paired difference to the best observer of the point.
-        indices: A row a figure, observer and field, of a design for Sobol indices; None of another.
     """
 
     study: SweepStudy
     trials: pa.Table
     cells: pa.Table
-    indices: pa.Table | None = None
 
     def keys(self) -> list[str]:
-        """List the names of the tables that there are: `trials`, `cells`, perhaps `indices`."""
-        return ["trials", "cells", *(["indices"] if self.indices is not None else [])]
+        """List the names of the tables: `trials`, `cells`."""
+        return ["trials", "cells"]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.keys())
@@ -57,7 +54,7 @@ class SweepResult:
         """Make a pandas frame of one table.
 
         Args:
-            table: The table's name: `cells`, `trials` or `indices`.
+            table: The table's name: `cells` or `trials`.
 
         Returns:
             The frame.
@@ -76,7 +73,6 @@ def sweep(
     observers: Sequence[str] | None = None,
     worlds: int = WORLDS,
     sample: int | None = None,
-    sobol: int | None = None,
 ) -> SweepResult:
     """Run a scenario in every cell: every point of what is varied with every observer.
 
@@ -87,7 +83,6 @@ def sweep(
             are those of a loop with the true rate.
         worlds: Trials a cell: world i has the same noise in every cell.
         sample: Number of points of a quasi-random design of the ranges and lists, instead of every combination.
-        sobol: Rows of a design for Sobol indices instead, a power of two.
 
     Returns:
         The trials and cells, as tables.
@@ -95,21 +90,14 @@ def sweep(
     Raises:
         InputError: A field or its values are not written so or do not fit the design, or an observer cannot run.
     """
-    design, n = sampling(sample, sobol) or ("grid", 0)
     base = load_scenario(scenario) if isinstance(scenario, str) else scenario
     axes = tuple(parse_axis(field, values, f"vary: {field!r}") for field, values in vary.items())
     if isinstance(observers, str):
         raise InputError(f"observers = {observers!r}: must be a list of names, such as ['linear', 'ltv']")
     names = (base.observer.kind,) if observers is None else tuple(observers)
-    study = SweepStudy(base, axes, names, worlds, design, n)
-
+    study = SweepStudy(base, axes, names, worlds, *(("grid", 0) if sample is None else ("sample", sample)))
     check_values(study)
     rows = (compute(study, *study.chunk(number)) for number in range(study.n_chunks))
     table = pa.concat_tables(table_of(chunk_rows, trials_schema(study)) for chunk_rows in rows)
     trials = Trials(study, [table])
-    return SweepResult(
-        study,
-        table,
-        pa.concat_tables(cells_in_blocks(trials)),
-        index_table(index_rows(trials)) if design == "sobol" else None,
-    )
+    return SweepResult(study, table, pa.concat_tables(cells_in_blocks(trials)))

@@ -120,6 +120,22 @@ def fell_interval(fell: int, trials: int) -> Interval:
     return Interval(fell / trials, float(ends.low), float(ends.high))
 
 
+def fall_shares(trials: Trials) -> np.ndarray:
+    """Compute the share of falls among those that fell or stood, and its interval's ends, (n_points, n_observers, 3).
+
+    NaN where all trials of a cell were refused or stopped.
+    """
+    fell, known = fall_counts(trials)
+    counts = zip(fell.ravel().tolist(), known.ravel().tolist(), strict=True)
+    rows = [fell_interval(*count) if count[1] else (math.nan,) * 3 for count in counts]
+    return np.reshape(rows, (*fell.shape, 3))
+
+
+def fall_counts(trials: Trials) -> tuple[np.ndarray, np.ndarray]:
+    """Count the worlds that fell, and those that fell or stood, (n_points, n_observers) each."""
+    return trials.fell.sum(axis=2), (trials.fell | trials.stood).sum(axis=2)
+
+
 def least(means: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.ndarray]:
     """Find the place of the least among some observers, -1 where there is none, (..., n_observers) -> (...) each.
 
@@ -254,7 +270,7 @@ def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
     """Count the points at which each observer leads, and each baseline is ahead.
 
     Args:
-        trials: The trials. In a design for indices the rows A and B count, whose points are independent.
+        trials: The trials.
         key: The figure, less of which is better.
 
     Returns:
@@ -262,8 +278,6 @@ def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
     """
     study = trials.study
     figure = trials.figure(key)
-    if study.design == "sobol":
-        figure = figure[: 2 * study.n]
     best, sure, error = least_error(figure, study.contenders)
     ahead = baselines_ahead(study, figure, error)
     rows = []

@@ -76,27 +76,22 @@ def compute(
 
         Each trial is through or has raised by itself, so that no row depends on another's.
         """
-        stopped = run_once(batch, tick)
-        half = (len(stopped) + 1) // 2
-        for part in (stopped[:half], stopped[half:]):
-            if part:
-                run({trial: batch[trial] for trial in part}, tick)
-
-    def run_once(batch: Mapping[Trial, Experiment], tick: OnProgress) -> list[Trial]:
-        """Run trials in one batch; return those that another one may have stopped."""
         worlds = [world for _, world in batch]
         try:
             result = run_batch(list(batch.values()), worlds, keep_trajectory=False, on_progress=tick, threads=threads)
         except Exception as error:  # a user's observer may fail in any way
-            if len(batch) > 1:
-                return list(batch)
             results.update(dict.fromkeys(batch, unfinished("stopped", raised(error))))
-            return []
-        if any(outcome.kind == "interrupted" for outcome in result.outcomes):
-            raise KeyboardInterrupt
-        rows = result.rows(observer if observer in study.baselines else None)
-        results.update(zip(batch, rows, strict=True))
-        return [trial for trial, outcome in zip(batch, result.outcomes, strict=True) if outcome.with_others]
+            stopped = list(batch) if len(batch) > 1 else []
+        else:
+            if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+                raise KeyboardInterrupt
+            rows = result.rows(observer if observer in study.baselines else None)
+            results.update(zip(batch, rows, strict=True))
+            stopped = [trial for trial, outcome in zip(batch, result.outcomes, strict=True) if outcome.with_others]
+        half = (len(stopped) + 1) // 2
+        for part in (stopped[:half], stopped[half:]):
+            if part:
+                run({trial: batch[trial] for trial in part}, tick)
 
     done = len(results) / len(trials)
     for batch in batches.values():
@@ -198,8 +193,8 @@ def _seconds_a_trial(study: SweepStudy, observer: str) -> float:
     trials = study.n_points * study.worlds
     stretches = min(STRETCHES, trials) if study.apart else 1
     count = min(TIMED, trials // stretches)
-    starts = [trials * i // stretches for i in range(stretches)]
-    return sum(_seconds(study, observer, study.stretch(first, count)) for first in starts) / stretches / count
+    parts = [study.stretch(trials * i // stretches, count) for i in range(stretches)]
+    return sum(_seconds(study, observer, part) for part in parts) / stretches / count
 
 
 def _seconds(study: SweepStudy, observer: str, trials: Sequence[Trial]) -> float:
@@ -227,7 +222,7 @@ def _seconds(study: SweepStudy, observer: str, trials: Sequence[Trial]) -> float
 StudyFields: TypeAlias = dict[str, dict[str, Any]]
 """A study file's sections."""
 STUDY, CHUNKS, TRIALS, CELLS = "study.toml", "chunks", "trials.parquet", "cells.parquet"
-INDICES, REPORT = "indices.parquet", "report.md"
+REPORT = "report.md"
 PICTURES = ("map_velocity_error.png", "map_push_error.png", "map_falls.png", "curves.png")
 KEY = b"cmg_mj.chunk"
 """Key of a chunk's hash in its file's metadata."""
@@ -270,7 +265,7 @@ class Store:
             with whole_file(store.folder / STUDY) as temporary:
                 temporary.write_text(tomli_w.dumps(fields), encoding="utf-8")
             chunks = [f"{CHUNKS}/{store.path(number).name}" for number in range(study.n_chunks)]
-            names = [STUDY, TRIALS, CELLS, INDICES, REPORT, *PICTURES, *chunks]
+            names = [STUDY, TRIALS, CELLS, REPORT, *PICTURES, *chunks]
             write_marker(store.folder, names, complete=False)
         except OSError as error:
             raise InputError(f"--out {path}: cannot be written: {error.strerror or error}") from error
@@ -357,15 +352,12 @@ def _may_take(folder: Path, fields: StudyFields, overwrite: bool) -> bool:
             there = tomllib.loads((folder / STUDY).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             there = {}
-        if not any(folder.iterdir()) or _without_versions(there) == _without_versions(fields):
+        there["scenario"] = {**there.get("scenario", {}), "versions": fields["scenario"]["versions"]}
+        if not any(folder.iterdir()) or there == fields:
             return True
     if overwrite and is_own(folder):
         remove(folder)
     return not os.path.lexists(folder)
-
-
-def _without_versions(fields: StudyFields) -> StudyFields:
-    return {**fields, "scenario": {**fields.get("scenario", {}), "versions": None}}
 
 
 def hash_of(study: SweepStudy, fields: StudyFields) -> str:

@@ -151,7 +151,11 @@ def _run(
             for future in waited.done if waited else ():
                 number = running.pop(future)
                 try:
-                    rows = _result(future, address)
+                    rows = future.result()
+                except CancelledError:
+                    raise
+                except InputError as error:
+                    raise InputError(f"--cluster {address}: {error}") from None
                 except KilledWorker as error:
                     killed[number] += error.allowed_failures + 1
                     if not alone or killed[number] < KILLS:
@@ -160,6 +164,9 @@ def _run(
                     observer, trials = study.chunk(number)
                     reason = unfinished("stopped", f"its chunk has killed {killed[number]} workers")
                     rows = rows_of(study, observer, dict.fromkeys(trials, reason), trials)
+                except Exception as error:
+                    why = raised(error.__cause__ or error)
+                    raise RunStopped(f"--cluster {address}: a chunk cannot be computed there: {why}") from error
                 store.keep(number, rows)
                 done += study.chunk_size(number)
             on_progress(done)
@@ -168,20 +175,6 @@ def _run(
     finally:
         if client.status == "running":
             client.cancel(list(running))
-
-
-def _result(future: Future, address: str) -> list[Summary]:
-    from distributed import CancelledError, KilledWorker
-
-    try:
-        return future.result()
-    except (CancelledError, KilledWorker):
-        raise
-    except InputError as error:
-        raise InputError(f"--cluster {address}: {error}") from None
-    except Exception as error:
-        why = raised(error.__cause__ or error)
-        raise RunStopped(f"--cluster {address}: a chunk cannot be computed there: {why}") from error
 
 
 def packed(study: SweepStudy) -> bytes:

@@ -20,7 +20,7 @@ from cmg_mj.cli.terminal import (
 from cmg_mj.core.errors import InputError
 
 if TYPE_CHECKING:
-    from cmg_mj.features.sweeps.study import SamplingDesign, SweepStudy
+    from cmg_mj.features.sweeps.study import SweepStudy
 
 
 @click.command(short_help="Run a scenario with varied fields, observers and noise.")
@@ -31,16 +31,13 @@ if TYPE_CHECKING:
     multiple=True,
     metavar="FIELD=VALUES",
     help="Field and its values: a list (0,0.5,1 or RK4,implicit), a range first:last:count, or a logarithmic range "
-    "log:first:last:count. With --sample or --sobol also low:high. Fields joined by + take the same values. May be "
+    "log:first:last:count. With --sample also low:high. Fields joined by + take the same values. May be "
     "given again: the sweep runs every combination.",
 )
 @observers_option("the scenario's", distinct=False, baselines=True)
 @worlds_option("Worlds of each cell.  [default: 20]")
 @click.option(
     "--sample", type=click.IntRange(1), metavar="N", help="Run N points of a quasi-random design instead of a grid."
-)
-@click.option(
-    "--sobol", type=click.IntRange(1), metavar="N", help="Run a design for Sobol indices; N is a power of two."
 )
 @click.option("--dry-run", is_flag=True, help="Print the number of trials, time and memory, and run nothing.")
 @click.option(
@@ -56,7 +53,6 @@ def sweep(
     observers: list[str] | None,
     worlds: int | None,
     sample: int | None,
-    sobol: int | None,
     dry_run: bool,
     cluster: str | None,
     yes: bool,
@@ -78,13 +74,12 @@ def sweep(
     from cmg_mj.features.sweeps.chunks import run as run_here
     from cmg_mj.features.sweeps.cluster import local_workers, on_cluster
     from cmg_mj.features.sweeps.report import save, summary
-    from cmg_mj.features.sweeps.sobol import index_rows
-    from cmg_mj.features.sweeps.study import MAX_TRIALS, check_values, counted, sampling
+    from cmg_mj.features.sweeps.study import MAX_TRIALS, check_values, counted
     from cmg_mj.scenario.resolve import safe_name
 
     if cluster is not None:
         local_workers(cluster)
-    study = _study(arguments, varied, observers, worlds, sampling(sample, sobol))
+    study = _study(arguments, varied, observers, worlds, sample)
     check_values(study)
     if dry_run:
         cost = estimate_cost(study)
@@ -114,12 +109,9 @@ def sweep(
                 kept = f"finished trials are kept in {store.folder}, and the same command resumes the sweep"
                 end_interrupted(f"interrupted; {kept}")
             trials = Trials(study, store.tables(COLUMNS))
-            indices = index_rows(trials) if study.design == "sobol" else []
-            save(store, trials, indices)
+            save(store, trials)
     figures = {"trials": study.trials, "cells": list(cells_of(trials))} if arguments.as_json else {}
-    if study.design == "sobol":
-        figures["indices"] = indices
-    show(figures, summary(trials, indices), arguments.as_json)
+    show(figures, summary(trials), arguments.as_json)
     if not arguments.as_json or store.folder != path:
         click.echo(f"Written to {store.folder}. Read {store.folder / 'report.md'}", err=True)
 
@@ -129,7 +121,7 @@ def _study(
     varied: tuple[str, ...],
     observers: list[str] | None,
     worlds: int | None,
-    design: tuple[SamplingDesign, int] | None,
+    sample: int | None,
 ) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.features.sweeps.study import (
@@ -160,5 +152,5 @@ def _study(
         tuple(locate_tracks(axis, beside) for axis in axes),
         tuple(observers or section.observers or [scenario.observer.kind]),
         worlds or section.worlds,
-        *(design or (section.design, section.n)),
+        *((section.design, section.n) if sample is None else ("sample", sample)),
     )

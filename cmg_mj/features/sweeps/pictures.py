@@ -10,14 +10,14 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from cmg_mj.features.sweeps.cells import Trials, baselines_ahead, fell_interval, least, least_error, with_ends
+from cmg_mj.features.sweeps.cells import Trials, baselines_ahead, fall_shares, least, least_error, with_ends
 from cmg_mj.features.sweeps.study import VariedField, counted
 from cmg_mj.results.summary_keys import heading
 from cmg_mj.view.plots.figure import pyplot
 from cmg_mj.view.plots.style import colours, hexadecimal
 
 ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
-"""Figures that are drawn, and whose indices are shown, where a trial has them; tables show the first."""
+"""Figures that are drawn where a trial has them; tables show the first."""
 CURVES, FALLS = "curves", "map_falls"
 MAPS = {ERRORS[0]: "map_velocity_error", ERRORS[1]: "map_push_error"}
 """Figure -> its map."""
@@ -30,7 +30,6 @@ MAX_NUMBERS = 8
 LABEL = {"facecolor": "w", "alpha": 0.6, "edgecolor": "none", "pad": 1.0}
 NOBODY, EMPTY = "none, or several alike", (232, 232, 232)
 """Name and colour of a cell without a best."""
-UNKNOWN = (math.nan, math.nan, math.nan)
 LOGARITHMIC = 10.0
 """Values that differ by more than this factor have a logarithmic scale."""
 
@@ -83,7 +82,7 @@ def pictures_of(trials: Trials) -> list[Picture]:
     title = f"{study.scenario.title or 'Sweep'}: "
     if not all(is_number(value) for axis in axes for value in axis.values):
         return []
-    if len(axes) == 1 and study.design != "sobol" and (trials.stood | trials.fell).any():
+    if len(axes) == 1 and (trials.stood | trials.fell).any():
         return [Picture(CURVES, title + worlds, partial(curves, trials, axes[0].field))]
     if len(axes) == 2 and study.design == "grid":
         across, up = axes
@@ -102,10 +101,10 @@ def curves(trials: Trials, field: str) -> Any:
     keys = [key for key in ERRORS if np.isfinite(trials.figure(key)).any()]
     n = len(keys) + bool(trials.fell.any())
     figure, grid = pyplot().subplots(n, sharex=True, squeeze=False, layout="constrained", figsize=(9.0, 0.8 + 2.9 * n))
-    palette = colours(study.observers)
+    palette, falls = colours(study.observers), np.insert(fall_shares(trials), 3, 0.0, axis=2)
     for axes, key in zip(grid[:, 0], [*keys, FALLS], strict=False):
         for place, name in enumerate(study.observers):
-            curve = fall_curve(trials, place) if key == FALLS else error_curve(trials.figure(key)[:, place])
+            curve = falls[:, place] if key == FALLS else error_curve(trials.figure(key)[:, place])
             mean, low, high, is_part = curve[order].T
             color = hexadecimal(palette[name])
             axes.errorbar(x[order], mean, [mean - low, high - mean], fmt=".-", color=color, label=name)
@@ -125,12 +124,6 @@ def error_curve(worlds: np.ndarray) -> np.ndarray:
     return np.column_stack([np.array(ends, dtype=float), (known > 0) & (known < worlds.shape[1])])
 
 
-def fall_curve(trials: Trials, place: int) -> np.ndarray:
-    """Compute an observer's share of falls, the ends of its interval, and a column of 0, (n_points, 4)."""
-    counts = zip(*(counts[:, place].tolist() for counts in fall_counts(trials)), strict=True)
-    return np.array([(*(fell_interval(fell, known) if known else UNKNOWN), 0.0) for fell, known in counts])
-
-
 def scale_of(values: np.ndarray) -> Literal["linear", "log"]:
     """Choose a logarithmic scale for positive values of more than one decade."""
     known = values[np.isfinite(values)]
@@ -147,8 +140,8 @@ def maps(trials: Trials, across: VariedField, up: VariedField) -> dict[str, Map]
         grid = points.reshape(len(x_order), len(y_order), *points.shape[1:])
         return grid.swapaxes(0, 1)[y_order][:, x_order]
 
-    fell, known = (gridded(counts) for counts in fall_counts(trials))
-    shares = np.divide(fell, known, out=np.full(fell.shape, math.nan), where=known > 0)
+    intervals = gridded(fall_shares(trials))
+    shares = intervals[..., 0]
     falls = {study.observers[place]: shares[:, :, place] for place in places}
     if study.references:
         falls[TRUE_RATE] = shares[:, :, study.observers.index(study.references[0])]
@@ -164,11 +157,8 @@ def maps(trials: Trials, across: VariedField, up: VariedField) -> dict[str, Map]
         best[(shares[:, :, places] == value[:, :, None]).sum(axis=2) > 1] = -1  # several alike
         sure = np.zeros(best.shape, dtype=bool)
         for at in zip(*np.nonzero(best >= 0), strict=True):
-            others = [
-                fell_interval(int(fell[at][i]), int(known[at][i])) for i in places if i != best[at] and known[at][i]
-            ]
-            own = fell_interval(int(fell[at][best[at]]), int(known[at][best[at]]))
-            sure[at] = all(own.high < other.low for other in others)
+            others = [place for place in places if place != best[at]]
+            sure[at] = not (intervals[at][others, 1] <= intervals[at][best[at], 2]).any()
         found[FALLS] = Map("share of falls", best, sure, falls, {}, falls)
     return found
 
@@ -225,8 +215,3 @@ def draw_map(a_map: Map, observers: Sequence[str], across: VariedField, up: Vari
     figure.supylabel(up.field)
     figure.legend(handles=handles, loc="outside upper right", ncols=3)
     return figure
-
-
-def fall_counts(trials: Trials) -> tuple[np.ndarray, np.ndarray]:
-    """Count the worlds that fell, and those that fell or stood, (n_points, n_observers) each."""
-    return trials.fell.sum(axis=2), (trials.fell | trials.stood).sum(axis=2)

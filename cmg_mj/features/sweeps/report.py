@@ -17,12 +17,12 @@ from cmg_mj.features.sweeps.cells import (
     cells_in_blocks,
     cells_of,
     cells_schema,
+    fall_counts,
     fell_interval,
     lead_rows,
 )
-from cmg_mj.features.sweeps.chunks import CELLS, INDICES, REPORT, RESUMES, TRIALS, Store, trials_schema
-from cmg_mj.features.sweeps.pictures import CURVES, ERRORS, Picture, fall_counts, pictures_of
-from cmg_mj.features.sweeps.sobol import LOST, MIN_ROWS, IndexRow, index_table
+from cmg_mj.features.sweeps.chunks import CELLS, REPORT, RESUMES, TRIALS, Store, trials_schema
+from cmg_mj.features.sweeps.pictures import CURVES, ERRORS, Picture, pictures_of
 from cmg_mj.features.sweeps.study import SweepStudy, VariedField, counted
 from cmg_mj.results.folder import whole_file, write_text
 from cmg_mj.results.intervals import finite_mean
@@ -55,14 +55,9 @@ ABOUT_CURVES = (
     "Bars are 95 % intervals. A cross: some worlds did not stand to the end, and the mean is that of the others, "
     "which had it easier."
 )
-ABOUT_INDICES = (
-    "Shares of the variance of a point's mean over its worlds: first order, what a field explains by itself; "
-    "total, with all that it acts together with. In brackets bootstrap 95 % intervals. Decisive: its total index's "
-    f"interval is above all others', of {MIN_ROWS} rows or more. All figures are in {INDICES}."
-)
 
 
-def save(store: Store, trials: Trials, indices: Sequence[IndexRow]) -> None:
+def save(store: Store, trials: Trials) -> None:
     """Write the tables, the pictures and the report of a finished sweep.
 
     Raises:
@@ -75,9 +70,7 @@ def save(store: Store, trials: Trials, indices: Sequence[IndexRow]) -> None:
     }
     for picture in pictures:
         files[f"{picture.name}.png"] = lambda path, it=picture: save_figure(path, it.draw(), it.title, dpi=100)
-    if study.design == "sobol":
-        files[INDICES] = lambda path: pq.write_table(index_table(indices), path)
-    files[REPORT] = lambda path: write_text(path, report(trials, indices, pictures))
+    files[REPORT] = lambda path: write_text(path, report(trials, pictures))
     for name, write in files.items():
         path = store.folder / name
         try:
@@ -94,7 +87,7 @@ def _write_tables(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> 
             writer.write_table(table)
 
 
-def report(trials: Trials, indices: Sequence[IndexRow], pictures: Sequence[Picture]) -> str:
+def report(trials: Trials, pictures: Sequence[Picture]) -> str:
     """Write the report as Markdown."""
     study = trials.study
     sizes = ((study.n_points, "point"), (len(study.observers), "observer"), (study.worlds, "world"))
@@ -107,8 +100,6 @@ def report(trials: Trials, indices: Sequence[IndexRow], pictures: Sequence[Pictu
             *_varied(study),
             *_pictures(trials, pictures),
             *_leads(trials),
-            *(["## What the errors depend on: Sobol indices", ABOUT_INDICES] if study.design == "sobol" else []),
-            *_indices(indices),
             *_unfinished(trials),
             *(["## Cells", f"Mean {heading(ERROR)}, with the falls:"] if is_grid else ["## Observers over all points"]),
             *_cells(trials),
@@ -116,14 +107,14 @@ def report(trials: Trials, indices: Sequence[IndexRow], pictures: Sequence[Pictu
     )
 
 
-def summary(trials: Trials, indices: Sequence[IndexRow]) -> str:
-    """Write for the terminal: cells, reasons of unfinished trials, total indices."""
+def summary(trials: Trials) -> str:
+    """Write for the terminal: cells, reasons of unfinished trials."""
     parts = _cells(trials)
     more = len(trials.reasons.counts) - 1
     if more >= 0:
         others = f" (and {counted(more, 'other reason')}: see the report)" if more else ""
         parts.append(f"{_count_unfinished(trials)}. {trials.reasons.most(1)[0]}{others}")
-    return "\n\n".join([*parts, *_indices(indices)])
+    return "\n\n".join(parts)
 
 
 def _varied(study: SweepStudy) -> list[str]:
@@ -223,36 +214,4 @@ def _leads(trials: Trials) -> list[str]:
         leads, *counts = (f"{count} of {row.points}" for count in (row.leads, row.surely, row.close))
         table.append([f"{row.name} (baseline)" if row.is_baseline else row.name, leads, *interval, *counts])
     head = ["observer", "leads", *([] if is_grid else ["95 % interval"]), "surely", "close"]
-    independent = " Of a design for indices, its independent points count." if study.design == "sobol" else ""
-    return ["## Who leads", ABOUT_LEADS + independent, markdown_table(head, table)]
-
-
-def _indices(rows: Sequence[IndexRow]) -> list[str]:
-    """Show the first-order and total indices of the figures that matter most, or why there are none."""
-    parts = []
-    for key, title in {**{key: heading(key) for key in ERRORS}, LOST: "share of worlds that fell or stopped"}.items():
-        of_figure = [row for row in rows if row["figure"] == key]
-        table = [
-            [
-                row["observer"],
-                row["field"],
-                _index(row, "first"),
-                _index(row, "total"),
-                "yes" if row["decisive"] else "",
-            ]
-            for row in of_figure
-            if not row["refused"]
-        ]
-        refused = {row["observer"]: row["refused"] for row in of_figure if row["refused"]}
-        if of_figure:
-            parts.append(f"### {capitalised(title)}")
-        if table:
-            headings = ["observer", "field", "first order", "total", "decisive"]
-            parts.append(markdown_table(headings, table, text_columns=2))
-        if refused:
-            parts.append("\n".join(["Refused:", "", *(f"- {name}: {why}" for name, why in refused.items())]))
-    return parts
-
-
-def _index(row: IndexRow, kind: str) -> str:
-    return "{:.3f} [{:.3f}, {:.3f}]".format(*(row[f"{kind}{end}"] for end in ("", "_low", "_high")))
+    return ["## Who leads", ABOUT_LEADS, markdown_table(head, table)]

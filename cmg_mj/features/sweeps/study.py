@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.core.types import law_needs
-from cmg_mj.inputs.files import bundled, find, whole_path
+from cmg_mj.inputs.files import find, whole_path
 from cmg_mj.inputs.messages import complaints
 from cmg_mj.inputs.overrides import assign, override
 from cmg_mj.laws import LAW_CLASSES
@@ -128,7 +128,7 @@ def _parse_range(fields: tuple[str, ...], text: str, where: str) -> VariedField:
         (count,) = map(int, counts) if counts else (None,)
     except ValueError:
         raise InputError(
-            f"{where}: {text!r} is no range; write first:last:count, or low:high for --sample and --sobol, "
+            f"{where}: {text!r} is no range; write first:last:count, or low:high for --sample, "
             "with log: before it for a logarithmic one"
         ) from None
     if not math.isfinite(high - low) or low == high or (count is None and low > high):
@@ -173,7 +173,7 @@ def _parse_list(text: str, where: str) -> list[Any]:
 
 # --- the study
 
-SamplingDesign = Literal["grid", "sample", "sobol"]
+SamplingDesign = Literal["grid", "sample"]
 Point = dict[str, Any]
 """Varied field -> its value."""
 Trial = tuple[int, int]
@@ -210,8 +210,8 @@ class SweepStudy:
             their trials are those of a loop with the true rate.
         worlds: Trials a point and observer: world i has the same noise at every point, for every observer.
         design: `grid`: every combination of values, of which the last field's change first. `sample`: a quasi-random
-            design of the ranges and lists. `sobol`: one for Sobol indices.
-        n: Points of the design; a design for indices has as many for each axis, and for two more.
+            design of the ranges and lists.
+        n: Points of the quasi-random design.
     """
 
     scenario: Scenario
@@ -238,11 +238,15 @@ class SweepStudy:
         for axis in self.axes:
             if not axis.values and self.design == "grid":
                 raise InputError(
-                    f"--vary {axis.field}: a range without a count is for --sample and --sobol; write first:last:count"
+                    f"--vary {axis.field}: a range without a count is for --sample; write first:last:count"
                 )
         if not _is_count(self.worlds):
             raise InputError(f"worlds = {shown(self.worlds)}: must be a whole number, 1 or more")
-        self._check_design()
+        n = shown(self.n)
+        if self.design == "grid" and self.n != 0:
+            raise InputError(f"n = {n}: is for the design sample; a grid is every combination")
+        if self.design == "sample" and not _is_count(self.n):
+            raise InputError(f"--sample, n = {n}: must be a whole number of points, 1 or more")
         for name, times in Counter(self.observers).items():
             if not isinstance(name, str) or (":" not in name and name not in (*OBSERVERS, *RATES)):
                 known = nearest(str(name), [*OBSERVERS, *RATES])
@@ -251,20 +255,6 @@ class SweepStudy:
                 raise InputError(f"observers: {name!r} is there twice")
         if not self.observers:
             raise InputError("observers: there must be one at least")
-
-    def _check_design(self) -> None:
-        n = shown(self.n)
-        if self.design == "grid" and self.n != 0:
-            raise InputError(f"n = {n}: is for the designs sample and sobol; a grid is every combination")
-        if self.design == "sample" and not _is_count(self.n):
-            raise InputError(f"--sample, n = {n}: must be a whole number of points, 1 or more")
-        if self.design == "sobol":
-            if not _is_count(self.n) or self.n < 2 or self.n & (self.n - 1):
-                raise InputError(f"--sobol {n}: must be a power of two, such as 256")
-            if len(self.axes) < 2:
-                raise InputError(
-                    "--sobol: indices compare several fields; vary two or more (fields with + between count as one)"
-                )
 
     @property
     def _fields(self) -> list[str]:
@@ -275,7 +265,7 @@ class SweepStudy:
         """Number of points, without drawing them."""
         if self.design == "grid":
             return math.prod(len(axis.values) for axis in self.axes)
-        return self.n * (len(self.axes) + 2 if self.design == "sobol" else 1)
+        return self.n
 
     @property
     def cells(self) -> int:
@@ -290,7 +280,7 @@ class SweepStudy:
     @cached_property
     def _drawn(self) -> list[list[Any]]:
         """The values of each axis at a design's points, (n_axes, n_points)."""
-        shares = sampled(len(self.axes), self.n, self.scenario.seed, indices=self.design == "sobol")
+        shares = sampled(len(self.axes), self.n, self.scenario.seed)
         return [axis.at(share) for axis, share in zip(self.axes, shares.T, strict=True)]
 
     def point(self, number: int) -> Point:
@@ -397,41 +387,15 @@ def counted(n: int, noun: str) -> str:
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
-def sampled(dimensions: int, n: int, seed: int, *, indices: bool) -> np.ndarray:
-    """Spread points evenly in the unit cube, (n_points, dimensions).
-
-    For indices the points are those of Saltelli's scheme, as `scipy.stats.sobol_indices` wants them: A, B, then A with
-    each column in turn from B.
-    """
+def sampled(dimensions: int, n: int, seed: int) -> np.ndarray:
+    """Spread points evenly in the unit cube, (n, dimensions)."""
     from scipy.stats import qmc  # half a second
 
     # The argument is called `rng` since 1.15; all versions take this name.
     generator: Any = {"seed": np.random.default_rng(seed)}
     with warnings.catch_warnings():  # that n is no power of two
         warnings.simplefilter("ignore", UserWarning)
-        drawn = qmc.Sobol(2 * dimensions if indices else dimensions, **generator).random(n)
-    if not indices:
-        return drawn
-    a, b = drawn[:, :dimensions], drawn[:, dimensions:]
-    crossed = [np.where(np.arange(dimensions) == i, b, a) for i in range(dimensions)]
-    return np.concatenate([a, b, *crossed])
-
-
-def sampling(sample: int | None, sobol: int | None) -> tuple[SamplingDesign, int] | None:
-    """Return the design of `sample` or `sobol` and its number of points; None without either.
-
-    Args:
-        sample: Number of points of a quasi-random design.
-        sobol: Rows of a design for Sobol indices.
-
-    Raises:
-        InputError: Both are there.
-    """
-    if sample is not None and sobol is not None:
-        raise InputError("--sample and --sobol: one of them")
-    if sobol is not None:
-        return "sobol", sobol
-    return None if sample is None else ("sample", sample)
+        return qmc.Sobol(dimensions, **generator).random(n)
 
 
 def check_values(study: SweepStudy) -> None:
@@ -504,8 +468,6 @@ def read_study(name: str) -> StudyFile | None:
         InputError: The file is neither.
     """
     path = find("scenarios", name, ".toml", "scenario")
-    if path.stem in bundled("scenarios"):
-        return None
     try:
         fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
@@ -525,7 +487,7 @@ def scenario_of(name: str, file: StudyFile, settings: Sequence[str] = ()) -> Sce
     fields = {key: value for key, value in copy.deepcopy(file.scenario).items() if key != "versions"}
     for setting in settings:
         override(fields, setting)
-    scenario = parse_scenario(fields, " ".join([name, *(["with"] * bool(settings)), *(f"--set {s}" for s in settings)]))
+    scenario = parse_scenario(fields, name)
     beside = find("scenarios", name, ".toml", "scenario").parent
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in settings):
         scenario = find_model(scenario, beside)
@@ -544,15 +506,11 @@ def varied_tracks(axis: VariedField) -> list[str]:
     """List the tracks that an axis varies."""
     files: list[str] = []
 
-    def note(file: str) -> str:
-        files.append(file)
-        return file
-
-    _change_tracks(axis, note)
+    _change_tracks(axis, files.append)  # the changed axis is not needed
     return files
 
 
-def _change_tracks(axis: VariedField, change: Callable[[str], str]) -> VariedField:
+def _change_tracks(axis: VariedField, change: Callable[[str], str | None]) -> VariedField:
     def changed(value: Any) -> Any:
         """Change the paths in a value: of a file, of a motion, or of all motions."""
         if isinstance(value, str):

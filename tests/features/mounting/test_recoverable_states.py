@@ -99,7 +99,7 @@ def test_no_controller_bears_more(fast: Experiment, feedback: dict[str, Any], mo
     experiment = fast.with_settings(feedback)
     top = ceiling(experiment.plant.reduced, experiment.law.rate_limit)
     assert top.pole == pytest.approx(7.85, rel=0.01)
-    impulse = push_margin(experiment.scenario, experiment.design).median_impulse
+    impulse = push_margin(experiment.design).median_impulse
     assert 0.4 * top.push_impulse(PUSH_S) < impulse < top.push_impulse(PUSH_S)
     if feedback:
         assert impulse > top.impulse

@@ -34,7 +34,7 @@ def files() -> list[str]:
         (".", f"-o .: {NO_XML}"),
         ("", NO_XML),
         ("there/is/none.xml", "-o there/is/none.xml: cannot be written: there is no folder there/is"),
-        ("folder.xml", "-o folder.xml: folder.xml is a folder"),
+        ("folder.xml", "-o folder.xml: folder.xml is not of cmg-mj mount"),
     ],
 )
 def test_the_place_is_looked_at_before_anything_is_made(out: str, message: str) -> None:
@@ -72,7 +72,7 @@ def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.Monke
 @pytest.mark.parametrize("options", [(), ("--overwrite",)])
 def test_what_no_mount_has_written_is_never_replaced(name: str, options: tuple[str, ...]) -> None:
     Path(name).write_text("mine", encoding="utf-8")
-    assert f"{name} is not a file of cmg-mj mount" in cmg_mj(*MOUNT, "-o", "a.xml", *options).complaint
+    assert f"{name} is not of cmg-mj mount" in cmg_mj(*MOUNT, "-o", "a.xml", *options).complaint
     assert (files(), Path(name).read_text(encoding="utf-8")) == ([name], "mine")
 
 
@@ -82,7 +82,7 @@ def test_a_mounts_own_file_is_replaced_where_that_is_asked_for() -> None:
     mount(TORSO, "torso", axis="x", scale=1.3).save("a.xml")
     assert mujoco.MjSpec.from_file("a.xml").body("torso") is not None
     Path("link.xml").symlink_to("a.xml")
-    with pytest.raises(InputError, match=r"link\.xml is not a file of cmg-mj mount"):
+    with pytest.raises(InputError, match=r"link\.xml is not of cmg-mj mount"):
         mount(TORSO, "torso", axis="x", scale=1.3).save("link.xml")
 
 

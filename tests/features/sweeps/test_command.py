@@ -17,7 +17,7 @@ from cmg_mj.features.sweeps import chunks
 from cmg_mj.features.sweeps.chunks import FIGURES
 from cmg_mj.inputs.files import folder
 from tests.command import cmg_mj
-from tests.features.sweeps.synthetic_trials import BIAS, NOISE, VELOCITY
+from tests.features.sweeps.synthetic_trials import BIAS, VELOCITY
 
 SMALL = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--observers", "linear,gyro_free", "--worlds", "3"]
 SHORT = ["--set", "duration_s=0.5", "--set", "push=[]"]
@@ -84,22 +84,6 @@ def test_a_row_reruns_alone(tmp_path: Path) -> None:
         assert {key: alone[key] for key in figures} == {key: row[key] for key in figures}
     assert {row["observer"] for row in (rows[0], rows[8])} == {"linear", "gyro_free"}
     assert len({row[VELOCITY] for row in rows[:3]}) == 3  # worlds differ
-
-
-@pytest.mark.slow
-def test_a_design_for_indices(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    axes = ["--vary", f"{BIAS}=-1:1", "--vary", f"{NOISE}=log:100:800"]
-    arguments = ["sweep", "push_recovery", *axes, "--sobol", "16", "--worlds", "2", *SHORT, "--out", out]
-    outcome = cmg_mj(*arguments, "--observers", "linear")
-    assert outcome.status == 0
-    rows = pq.read_table(out / "indices.parquet").to_pylist()
-    (noise,) = (row for row in rows if row["figure"] == VELOCITY and row["field"] == NOISE)
-    assert noise["total_low"] < noise["total"] < noise["total_high"]
-    assert not any("push" in row["figure"] for row in rows)
-    for text in (outcome.out, (out / "report.md").read_text(encoding="utf-8")):
-        assert f"{noise['total']:.3f} [{noise['total_low']:.3f}, {noise['total_high']:.3f}]" in text
-    assert not list(out.glob("*.png"))
 
 
 def test_a_study_file_with_settings_and_its_own_model(tmp_path: Path) -> None:

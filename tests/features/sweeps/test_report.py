@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.features.sweeps.cells import Trials
+from cmg_mj.features.sweeps.cells import Trials, fall_shares
 from cmg_mj.features.sweeps.chunks import PICTURES
-from cmg_mj.features.sweeps.pictures import Map, error_curve, fall_curve, maps, pictures_of
+from cmg_mj.features.sweeps.pictures import Map, error_curve, maps, pictures_of
 from cmg_mj.features.sweeps.report import report, summary
-from cmg_mj.features.sweeps.sobol import index_rows
 from cmg_mj.view.plots.figure import save_figure
 from tests.features.sweeps.synthetic_trials import BIAS, NOISE, RATE, VELOCITY, make_trials
 
@@ -41,42 +40,32 @@ def test_of_a_design_an_observer_has_a_row_and_the_report_says_what_is_varied() 
     falls = bias > 0.5
     errors = bias + 0.05 * ~falls
     figures = [f"{figure:.4f}" for figure in (errors.mean(), *np.quantile(errors, (0.1, 0.5, 0.9)))]
-    for text in (report(trials, [], []), summary(trials, [])):
+    for text in (report(trials, []), summary(trials)):
         share = f"{falls.sum()} of 48 ({100 * falls.sum() / 48:.1f} %)"
         assert row_of(text, "ltv")[1:] == ["24 of 24", *figures, share]
         assert row_of(text, "kalman")[1:] == ["0 of 24", "-", "-", "-", "-", "0 of 0"]
     varied = {f"- {BIAS}: 0 to 1", f"- {NOISE}: 100 to 800, evenly in the logarithm", f"- {RATES}: 100, 200"}
-    assert varied <= set(report(trials, [], []).splitlines())
+    assert varied <= set(report(trials, []).splitlines())
 
 
 def test_of_a_grid_a_point_has_a_row() -> None:
     trials = make_trials({RATES: "100,200"}, OBSERVERS, 2, lambda _, name, w: None if w and name == "ltv" else 0.5)
-    for text in (report(trials, [], []), summary(trials, [])):
+    for text in (report(trials, []), summary(trials)):
         assert row_of("| " + text.splitlines()[-1].lstrip("| "), "200") == ["200", "0.5000", "0.5000 [1 fell]"]
-    assert "With controller.rate_hz go, alike: sensors.accelerometer.rate_hz." in report(trials, [], [])
-
-
-def test_the_terminal_says_why_there_are_no_indices() -> None:
-    def error(point: dict[str, Any], name: str, _: int) -> float | None:
-        return None if name == "ltv" else point[BIAS] + point[NOISE]
-
-    trials = make_trials({BIAS: "0:1", NOISE: "1:2"}, OBSERVERS, 1, error, design="sobol", n=16)
-    text = summary(trials, index_rows(trials))
-    assert len([line for line in text.splitlines() if line.startswith("| linear ") and BIAS in line]) == 1
-    assert "- ltv: no value at 64 of 64 points: of 64 trials 64 fell" in text.splitlines()
+    assert "With controller.rate_hz go, alike: sensors.accelerometer.rate_hz." in report(trials, [])
 
 
 def test_reasons_are_in_the_report_and_on_the_terminal() -> None:
     """Those that differ in their numbers are of one kind; a refusal begins with what is wrong, not with its point."""
     trials = make_trials({BIAS: "0,1"}, ("linear",), 4, lambda *_: 1.0)
-    assert "refused" not in report(trials, [], []) + summary(trials, [])
+    assert "refused" not in report(trials, []) + summary(trials)
     for reason in ("gone at t = 0.5 s", "gone at t = 1e-3 s", None):
         trials.reasons.add("stopped", reason)
     trials.reasons.add("refused", f"it with --set x=1 with a=1, {BIAS}=2: b.c = 2: must be\n  less: than 1")
-    lines = report(trials, [], []).splitlines()
+    lines = report(trials, []).splitlines()
     assert "- 2 stopped, such as: gone at t = 0.5 s" in lines
     assert "- 1 refused: b.c = 2: must be less: than 1" in lines
-    for text in (*lines, summary(trials, [])):
+    for text in (*lines, summary(trials)):
         if "were refused" in text:
             assert "4 of 8 trials were refused or stopped" in text
 
@@ -118,7 +107,7 @@ def test_a_map_has_the_best_of_every_cell_and_each_ones_own_figure() -> None:
     assert not falls.sure.any()  # none of 4 beside 3 of 4
     pictures = pictures_of(trials)
     assert {f"{picture.name}.png" for picture in pictures} <= set(PICTURES)
-    assert all(f"({picture.name}.png)" in report(trials, [], pictures) for picture in pictures)
+    assert all(f"({picture.name}.png)" in report(trials, pictures) for picture in pictures)
 
 
 def test_a_map_shows_where_baselines_are_ahead() -> None:
@@ -140,7 +129,7 @@ def test_curves_have_intervals_and_say_where_some_worlds_fell() -> None:
     assert low == pytest.approx([0.1, 0.2, 0.2 * math.exp(-half_width / 0.2)], rel=1e-4)
     assert not is_part.any()
     assert error_curve(trials.figure(VELOCITY)[:, 1])[:, 3].all()
-    assert fall_curve(trials, 1)[0, :3] == pytest.approx((0.75, 0.3006, 0.9544), abs=1e-4)
+    assert fall_shares(trials)[0, 1] == pytest.approx((0.75, 0.3006, 0.9544), abs=1e-4)
 
 
 @pytest.mark.parametrize(
