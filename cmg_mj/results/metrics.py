@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,34 +12,6 @@ from cmg_mj.results.floors import Floors
 from cmg_mj.results.summary_keys import Figures, Summary
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push, inside, push_windows
-
-
-class TickBlock(NamedTuple):
-    """Successive ticks as columns, (n_ticks, n_worlds) each.
-
-    Attributes:
-        x1: True tilt [rad].
-        x2: True tilt rate [rad/s].
-        body_rate: Rate of the frame along the tilt axis, as a perfect gyro on it shows [rad/s].
-        x3: True gimbal angle [rad].
-        y1: Measured tilt [rad].
-        fog: The gyro's rate [rad/s].
-        u: Command [rad/s].
-        estimates: Signal -> values, for the observer in the loop and each open-loop observer; `x2_rad_s` among them.
-        columns: The trajectory's columns after its time, by name.
-        ended: Which worlds have ended; None for one world.
-    """
-
-    x1: np.ndarray
-    x2: np.ndarray
-    body_rate: np.ndarray
-    x3: np.ndarray
-    y1: np.ndarray
-    fog: np.ndarray
-    u: np.ndarray
-    estimates: list[dict[str, np.ndarray]]
-    columns: dict[str, np.ndarray]
-    ended: np.ndarray | None
 
 
 class Metrics:
@@ -84,37 +55,40 @@ class Metrics:
         self._last_outside = np.full(n_worlds, -1)
         self._last_tick = np.full(n_worlds, -1)
 
-    def update(self, block: TickBlock, references: Mapping[str, np.ndarray] | None = None) -> None:
+    def update(self, columns: Mapping[str, np.ndarray], references: Mapping[str, np.ndarray]) -> None:
         """Add the next ticks.
 
         Args:
-            block: The ticks.
+            columns: The trajectory's columns after its time, by name, (n_ticks, n_worlds) each.
             references: Each baseline's tilt rate, (n_ticks, n_worlds) [rad/s].
         """
-        counted = np.isfinite(block.x1)
+        x1, x2, u = columns["x1_rad"], columns["x2_rad_s"], columns["u_rad_s"]
+        counted = np.isfinite(x1)
         tick = self._ticks + np.arange(len(counted))[:, None]
         self._ticks += len(counted)
         pushed = counted & inside(tick * self._dt, self._windows)
         bias_ticks = counted & (tick * self._dt >= self._bias_from - 1e-9)
         for part, ticks in (("run", counted), ("push", pushed), ("bias", bias_ticks)):
             self._sums["ticks", part] += ticks.sum(axis=0)
-        self._sums["saturated", "run"] += (counted & (np.abs(block.u) >= self._limit)).sum(axis=0)
-        self._add_squares("tilt", block.x1, run=counted)
-        self._add_squares("velocity", block.x2, run=counted, push=pushed)
-        self._add_squares("command", block.u, run=counted)
+        self._sums["saturated", "run"] += (counted & (np.abs(u) >= self._limit)).sum(axis=0)
+        self._add_squares("tilt", x1, run=counted)
+        self._add_squares("velocity", x2, run=counted, push=pushed)
+        self._add_squares("command", u, run=counted)
         if self._floors:
-            self._floors.add(block.y1, block.x2, counted, pushed)
-        rates = {name: estimate["x2_rad_s"] for name, estimate in zip(self.observers, block.estimates, strict=True)}
-        for name, rate in [*rates.items(), *(references or {}).items()]:
-            self._add_squares(name, rate - block.x2, run=counted, push=pushed)
-            self._add_squares(f"{name} against the gyro", rate - block.fog, run=counted)
-        for name, estimate in zip(self.observers, block.estimates, strict=True):
-            for signal in self._targets.keys() & estimate.keys():
-                self._sums[f"{name} {signal}", "sum"] += _sum(estimate[signal], bias_ticks)
-                self._add_squares(f"{name} {signal}", estimate[signal] - self._targets[signal], bias=bias_ticks)
-        gimbal = np.where(counted, np.abs(block.x3), 0.0)
+            self._floors.add(columns["y1_rad"], x2, counted, pushed)
+        rates = {name: columns[f"estimate/{name}/x2_rad_s"] for name in self.observers}
+        for name, rate in {**rates, **references}.items():
+            self._add_squares(name, rate - x2, run=counted, push=pushed)
+            self._add_squares(f"{name} against the gyro", rate - columns["fog_rad_s"], run=counted)
+        for name in self.observers:
+            for signal, targets in self._targets.items():
+                estimate = columns.get(f"estimate/{name}/{signal}")
+                if estimate is not None:
+                    self._sums[f"{name} {signal}", "sum"] += _sum(estimate, bias_ticks)
+                    self._add_squares(f"{name} {signal}", estimate - targets, bias=bias_ticks)
+        gimbal = np.where(counted, np.abs(columns["x3_rad"]), 0.0)
         self._gimbal_peak = np.maximum(self._gimbal_peak, gimbal.max(axis=0, initial=0.0))
-        outside = counted & (np.abs(block.x1) > self._band)
+        outside = counted & (np.abs(x1) > self._band)
         self._last_outside = np.maximum(self._last_outside, np.where(outside, tick, -1).max(axis=0, initial=-1))
         self._last_tick = np.maximum(self._last_tick, np.where(counted, tick, -1).max(axis=0, initial=-1))
 

@@ -89,10 +89,6 @@ class Layout:
         """List all columns after `time_s`, in order."""
         return [*self._signals(), *self.positions(), *self.rates()]
 
-    def named(self, columns: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
-        """Name the columns after `time_s`, given in order."""
-        return dict(zip(self.columns(), columns, strict=True))
-
     def _signals(self) -> list[str]:
         """List the columns that are no joints'."""
         if self.axes:
@@ -209,8 +205,10 @@ class Trajectory(NamedColumns):
 
     @staticmethod
     def joined(axes: Mapping[str, Trajectory]) -> Trajectory:
-        """Join the trajectories of a plant's axes; the first has the joints."""
+        """Join the trajectories of a plant's axes, the first of which has the joints; an only one stays as it is."""
         first = next(iter(axes.values()))
+        if len(axes) == 1:
+            return first
         parts = tuple(replace(axis.layout, joints=(), kinds=(), name=name) for name, axis in axes.items())
         layout = replace(first.layout, axes=parts)
         columns = {"time_s": first["time_s"]}
