@@ -31,10 +31,8 @@ GYRO = "#a9c4ef"
 """Colour of the gyro's thin line, which lies on the wide true one."""
 SWING_COLOR, SWING_HEIGHT = "C4", 0.05
 """Colour of swings, and the share of a panel's height that a swing's strip takes."""
-PAGE = (9.0, 12.7)
-"""Width and height of a page [inch]."""
-PANEL_HEIGHT, SMALL_HEIGHT, SMALL_COLUMNS, SMALL_ROWS = 1.6, 1.25, 4, 3
-"""Heights of the panels and of the small ones [inch], and the grid of the small ones, one an observer."""
+SMALL_COLUMNS, SMALL_ROWS = 4, 3
+"""Grid of the small panels, one an observer."""
 
 
 def plot_run(
@@ -107,17 +105,7 @@ def plot_run(
         curves = [line(trajectory[f"estimate/{name}/x2_rad_s"], "", name, 0.5), true_line("x2_rad_s", "", 0.8)]
         panels.append(Panel("tilt rate [rad/s]", curves, labels[name], shaded=unnamed, y_range=limits))
     columns = max(SMALL_COLUMNS, -(-len(others) // SMALL_ROWS))
-    page = Picture(
-        "plot",
-        title,
-        panels,
-        columns=columns,
-        panel_height=SMALL_HEIGHT,
-        panel_width=PAGE[0] / columns,
-        first_height=PANEL_HEIGHT,
-        n_first=5,
-    )
-    draw(path, page)
+    draw(path, Picture("plot", title, panels, columns=columns, n_first=5))
 
 
 def _limits(curves: Sequence[Sequence[float] | np.ndarray]) -> tuple[float, float] | None:

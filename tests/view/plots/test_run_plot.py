@@ -16,7 +16,7 @@ from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
-from cmg_mj.view.plots.run_plot import PAGE, plot_run
+from cmg_mj.view.plots.run_plot import plot_run
 from cmg_mj.view.plots.style import colour, hexadecimal
 
 BAND, LIMIT = 1.0, 4.7
@@ -65,8 +65,8 @@ def test_eleven_lines_on_one_page(
     trajectory, summary = all_observers
     figure = plot(tmp_path, trajectory, summary, figures)
     width, height = figure.get_size_inches()
-    assert width <= PAGE[0]
-    assert height <= PAGE[1]
+    assert width <= (9.0, 12.7)[0]
+    assert height <= (9.0, 12.7)[1]
     tilt, rate, error, _, command, *small = figure.axes
     assert len(small) == len(OBSERVERS) - 3
     assert min(axes.get_position().height * height for axes in figure.axes) > 0.7
