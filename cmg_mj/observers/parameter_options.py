@@ -12,7 +12,6 @@ from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS
 
 ParameterValue: TypeAlias = "bool | int | float | str | Sequence[ParameterValue] | None"
 """Value of an observer's parameter."""
-MAX_NUMBER = 1e30
 Parameters = Mapping[str, Mapping[str, ParameterValue]]
 """Observer -> parameter -> value."""
 
@@ -38,12 +37,7 @@ def numbers(text: str, option: str, names: Collection[str]) -> dict[str, float]:
             raise InputError(f"{option} {name}: no such number; {nearest(name, names)}")
         if name in values:
             raise InputError(f"{option} {name}: given twice")
-        try:
-            values[name] = float(value)
-        except ValueError:
-            values[name] = math.nan
-        if not abs(values[name]) <= MAX_NUMBER:
-            raise InputError(f"{option} {name}={value}: must be a finite number")
+        values[name] = finite(value, f"{option} {name}")
     return values
 
 
@@ -74,3 +68,18 @@ def parameters_of(settings: Sequence[str]) -> dict[str, dict[str, ParameterValue
             raise InputError(f"--set {setting!r}: {text!r} is no number, list or text in quotes") from None
         parameters.setdefault(kind, {})[name] = value
     return parameters
+
+
+def finite(text: str, where: str) -> float:
+    """Read a finite number.
+
+    Raises:
+        InputError: It is none.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or abs(value) > 1e30:
+        raise InputError(f"{where}={text}: must be a finite number")
+    return value

@@ -140,10 +140,10 @@ class TiltFloor:
         Returns:
             RMS error in the whole run and in the push windows [rad/s]; None where there are too few samples for a fit.
         """
-        whole, pushed = (self._error(self._products[part, world], self._counts[part, world]) for part in (0, 1))
-        return whole, pushed
+        return self._error(0, world), self._error(1, world)
 
-    def _error(self, products: np.ndarray, count: float) -> float | None:
+    def _error(self, part: int, world: int) -> float | None:
+        products, count = self._products[part, world], self._counts[part, world]
         if count < ROWS_A_TAP * self._taps or not np.isfinite(products).all():
             return None
         taps = np.linalg.lstsq(products[:-1, :-1], products[:-1, -1], rcond=1e-13)[0]

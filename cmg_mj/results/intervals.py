@@ -74,12 +74,7 @@ def positive_mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
 
     Returns:
         The mean and its interval; infinite ends if a value is not finite.
-
-    Raises:
-        InputError: There are fewer values.
     """
-    if len(values) < MIN_WORLDS:
-        raise InputError(f"an interval of a non-negative figure needs four worlds or more, not {len(values)}")
     mean, low, high = mean_interval(values)
     if not mean > 0.0:  # all are zero, or one is no number
         return Interval(mean, low, high)

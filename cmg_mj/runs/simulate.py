@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from types import MappingProxyType
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -56,9 +55,9 @@ def simulate(
     controller: ControllerLike,
     duration_s: float,
     *,
-    observers: Sequence[str] | Mapping[str, Sequence[str]],
-    outside: Outsides = MappingProxyType({}),
-    settings: MetricsSettings | None = None,
+    observers: Mapping[str, Sequence[str]],
+    outside: Outsides,
+    settings: MetricsSettings,
     driver: str = "native",
     loop: type[ControlLoop] = ControlLoop,
     **options: Unpack[SimulationOptions],
@@ -69,7 +68,7 @@ def simulate(
         plant: The plant; or one a world, which may differ in numbers but not in structure.
         controller: A fresh controller, made for one world or for as many as there are plants.
         duration_s: Simulated time [s].
-        observers: Names of the controller's observer and open-loop observers; or of each axis' if they differ.
+        observers: Axis -> names of its observer in the loop and open-loop observers.
         outside: What acts from outside.
         settings: What counts as settled and fallen.
         driver: Name of what calls the controller: `native`: the loop, `callback`: MuJoCo (one world only).
@@ -87,14 +86,13 @@ def simulate(
     if driver != "native" and not single:
         raise InputError(f"driver = {driver!r}: drives one world, not a batch")
     names = plants[0].axis_names
-    of_axis = observers if isinstance(observers, Mapping) else dict.fromkeys(names, observers)
     acting = disturbances(outside, plants, controller.seed, controller.worlds)
     if single and any(one.accelerates for one in acting):
         plants = [plants[0].with_own_model()]
-    settings, timestep = settings or MetricsSettings(), plants[0].timestep
+    timestep = plants[0].timestep
     steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
     recorders = {
-        name: _recorder(plants, name, part, of_axis[name], outside, settings, options)
+        name: _recorder(plants, name, part, observers[name], outside, settings, options)
         for name, part in zip(names, controller.parts, strict=True)
     }
 
@@ -127,7 +125,7 @@ def simulate(
         summaries,
         since(0) if options.get("keep_trajectory", True) else None,
         max(outcome.time_s for outcome in outcomes),
-        tuple(of_axis[names[0]]),
+        tuple(observers[names[0]]),
         controller.seed,
         (controller.worlds,) if isinstance(controller.worlds, int) else tuple(controller.worlds),
         driver,

@@ -21,8 +21,8 @@ from cmg_mj.observers.parameter_options import Parameters
 from cmg_mj.results.folder import RunFolder, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.scenario.resolve import safe_name
-from cmg_mj.view.plots.figure import pyplot, save_figure
-from cmg_mj.view.plots.run_plot import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_COLUMNS, SMALL_HEIGHT
+from cmg_mj.view.plots.figure import FIRST_HEIGHT, PAGE_WIDTH, SMALL_HEIGHT, pyplot, save_figure
+from cmg_mj.view.plots.run_plot import INK, MEASURED, SMALL_COLUMNS
 from cmg_mj.view.plots.style import BASELINE_COLOURS, Colour, colours, hexadecimal, short_names, thinned
 
 if TYPE_CHECKING:
@@ -65,8 +65,8 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     reference = [log[REFERENCE]] if "reference" in log.has else []
     others = [name for name in rates if name not in few]
     tall, rows = 3 + len(reference), -(-len(others) // SMALL_COLUMNS)
-    heights = [PANEL_HEIGHT] * tall + [SMALL_HEIGHT] * rows
-    figure = pyplot().figure(figsize=(PAGE[0], min(PAGE[1], 0.8 + sum(heights))), layout="constrained")
+    heights = [FIRST_HEIGHT] * tall + [SMALL_HEIGHT] * rows
+    figure = pyplot().figure(figsize=(PAGE_WIDTH, min(12.7, 0.8 + sum(heights))), layout="constrained")
     grid = figure.add_gridspec(len(heights), SMALL_COLUMNS, height_ratios=heights)
     panels = [figure.add_subplot(grid[i, :]) for i in range(tall)]
     small = [figure.add_subplot(grid[tall + i // SMALL_COLUMNS, i % SMALL_COLUMNS]) for i in range(len(others))]

@@ -36,20 +36,20 @@ class RecordingHeader:
 
     Attributes:
         plant: The plant of all runs.
+        rate_limit_rad_s: Largest gimbal rate [rad/s].
         title: The experiment's title.
         pushes: Torques from outside, the same in all runs.
         swings: Sinusoidal torques from outside, the same in all runs.
         settings: The settle band.
-        rate_limit_rad_s: Largest gimbal rate; None to leave its bounds away [rad/s].
         scenario_toml: The resolved scenario.
     """
 
     plant: Plant
+    rate_limit_rad_s: float
     title: str = ""
     pushes: Sequence[Push] = ()
     swings: Sequence[Swing] = ()
     settings: MetricsSettings = field(default_factory=MetricsSettings)
-    rate_limit_rad_s: float | None = None
     scenario_toml: str = ""
 
 

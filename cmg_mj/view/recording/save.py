@@ -66,10 +66,9 @@ def write_recording(path: Path, header: RecordingHeader, runs: Sequence[Run]) ->
     Args:
         path: The file, `recording.rrd`.
         header: The experiment of all runs.
-        runs: The runs; each has a branch, named after the run.
+        runs: The runs; each has a branch, named after the run. No two have the same name.
 
     Raises:
-        ValueError: There is no run, or two have the same name.
         InputError: The environment turns rerun off.
         OSError: The file cannot be written.
     """

@@ -299,10 +299,6 @@ def test_two_observers_have_a_branch_each(run: Run, experiment: Experiment, tmp_
     for i, branch in enumerate((run, other), 1):
         _, rate = scalars(path, f"/{i}_{branch.name}/rate/true")
         assert np.array_equal(rate, branch.trajectory["x2_rad_s"])
-    for runs in ([], [run, run]):
-        with pytest.raises(ValueError, match="different names"):
-            write(tmp_path / "none.rrd", experiment, runs)
-    assert [file.name for file in tmp_path.iterdir()] == ["compare.rrd"]
 
 
 def test_pages_name_and_layout(path: Path, run: Run) -> None:
