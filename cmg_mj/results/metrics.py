@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmg_mj.results.floors import Floors
+from cmg_mj.results.floors import FLOOR_ACCELERATION, FLOOR_Y1, TiltFloor
 from cmg_mj.results.summary_keys import Figures, Summary
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push, inside, push_windows
@@ -26,7 +26,9 @@ class Metrics:
         settings: The settle band, and from when on a bias estimate is judged.
         targets: Extra signal -> its true value in each world, (n_worlds,) [rad].
         references: Names of the baselines.
-        floors: Lower bounds on the error.
+        tilt_floor: The floor of y1 alone.
+        acceleration_floors: Least error from y1 with its acceleration in each world [rad/s]; None where there is no
+            such floor.
     """
 
     def __init__(
@@ -39,10 +41,12 @@ class Metrics:
         settings: MetricsSettings,
         targets: Mapping[str, Sequence[float]] | None = None,
         references: Sequence[str] = (),
-        floors: Floors | None = None,
+        tilt_floor: TiltFloor | None = None,
+        acceleration_floors: Sequence[float | None] = (),
     ) -> None:
         self.observers, self.references = list(observers), list(references)
-        self._floors, self._dt, self._limit = floors, dt, rate_limit
+        self._tilt_floor, self._acceleration_floors = tilt_floor, acceleration_floors
+        self._dt, self._limit = dt, rate_limit
         self._push_end = max((push.end_s for push in pushes), default=0.0)
         self._windows = push_windows(pushes)
         self._band = math.radians(settings.settle_band_deg)
@@ -74,8 +78,8 @@ class Metrics:
         self._add_squares("tilt", x1, run=counted)
         self._add_squares("velocity", x2, run=counted, push=pushed)
         self._add_squares("command", u, run=counted)
-        if self._floors:
-            self._floors.add(columns["y1_rad"], x2, counted, pushed)
+        if self._tilt_floor:
+            self._tilt_floor.add(columns["y1_rad"], x2, counted, pushed)
         rates = {name: columns[f"estimate/{name}/x2_rad_s"] for name in self.observers}
         for name, rate in {**rates, **references}.items():
             self._add_squares(name, rate - x2, run=counted, push=pushed)
@@ -131,8 +135,11 @@ class Metrics:
         loop, *others = self.observers
         open_loop = {name: self._rate_figures(name, world) | self._signal_figures(name, world) for name in others}
         references = {name: self._rate_figures(name, world) for name in self.references}
-        floors = self._floors.errors(world) if self._floors else {}
-        references |= {name: self._error_figures(world, *errors) for name, errors in floors.items()}
+        if self._tilt_floor:
+            references[FLOOR_Y1] = self._error_figures(world, *self._tilt_floor.errors(world))
+            least = self._acceleration_floors[world]
+            if least is not None:
+                references[FLOOR_ACCELERATION] = self._error_figures(world, least, least)
         return {
             "settle_time_s": self._settle_time(world, stood),
             **self._rate_figures(loop, world),

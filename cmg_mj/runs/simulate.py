@@ -19,7 +19,7 @@ from cmg_mj.plant.mjcf import quiet
 from cmg_mj.plant.physics import ManyWorlds, OneWorld
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import RATES, Baselines
-from cmg_mj.results.floors import Floors
+from cmg_mj.results.floors import TiltFloor, acceleration_floor
 from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
@@ -149,17 +149,17 @@ def _recorder(
     noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
     y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
     unmodelled = any(part.unmodelled for parts in outside.values() for part in parts)
-    has_acceleration = [
-        not (unmodelled or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.bends)
-        and plant.radial_tilt.height == plant.reduced.pivot_arm
-        for plant, sensor in pairs
-    ]
-    floors = Floors(noises, y1_period, has_acceleration)
+    acceleration_floors = []
+    for noise, (plant, sensor) in zip(noises, pairs, strict=True):
+        slides = plant.radial_tilt.height != plant.reduced.pivot_arm
+        other = unmodelled or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.bends or slides
+        acceleration_floors.append(None if other else acceleration_floor(noise, y1_period))
     # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
     tilt_sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
     references = Baselines(sensors.mems_gyro, dt, controller.seed, controller.worlds, tilt_sigmas, controller.axis)
     pushes = outside.get("push", ())
-    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, floors)
+    floors = TiltFloor(y1_period, len(plants)), acceleration_floors
+    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, *floors)
     keep, first = options.get("keep_trajectory", True), axis == rigs[0].axis_names[0]
     return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first)
 
