@@ -124,7 +124,6 @@ def simulate(
         outcomes,
         summaries,
         since(0) if options.get("keep_trajectory", True) else None,
-        max(outcome.time_s for outcome in outcomes),
         tuple(observers[names[0]]),
         controller.seed,
         (controller.worlds,) if isinstance(controller.worlds, int) else tuple(controller.worlds),
