@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from cmg_mj.core.types import BIAS
 from cmg_mj.results.floors import FLOOR_ACCELERATION, FLOOR_Y1, TiltFloor
 from cmg_mj.results.summary_keys import Figures, Summary
 from cmg_mj.scenario.schema import MetricsSettings
@@ -24,7 +25,7 @@ class Metrics:
         pushes: Torques from outside.
         rate_limit: Largest gimbal rate [rad/s].
         settings: The settle band, and from when on a bias estimate is judged.
-        targets: Extra signal -> its true value in each world, (n_worlds,) [rad].
+        biases: True value of the signal `bias_rad` in each world, (n_worlds,) [rad].
         references: Names of the baselines.
         tilt_floor: The floor of y1 alone.
         acceleration_floors: Least error from y1 with its acceleration in each world [rad/s]; None where there is no
@@ -39,7 +40,7 @@ class Metrics:
         pushes: Sequence[Push],
         rate_limit: float,
         settings: MetricsSettings,
-        targets: Mapping[str, Sequence[float]] | None = None,
+        biases: Sequence[float],
         references: Sequence[str] = (),
         tilt_floor: TiltFloor | None = None,
         acceleration_floors: Sequence[float | None] = (),
@@ -50,8 +51,7 @@ class Metrics:
         self._push_end = max((push.end_s for push in pushes), default=0.0)
         self._windows = push_windows(pushes)
         self._band = math.radians(settings.settle_band_deg)
-        self._targets = {signal: np.array(values) for signal, values in (targets or {}).items()}
-        self._bias_from = settings.bias_from_s
+        self._biases, self._bias_from = np.array(biases), settings.bias_from_s
         self._ticks = 0
         # What is summed, and over which ticks -> sum in each world
         self._sums: dict[tuple[str, str], np.ndarray] = defaultdict(lambda: np.zeros(n_worlds))
@@ -85,11 +85,10 @@ class Metrics:
             self._add_squares(name, rate - x2, run=counted, push=pushed)
             self._add_squares(f"{name} against the gyro", rate - columns["fog_rad_s"], run=counted)
         for name in self.observers:
-            for signal, targets in self._targets.items():
-                estimate = columns.get(f"estimate/{name}/{signal}")
-                if estimate is not None:
-                    self._sums[f"{name} {signal}", "sum"] += _sum(estimate, bias_ticks)
-                    self._add_squares(f"{name} {signal}", estimate - targets, bias=bias_ticks)
+            estimate = columns.get(f"estimate/{name}/{BIAS}")
+            if estimate is not None:
+                self._sums[f"{name} bias", "sum"] += _sum(estimate, bias_ticks)
+                self._add_squares(f"{name} bias", estimate - self._biases, bias=bias_ticks)
         gimbal = np.where(counted, np.abs(columns["x3_rad"]), 0.0)
         self._gimbal_peak = np.maximum(self._gimbal_peak, gimbal.max(axis=0, initial=0.0))
         outside = counted & (np.abs(x1) > self._band)
@@ -105,21 +104,17 @@ class Metrics:
         n = self._sums["ticks", part][world]
         return finite_or_none(math.sqrt(self._sums[what, part][world] / n)) if n else None
 
-    def _signal_figures(self, name: str, world: int) -> Figures:
-        """Give the true value, the mean estimate and its RMS error of each signal; None if the run ended too early."""
-        figures: Figures = {}
-        for signal, targets in self._targets.items():
-            if (f"{name} {signal}", "sum") not in self._sums:
-                continue
-            n, total = self._sums["ticks", "bias"][world], self._sums[f"{name} {signal}", "sum"][world]
-            error = self._rms(world, f"{name} {signal}", "bias")
-            label = signal.removesuffix("_rad")
-            figures |= {
-                f"{label}_deg": math.degrees(targets[world]),
-                f"{label}_estimate_deg": finite_or_none(math.degrees(total / n)) if n else None,
-                f"{label}_rms_error_deg": None if error is None else math.degrees(error),
-            }
-        return figures
+    def _bias_figures(self, name: str, world: int) -> Figures:
+        """Give the true bias, its mean estimate and the RMS error, of which a run that ended too early has none."""
+        if (f"{name} bias", "sum") not in self._sums:
+            return {}
+        n, total = self._sums["ticks", "bias"][world], self._sums[f"{name} bias", "sum"][world]
+        error = self._rms(world, f"{name} bias", "bias")
+        return {
+            "bias_deg": math.degrees(self._biases[world]),
+            "bias_estimate_deg": finite_or_none(math.degrees(total / n)) if n else None,
+            "bias_rms_error_deg": None if error is None else math.degrees(error),
+        }
 
     def summary(self, world: int, stood: bool) -> Summary:
         """Compute the numbers of one world.
@@ -133,7 +128,7 @@ class Metrics:
         """
         n, tilt = self._sums["ticks", "run"][world], self._rms(world, "tilt")
         loop, *others = self.observers
-        open_loop = {name: self._rate_figures(name, world) | self._signal_figures(name, world) for name in others}
+        open_loop = {name: self._rate_figures(name, world) | self._bias_figures(name, world) for name in others}
         references = {name: self._rate_figures(name, world) for name in self.references}
         if self._tilt_floor:
             references[FLOOR_Y1] = self._error_figures(world, *self._tilt_floor.errors(world))
@@ -147,7 +142,7 @@ class Metrics:
             "gimbal_peak_deg": math.degrees(self._gimbal_peak[world]) if n else None,
             "command_rms_rad_s": self._rms(world, "command"),
             "command_saturated_fraction": float(self._sums["saturated", "run"][world] / n) if n else None,
-            **self._signal_figures(loop, world),
+            **self._bias_figures(loop, world),
             **({"open_loop_observers": open_loop} if open_loop else {}),
             **({"references": references} if references else {}),
         }

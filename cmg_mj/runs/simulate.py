@@ -14,7 +14,6 @@ from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import ControlLoop, Ending
 from cmg_mj.core.sensor import whole_steps
-from cmg_mj.core.types import BIAS
 from cmg_mj.plant.mjcf import quiet
 from cmg_mj.plant.physics import ManyWorlds, OneWorld
 from cmg_mj.plant.plant import Plant
@@ -143,7 +142,7 @@ def _recorder(
     """Make what records and judges the ticks of one axis; that of the first axis has the joints."""
     plants = [rig.single_axis(axis) for rig in rigs]
     pairs = list(zip(plants, unstack(controller.sensors, len(plants)), strict=True))
-    targets = {BIAS: [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs]}
+    biases = [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs]
     dt, limit, sensors = controller.law.dt, controller.law.rate_limit, controller.sensors
     noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
     y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
@@ -158,7 +157,7 @@ def _recorder(
     references = Baselines(sensors.mems_gyro, dt, controller.seed, controller.worlds, tilt_sigmas, controller.axis)
     pushes = outside.get("push", ())
     floors = TiltFloor(y1_period, len(plants)), acceleration_floors
-    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, targets, RATES, *floors)
+    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, biases, RATES, *floors)
     keep, first = options.get("keep_trajectory", True), axis == rigs[0].axis_names[0]
     return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first)
 

@@ -29,8 +29,7 @@ def metrics(
     **settings: Any,
 ) -> Metrics:
     pushes = pushes or ((Push(push_end_s - 0.1, 0.1),) if push_end_s else ())
-    targets = {"bias_rad": [0.0] * n_worlds}
-    return Metrics(observers, n_worlds, DT, pushes, 4.7, MetricsSettings(**settings), targets, references)
+    return Metrics(observers, n_worlds, DT, pushes, 4.7, MetricsSettings(**settings), [0.0] * n_worlds, references)
 
 
 def rows(values: Any, n: int) -> np.ndarray:
@@ -238,7 +237,7 @@ def test_an_estimate_that_is_not_finite_gives_none_not_nan() -> None:
 
 def test_bias_is_judged_from_its_time_on() -> None:
     """Far off at first, then 0.3 degrees above and below 1.1 in turn, with 1.0 to be figures: RMS of 0.4 and -0.2."""
-    run = Metrics(("adaptive", "other"), 1, DT, (), 4.7, MetricsSettings(bias_from_s=5.0), {"bias_rad": [DEG]})
+    run = Metrics(("adaptive", "other"), 1, DT, (), 4.7, MetricsSettings(bias_from_s=5.0), [DEG])
     bias = np.where(T < 5.0 - DT / 2.0, 90.0 * DEG, (1.1 + 0.3 * (-1.0) ** np.arange(len(T))) * DEG)
     for part in np.array_split(np.arange(len(T)), 7):
         n = len(part)
