@@ -8,8 +8,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.errors import InputError
-
 CONFIDENCE = 0.95
 LOPSIDED = 0.1
 MIN_WORLDS = 4
@@ -52,8 +50,6 @@ def mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
     from scipy.special import stdtrit  # scipy.stats would take half a second more
 
     sample = np.asarray(values, dtype=float)
-    if len(sample) < 2:
-        raise InputError(f"an interval needs two worlds or more, not {len(sample)}")
     if not np.isfinite(sample).all():
         return Interval(math.nan, -math.inf, math.inf)
     mean = float(sample.mean())

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmg_mj.core.errors import InputError
 from cmg_mj.results.intervals import (
     MIN_WORLDS,
     Interval,
@@ -114,8 +113,3 @@ def test_ratio_interval_of_an_exact_ratio() -> None:
 )
 def test_verdict_of_a_paired_difference(low: float, high: float, verdict: str) -> None:
     assert paired_verdict(Interval((low + high) / 2.0, low, high)) == verdict
-
-
-def test_one_world_makes_no_interval() -> None:
-    with pytest.raises(InputError, match="two worlds or more"):
-        mean_interval([1.0])
