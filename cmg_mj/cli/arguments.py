@@ -134,7 +134,9 @@ def worlds_option(help: str, default: int | None = None, range: tuple[int, int] 
 
 def observer_option(role: str = "in the loop", default: str | None = None, *, required: bool = False) -> Decorator:
     """Make the option `--observer`, which refuses an observer that does not exist."""
-    choice = {"required": True} if required else {"default": default, "show_default": True}  # None is a default, too
+    choice: dict[str, Any] = (
+        {"required": True} if required else {"default": default, "show_default": True}
+    )  # None is a default, too
     return click.option(
         "--observer",
         metavar="NAME",
