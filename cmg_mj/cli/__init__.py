@@ -134,23 +134,26 @@ def _status(arguments: Sequence[str]) -> ExitStatus:
     if not arguments:
         click.echo(cli.make_context("cmg-mj", [], resilient_parsing=True).get_help(), err=True)
         return WRONG_INPUT
+    status = WRONG_INPUT
     try:
         cli.main(args=list(arguments), prog_name="cmg-mj", standalone_mode=False)
-    except SystemExit as exit:
-        return exit.code if (blame := _blame(exit)) is None else _fail_with(blame, WRONG_INPUT)
-    except (InputError, RunStopped, click.ClickException) as error:
-        return _fail_with(
-            error.format_message() if isinstance(error, click.ClickException) else str(error), WRONG_INPUT
-        )
+        return DONE
+    except click.ClickException as error:
+        message = error.format_message()
+    except (InputError, RunStopped) as error:
+        message = str(error)
     except MemoryError:
-        return _fail_with("there is not enough memory for this; take a shorter run or fewer worlds", WRONG_INPUT)
+        message = "there is not enough memory for this; take a shorter run or fewer worlds"
     except (KeyboardInterrupt, click.Abort):  # before or after a command
-        return _fail_with("interrupted", INTERRUPTED)
+        message, status = "interrupted", INTERRUPTED
     except BaseException as error:
-        if (blame := _blame(error)) is None:
+        message = _blame(error)
+        if message is None:
+            if isinstance(error, SystemExit):
+                return error.code
             raise
-        return _fail_with(blame, WRONG_INPUT)
-    return DONE
+    note(message)
+    return status
 
 
 def _blame(error: BaseException) -> str | None:
@@ -166,13 +169,6 @@ def _open_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8"))
-
-
-def _fail_with(message: str, status: int) -> int:
-    """Print a message, if it is read, and return the status."""
-    with suppress(BrokenPipeError):
-        note(message)
-    return status
 
 
 def _detach_streams(error: OSError) -> None:

@@ -134,14 +134,16 @@ def worlds_option(help: str, default: int | None = None, range: tuple[int, int] 
 
 def observer_option(role: str = "in the loop", default: str | None = None, *, required: bool = False) -> Decorator:
     """Make the option `--observer`, which refuses an observer that does not exist."""
-    option = functools.partial(
-        click.option,
+    choice: dict[str, Any] = (
+        {"required": True} if required else {"default": default, "show_default": True}
+    )  # None is a default, too
+    return click.option(
         "--observer",
         metavar="NAME",
         callback=lambda context, parameter, name: None if name is None else check_observer("--observer", name),
         help=f"Observer {role}: a name, or your own as package.module:Class.",
+        **choice,
     )
-    return option(required=True) if required else option(default=default, show_default=True)  # None is a default, too
 
 
 def observers_option(otherwise: str = "", *, distinct: bool = True, baselines: bool = False) -> Decorator:

@@ -19,6 +19,8 @@ from cmg_mj.scenario.schema import ControllerSettings
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
 
+OWN_CODE = "your own code, which was imported and tried on two samples"
+
 
 def description(name: str, part: Experiment) -> str:
     """Describe a scenario in the lines that `cmg-mj check` prints.
@@ -40,6 +42,13 @@ def description(name: str, part: Experiment) -> str:
     rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
     imperfections = scenario.sensors.accelerometer.imperfections
     changes = settings.changes()
+    torques = [
+        ("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push
+    ]
+    torques += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
+    missing = list(omissions(scenario).values())
+    omitted = f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"
+    judgements = [judge(design, part.plant) for judge in entries("judge").values()]
     rows = [
         ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
         ("plant", f"{fields['plant']['model']}, modules: {', '.join(rig.modules)}"),
@@ -47,29 +56,19 @@ def description(name: str, part: Experiment) -> str:
         ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
         *_law_rows(design, fields["controller"]),
         ("observer", f"{scenario.observer.kind}  {assignments(observer)}".rstrip()),
-        *(
-            [("", "your own code, which was imported and tried on two samples")]
-            if ":" in scenario.observer.kind
-            else []
-        ),
+        *([("", OWN_CODE)] if ":" in scenario.observer.kind else []),
         ("open loop", ", ".join(scenario.open_loop_names()) or "none"),
         ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
         *([("", f"accelerometer: {assignments(imperfections)}")] if imperfections else []),
         *([("compare", f"{', '.join(compare.names())}; {compare.worlds} worlds")] if compare else []),
-        *(("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push),
+        *torques,
+        *_pivot_rows(part.plant),
+        *([("omitted", omitted)] if missing else []),
+        *(row for judgement in judgements for row in judgement.rows),
+        *(("hint", hint) for hint in hints(design, part.plant)),
+        *(("hint", hint) for judgement in judgements for hint in judgement.hints),
     ]
-    rows += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
-    rows += _pivot_rows(part.plant)
-    missing = list(omissions(scenario).values())
-    if missing:
-        rows.append(("omitted", f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"))
-    judgements = [judge(design, part.plant) for judge in entries("judge").values()]
-    rows += [row for judgement in judgements for row in judgement.rows]
-    clauses = [*hints(design, part.plant), *(hint for judgement in judgements for hint in judgement.hints)]
-    return lines(
-        f"{name}{f', axis {axis}' if axis else ''}: valid",
-        [*rows, *(("hint", hint) for hint in clauses)],
-    )
+    return lines(f"{name}{f', axis {axis}' if axis else ''}: valid", rows)
 
 
 def _about(torque: Push | Swing) -> str:
@@ -89,25 +88,22 @@ def _law_rows(design: Design, fields: Mapping[str, TomlValue]) -> Iterator[tuple
     controller, law = design.scenario.controller, design.law
     limits = f"at {controller.rate_hz:g} Hz, at most {controller.rate_limit_rad_s:g} rad/s"
     inputs = f"tilt rate from the {controller.feedback}, {controller.angle_source} angles"
-    notch = f"notch at {controller.notch_hz:g} Hz on the command" if controller.notch_hz else ""
+    if isinstance(law, StateFeedback):
+        yield "law", f"K_e = {number(law.gains)} {limits}"
+    else:
+        yield "law", f"{controller.kind} {limits}"
+        parameters = {name: value for name, value in fields.items() if name not in ControllerSettings.model_fields}
+        if parameters:
+            yield "", assignments(parameters)
+    yield "", inputs if law_needs(law) else "takes nothing of the observer, which is judged only"
+    if controller.notch_hz:
+        yield "", f"notch at {controller.notch_hz:g} Hz on the command"
     if isinstance(law, StateFeedback):
         loop = judge_gains(design).loop
-        yield "law", f"K_e = {number(law.gains)} {limits}"
-        yield "", inputs
-        if notch:
-            yield "", notch
         yield "", f"{loop.words} with the reduced model and its true state, slowest pole {loop.slowest:.3g} 1/s,"
         yield "", f"least damping ratio {loop.damping:.2g}, nearest to -1 {loop.distance:.2g}"
-        return
-    yield "law", f"{controller.kind} {limits}"
-    parameters = {name: value for name, value in fields.items() if name not in ControllerSettings.model_fields}
-    if parameters:
-        yield "", assignments(parameters)
-    yield "", inputs if law_needs(law) else "takes nothing of the observer, which is judged only"
-    if notch:
-        yield "", notch
-    if controller.kind not in LAWS:
-        yield "", "your own code, which was imported and tried on two samples"
+    elif controller.kind not in LAWS:
+        yield "", OWN_CODE
 
 
 def rig_description(name: str, part: Experiment, own: str = "") -> str:

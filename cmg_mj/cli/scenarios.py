@@ -92,11 +92,10 @@ def run(
     live_view = runs.live_view(experiment) if live else None
     with CtrlC() as ctrl_c:
         with progress(scenario.title or arguments.name, scenario.duration_s, ctrl_c) as on_progress:
-            options: SimulationOptions = {"on_progress": on_progress}
-            if live_view is not None:
-                options |= live_view.options(on_progress)
+            watched: SimulationOptions = {"on_progress": on_progress}
+            options = live_view.options(on_progress) if live_view else watched
             result = experiment.run(driver=driver, world=world, **options)
-        if live_view is not None:
+        if live_view:
             live_view.show()
         report = runs.report_run(experiment, result)
         try:
@@ -106,14 +105,13 @@ def run(
     say_written(
         folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", arguments.as_json
     )
-    outcome = result.outcomes[0]
+    outcome, where = result.outcomes[0], final_path(folder, place)
     if outcome.kind == "stopped":
-        raise RunStopped(f"{outcome.reason}; what was recorded until then is in {final_path(folder, place)}")
+        raise RunStopped(f"{outcome.reason}; what was recorded until then is in {where}")
     if outcome.kind == "interrupted":
-        recorded = f"what was recorded until then is in {final_path(folder, place)}"
-        end_interrupted(f"interrupted at {outcome.time_s:g} s; {recorded}")
+        end_interrupted(f"interrupted at {outcome.time_s:g} s; what was recorded until then is in {where}")
     if ctrl_c.noted:
-        end_interrupted(f"interrupted at the end; the complete run is in {final_path(folder, place)}")
+        end_interrupted(f"interrupted at the end; the complete run is in {where}")
 
 
 @click.command(short_help="Run several observers on the same plant, pushes and noise.")
@@ -144,7 +142,6 @@ def compare(
     from cmg_mj.results import reports as report
     from cmg_mj.runs import comparison
     from cmg_mj.runs import save as runs
-    from cmg_mj.runs.comparison import standings
     from cmg_mj.scenario.resolve import describe_differences
     from cmg_mj.scenario.schema import CompareSettings
 
@@ -170,7 +167,7 @@ def compare(
             compared = comparison.compare(experiments, worlds, on_progress)
         if not compared:
             end_interrupted("interrupted before the first observer was done; nothing was written")
-        summaries = standings(compared)
+        summaries = comparison.standings(compared)
         try:
             place = runs.save_comparison(folder, rerun, compared, plot=plot, complete=len(compared) == len(names))
         finally:

@@ -92,7 +92,7 @@ class Adaptive:
             raise ValueError(
                 f"sinusoid_hz = {self.sinusoid_hz:g}: must be below half the sample rate, {0.5 / self.dt:g} Hz"
             )
-        poles = np.linalg.eigvals(self.error_matrix)
+        poles = np.linalg.eigvals([[self.L[0], 1.0], [self.L[1], 0.0]])  # of A + L C at rest
         if not is_hurwitz(poles):
             listed = ", ".join(f"{p:.3g}" for p in poles)
             raise ValueError(
@@ -124,11 +124,6 @@ class Adaptive:
         constant += torque * per_torque**2 if self.torque else 0.0
         swinging = sinusoid * per_torque**2 / ((w * w + l2) ** 2 + (l1 * w) ** 2) if w else 0.0
         return self.Sigma * (constant / l2**2 + swinging)
-
-    @property
-    def error_matrix(self) -> np.ndarray:
-        """A + L C at rest, (2, 2)."""
-        return np.array([[self.L[0], 1.0], [self.L[1], 0.0]])
 
     @cached_property
     def _unknowns(self) -> list[tuple[str, list[float]]]:
@@ -167,10 +162,6 @@ class Adaptive:
         angle = 2.0 * math.pi * self.sinusoid_hz * self.dt
         return math.cos(angle), math.sin(angle)
 
-    @cached_property
-    def _known_bias(self) -> float:
-        return math.radians(self.known_bias_deg)
-
     def init(self, y: Measurement) -> State:
         """Start at rest at the measured tilt, with nothing known and T = 0."""
         zero = 0.0 * y.y1
@@ -183,7 +174,7 @@ class Adaptive:
         x1, x2, xm, T1, T2, before = state
         y1, y2 = y
         tilt, gimbal = 0.5 * (before[0] + y1), 0.5 * (before[1] + y2)
-        drift, gain, damping = model.terms(tilt + self._known_bias, gimbal)
+        drift, gain, damping = model.terms(tilt + math.radians(self.known_bias_deg), gimbal)
         a = -u * damping
         B0 = self._acting(tilt, model.inertia(gimbal))
         forward = _midpoint_rule(h, l1, l2, a)  # of v' = (A + L C) v + (w1, w2), A + L C = [[l1, 1], [l2, a]]

@@ -95,13 +95,10 @@ class HighGain:
             raise ValueError(f"b = {self.b:g}: must be below (1 - d_inf)/d_inf = {bound:.4g}, andrieu2009 (21)")
         poles = np.roots([1.0, self.l1, self.l1 * self.l2])
         require_stable_step("l1, l2, phi2", self.phi2 * poles, self.dt)
-        L = self.phi2 + self.phi3 / self.phi1 * GIMBAL_RATE * self.largest_damping
-        require_stable_step(
-            f"phi3/phi1 = {self.phi3 / self.phi1:.3g}, with which L rises to {L:.3g} at a gimbal rate of "
-            f"{GIMBAL_RATE:g} rad/s",
-            L * poles,
-            self.dt,
-        )
+        ratio = self.phi3 / self.phi1
+        L = self.phi2 + ratio * GIMBAL_RATE * self.largest_damping
+        too_large = f"phi3/phi1 = {ratio:.3g}, with which L rises to {L:.3g} at a gimbal rate of {GIMBAL_RATE:g} rad/s"
+        require_stable_step(too_large, L * poles, self.dt)
 
     @property
     def largest_damping(self) -> float:
@@ -117,14 +114,12 @@ class HighGain:
     def correction(self, e: Scalar, L: Scalar) -> tuple[Scalar, Scalar]:
         """L^(1+b) q1(s), L^(2+b) q2(l2 q1(s)) with s = l1 e/L^b."""
         scale = signed_power(L, self.b)
-        s = self._q1(self.l1 * e / scale)
-        return L * scale * s, L * (L * scale) * self._q2(self.l2 * s)
+        s = self._with_power(self.l1 * e / scale, 1.0 / (1.0 - self.d_inf))
+        return L * scale * s, L * (L * scale) * self._with_power(self.l2 * s, 1.0 + self.d_inf)
 
-    def _q1(self, w: Scalar) -> Scalar:
-        return w + signed_power(w, 1.0 / (1.0 - self.d_inf)) if self.d_inf else w
-
-    def _q2(self, w: Scalar) -> Scalar:
-        return w + signed_power(w, 1.0 + self.d_inf) if self.d_inf else w
+    def _with_power(self, w: Scalar, exponent: float) -> Scalar:
+        """q1 or q2."""
+        return w + signed_power(w, exponent) if self.d_inf else w
 
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
         """Advance by one sample period."""

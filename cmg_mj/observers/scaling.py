@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import NamedTuple, TypeAlias
 
 from cmg_mj.core.reduced_model import ReducedModel
@@ -28,17 +27,6 @@ Number: TypeAlias = "float | tuple[Number, ...]"
 """Value of a parameter: a number, or some of them in tuples."""
 
 
-class Owner(Enum):
-    """The thing that a parameter describes."""
-
-    RIG = "rig"
-    """The rig's motion: it goes with the rig's units."""
-    SENSORS = "sensors"
-    """Errors of the sensors, which are the same on a slow rig."""
-    SURROUNDINGS = "surroundings"
-    """The pivot's motion, a gait, friction: what the rig's own pace says nothing of."""
-
-
 class Scales(NamedTuple):
     """The units of a rig, in those of the papers' rig."""
 
@@ -50,11 +38,15 @@ class Scales(NamedTuple):
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit of a parameter, s^time (kg m^2)^inertia, and what the parameter describes."""
+    """The unit of a parameter, s^time (kg m^2)^inertia.
+
+    A parameter `of_rig` describes the rig's motion and goes with the rig's units. Others describe errors of the
+    sensors, which are the same on a slow rig, or the surroundings: the pivot's motion, a gait, friction.
+    """
 
     time: float = 0.0
     inertia: float = 0.0
-    owner: Owner = Owner.RIG
+    of_rig: bool = True
 
     def factor(self, scales: Scales) -> float:
         """Return what a parameter of this unit is multiplied by."""
@@ -81,10 +73,10 @@ _ADAPTIVE: dict[str, Units] = {
     "Sigma": Unit(-1),  # Sigma Gamma T^2 is the rate at which e is learnt, T = g/l2 a pure number
 }
 _ACCELERATION: dict[str, Units] = {
-    "rate_start": Unit(-1, owner=Owner.SENSORS),  # about what remains of it: the sensors' noise
-    "bias_start": Unit(-2, owner=Owner.SENSORS),
-    "bias_walk": Unit(-2.5, owner=Owner.SENSORS),
-    "jerk": Unit(-2, owner=Owner.SENSORS),  # beside the acceleration's noise, which is as large or larger
+    "rate_start": Unit(-1, of_rig=False),  # about what remains of it: the sensors' noise
+    "bias_start": Unit(-2, of_rig=False),
+    "bias_walk": Unit(-2.5, of_rig=False),
+    "jerk": Unit(-2, of_rig=False),  # beside the acceleration's noise, which is as large or larger
 }
 
 UNITS: Mapping[str, Mapping[str, Units]] = {
@@ -95,9 +87,9 @@ UNITS: Mapping[str, Mapping[str, Units]] = {
     },
     "homogeneous": {
         **_HOMOGENEOUS,
-        "friction_n_m": replace(TORQUE, owner=Owner.SURROUNDINGS),
-        "damping_n_m_s": Unit(-1, 1, Owner.SURROUNDINGS),
-        "friction_width_rad_s": Unit(-1, owner=Owner.SURROUNDINGS),
+        "friction_n_m": replace(TORQUE, of_rig=False),
+        "damping_n_m_s": Unit(-1, 1, of_rig=False),
+        "friction_width_rad_s": Unit(-1, of_rig=False),
     },
     "luenberger": {  # x' = A x + B u + L (y - C x)
         "L": ((GAIN_1, GAIN_1), (GAIN_2, GAIN_2), (GAIN_1, GAIN_1)),
@@ -112,13 +104,13 @@ UNITS: Mapping[str, Mapping[str, Units]] = {
     "gyro_free": _ACCELERATION,
     "free_pivot": {
         **_ACCELERATION,
-        "pivot_hz": Unit(-1, owner=Owner.SURROUNDINGS),
+        "pivot_hz": Unit(-1, of_rig=False),
         "pivot_start": PURE,
         "pivot_floor": PURE,
-        "pivot_s": Unit(1, owner=Owner.SURROUNDINGS),
-        "learn_s": Unit(1, owner=Owner.SURROUNDINGS),
+        "pivot_s": Unit(1, of_rig=False),
+        "learn_s": Unit(1, of_rig=False),
         "surprise": PURE,
-        "noise_s": Unit(1, owner=Owner.SENSORS),
+        "noise_s": Unit(1, of_rig=False),
         "hurry": PURE,
         "doubt": PURE,
         "inflation": PURE,
@@ -130,7 +122,7 @@ UNITS: Mapping[str, Mapping[str, Units]] = {
         "phi2": Unit(-1),  # L' = L (phi1 (phi2 - L) + phi3 Omega), L and Omega [1/s]
         **dict.fromkeys(("l1", "l2", "d_inf", "b", "phi1", "phi3"), PURE),
     },
-    "adaptive": {**_ADAPTIVE, "sinusoid_hz": Unit(-1, owner=Owner.SURROUNDINGS), "known_bias_deg": PURE},
+    "adaptive": {**_ADAPTIVE, "sinusoid_hz": Unit(-1, of_rig=False), "known_bias_deg": PURE},
     "homogeneous_adaptive": {**_HOMOGENEOUS, **_ADAPTIVE, "Gamma": PURE},
 }
 """Observer -> parameter -> its unit. A user's own observer has none here."""
@@ -154,7 +146,7 @@ def scale_value(value: Number, unit: Units, scales: Scales) -> Number:
 def scaled_names(kind: str) -> tuple[str, ...]:
     """Return the parameters of an observer that go with the rig; none of a user's own observer."""
     units = UNITS.get(kind, {}).items()
-    return tuple(name for name, its in units if any(u.owner is Owner.RIG and u != PURE for u in _flat(its)))
+    return tuple(name for name, its in units if any(unit.of_rig and unit != PURE for unit in _flat(its)))
 
 
 def scaled_parameters(kind: str, model: ReducedModel) -> dict[str, Number]:

@@ -6,7 +6,6 @@ They are for the sensors' noise alone: offsets, other errors of the sensors and 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 
@@ -140,39 +139,15 @@ class TiltFloor:
         Returns:
             RMS error in the whole run and in the push windows [rad/s]; None where there are too few samples for a fit.
         """
-        whole, pushed = (self._error(self._products[part, world], self._counts[part, world]) for part in (0, 1))
-        return whole, pushed
+        return self._error(0, world), self._error(1, world)
 
-    def _error(self, products: np.ndarray, count: float) -> float | None:
+    def _error(self, part: int, world: int) -> float | None:
+        products, count = self._products[part, world], self._counts[part, world]
         if count < ROWS_A_TAP * self._taps or not np.isfinite(products).all():
             return None
         taps = np.linalg.lstsq(products[:-1, :-1], products[:-1, -1], rcond=1e-13)[0]
         residual = np.append(taps, -1.0)
         return math.sqrt(max(residual @ products @ residual, 0.0) / count)
-
-
-class Floors:
-    """Both floors of a run.
-
-    Args:
-        noises: Noise of one sample of y1 and its acceleration, a world each.
-        dt: Sample period [s].
-        has_acceleration: Which worlds have a floor of y1 with its acceleration, (n_worlds,). It is no floor
-            where a pivot moves, or where accelerometers vibrate or are off their radii.
-    """
-
-    def __init__(self, noises: Sequence[MeasurementNoise], dt: float, has_acceleration: Sequence[bool]) -> None:
-        self._y1 = TiltFloor(dt, len(noises))
-        self._acceleration = [acceleration_floor(noise, dt) for noise in noises]
-        self._has_acceleration = has_acceleration
-        self.add = self._y1.add
-
-    def errors(self, world: int) -> dict[str, tuple[float | None, float | None]]:
-        """Compute each floor's RMS error in the whole run and in the push windows of one world [rad/s]."""
-        floors = {FLOOR_Y1: self._y1.errors(world)}
-        if self._has_acceleration[world]:
-            floors[FLOOR_ACCELERATION] = self._acceleration[world], self._acceleration[world]
-        return floors
 
 
 def _edges(memory: int) -> list[int]:

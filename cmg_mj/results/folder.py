@@ -97,16 +97,17 @@ class RunFolder:
             if not isinstance(error, Exception):
                 raise error
         if wrong:
-            raise InputError("; ".join(_complaint(place / name, error) for name, error in wrong.items()))
+            reasons = {name: getattr(error, "strerror", None) or raised(error) for name, error in wrong.items()}
+            raise InputError("; ".join(f"{place / name}: cannot be written: {why}" for name, why in reasons.items()))
         return place
 
     def _move_in(self) -> Path:
         """Rename the written folder into the first place that it may take."""
         for place in numbered(self._folder):
             old = _hidden(place, "old")
-            if _is_empty(place):
-                place.rmdir()
-            elif os.path.lexists(place):
+            with suppress(OSError):
+                place.rmdir()  # if it is empty
+            if os.path.lexists(place):
                 if not self._may_replace(place):
                     continue
                 place.rename(old)
@@ -235,12 +236,8 @@ def _is_alive(process: int) -> bool:
     except (ProcessLookupError, OverflowError):
         return False
     except PermissionError:
-        return True
+        pass
     return True
-
-
-def _is_empty(folder: Path) -> bool:
-    return folder.is_dir() and not folder.is_symlink() and not any(folder.iterdir())
 
 
 def _text(path: Path) -> str | None:
@@ -249,10 +246,6 @@ def _text(path: Path) -> str | None:
         return path.read_text(encoding="utf-8", errors="surrogateescape")
     except OSError:
         return None
-
-
-def _complaint(path: Path, error: BaseException) -> str:
-    return f"{path}: cannot be written: {getattr(error, 'strerror', None) or raised(error)}"
 
 
 def write_text(path: Path, text: str) -> None:

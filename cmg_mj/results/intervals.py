@@ -8,8 +8,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.errors import InputError
-
 CONFIDENCE = 0.95
 LOPSIDED = 0.1
 MIN_WORLDS = 4
@@ -52,8 +50,6 @@ def mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
     from scipy.special import stdtrit  # scipy.stats would take half a second more
 
     sample = np.asarray(values, dtype=float)
-    if len(sample) < 2:
-        raise InputError(f"an interval needs two worlds or more, not {len(sample)}")
     if not np.isfinite(sample).all():
         return Interval(math.nan, -math.inf, math.inf)
     mean = float(sample.mean())
@@ -74,12 +70,7 @@ def positive_mean_interval(values: Sequence[float] | np.ndarray) -> Interval:
 
     Returns:
         The mean and its interval; infinite ends if a value is not finite.
-
-    Raises:
-        InputError: There are fewer values.
     """
-    if len(values) < MIN_WORLDS:
-        raise InputError(f"an interval of a non-negative figure needs four worlds or more, not {len(values)}")
     mean, low, high = mean_interval(values)
     if not mean > 0.0:  # all are zero, or one is no number
         return Interval(mean, low, high)

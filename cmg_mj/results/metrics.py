@@ -5,42 +5,14 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from cmg_mj.results.floors import Floors
+from cmg_mj.core.types import BIAS
+from cmg_mj.results.floors import FLOOR_ACCELERATION, FLOOR_Y1, TiltFloor
 from cmg_mj.results.summary_keys import Figures, Summary
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push, inside, push_windows
-
-
-class TickBlock(NamedTuple):
-    """Successive ticks as columns, (n_ticks, n_worlds) each.
-
-    Attributes:
-        x1: True tilt [rad].
-        x2: True tilt rate [rad/s].
-        body_rate: Rate of the frame along the tilt axis, as a perfect gyro on it shows [rad/s].
-        x3: True gimbal angle [rad].
-        y1: Measured tilt [rad].
-        fog: The gyro's rate [rad/s].
-        u: Command [rad/s].
-        estimates: Signal -> values, for the observer in the loop and each open-loop observer; `x2_rad_s` among them.
-        columns: The trajectory's columns after its time, by name.
-        ended: Which worlds have ended; None for one world.
-    """
-
-    x1: np.ndarray
-    x2: np.ndarray
-    body_rate: np.ndarray
-    x3: np.ndarray
-    y1: np.ndarray
-    fog: np.ndarray
-    u: np.ndarray
-    estimates: list[dict[str, np.ndarray]]
-    columns: dict[str, np.ndarray]
-    ended: np.ndarray | None
 
 
 class Metrics:
@@ -53,9 +25,11 @@ class Metrics:
         pushes: Torques from outside.
         rate_limit: Largest gimbal rate [rad/s].
         settings: The settle band, and from when on a bias estimate is judged.
-        targets: Extra signal -> its true value in each world, (n_worlds,) [rad].
+        biases: True value of the signal `bias_rad` in each world, (n_worlds,) [rad].
         references: Names of the baselines.
-        floors: Lower bounds on the error.
+        tilt_floor: The floor of y1 alone.
+        acceleration_floors: Least error from y1 with its acceleration in each world [rad/s]; None where there is no
+            such floor.
     """
 
     def __init__(
@@ -66,17 +40,18 @@ class Metrics:
         pushes: Sequence[Push],
         rate_limit: float,
         settings: MetricsSettings,
-        targets: Mapping[str, Sequence[float]] | None = None,
+        biases: Sequence[float],
         references: Sequence[str] = (),
-        floors: Floors | None = None,
+        tilt_floor: TiltFloor | None = None,
+        acceleration_floors: Sequence[float | None] = (),
     ) -> None:
         self.observers, self.references = list(observers), list(references)
-        self._floors, self._dt, self._limit = floors, dt, rate_limit
+        self._tilt_floor, self._acceleration_floors = tilt_floor, acceleration_floors
+        self._dt, self._limit = dt, rate_limit
         self._push_end = max((push.end_s for push in pushes), default=0.0)
         self._windows = push_windows(pushes)
         self._band = math.radians(settings.settle_band_deg)
-        self._targets = {signal: np.array(values) for signal, values in (targets or {}).items()}
-        self._bias_from = settings.bias_from_s
+        self._biases, self._bias_from = np.array(biases), settings.bias_from_s
         self._ticks = 0
         # What is summed, and over which ticks -> sum in each world
         self._sums: dict[tuple[str, str], np.ndarray] = defaultdict(lambda: np.zeros(n_worlds))
@@ -84,37 +59,39 @@ class Metrics:
         self._last_outside = np.full(n_worlds, -1)
         self._last_tick = np.full(n_worlds, -1)
 
-    def update(self, block: TickBlock, references: Mapping[str, np.ndarray] | None = None) -> None:
+    def update(self, columns: Mapping[str, np.ndarray], references: Mapping[str, np.ndarray]) -> None:
         """Add the next ticks.
 
         Args:
-            block: The ticks.
+            columns: The trajectory's columns after its time, by name, (n_ticks, n_worlds) each.
             references: Each baseline's tilt rate, (n_ticks, n_worlds) [rad/s].
         """
-        counted = np.isfinite(block.x1)
+        x1, x2, u = columns["x1_rad"], columns["x2_rad_s"], columns["u_rad_s"]
+        counted = np.isfinite(x1)
         tick = self._ticks + np.arange(len(counted))[:, None]
         self._ticks += len(counted)
         pushed = counted & inside(tick * self._dt, self._windows)
         bias_ticks = counted & (tick * self._dt >= self._bias_from - 1e-9)
         for part, ticks in (("run", counted), ("push", pushed), ("bias", bias_ticks)):
             self._sums["ticks", part] += ticks.sum(axis=0)
-        self._sums["saturated", "run"] += (counted & (np.abs(block.u) >= self._limit)).sum(axis=0)
-        self._add_squares("tilt", block.x1, run=counted)
-        self._add_squares("velocity", block.x2, run=counted, push=pushed)
-        self._add_squares("command", block.u, run=counted)
-        if self._floors:
-            self._floors.add(block.y1, block.x2, counted, pushed)
-        rates = {name: estimate["x2_rad_s"] for name, estimate in zip(self.observers, block.estimates, strict=True)}
-        for name, rate in [*rates.items(), *(references or {}).items()]:
-            self._add_squares(name, rate - block.x2, run=counted, push=pushed)
-            self._add_squares(f"{name} against the gyro", rate - block.fog, run=counted)
-        for name, estimate in zip(self.observers, block.estimates, strict=True):
-            for signal in self._targets.keys() & estimate.keys():
-                self._sums[f"{name} {signal}", "sum"] += _sum(estimate[signal], bias_ticks)
-                self._add_squares(f"{name} {signal}", estimate[signal] - self._targets[signal], bias=bias_ticks)
-        gimbal = np.where(counted, np.abs(block.x3), 0.0)
+        self._sums["saturated", "run"] += (counted & (np.abs(u) >= self._limit)).sum(axis=0)
+        self._add_squares("tilt", x1, run=counted)
+        self._add_squares("velocity", x2, run=counted, push=pushed)
+        self._add_squares("command", u, run=counted)
+        if self._tilt_floor:
+            self._tilt_floor.add(columns["y1_rad"], x2, counted, pushed)
+        rates = {name: columns[f"estimate/{name}/x2_rad_s"] for name in self.observers}
+        for name, rate in {**rates, **references}.items():
+            self._add_squares(name, rate - x2, run=counted, push=pushed)
+            self._add_squares(f"{name} against the gyro", rate - columns["fog_rad_s"], run=counted)
+        for name in self.observers:
+            estimate = columns.get(f"estimate/{name}/{BIAS}")
+            if estimate is not None:
+                self._sums[f"{name} bias", "sum"] += _sum(estimate, bias_ticks)
+                self._add_squares(f"{name} bias", estimate - self._biases, bias=bias_ticks)
+        gimbal = np.where(counted, np.abs(columns["x3_rad"]), 0.0)
         self._gimbal_peak = np.maximum(self._gimbal_peak, gimbal.max(axis=0, initial=0.0))
-        outside = counted & (np.abs(block.x1) > self._band)
+        outside = counted & (np.abs(x1) > self._band)
         self._last_outside = np.maximum(self._last_outside, np.where(outside, tick, -1).max(axis=0, initial=-1))
         self._last_tick = np.maximum(self._last_tick, np.where(counted, tick, -1).max(axis=0, initial=-1))
 
@@ -127,21 +104,17 @@ class Metrics:
         n = self._sums["ticks", part][world]
         return finite_or_none(math.sqrt(self._sums[what, part][world] / n)) if n else None
 
-    def _signal_figures(self, name: str, world: int) -> Figures:
-        """Give the true value, the mean estimate and its RMS error of each signal; None if the run ended too early."""
-        figures: Figures = {}
-        for signal, targets in self._targets.items():
-            if (f"{name} {signal}", "sum") not in self._sums:
-                continue
-            n, total = self._sums["ticks", "bias"][world], self._sums[f"{name} {signal}", "sum"][world]
-            error = self._rms(world, f"{name} {signal}", "bias")
-            label = signal.removesuffix("_rad")
-            figures |= {
-                f"{label}_deg": math.degrees(targets[world]),
-                f"{label}_estimate_deg": finite_or_none(math.degrees(total / n)) if n else None,
-                f"{label}_rms_error_deg": None if error is None else math.degrees(error),
-            }
-        return figures
+    def _bias_figures(self, name: str, world: int) -> Figures:
+        """Give the true bias, its mean estimate and the RMS error, of which a run that ended too early has none."""
+        if (f"{name} bias", "sum") not in self._sums:
+            return {}
+        n, total = self._sums["ticks", "bias"][world], self._sums[f"{name} bias", "sum"][world]
+        error = self._rms(world, f"{name} bias", "bias")
+        return {
+            "bias_deg": math.degrees(self._biases[world]),
+            "bias_estimate_deg": finite_or_none(math.degrees(total / n)) if n else None,
+            "bias_rms_error_deg": None if error is None else math.degrees(error),
+        }
 
     def summary(self, world: int, stood: bool) -> Summary:
         """Compute the numbers of one world.
@@ -155,10 +128,13 @@ class Metrics:
         """
         n, tilt = self._sums["ticks", "run"][world], self._rms(world, "tilt")
         loop, *others = self.observers
-        open_loop = {name: self._rate_figures(name, world) | self._signal_figures(name, world) for name in others}
+        open_loop = {name: self._rate_figures(name, world) | self._bias_figures(name, world) for name in others}
         references = {name: self._rate_figures(name, world) for name in self.references}
-        floors = self._floors.errors(world) if self._floors else {}
-        references |= {name: self._error_figures(world, *errors) for name, errors in floors.items()}
+        if self._tilt_floor:
+            references[FLOOR_Y1] = self._error_figures(world, *self._tilt_floor.errors(world))
+            least = self._acceleration_floors[world]
+            if least is not None:
+                references[FLOOR_ACCELERATION] = self._error_figures(world, least, least)
         return {
             "settle_time_s": self._settle_time(world, stood),
             **self._rate_figures(loop, world),
@@ -166,7 +142,7 @@ class Metrics:
             "gimbal_peak_deg": math.degrees(self._gimbal_peak[world]) if n else None,
             "command_rms_rad_s": self._rms(world, "command"),
             "command_saturated_fraction": float(self._sums["saturated", "run"][world] / n) if n else None,
-            **self._signal_figures(loop, world),
+            **self._bias_figures(loop, world),
             **({"open_loop_observers": open_loop} if open_loop else {}),
             **({"references": references} if references else {}),
         }

@@ -53,7 +53,6 @@ class Result(NamedColumns):
         outcomes: How each world ended, (n_worlds,).
         summaries: Each world's numbers, (n_worlds,).
         trajectory: All ticks, if they were kept.
-        seconds: Simulated time of the longest world [s].
         observers: The observer in the loop, then the open-loop observers.
         seed: Seed of the sensors' noise.
         worlds: The worlds' numbers, (n_worlds,).
@@ -63,11 +62,15 @@ class Result(NamedColumns):
     outcomes: list[Outcome]
     summaries: list[Summary]
     trajectory: Trajectory | None = None
-    seconds: float = 0.0
     observers: Sequence[str] = ("",)
     seed: int = 0
     worlds: Sequence[int] = ()
     driver: str = "native"
+
+    @property
+    def seconds(self) -> float:
+        """Simulated time of the longest world [s]."""
+        return max(outcome.time_s for outcome in self.outcomes)
 
     @property
     def stood(self) -> np.ndarray:
@@ -197,6 +200,5 @@ class Result(NamedColumns):
             outcomes=self.outcomes[worlds],
             summaries=self.summaries[worlds],
             trajectory=None if self.trajectory is None else self.trajectory.of_worlds(worlds),
-            seconds=max(outcome.time_s for outcome in self.outcomes[worlds]),
             worlds=self.worlds[worlds],
         )

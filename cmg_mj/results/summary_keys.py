@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -94,16 +94,12 @@ def capitalised(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def finite(summary: Mapping[str, SummaryValue]) -> Summary:
-    """Replace each number that JSON does not know by None."""
-    return {key: _finite_value(value) for key, value in summary.items()}
-
-
-def _finite_value(value: SummaryValue) -> SummaryValue:
+def finite(value: Any) -> Any:
+    """Replace each number that JSON does not know by None, in a summary or a part of one."""
     if isinstance(value, Mapping):
-        return finite(value)
+        return {key: finite(part) for key, part in value.items()}
     if isinstance(value, list):
-        return [_finite_value(item) for item in value]
+        return [finite(part) for part in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -89,10 +88,6 @@ class Layout:
         """List all columns after `time_s`, in order."""
         return [*self._signals(), *self.positions(), *self.rates()]
 
-    def named(self, columns: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
-        """Name the columns after `time_s`, given in order."""
-        return dict(zip(self.columns(), columns, strict=True))
-
     def _signals(self) -> list[str]:
         """List the columns that are no joints'."""
         if self.axes:
@@ -112,13 +107,12 @@ def frame_of(table: pa.Table) -> pd.DataFrame:
         InputError: pandas is not installed.
     """
     try:
-        importlib.import_module("pandas")
+        return table.to_pandas()
     except ImportError as error:
         raise InputError(
             "to_pandas: pandas is not installed. Install it with `python -m pip install pandas`, or use the columns "
             "without it: dict(...) has them as NumPy arrays"
         ) from error
-    return table.to_pandas()
 
 
 class NamedColumns:
@@ -209,8 +203,10 @@ class Trajectory(NamedColumns):
 
     @staticmethod
     def joined(axes: Mapping[str, Trajectory]) -> Trajectory:
-        """Join the trajectories of a plant's axes; the first has the joints."""
+        """Join the trajectories of a plant's axes, the first of which has the joints; an only one stays as it is."""
         first = next(iter(axes.values()))
+        if len(axes) == 1:
+            return first
         parts = tuple(replace(axis.layout, joints=(), kinds=(), name=name) for name, axis in axes.items())
         layout = replace(first.layout, axes=parts)
         columns = {"time_s": first["time_s"]}
@@ -225,8 +221,8 @@ class Trajectory(NamedColumns):
 
     def world(self, index: int) -> Trajectory:
         """Select one world of many, up to its end."""
-        alone = self.of_worlds(index)
-        return alone._rows(np.isfinite(alone[self._first_signal]))
+        alone, first = self.of_worlds(index), self.layout.columns()[0] if self.axes else SIGNALS[0]
+        return alone._rows(np.isfinite(alone[first]))  # NaN after the world's end
 
     def of_worlds(self, worlds: np.ndarray | slice | int) -> Trajectory:
         """Select some of many worlds by their indices, a mask (n_worlds,) or a slice."""
@@ -259,11 +255,6 @@ class Trajectory(NamedColumns):
             number = np.repeat(np.arange(len(worlds)), [len(world) for world in worlds])
             columns = {"world": number, **{name: np.concatenate([world[name] for world in worlds]) for name in self}}
         return frame_of(pa.table(columns))
-
-    @property
-    def _first_signal(self) -> str:
-        """The column that is NaN after a world's end, whatever the plant."""
-        return self.layout.columns()[0] if self.layout.axes else SIGNALS[0]
 
     def save(self, path: Path) -> None:
         """Write one world's trajectory as Parquet, whole or not at all."""

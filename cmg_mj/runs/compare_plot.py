@@ -10,7 +10,7 @@ import numpy as np
 
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import KEYS
-from cmg_mj.runs.comparison import ComparedObserver, ComparisonRow, comparison_rows
+from cmg_mj.runs.comparison import ComparedObserver, comparison_rows
 from cmg_mj.view.plots.figure import pyplot, save_figure
 from cmg_mj.view.plots.style import colours, hexadecimal, short_names
 
@@ -31,7 +31,7 @@ def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) ->
         title: The scenario's title.
     """
     rows = comparison_rows(compared)
-    figures = {key: [_figures(row, key) for row in rows] for key, about in KEYS.items() if about.compared}
+    figures = {key: [row.figures(key) for row in rows] for key, about in KEYS.items() if about.compared}
     drawn = {key: worlds for key, worlds in figures.items() if np.isfinite(worlds).any()}
     down = -(-len(drawn) // COLUMNS)
     size = (12.0, 1.2 + down * (0.9 + 0.22 * len(rows)))
@@ -44,24 +44,16 @@ def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) ->
         _draw(axes, key, worlds, stood, palette)
     first = grid.flat[0]
     names = short_names([row.name for row in rows])
-    first.set_yticks(range(len(rows)), [_label(row, names[row.name]) for row in rows])
+    lost = [
+        "" if row.reference or world.all() else f" ({(~world).sum()} lost)"
+        for row, world in zip(rows, stood, strict=True)
+    ]
+    first.set_yticks(range(len(rows)), [names[row.name] + more for row, more in zip(rows, lost, strict=True)])
     first.invert_yaxis()  # shared: the table's order in every panel
     heading = f"{title or 'Comparison'}: {len(stood[0])} worlds an observer. Lines: mean and its 95 % interval."
     if not np.all(stood):
         heading += " Crosses: worlds that did not stand to the end, until then."
     save_figure(path, figure, heading, dpi=100)
-
-
-def _label(row: ComparisonRow, name: str) -> str:
-    """Label a row with its name and the number of worlds that did not stand."""
-    lost = int((~row.entry.result.stood).sum())
-    return f"{name} ({lost} lost)" if lost and not row.reference else name
-
-
-def _figures(row: ComparisonRow, key: str) -> np.ndarray:
-    """Return a figure of every world, (n_worlds,): until its end, where it did not stand; NaN where there is none."""
-    figures = [world.get(key) for world in row.entry.result.rows(row.reference)]
-    return np.array([np.nan if figure is None else figure for figure in figures], dtype=float)
 
 
 def _draw(

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +13,7 @@ from cmg_mj.plant.plant import Plant, load_scenario_plant
 from cmg_mj.results.baselines import BASELINES
 from cmg_mj.results.intervals import finite_mean, finite_values, known_interval
 from cmg_mj.results.result import Outcome, Result
-from cmg_mj.results.summary_keys import KEYS, NESTED, Summary, as_table, finite, open_loop_figures, section
+from cmg_mj.results.summary_keys import KEYS, NESTED, Summary, as_table, finite, section
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.schema import CompareSettings, Scenario
 from cmg_mj.scenario.time_grid import time_grid
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class ComparedObserver:
     """One observer's part in a comparison.
 
@@ -148,10 +147,8 @@ def repeatable(scenario: Scenario, experiments: Sequence[Experiment], worlds: in
     trimmed = [e for e in experiments if e.scenario.controller.bias_trim_s]
     choice = (same or trimmed or list(experiments))[0]
     settings = CompareSettings(observers=[e.scenario.observer.kind for e in experiments], worlds=worlds)
-    controller = (trimmed or [choice])[0].scenario.controller
-    return dataclasses.replace(
-        choice, scenario=choice.scenario.model_copy(update={"compare": settings, "controller": controller})
-    )
+    changes = {"compare": settings, "controller": (trimmed or [choice])[0].scenario.controller}
+    return replace(choice, scenario=choice.scenario.model_copy(update=changes))
 
 
 PUSH_ERROR, ERROR = "velocity_rms_error_push_rad_s", "velocity_rms_error_rad_s"
@@ -174,12 +171,14 @@ class ComparisonRow:
         """The row's label."""
         return self.reference or self.entry.kind
 
+    def figures(self, key: str) -> np.ndarray:
+        """Return a figure of every world, until its end, (n_worlds,); NaN where there is none."""
+        figures = [world.get(key) for world in self.entry.result.rows(self.reference)]
+        return np.array([np.nan if figure is None else figure for figure in figures], dtype=float)
+
     def values(self, key: str) -> np.ndarray:
         """Return a figure of every world, (n_worlds,); NaN where a world did not stand or has no such figure."""
-        result = self.entry.result
-        summary = result.summaries[0]
-        figures = open_loop_figures(summary)[self.reference] if self.reference else summary
-        return result.values(key, self.reference) if key in figures else np.full(len(result.outcomes), np.nan)
+        return np.where(self.entry.result.stood, self.figures(key), np.nan)
 
     @property
     def summary(self) -> Summary:
@@ -190,19 +189,14 @@ class ComparisonRow:
         loop = self.entry.summary
         if self.reference is None:
             return loop
-        means = {key: finite_mean(self.values(key)) for key in loop if key in KEYS}
-        return finite(
-            {
-                **dict.fromkeys(loop),
-                "observer": self.reference,
-                "in_loop_of": self.entry.kind,
-                "seed": loop["seed"],
-                "differs": loop["differs"],
-                "worlds": loop["worlds"],
-                **means,
-                "velocity_rms_error_std_rad_s": standard_deviation(self.values(ERROR)),
-            }
-        )
+        return {
+            **dict.fromkeys(loop),
+            "observer": self.reference,
+            "in_loop_of": self.entry.kind,
+            **{key: loop[key] for key in ("seed", "differs", "worlds")},
+            **{key: finite_mean(self.values(key)) for key in loop if key in KEYS},
+            "velocity_rms_error_std_rad_s": standard_deviation(self.values(ERROR)),
+        }
 
 
 def best_observer(compared: Sequence[ComparedObserver], key: str) -> ComparedObserver | None:

@@ -10,8 +10,7 @@ from collections.abc import Callable
 import rerun as rr
 
 from cmg_mj.results.result import Outcome
-from cmg_mj.runs.recorder import MultiAxisRecorder, TickRecorder
-from cmg_mj.runs.simulate import SimulationOptions
+from cmg_mj.runs.simulate import SimulationOptions, Since
 from cmg_mj.view.recording.layout import default_blueprint
 from cmg_mj.view.recording.run import RecordingHeader, Run
 from cmg_mj.view.recording.save import require_enabled, set_up
@@ -60,9 +59,9 @@ class LiveView:
 
         return {"on_start": self._begin, "on_progress": progress}
 
-    def _begin(self, recorder: TickRecorder | MultiAxisRecorder) -> None:
+    def _begin(self, since: Since) -> None:
         """Show the rig and empty plots, before the first tick."""
-        self._recorder = recorder
+        self._since = since
         branches = self._new_ticks()
         self._rec.send_blueprint(default_blueprint(branches, "following"))
         for branch in branches:
@@ -77,7 +76,7 @@ class LiveView:
                 log_poses(self._rec, branch)
 
     def _new_ticks(self) -> list[Branch]:
-        ticks = self._recorder.since(self._ticks)
+        ticks = self._since(self._ticks)
         self._ticks += len(ticks)
         now = Outcome("done", 0.0)
         runs = [Run(axis, ticks.along(axis), {}, now, axis) for axis in ticks.axes]

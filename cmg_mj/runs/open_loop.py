@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import chain
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -33,29 +32,21 @@ def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
 
 def replay_all(observer: Observer, trajectory: Trajectory) -> dict[str, np.ndarray]:
     """Replay as `replay` does; return x and the observer's other estimates (zero at the first row) by name."""
-    names = (*ESTIMATES, *extra_signals(observer))
-    rows = _steps(observer, trajectory, len(names))
-    shape = trajectory["y1_rad"].shape
-    if len(shape) == 1:  # no list: of a long log, floats of Python take much memory
-        columns = np.fromiter(chain.from_iterable(rows), dtype=float).reshape(-1, len(names)).T.copy()
-    else:
-        columns = zip(*rows, strict=True)
-    return {name: np.array(column, dtype=float).reshape(shape) for name, column in zip(names, columns, strict=True)}
-
-
-def _steps(observer: Observer, trajectory: Trajectory, n_names: int) -> Iterator[Sequence[Scalar]]:
-    """Yield the estimates row by row."""
-    y1, y2, held = (_rows(trajectory[name]) for name in ("y1_rad", "y2_rad", "u_rad_s"))
+    y1 = trajectory["y1_rad"]
     measured = trajectory.columns.get("acceleration_rad_s2")
-    acceleration = _rows(np.full_like(trajectory["y1_rad"], np.nan) if measured is None else measured)
-    measurements = map(Measurement, y1, y2, acceleration)
+    acceleration = np.full_like(y1, np.nan) if measured is None else measured
+    measurements = map(Measurement, *map(_rows, (y1, trajectory["y2_rad"], acceleration)))
     first = next(measurements)
+    columns = {name: np.empty(y1.shape) for name in (*ESTIMATES, *extra_signals(observer))}
+    for column in columns.values():
+        column[0] = 0.0 * first.y1
+    columns["x1_rad"][0], columns["x3_rad"][0] = first.y1, first.y2
     state = observer.init(first)
-    zero = 0.0 * first.y1
-    yield (first.y1, zero, first.y2, *[zero] * (n_names - len(ESTIMATES)))
-    for measurement, u in zip(measurements, held, strict=False):
+    for row, (measurement, u) in enumerate(zip(measurements, _rows(trajectory["u_rad_s"]), strict=False), 1):
         state, estimate = observer.step(state, measurement, u)
-        yield estimate[:n_names]
+        for column, value in zip(columns.values(), estimate, strict=False):
+            column[row] = value
+    return columns
 
 
 def _rows(values: np.ndarray) -> Iterator[Scalar]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
@@ -12,8 +12,8 @@ from cmg_mj.core.controller import Controller, Tick
 from cmg_mj.plant.physics import Joints
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import Baselines
-from cmg_mj.results.metrics import Metrics, TickBlock
-from cmg_mj.results.trajectory import ESTIMATES, Layout, Trajectory
+from cmg_mj.results.metrics import Metrics
+from cmg_mj.results.trajectory import Layout, Trajectory
 
 TICKS_A_PIECE = 256
 """Ticks that are made into columns together, which is much cheaper than one by one."""
@@ -46,17 +46,12 @@ class TickRecorder:
         self._axis = plants[0].axis
         self._bias = np.array([plant.bias for plant in plants])
         names, kinds = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ((), ())
-        extras, worlds = controller.extra_signals, controller.worlds
-        self._layout = Layout(tuple(observers), tuple(map(tuple, extras)), names, kinds)
-        self._joints = joints
-        self._estimated = [(*ESTIMATES, *names) for names in extras]
-        self.metrics = metrics
-        self._dt = controller.law.dt
-        self._references = references
-        self._keep = keep
-        self._single = isinstance(worlds, int)
+        self._layout = Layout(tuple(observers), tuple(map(tuple, controller.extra_signals)), names, kinds)
+        self.metrics, self._references = metrics, references
+        self._keep, self._joints, self._dt = keep, joints, controller.law.dt
+        self._single = isinstance(controller.worlds, int)
         self._waiting: list[tuple] = []
-        self._kept: list[list[np.ndarray]] = [[] for _ in self._layout.columns()]
+        self._kept = {name: [np.zeros((0, len(plants)))] for name in self._layout.columns()}
 
     def add(
         self, q: Joints, v: Joints, tick: Tick, body_rate: Scalar, torque: Scalar, running: np.ndarray | None
@@ -81,34 +76,29 @@ class TickRecorder:
         """Make the waiting ticks into columns: to the metrics, and to the trajectory if it is kept."""
         if not self._waiting:
             return
-        piece = self._piece(self._waiting)
+        columns, body_rate = self._piece()
         self._waiting = []
-        self.metrics.update(piece, self._references.rates(piece.body_rate, piece.y1))
+        self.metrics.update(columns, self._references.rates(body_rate, columns["y1_rad"]))
         if self._keep:
-            columns, ended = piece.columns, piece.ended
-            if ended is not None:
-                columns = {name: np.where(ended, np.nan, column) for name, column in columns.items()}
-            for kept, name in zip(self._kept, self._layout.columns(), strict=True):
-                kept.append(columns[name])
+            for name, column in columns.items():
+                self._kept[name].append(column)
 
-    def _piece(self, waiting: Sequence[tuple]) -> TickBlock:
-        qs, vs, ticks, body_rates, torques, runnings = zip(*waiting, strict=True)
+    def _piece(self) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """Make the waiting ticks into columns by name, NaN after a world's end, and the frame's rate."""
+        qs, vs, ticks, body_rates, torques, runnings = zip(*self._waiting, strict=True)
         q, v = self._columns(qs), self._columns(vs)
-        *signals, estimates = zip(*ticks, strict=True)
-        y1, y2, acceleration, fog, u, x_e = self._columns(list(zip(*signals, strict=True)))
-        body_rate = np.array(body_rates).reshape(u.shape)
-        push = np.broadcast_to(self._columns([(torque,) for torque in torques])[0], u.shape)
-        estimated = [self._columns(estimate) for estimate in zip(*estimates, strict=True)]
-        x1 = self._axis.line.lean(q) + self._bias
-        x2 = self._axis.line.rate(v)
-        x3 = self._axis.gimbal_angle(q)
-        ended = None if self._single else ~np.array(runnings)
-        if ended is not None:
-            x1 = np.where(ended, np.nan, x1)
-        named = [dict(zip(names, parts, strict=True)) for names, parts in zip(self._estimated, estimated, strict=True)]
-        joints = [*q, *v] if self._joints else []
-        signals = [x1, x2, x3, y1, y2, acceleration, fog, u, x_e, push, *chain.from_iterable(estimated), *joints]
-        return TickBlock(x1, x2, body_rate, x3, y1, fog, u, named, self._layout.named(signals), ended)
+        *measured, estimates = zip(*ticks, strict=True)
+        measured = self._columns(list(zip(*measured, strict=True)))
+        shape = measured[0].shape
+        push = np.broadcast_to(self._columns([(torque,) for torque in torques])[0], shape)
+        estimated = chain.from_iterable(self._columns(estimate) for estimate in zip(*estimates, strict=True))
+        line = self._axis.line
+        true = line.lean(q) + self._bias, line.rate(v), self._axis.gimbal_angle(q)
+        signals = [*true, *measured, push, *estimated, *([*q, *v] if self._joints else [])]
+        if not self._single:
+            ended = ~np.array(runnings)
+            signals = [np.where(ended, np.nan, signal) for signal in signals]
+        return dict(zip(self._kept, signals, strict=True)), np.array(body_rates).reshape(shape)
 
     def _columns(self, ticks: Sequence) -> np.ndarray:
         """Turn (n_ticks, n_signals[, n_worlds]) into (n_signals, n_ticks, n_worlds)."""
@@ -117,55 +107,16 @@ class TickRecorder:
             return flat.reshape(len(ticks), -1).T[:, :, None]
         return np.swapaxes(np.array(ticks), 0, 1)
 
-    def trajectory(self) -> Trajectory | None:
-        """Return all that was kept."""
-        if not self._keep:
-            return None
-        for kept in self._kept:  # a column after the other: of a long run, all twice take much memory
-            kept[:] = [np.concatenate([np.zeros((0, len(self._bias))), *kept])]
-        return self._trajectory(self._kept, 0)
-
     def since(self, tick: int) -> Trajectory:
-        """Return the ticks from one on, of one world whose trajectory is kept, as far as the run has come.
+        """Return the ticks from one on that were kept, as far as the run has come.
 
         Those that wait go on waiting: whoever looks on changes no number.
         """
-        pieces = self._kept
-        if self._waiting:
-            waiting = self._piece(self._waiting).columns
-            pieces = [[*kept, waiting[name]] for kept, name in zip(pieces, self._layout.columns(), strict=True)]
-        return self._trajectory(pieces, tick)
-
-    def _trajectory(self, pieces: Sequence[Sequence[np.ndarray]], first: int) -> Trajectory:
-        """Join pieces of the columns, and take the rows from one on."""
+        waiting = self._piece()[0] if self._waiting else {}
         columns = {}
-        for name, parts in zip(self._layout.columns(), pieces, strict=True):
-            whole = parts[0] if len(parts) == 1 else np.concatenate([np.zeros((0, len(self._bias))), *parts])
-            columns[name] = whole[first:, 0] if self._single else whole[first:]
-        n_rows = sum(map(len, pieces[0]))
-        return Trajectory({"time_s": np.arange(min(first, n_rows), n_rows) * self._dt, **columns}, layout=self._layout)
-
-
-class MultiAxisRecorder:
-    """The rows of a rig of several axes.
-
-    Args:
-        rows: Those of each axis, by its name; the first have the joints.
-    """
-
-    def __init__(self, rows: Mapping[str, TickRecorder]) -> None:
-        self.rows = rows
-
-    def trajectory(self) -> Trajectory | None:
-        """Return all that was kept."""
-        return self._joined({name: rows.trajectory() for name, rows in self.rows.items()})
-
-    def since(self, tick: int) -> Trajectory:
-        """Return the ticks from one on: see `TickRecorder.since`."""
-        trajectory = self._joined({name: rows.since(tick) for name, rows in self.rows.items()})
-        assert trajectory is not None
-        return trajectory
-
-    def _joined(self, trajectories: Mapping[str, Trajectory | None]) -> Trajectory | None:
-        parts = {name: trajectory for name, trajectory in trajectories.items() if trajectory is not None}
-        return Trajectory.joined(parts) if parts else None
+        for name, kept in self._kept.items():  # a column after the other: of a long run, all twice take much memory
+            kept[:] = [np.concatenate(kept)]
+            whole = np.concatenate([*kept, waiting[name]]) if waiting else kept[0]
+            columns[name] = whole[tick:, 0] if self._single else whole[tick:]
+        time = (tick + np.arange(len(columns["x1_rad"]))) * self._dt
+        return Trajectory({"time_s": time, **columns}, layout=self._layout)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 from cmg_mj.plant.mjcf import quiet
 from cmg_mj.results.folder import RunFolder, claimed, write_parquet, write_text
-from cmg_mj.results.reports import run_title
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import AXES, OPEN_LOOP_SECTIONS, Summary, finite, section
 from cmg_mj.results.trajectory import Trajectory
@@ -110,6 +109,7 @@ def save_run(folder: RunFolder | Path, report: RunReport, *, plot: bool = False)
     Raises:
         InputError: The folder, or a file, cannot be written.
     """
+    from cmg_mj.view.plots.run_plot import plot_run
     from cmg_mj.view.recording import write_recording
 
     header = recording_header(report.experiment, report.driver, report.world)
@@ -121,7 +121,7 @@ def save_run(folder: RunFolder | Path, report: RunReport, *, plot: bool = False)
     }
     for run in report.runs if plot else ():
         name = "plot" if run.axis is None else f"plot-{run.axis}"
-        files[f"{name}.png"] = partial(_plot, run=run, experiment=report.experiment)
+        files[f"{name}.png"] = partial(plot_run, header=header, run=run)
     with claimed(folder) as place:
         return place.write(files, complete=report.outcome.kind in ("done", "fell"))
 
@@ -151,13 +151,17 @@ def save_comparison(
         InputError: The folder, or a file, cannot be written.
     """
     from cmg_mj.runs.compare_plot import plot_worlds
+    from cmg_mj.view.plots.style import short_names
     from cmg_mj.view.recording import write_recording
 
     reports = [report_run(entry.experiment, entry.world_0, several=len(observers) > 1) for entry in observers]
     header = recording_header(reports[0].experiment, reports[0].driver, reports[0].world)
-    kinds = file_names([entry.kind for entry in observers])
+    names = short_names([entry.kind for entry in observers]).values()
     files: dict[str, Callable[[Path], object]] = {
-        **{f"trajectory-{kind}.parquet": it.trajectory.save for kind, it in zip(kinds, reports, strict=True)},
+        **{
+            f"trajectory-{name.replace(':', '.')}.parquet": it.trajectory.save
+            for name, it in zip(names, reports, strict=True)
+        },
         "summary.json": lambda path: _write_json(path, standings(observers)),
         "worlds.parquet": lambda path: write_parquet(
             path, worlds_table(observers), {"scenario": experiment.resolved()}
@@ -171,35 +175,9 @@ def save_comparison(
         return place.write(files, complete=complete)
 
 
-def file_names(kinds: Sequence[str]) -> list[str]:
-    """Make observers' names into parts of file names, no two alike: a dotted path's class, or all of the path."""
-    short = [file_name(kind) for kind in kinds]
-    return [name if short.count(name) == 1 else kind.replace(":", ".") for name, kind in zip(short, kinds, strict=True)]
-
-
 def file_name(kind: str) -> str:
     """Make an observer's name into a part of a file name: a dotted path's class."""
     return kind.rpartition(":")[2]
-
-
-def _plot(path: Path, run: Run, experiment: Experiment) -> None:
-    from cmg_mj.view.plots.run_plot import plot_run
-
-    axis = f", {run.axis}" if run.axis else ""
-    plot_run(
-        path,
-        run.trajectory,
-        run_title(run.summary) + axis,
-        run.summary,
-        settle_band_deg=experiment.scenario.metrics.settle_band_deg,
-        rate_limit_rad_s=experiment.law.rate_limit,
-        pushes=[push for push in experiment.scenario.push if run.axis is None or push.axis == run.axis],
-        swings=[
-            swing
-            for swing in experiment.scenario.swing
-            if run.axis is None or (swing.axis or experiment.plant.axis_names[0]) == run.axis
-        ],
-    )
 
 
 def recording_header(experiment: Experiment, driver: str = "native", world: int = 0) -> RecordingHeader:

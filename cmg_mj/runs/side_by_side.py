@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from itertools import groupby
 from typing import NamedTuple, Unpack
 
@@ -12,7 +12,7 @@ import numpy as np
 from cmg_mj.core.types import extra_signals
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs.batch import BatchedObservers, BatchKey, PlantStructure, plant_structure, unique
+from cmg_mj.runs.batch import BatchedObservers, plant_structure, unique
 from cmg_mj.runs.experiment import Experiment, batch_inputs, run_batch
 from cmg_mj.runs.simulate import SimulationOptions
 
@@ -64,7 +64,7 @@ def run_jobs(runs: Sequence[BatchJob], **options: Unpack[SimulationOptions]) -> 
 
 def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
     """Return the jobs' indices, those together that may share a batch."""
-    alike: dict[SharedKey | int, list[int]] = {}
+    alike: dict[Hashable, list[int]] = {}
     for i, job in enumerate(jobs):
         alike.setdefault(_shared_key(job) or i, []).append(i)
     for indices in alike.values():
@@ -77,23 +77,14 @@ def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
         yield batch
 
 
-class SharedKey(NamedTuple):
-    """Key that jobs with different observers share."""
-
-    key: BatchKey
-    plant: PlantStructure
-    extra_signals: tuple[str, ...]
-    open_loop: tuple[str, ...]
-
-
-def _shared_key(job: BatchJob) -> SharedKey | None:
+def _shared_key(job: BatchJob) -> Hashable:
     """Return the key that jobs of one batch share; None for a job that cannot share a batch."""
     first = job.experiments[0]
     if first.axes or len({one.batch_key for one in unique(job.experiments)}) > 1:
         return None
     key = first.batch_key.without_observer()
     names = extra_signals(first.design.observer())
-    return SharedKey(key, plant_structure(first.plant), names, tuple(first.scenario.open_loop_names()))
+    return key, plant_structure(first.plant), names, tuple(first.scenario.open_loop_names())
 
 
 def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[Result]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
-from types import MappingProxyType
+from contextlib import nullcontext
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -14,27 +13,26 @@ from cmg_mj.core.axes import ControllerLike
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import ControlLoop, Ending
-from cmg_mj.core.outside import Disturbance
 from cmg_mj.core.sensor import whole_steps
-from cmg_mj.core.types import BIAS
 from cmg_mj.plant.mjcf import quiet
 from cmg_mj.plant.physics import ManyWorlds, OneWorld
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import RATES, Baselines
-from cmg_mj.results.floors import Floors
+from cmg_mj.results.floors import TiltFloor, acceleration_floor
 from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
+from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.batch import unstack
 from cmg_mj.runs.callback import CallbackLoop, control_callback
 from cmg_mj.runs.disturbances import Outsides, disturbances
-from cmg_mj.runs.recorder import MultiAxisRecorder, TickRecorder
+from cmg_mj.runs.recorder import TickRecorder
 from cmg_mj.scenario.schema import MetricsSettings
 
 DIVERGED_TILT = 2.0 * math.pi
 """No plant that stood at one instant lies a whole turn farther at the next one: it has diverged [rad]."""
-
-Recorder = TickRecorder | MultiAxisRecorder
+Since = Callable[[int], Trajectory]
+"""Returns the ticks from one on, as far as the run has come."""
 
 
 class SimulationOptions(TypedDict, total=False):
@@ -44,8 +42,8 @@ class SimulationOptions(TypedDict, total=False):
     """True to keep every tick; if False, memory does not grow with the duration."""
     on_progress: Callable[[float], None] | None
     """Called after every tick with the simulated time [s]; a KeyboardInterrupt it raises ends the run."""
-    on_start: Callable[[Recorder], None] | None
-    """Called before the first tick with the recorder, whose `since` shows the ticks meanwhile."""
+    on_start: Callable[[Since], None] | None
+    """Called before the first tick with a function that shows the ticks meanwhile."""
     threads: int
     """Number of threads that step many worlds; 0: as many as there are processors."""
 
@@ -56,9 +54,9 @@ def simulate(
     controller: ControllerLike,
     duration_s: float,
     *,
-    observers: Sequence[str] | Mapping[str, Sequence[str]],
-    outside: Outsides = MappingProxyType({}),
-    settings: MetricsSettings | None = None,
+    observers: Mapping[str, Sequence[str]],
+    outside: Outsides,
+    settings: MetricsSettings,
     driver: str = "native",
     loop: type[ControlLoop] = ControlLoop,
     **options: Unpack[SimulationOptions],
@@ -69,7 +67,7 @@ def simulate(
         plant: The plant; or one a world, which may differ in numbers but not in structure.
         controller: A fresh controller, made for one world or for as many as there are plants.
         duration_s: Simulated time [s].
-        observers: Names of the controller's observer and open-loop observers; or of each axis' if they differ.
+        observers: Axis -> names of its observer in the loop and open-loop observers.
         outside: What acts from outside.
         settings: What counts as settled and fallen.
         driver: Name of what calls the controller: `native`: the loop, `callback`: MuJoCo (one world only).
@@ -87,125 +85,102 @@ def simulate(
     if driver != "native" and not single:
         raise InputError(f"driver = {driver!r}: drives one world, not a batch")
     names = plants[0].axis_names
-    of_axis = observers if isinstance(observers, Mapping) else dict.fromkeys(names, observers)
     acting = disturbances(outside, plants, controller.seed, controller.worlds)
     if single and any(one.accelerates for one in acting):
         plants = [plants[0].with_own_model()]
-    run = _Simulation(plants, controller, duration_s, of_axis, outside, settings or MetricsSettings(), options)
+    timestep = plants[0].timestep
+    steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
+    recorders = {
+        name: _recorder(plants, name, part, observers[name], outside, settings, options)
+        for name, part in zip(names, controller.parts, strict=True)
+    }
+
+    def since(tick: int) -> Trajectory:
+        return Trajectory.joined({name: recorder.since(tick) for name, recorder in recorders.items()})
+
+    if on_start := options.get("on_start"):
+        on_start(since)
     physics = OneWorld(plants[0]) if single else ManyWorlds(plants, options.get("threads", 0))
-    run.advance(physics, acting, CallbackLoop if driver == "callback" else loop)
-    return run.result(driver)
+    kind = CallbackLoop if driver == "callback" else loop
+    ticks = kind(physics, controller, steps, acting, np.radians(settings.fall_angle_deg).item())
+    rest = Outcome("done", duration_s)
+    try:
+        with control_callback(plants[0], controller) if kind is CallbackLoop else nullcontext():
+            _record(ticks, controller, list(recorders.values()), timestep, options.get("on_progress"))
+    except RunStopped as error:
+        rest = Outcome("stopped", ticks.step * timestep, str(error), len(plants) > 1)
+    except KeyboardInterrupt:
+        rest = Outcome("interrupted", ticks.step * timestep)
+    for recorder in recorders.values():
+        recorder.flush()
+    endings = ticks.endings
+    outcomes = [_outcome(endings[world], timestep) if world in endings else rest for world in range(len(plants))]
+    summaries = []
+    for world, outcome in enumerate(outcomes):
+        done = outcome.kind == "done"
+        summaries.append(combine_axes({name: one.metrics.summary(world, done) for name, one in recorders.items()}))
+    return Result(
+        outcomes,
+        summaries,
+        since(0) if options.get("keep_trajectory", True) else None,
+        tuple(observers[names[0]]),
+        controller.seed,
+        (controller.worlds,) if isinstance(controller.worlds, int) else tuple(controller.worlds),
+        driver,
+    )
 
 
-class _Simulation:
-    """A run of one world or many: its loop, its recorders and how its worlds end. See `simulate`."""
+def _recorder(
+    rigs: Sequence[Plant],
+    axis: str,
+    controller: Controller,
+    observers: Sequence[str],
+    outside: Outsides,
+    settings: MetricsSettings,
+    options: SimulationOptions,
+) -> TickRecorder:
+    """Make what records and judges the ticks of one axis; that of the first axis has the joints."""
+    plants = [rig.single_axis(axis) for rig in rigs]
+    pairs = list(zip(plants, unstack(controller.sensors, len(plants)), strict=True))
+    biases = [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs]
+    dt, limit, sensors = controller.law.dt, controller.law.rate_limit, controller.sensors
+    noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
+    y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
+    unmodelled = any(part.unmodelled for parts in outside.values() for part in parts)
+    acceleration_floors = []
+    for noise, (plant, sensor) in zip(noises, pairs, strict=True):
+        slides = plant.radial_tilt.height != plant.reduced.pivot_arm
+        other = unmodelled or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.bends or slides
+        acceleration_floors.append(None if other else acceleration_floor(noise, y1_period))
+    # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
+    tilt_sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
+    references = Baselines(sensors.mems_gyro, dt, controller.seed, controller.worlds, tilt_sigmas, controller.axis)
+    pushes = outside.get("push", ())
+    floors = TiltFloor(y1_period, len(plants)), acceleration_floors
+    metrics = Metrics(observers, len(plants), dt, pushes, limit, settings, biases, RATES, *floors)
+    keep, first = options.get("keep_trajectory", True), axis == rigs[0].axis_names[0]
+    return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first)
 
-    def __init__(
-        self,
-        plants: Sequence[Plant],
-        controller: ControllerLike,
-        duration_s: float,
-        observers: Mapping[str, Sequence[str]],
-        outside: Outsides,
-        settings: MetricsSettings,
-        options: SimulationOptions,
-    ) -> None:
-        self.plants, self.controller, self.duration_s, self.observers = plants, controller, duration_s, observers
-        self.outside, self.settings = outside, settings
-        self.axis_names = names = plants[0].axis_names
-        self.timestep = timestep = plants[0].timestep
-        steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
-        self.fall_angle = np.radians(settings.fall_angle_deg).item()
-        self.recorders = [self._recorder_of(*pair, options) for pair in zip(names, controller.parts, strict=True)]
-        several = MultiAxisRecorder(dict(zip(names, self.recorders, strict=True))) if len(names) > 1 else None
-        self.recorder: Recorder = several or self.recorders[0]
-        self.on_progress = options.get("on_progress")
-        if on_start := options.get("on_start"):
-            on_start(self.recorder)
-        self.outcomes: list[Outcome] = []
-        self.steps = steps
 
-    def _recorder_of(self, axis: str, controller: Controller, options: SimulationOptions) -> TickRecorder:
-        """Make what records and judges the ticks of one axis; that of the first axis has the joints."""
-        plants, observers = [plant.single_axis(axis) for plant in self.plants], self.observers[axis]
-        pairs = list(zip(plants, unstack(controller.sensors, len(plants)), strict=True))
-        targets = {BIAS: [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs]}
-        dt, limit, sensors = controller.law.dt, controller.law.rate_limit, controller.sensors
-        noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
-        y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
-        unmodelled = any(part.unmodelled for parts in self.outside.values() for part in parts)
-        has_acceleration = [
-            not (unmodelled or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.bends)
-            and plant.radial_tilt.height == plant.reduced.pivot_arm
-            for plant, sensor in pairs
-        ]
-        floors = Floors(noises, y1_period, has_acceleration)
-        # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
-        tilt_sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
-        references = Baselines(
-            sensors.mems_gyro, dt, controller.seed, controller.worlds, tilt_sigmas, axis=controller.axis
-        )
-        metrics = Metrics(
-            observers, len(plants), dt, self.outside.get("push", ()), limit, self.settings, targets, RATES, floors
-        )
-        keep, first = options.get("keep_trajectory", True), axis == self.axis_names[0]
-        return TickRecorder(plants, observers, controller, metrics, references, keep=keep, joints=first)
-
-    def advance(
-        self, physics: OneWorld | ManyWorlds, disturbances: Sequence[Disturbance], kind: type[ControlLoop]
-    ) -> None:
-        """Run to the end, whatever that is."""
-        loop = kind(physics, self.controller, self.steps, disturbances, self.fall_angle)
-        driving: AbstractContextManager = nullcontext()
-        if kind is CallbackLoop:
-            driving = control_callback(self.plants[0], self.controller)
-        rest = Outcome("done", self.duration_s)
-        try:
-            with driving:
-                self._record(loop)
-        except RunStopped as error:
-            rest = Outcome("stopped", loop.step * self.timestep, str(error), len(self.plants) > 1)
-        except KeyboardInterrupt:
-            rest = Outcome("interrupted", loop.step * self.timestep)
-        for recorder in self.recorders:
-            recorder.flush()
-        endings = loop.endings
-        self.outcomes = [
-            _outcome(endings[world], self.timestep) if world in endings else rest for world in range(len(self.plants))
-        ]
-
-    def _record(self, loop: ControlLoop) -> None:
-        """Decide, advance and record at every control tick."""
-        timestep, on_progress = self.timestep, self.on_progress
-        parts = list(zip(range(len(self.recorders)), self.controller.parts, self.recorders, strict=True))
-        worlds, decide, advance = loop.physics, loop.decide, loop.advance
-        for tick in loop.ticks():
-            decide()
-            advance()
-            running = None if worlds.running is None else worlds.running.copy()
-            for axis, part, recorder in parts:
-                assert part.tick is not None
-                recorder.add(tick.q, tick.v, part.tick, part.body_rate, tick.torques[axis], running)
-            if on_progress:
-                on_progress((tick.step + tick.steps) * timestep)
-
-    def result(self, driver: str) -> Result:
-        """Put together outcomes, summaries and the trajectory."""
-        summaries = [
-            combine_axes(
-                {
-                    name: recorder.metrics.summary(world, outcome.kind == "done")
-                    for name, recorder in zip(self.axis_names, self.recorders, strict=True)
-                }
-            )
-            for world, outcome in enumerate(self.outcomes)
-        ]
-        worlds = self.controller.worlds
-        numbers = (worlds,) if isinstance(worlds, int) else tuple(worlds)
-        longest = max(outcome.time_s for outcome in self.outcomes)
-        trajectory = self.recorder.trajectory()
-        observers = tuple(self.observers[self.axis_names[0]])
-        return Result(self.outcomes, summaries, trajectory, longest, observers, self.controller.seed, numbers, driver)
+def _record(
+    loop: ControlLoop,
+    controller: ControllerLike,
+    recorders: Sequence[TickRecorder],
+    timestep: float,
+    on_progress: Callable[[float], None] | None,
+) -> None:
+    """Decide, advance and record at every control tick."""
+    parts = list(zip(range(len(recorders)), controller.parts, recorders, strict=True))
+    worlds, decide, advance = loop.physics, loop.decide, loop.advance
+    for tick in loop.ticks():
+        decide()
+        advance()
+        running = None if worlds.running is None else worlds.running.copy()
+        for axis, part, recorder in parts:
+            assert part.tick is not None
+            recorder.add(tick.q, tick.v, part.tick, part.body_rate, tick.torques[axis], running)
+        if on_progress:
+            on_progress((tick.step + tick.steps) * timestep)
 
 
 def _outcome(ending: Ending, timestep: float) -> Outcome:

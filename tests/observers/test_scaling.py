@@ -13,7 +13,7 @@ from cmg_mj.core.types import extra_signals
 from cmg_mj.laws import scaled_gains
 from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
-from cmg_mj.observers.scaling import PURE, TORQUE, UNITS, Owner, Scales, Unit, scale_value, scaled_parameters, scales_of
+from cmg_mj.observers.scaling import PURE, TORQUE, UNITS, Scales, Unit, scale_value, scaled_parameters, scales_of
 from tests.observers.reference import DT, HEAVY, NOISE, rough_signals
 
 EXTRA = {"bias_rad": PURE}
@@ -93,4 +93,4 @@ def test_the_scale_of_time_is_that_of_the_law() -> None:
 def test_the_sensors_observers_and_a_users_own_stay_as_they_are() -> None:
     for kind in ("gyro_free", "free_pivot", "finite_difference", "tests.features.tuning.user_observer:UserObserver"):
         assert scaled_parameters(kind, HEAVY) == {}
-    assert {unit.owner for unit in UNITS["gyro_free"].values() if isinstance(unit, Unit)} == {Owner.SENSORS}
+    assert not any(unit.of_rig for unit in UNITS["gyro_free"].values() if isinstance(unit, Unit))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.results.metrics import Metrics, TickBlock
+from cmg_mj.results.metrics import Metrics
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push
 
@@ -17,7 +17,7 @@ DT = 0.01
 DEG = math.radians(1.0)
 T = np.arange(2000) * DT
 
-SIGNALS = ("x1", "x2", "x3", "u", "fog")
+SIGNALS = {"x1": "rad", "x2": "rad_s", "x3": "rad", "u": "rad_s", "fog": "rad_s"}
 
 
 def metrics(
@@ -29,8 +29,7 @@ def metrics(
     **settings: Any,
 ) -> Metrics:
     pushes = pushes or ((Push(push_end_s - 0.1, 0.1),) if push_end_s else ())
-    targets = {"bias_rad": [0.0] * n_worlds}
-    return Metrics(observers, n_worlds, DT, pushes, 4.7, MetricsSettings(**settings), targets, references)
+    return Metrics(observers, n_worlds, DT, pushes, 4.7, MetricsSettings(**settings), [0.0] * n_worlds, references)
 
 
 def rows(values: Any, n: int) -> np.ndarray:
@@ -47,14 +46,17 @@ def estimates(rates: Iterable[np.ndarray]) -> list[dict[str, np.ndarray]]:
     return [{"x2_rad_s": rate} for rate in rates]
 
 
-def block(estimates: list[dict[str, np.ndarray]], **signals: np.ndarray) -> TickBlock:
-    """Ticks of which nothing but these signals is known."""
-    return TickBlock(**signals, body_rate=signals["x2"], y1=signals["x1"], estimates=estimates, columns={}, ended=None)
+def add(run: Metrics, estimates: list[dict[str, np.ndarray]], references: Any = None, **signals: np.ndarray) -> None:
+    """Add ticks of which nothing but these signals is known."""
+    columns = {f"{name}_{unit}": signals[name] for name, unit in SIGNALS.items()}
+    for name, estimate in zip(run.observers, estimates, strict=True):
+        columns |= {f"estimate/{name}/{signal}": values for signal, values in estimate.items()}
+    run.update(columns, references or {})
 
 
 def summary(run: Metrics, n: int = len(T), fell: bool = False, rates: tuple = (0.0,), **signals: Any) -> dict[str, Any]:
     columns: dict[str, Any] = {name: rows(signals.get(name, 0.0), n) for name in SIGNALS}
-    run.update(block(estimates(rows(rate, n) for rate in rates), **columns))
+    add(run, estimates(rows(rate, n) for rate in rates), **columns)
     return run.summary(0, stood=not fell)
 
 
@@ -196,9 +198,9 @@ def test_pieces_add_up_to_the_whole(borders: tuple[int, ...]) -> None:
     signals["x1"][250:, 1] = np.nan
     rates = [0.9 * signals["x2"], 1.2 * signals["fog"]]
     run, pieces = (metrics(n_worlds, 1.0, ("mine", "hers")) for _ in range(2))
-    run.update(block(estimates(rates), **signals))
+    add(run, estimates(rates), **signals)
     for part in np.split(np.arange(n), borders):
-        pieces.update(block(estimates(rate[part] for rate in rates), **{k: v[part] for k, v in signals.items()}))
+        add(pieces, estimates(rate[part] for rate in rates), **{k: v[part] for k, v in signals.items()})
     for world in range(n_worlds):
         assert_same(pieces.summary(world, False), run.summary(world, False))
 
@@ -209,12 +211,12 @@ def test_rows_after_a_worlds_end_do_not_count() -> None:
     signals = restless_signals(n, 2)
     rate = 0.9 * signals["x2"]
     alone = metrics()
-    alone.update(block(estimates([rate[:end, 1:]]), **{k: v[:end, 1:] for k, v in signals.items()}))
+    add(alone, estimates([rate[:end, 1:]]), **{k: v[:end, 1:] for k, v in signals.items()})
     batch = metrics(2)
     for name in SIGNALS:
         signals[name][end:, 1] = np.nan
     rate[end:, 1] = np.nan
-    batch.update(block(estimates([rate]), **signals))
+    add(batch, estimates([rate]), **signals)
     for fell in (True, False):
         assert_same(batch.summary(1, fell), alone.summary(0, fell))
 
@@ -235,12 +237,12 @@ def test_an_estimate_that_is_not_finite_gives_none_not_nan() -> None:
 
 def test_bias_is_judged_from_its_time_on() -> None:
     """Far off at first, then 0.3 degrees above and below 1.1 in turn, with 1.0 to be figures: RMS of 0.4 and -0.2."""
-    run = Metrics(("adaptive", "other"), 1, DT, (), 4.7, MetricsSettings(bias_from_s=5.0), {"bias_rad": [DEG]})
+    run = Metrics(("adaptive", "other"), 1, DT, (), 4.7, MetricsSettings(bias_from_s=5.0), [DEG])
     bias = np.where(T < 5.0 - DT / 2.0, 90.0 * DEG, (1.1 + 0.3 * (-1.0) ** np.arange(len(T))) * DEG)
     for part in np.array_split(np.arange(len(T)), 7):
         n = len(part)
         rate, figures = {"x2_rad_s": rows(0.0, n)}, {"bias_rad": rows(bias[part], n)}
-        run.update(block([rate | figures, rate], **rest_signals(n)))
+        add(run, [rate | figures, rate], **rest_signals(n))
     figures: dict[str, Any] = run.summary(0, stood=True)
     assert figures["bias_deg"] == pytest.approx(1.0)
     assert figures["bias_estimate_deg"] == pytest.approx(1.1, rel=1e-12)
@@ -251,7 +253,7 @@ def test_bias_is_judged_from_its_time_on() -> None:
 def test_a_run_that_ends_before_has_no_bias_figures() -> None:
     run = metrics(bias_from_s=5.0)
     estimate = {"x2_rad_s": rows(0.0, 100), "bias_rad": rows(0.1, 100)}
-    run.update(block([estimate], **rest_signals(100)))
+    add(run, [estimate], **rest_signals(100))
     figures: dict[str, Any] = run.summary(0, stood=True)
     assert figures["bias_estimate_deg"] is None
     assert figures["bias_rms_error_deg"] is None

@@ -176,10 +176,6 @@ def test_a_comparison_reports_progress_from_nothing_to_all() -> None:
     assert 0.0 < shares[0] < 0.5 < shares[-1] <= 1.0
 
 
-def test_observers_of_one_name_from_two_places_do_not_overwrite_each_other() -> None:
-    assert runs.file_names(["ltv", "a.b:Mine", "c:Mine", "c:Yours"]) == ["ltv", "a.b.Mine", "c.Mine", "Yours"]
-
-
 def test_a_comparison_trims_where_there_is_a_bias_estimate() -> None:
     """Observers without one run untrimmed; alone, they are refused (tests/inputs/)."""
     scenario = load_scenario("bias_estimation", ["duration_s=0.5"])

@@ -19,7 +19,7 @@ from cmg_mj.results.folder import RunFolder, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.scenario.resolve import safe_name
 from cmg_mj.view.plots.figure import Line, Panel, Picture, Span, draw
-from cmg_mj.view.plots.run_plot import INK, MEASURED, PAGE, PANEL_HEIGHT, SMALL_COLUMNS, SMALL_HEIGHT
+from cmg_mj.view.plots.run_plot import INK, MEASURED, SMALL_COLUMNS
 from cmg_mj.view.plots.style import BASELINE_COLOURS, Colour, colours, short_names, thinned
 
 if TYPE_CHECKING:
@@ -90,17 +90,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         if name not in few:
             lines = [replace(line, label="") for line in rate_lines([name], detail)]
             panels.append(Panel("tilt rate [rad/s]", lines, titles[name], y_range=y_range))
-    page = Picture(
-        "plot",
-        log.title,
-        panels,
-        share_x=False,
-        columns=SMALL_COLUMNS,
-        panel_height=SMALL_HEIGHT,
-        panel_width=PAGE[0] / SMALL_COLUMNS,
-        first_height=PANEL_HEIGHT,
-        n_first=n_first,
-    )
+    page = Picture("plot", log.title, panels, share_x=False, columns=SMALL_COLUMNS, n_first=n_first)
     draw(path, page)
 
 

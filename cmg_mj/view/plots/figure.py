@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 ROW_OF_LABELS = 110
 """Characters of a legend that fit into a row."""
+HEIGHT, FIRST_HEIGHT, SMALL_HEIGHT = 2.3, 1.6, 1.25
+"""Heights of a panel, of a first one and of a small one below [inch]."""
+PAGE_WIDTH, COLUMN_WIDTH = 9.0, 5.5
+"""Widths of a page, and of each of several columns [inch]."""
 
 
 @dataclass(frozen=True)
@@ -99,11 +103,7 @@ class Picture:
         panels: The panels, from top to bottom.
         share_x: Whether all panels have the same abscissa.
         columns: Number of panels beside each other.
-        panel_height: Height of each panel [inch].
-        panel_width: Width of each of several columns [inch].
-        first_height: Height of the first panels, which have a row each; the others are small, in a grid below.
-            None if all panels are alike [inch].
-        n_first: Number of first panels, if they have a height.
+        n_first: Number of first panels that have a row each; the others are then small, in a grid below.
     """
 
     name: str
@@ -111,10 +111,7 @@ class Picture:
     panels: Sequence[Panel] = ()
     share_x: bool = True
     columns: int = 1
-    panel_height: float = 2.3
-    panel_width: float = 5.5
-    first_height: float | None = None
-    n_first: int = 1
+    n_first: int = 0
 
 
 def pyplot() -> ModuleType:
@@ -142,11 +139,10 @@ def draw(path: Path, picture: Picture) -> None:
         path: The PNG to write.
         picture: The figure's data.
     """
-    columns, panels = picture.columns, picture.panels
-    n_first, first_height = (picture.n_first, picture.first_height) if picture.first_height else (0, 0.0)
+    columns, panels, n_first = picture.columns, picture.panels, picture.n_first
     n_rows = -(-(len(panels) - n_first) // columns)
-    heights = [first_height] * n_first + [picture.panel_height] * n_rows
-    width = max(9.0 if n_first or columns == 1 else 0.0, picture.panel_width * columns * (columns > 1))
+    heights = [FIRST_HEIGHT] * n_first + [SMALL_HEIGHT if n_first else HEIGHT] * n_rows
+    width = PAGE_WIDTH if n_first or columns == 1 else COLUMN_WIDTH * columns
     figure = pyplot().figure(figsize=(width, 0.8 + sum(heights)), layout="constrained")
     grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
     all_axes: list[Axes] = []
@@ -164,7 +160,7 @@ def draw(path: Path, picture: Picture) -> None:
         if is_lowest or not picture.share_x:
             axes.set_xlabel(panel.x_label)
         axes.tick_params(labelbottom=is_lowest or not picture.share_x)
-        if 0 < n_first <= i:
+        if 0 < n_first <= i:  # a small one
             axes.set_xlabel(axes.get_xlabel(), fontsize="small")
             axes.set_ylabel(panel.y_label.replace(" [", "\n[") if column == 0 else "", fontsize="x-small")
             axes.tick_params(labelleft=column == 0, labelsize="small")

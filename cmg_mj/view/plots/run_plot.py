@@ -4,25 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cmg_mj.results.reports import run_title
 from cmg_mj.results.summary_keys import format_figure
-from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
 from cmg_mj.view.plots.figure import Line, Panel, Picture, Span, draw
 from cmg_mj.view.plots.style import (
     BOUND_COLOURS,
     RANKING_KEYS,
-    Summary,
     colour,
-    figures_by_observer,
     hexadecimal,
     observers_to_draw,
     short_names,
     thinned,
 )
+
+if TYPE_CHECKING:  # it imports rerun
+    from cmg_mj.view.recording import RecordingHeader, Run
 
 INK = "0.15"
 """Colour of true signals on paper."""
@@ -31,40 +33,28 @@ GYRO = "#a9c4ef"
 """Colour of the gyro's thin line, which lies on the wide true one."""
 SWING_COLOR, SWING_HEIGHT = "C4", 0.05
 """Colour of swings, and the share of a panel's height that a swing's strip takes."""
-PAGE = (9.0, 12.7)
-"""Width and height of a page [inch]."""
-PANEL_HEIGHT, SMALL_HEIGHT, SMALL_COLUMNS, SMALL_ROWS = 1.6, 1.25, 4, 3
-"""Heights of the panels and of the small ones [inch], and the grid of the small ones, one an observer."""
+SMALL_COLUMNS, SMALL_ROWS = 4, 3
+"""Grid of the small panels, one an observer."""
 
 
-def plot_run(
-    path: Path,
-    trajectory: Trajectory,
-    title: str,
-    summary: Summary,
-    *,
-    settle_band_deg: float,
-    rate_limit_rad_s: float,
-    pushes: Sequence[Push] = (),
-    swings: Sequence[Swing] = (),
-) -> None:
+def plot_run(path: Path, header: RecordingHeader, run: Run) -> None:
     """Plot a run on one page: tilt, tilt rate, error of the estimates, gimbal angle, command.
 
     The observer in the loop and the best open-loop observers share the panels. Each other observer has a small panel.
 
     Args:
         path: The PNG to write.
-        trajectory: One world.
-        title: Title above the plot.
-        summary: The run's numbers, which rank the observers.
-        settle_band_deg: Largest tilt of a settled rig [deg].
-        rate_limit_rad_s: Largest command [rad/s].
-        pushes: The pushes about the trajectory's axis.
-        swings: The swings about the trajectory's axis.
+        header: The experiment: its pushes, swings and bounds.
+        run: The run, whose numbers rank the observers.
     """
+    trajectory, axis = run.trajectory, run.axis
+    title = run_title(run.summary) + (f", {axis}" if axis else "")
+    pushes = [push for push in header.pushes if axis is None or push.axis == axis]
+    first = header.plant.axis_names[0] if axis else None
+    swings = [swing for swing in header.swings if axis is None or (swing.axis or first) == axis]
     t, true = trajectory["time_s"], trajectory["x2_rad_s"]
     ends = (float(t[0]), float(t[-1])) if len(t) else (0.0, 0.0)
-    summaries = figures_by_observer(trajectory.observers, summary)
+    summaries = run.observers
     few = observers_to_draw(summaries, always=trajectory.observers[:1])
     others = [name for name in trajectory.observers if name not in few]
     # matplotlib hides a label that begins with an underscore
@@ -97,27 +87,17 @@ def plot_run(
     spans = list(_spans(ends, pushes, swings))
     unnamed = [span._replace(label="") for span in spans]
     panels = [
-        Panel("tilt [deg]", [*tilt, *bounds(settle_band_deg, "settle band")], shaded=spans),
+        Panel("tilt [deg]", [*tilt, *bounds(header.settings.settle_band_deg, "settle band")], shaded=spans),
         Panel("tilt rate\n[rad/s]", rates, shaded=unnamed, y_range=limits),
         Panel("error $\\hat x_2 - x_2$\n[rad/s]", errors, shaded=unnamed, y_range=limits),
         Panel("gimbal angle\n[deg]", gimbal, shaded=unnamed),
-        Panel("gimbal rate\n[rad/s]", [*command, *bounds(rate_limit_rad_s, "rate limit")], shaded=unnamed),
+        Panel("gimbal rate\n[rad/s]", [*command, *bounds(header.rate_limit_rad_s, "rate limit")], shaded=unnamed),
     ]
     for name in others:
         curves = [line(trajectory[f"estimate/{name}/x2_rad_s"], "", name, 0.5), true_line("x2_rad_s", "", 0.8)]
         panels.append(Panel("tilt rate [rad/s]", curves, labels[name], shaded=unnamed, y_range=limits))
     columns = max(SMALL_COLUMNS, -(-len(others) // SMALL_ROWS))
-    page = Picture(
-        "plot",
-        title,
-        panels,
-        columns=columns,
-        panel_height=SMALL_HEIGHT,
-        panel_width=PAGE[0] / columns,
-        first_height=PANEL_HEIGHT,
-        n_first=5,
-    )
-    draw(path, page)
+    draw(path, Picture("plot", title, panels, columns=columns, n_first=5))
 
 
 def _limits(curves: Sequence[Sequence[float] | np.ndarray]) -> tuple[float, float] | None:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from cmg_mj.results.summary_keys import SummaryValue, section
+from cmg_mj.results.summary_keys import SummaryValue
 
 Colour = tuple[int, int, int]
 
@@ -114,21 +114,6 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
     """
     short = [name.rpartition(":")[2] or name for name in names]
     return {name: part if short.count(part) == 1 else name for name, part in zip(names, short, strict=True)}
-
-
-def figures_by_observer(observers: Sequence[str], summary: Summary) -> dict[str, Summary]:
-    """Split a run's numbers by observer.
-
-    Args:
-        observers: The observer in the loop, then the open-loop observers.
-        summary: The run's numbers; those of open-loop observers are in `open_loop_observers`.
-
-    Returns:
-        Observer -> its numbers, in the order of `observers`; empty for an observer without numbers.
-    """
-    in_loop, *others = observers
-    open_loop = section(summary, "open_loop_observers")
-    return {in_loop: summary, **{name: open_loop.get(name, {}) for name in others}}
 
 
 def observers_to_draw(summaries: Mapping[str, Summary], always: Iterable[str] = ()) -> list[str]:

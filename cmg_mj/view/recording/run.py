@@ -20,7 +20,6 @@ from cmg_mj.view.plots.style import (
     Colour,
     Summary,
     colours,
-    figures_by_observer,
     observers_to_draw,
     short_names,
 )
@@ -36,20 +35,20 @@ class RecordingHeader:
 
     Attributes:
         plant: The plant of all runs.
+        rate_limit_rad_s: Largest gimbal rate [rad/s].
         title: The experiment's title.
         pushes: Torques from outside, the same in all runs.
         swings: Sinusoidal torques from outside, the same in all runs.
         settings: The settle band.
-        rate_limit_rad_s: Largest gimbal rate; None to leave its bounds away [rad/s].
         scenario_toml: The resolved scenario.
     """
 
     plant: Plant
+    rate_limit_rad_s: float
     title: str = ""
     pushes: Sequence[Push] = ()
     swings: Sequence[Swing] = ()
     settings: MetricsSettings = field(default_factory=MetricsSettings)
-    rate_limit_rad_s: float | None = None
     scenario_toml: str = ""
 
 
@@ -73,8 +72,10 @@ class Run:
 
     @property
     def observers(self) -> dict[str, Summary]:
-        """The observer in the loop, then the open-loop observers, each with its numbers."""
-        return figures_by_observer(self.trajectory.observers, self.summary)
+        """The observer in the loop, then the open-loop observers, each with its numbers, if it has any."""
+        in_loop, *others = self.trajectory.observers
+        open_loop = section(self.summary, "open_loop_observers")
+        return {in_loop: self.summary, **{name: open_loop.get(name, {}) for name in others}}
 
     @property
     def references(self) -> dict[str, Summary]:

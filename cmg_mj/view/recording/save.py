@@ -66,17 +66,16 @@ def write_recording(path: Path, header: RecordingHeader, runs: Sequence[Run]) ->
     Args:
         path: The file, `recording.rrd`.
         header: The experiment of all runs.
-        runs: The runs; each has a branch, named after the run.
+        runs: The runs; each has a branch, named after the run. No two have the same name.
 
     Raises:
-        ValueError: There is no run, or two have the same name.
         InputError: The environment turns rerun off.
         OSError: The file cannot be written.
     """
     branches = make_branches(header, runs)
     title = f"{header.title or 'Run'}: {', '.join(branch.label for branch in branches)}"
-    names, texts = [run.name for run in runs], pages(header, branches)
-    with _written(path, title, names, branches, default_blueprint(branches), texts) as rec:
+    names = [run.name for run in runs]
+    with _written(path, title, branches, default_blueprint(branches), pages(header, branches)) as rec:
         for branch in branches:
             log_shapes(rec, branch)
             log_pushes(rec, branch)
@@ -111,7 +110,7 @@ def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping
     ]
     boards = [_log_board(branch, log, list(texts)) for branch, log in zip(branches, logs, strict=True)]
     blueprint = tabbed_blueprint(boards, LOG_TIMELINE, "paused")
-    with _written(path, title, names, branches, blueprint, {name.lower(): text for name, text in texts.items()}):
+    with _written(path, title, branches, blueprint, {name.lower(): text for name, text in texts.items()}):
         pass
 
 
@@ -133,7 +132,6 @@ def _log_board(branch: Lines, log: LogSeries, titles: Sequence[str]) -> rrb.Cont
 def _written(
     path: Path,
     title: str,
-    names: Sequence[str],
     branches: Sequence[Lines],
     blueprint: rrb.Blueprint,
     texts: Mapping[str, str],
@@ -143,8 +141,7 @@ def _written(
     Args:
         path: The file.
         title: Name of the recording.
-        names: The runs or logs.
-        branches: Their series.
+        branches: The series of the runs or logs.
         blueprint: Layout in which the recording opens.
         texts: Path of a page -> Markdown.
 
@@ -161,7 +158,7 @@ def _written(
         with (
             whole_file(path) as temporary,
             pipe_into(temporary) as pipe,
-            rr.RecordingStream(_application_name(names, branches)) as rec,
+            rr.RecordingStream(_application_name(branches)) as rec,
         ):
             require_enabled(rec)
             rec.save(pipe)
@@ -224,17 +221,17 @@ def set_up(rec: rr.RecordingStream, name: str) -> None:
     rec.send_recording_name(name)
 
 
-def _application_name(names: Sequence[str], branches: Sequence[Lines]) -> str:
+def _application_name(branches: Sequence[Lines]) -> str:
     """Name the application of a recording.
 
     The viewer remembers a layout by application: recordings with other branches or lines must not share its name.
     The name may have about 180 characters, few of them punctuation.
     """
-    run_names = " ".join(names)
-    if len(run_names) > MAX_LIST:
-        run_names = f"{len(names)} runs"
+    names = " ".join(branch.label for branch in branches)
+    if len(names) > MAX_LIST:
+        names = f"{len(branches)} runs"
     lines = " ".join(f"{branch.path}/{path}" for branch in branches for path in branch.series)
-    return re.sub(r"[^\w -]", "-", f"cmg-mj {run_names} {zlib.crc32(lines.encode()):08x}", flags=re.ASCII)
+    return re.sub(r"[^\w -]", "-", f"cmg-mj {names} {zlib.crc32(lines.encode()):08x}", flags=re.ASCII)
 
 
 def show_recording(path: Path | str, *, height: int = 600) -> Any:

@@ -10,7 +10,6 @@ import mujoco
 import numpy as np
 import rerun as rr
 
-from cmg_mj.plant.elements import Module
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.view.recording.signals import TIMELINE, Branch, instant, time_column
@@ -18,10 +17,9 @@ from cmg_mj.view.recording.signals import TIMELINE, Branch, instant, time_column
 POSE_RATE_HZ = 100.0
 """Largest rate at which poses are recorded; the eye needs no more."""
 FLYWHEEL_SLOWDOWN = 100.0
-"""Flywheels are drawn turning this many times slower.
+"""Flywheels are recorded turning this many times slower.
 
-At 314 rad/s a mark on the disc makes half a turn between two poses and seems to stand still. The recorded pose of
-the flywheel is the true one; its shapes hang from a child entity, `slowed`, that turns them back.
+At 314 rad/s a mark on the disc makes half a turn between two poses and seems to stand still.
 """
 PUSH_COLOR = (213, 94, 0)
 PUSH_LENGTH, PUSH_RADIUS = 0.8, 0.047
@@ -108,47 +106,47 @@ def _radius(plant: Plant) -> float:
 
 def log_shapes(rec: rr.RecordingStream, branch: Branch) -> None:
     """Record the plant's shapes: one static entity for each geom and site that MuJoCo draws, under its body."""
-    plant, model, radius = branch.plant, branch.plant.drawn_model, _radius(branch.plant)
-    parents = {body: _body_path(branch, body) for body in range(model.nbody)}
-    for module in plant.axis.modules:
-        parents[int(model.dof_bodyid[module.flywheel_dof])] = _slowed_path(branch, module)
+    model, radius = branch.plant.drawn_model, _radius(branch.plant)
     shapes = [(geom.name or f"geom{i}", geom, rgba) for i, geom, rgba in _drawn(model, model.geom, model.ngeom)]
     shapes += [(f"site/{site.name or i}", site, rgba) for i, site, rgba in _drawn(model, model.site, model.nsite)]
     for name, element, rgba in shapes:
         path = "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
-        rec.log(f"{parents[int(element.bodyid[0])]}/{path}", _shape(model, element, rgba, radius), static=True)
+        parent = _body_path(branch, int(element.bodyid[0]))
+        rec.log(f"{parent}/{path}", _shape(model, element, rgba, radius), static=True)
 
 
 def _shape(model: mujoco.MjModel, element: Any, rgba: np.ndarray, radius: float) -> rr.AsComponents:
     """Convert a geom or a site, in its body's frame; of a plane, the tiles go by the radius of the rig."""
-    kind, size, position = element.type[0], element.size, element.pos
+    kind, size, position = _Type(int(element.type[0])), element.size, element.pos
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, element.quat.astype(float))
     rotation = rotation.reshape(3, 3)
     color = tuple(round(255.0 * c) for c in rgba.tolist())
     style: dict[str, Any] = {"colors": [color], "quaternions": [np.roll(element.quat, -1)]}
     solid = {**style, "fill_mode": rr.components.FillMode.Solid}
-    if kind == int(_Type.mjGEOM_CAPSULE):
-        # MuJoCo's capsule is centred, rerun's stands on its start.
-        start = position - rotation[:, 2] * size[1]
-        return rr.Capsules3D(lengths=[2.0 * size[1]], radii=[size[0]], translations=[start], **solid)
-    if kind == int(_Type.mjGEOM_CYLINDER):
-        return rr.Cylinders3D(lengths=[2.0 * size[1]], radii=[size[0]], centers=[position], **solid)
-    if kind == int(_Type.mjGEOM_BOX):
-        return rr.Boxes3D(half_sizes=[size], centers=[position], **solid)
-    if kind in (int(_Type.mjGEOM_SPHERE), int(_Type.mjGEOM_ELLIPSOID)):
-        half_sizes = size if kind == int(_Type.mjGEOM_ELLIPSOID) else np.full(3, size[0])
-        return rr.Ellipsoids3D(half_sizes=[half_sizes], centers=[position], **solid)
-    if kind == int(_Type.mjGEOM_PLANE):
-        return _tiles(size, position, rotation, radius)
-    if kind == int(_Type.mjGEOM_MESH):
-        mesh = model.mesh(int(element.dataid[0]))
-        vertices = model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]] @ rotation.T + position
-        faces = model.mesh_face[mesh.faceadr[0] :][: mesh.facenum[0]]
-        return rr.Mesh3D(vertex_positions=vertices, triangle_indices=faces, albedo_factor=color)
-    # A height field or a signed distance field: its bounding box.
-    centre, half_sizes = np.split(element.aabb, 2)
-    return rr.Boxes3D(half_sizes=[half_sizes], centers=[position + rotation @ centre], **style)
+    match kind:
+        case _Type.mjGEOM_CAPSULE:
+            # MuJoCo's capsule is centred, rerun's stands on its start.
+            start = position - rotation[:, 2] * size[1]
+            return rr.Capsules3D(lengths=[2.0 * size[1]], radii=[size[0]], translations=[start], **solid)
+        case _Type.mjGEOM_CYLINDER:
+            return rr.Cylinders3D(lengths=[2.0 * size[1]], radii=[size[0]], centers=[position], **solid)
+        case _Type.mjGEOM_BOX:
+            return rr.Boxes3D(half_sizes=[size], centers=[position], **solid)
+        case _Type.mjGEOM_SPHERE:
+            return rr.Ellipsoids3D(half_sizes=[np.full(3, size[0])], centers=[position], **solid)
+        case _Type.mjGEOM_ELLIPSOID:
+            return rr.Ellipsoids3D(half_sizes=[size], centers=[position], **solid)
+        case _Type.mjGEOM_PLANE:
+            return _tiles(size, position, rotation, radius)
+        case _Type.mjGEOM_MESH:
+            mesh = model.mesh(int(element.dataid[0]))
+            vertices = model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]] @ rotation.T + position
+            faces = model.mesh_face[mesh.faceadr[0] :][: mesh.facenum[0]]
+            return rr.Mesh3D(vertex_positions=vertices, triangle_indices=faces, albedo_factor=color)
+        case _:  # a height field or a signed distance field: its bounding box
+            centre, half_sizes = np.split(element.aabb, 2)
+            return rr.Boxes3D(half_sizes=[half_sizes], centers=[position + rotation @ centre], **style)
 
 
 def _tiles(size: np.ndarray, position: np.ndarray, rotation: np.ndarray, radius: float) -> rr.Mesh3D:
@@ -182,10 +180,11 @@ def recorded_poses(plant: Plant, trajectory: Trajectory) -> tuple[np.ndarray, np
 
 
 def log_poses(rec: rr.RecordingStream, branch: Branch) -> None:
-    """Record poses of all bodies under `<branch>/rig`."""
-    plant, model = branch.plant, branch.plant.model
-    time, qpos = recorded_poses(plant, branch.run.trajectory)
+    """Record poses of all bodies under `<branch>/rig`, the flywheels slowed."""
+    model = branch.plant.model
+    time, qpos = recorded_poses(branch.plant, branch.run.trajectory)
     times, data = time_column(time), mujoco.MjData(model)
+    qpos[:, [module.flywheel for module in branch.plant.axis.modules]] /= FLYWHEEL_SLOWDOWN
     poses = np.empty((len(qpos), model.nbody, 7))
     for k, angles in enumerate(qpos):
         data.qpos[:] = angles
@@ -195,32 +194,12 @@ def log_poses(rec: rr.RecordingStream, branch: Branch) -> None:
         place, quaternion = np.split(poses[:, body], [3], axis=1)
         pose = rr.Transform3D.columns(translation=place, quaternion=np.roll(quaternion, -1, axis=1))
         rec.send_columns(_body_path(branch, body), [times], pose)
-    for module in plant.axis.modules:
-        place, quaternion = _turn_back(plant, module, qpos)
-        pose = rr.Transform3D.columns(translation=place, quaternion=quaternion)
-        rec.send_columns(_slowed_path(branch, module), [times], pose)
 
 
 def _body_path(branch: Branch, body: int) -> str:
     """Name a body's entity: `cube1/gimbal` is `cube1.gimbal`, flat under the rig, as poses are in the world's frame."""
     name = branch.plant.model.body(body).name or f"body{body}"
     return f"{branch.path}/rig/{rr.escape_entity_path_part(name.replace('/', '.'))}"
-
-
-def _slowed_path(branch: Branch, module: Module) -> str:
-    return f"{_body_path(branch, int(branch.plant.model.dof_bodyid[module.flywheel_dof]))}/slowed"
-
-
-def _turn_back(plant: Plant, module: Module, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the motion, in the flywheel's frame, from its true angle to the slowed one: translation, quaternion."""
-    model = plant.model
-    joint = int(model.dof_jntid[module.flywheel_dof])
-    axis, anchor = model.jnt_axis[joint], model.jnt_pos[joint]
-    turn = (qpos[:, module.flywheel] * (1.0 / FLYWHEEL_SLOWDOWN - 1.0))[:, None]
-    quaternion = np.concatenate([np.sin(turn / 2.0) * axis, np.cos(turn / 2.0)], axis=1)
-    axis_part = axis * (axis @ anchor)
-    rotated_anchor = axis_part + np.cos(turn) * (anchor - axis_part) + np.sin(turn) * np.cross(axis, anchor)
-    return anchor - rotated_anchor, quaternion
 
 
 def log_pushes(rec: rr.RecordingStream, branch: Branch) -> None:

@@ -104,24 +104,25 @@ class Branch(Lines):
 
 
 def make_branches(header: RecordingHeader, runs: Sequence[Run]) -> list[Branch]:
-    """Make the branches of a recording, each named after its run.
-
-    Raises:
-        ValueError: There is no run, or two have the same name.
-    """
-    names = [run.name for run in runs]
-    if not names or len(set(names)) < len(names):
-        raise ValueError(f"a recording needs runs of different names, not {names}")
+    """Make the branches of a recording, each named after its run."""
     # A run that did not reach its end ranks last.
     entries = legend({run.name: {**run.summary, "fell": run.outcome.kind in ENDINGS} for run in runs})
     branches = []
     for run, entry in zip(runs, entries, strict=True):
         plant = header.plant if run.axis is None else header.plant.single_axis(run.axis)
         observers = legend(run.observers, always=run.trajectory.observers[:1])
-        series = {row.path: row for row in _series(run, plant, observers, header)}
-        pushes = [push for push in header.pushes if run.axis is None or push.axis == run.axis]
-        place = {"path": f"/{entry.part}", "label": entry.label, "series": series}
-        branches.append(Branch(**place, run=run, entry=entry, observers=observers, plant=plant, pushes=pushes))
+        branches.append(
+            Branch(
+                path=f"/{entry.part}",
+                label=entry.label,
+                series={row.path: row for row in _series(run, plant, observers, header)},
+                run=run,
+                entry=entry,
+                observers=observers,
+                plant=plant,
+                pushes=[push for push in header.pushes if run.axis is None or push.axis == run.axis],
+            )
+        )
     return branches
 
 
@@ -137,8 +138,7 @@ def time_column(seconds: np.ndarray, timeline: str = TIMELINE) -> rr.TimeColumn:
 
 def _series(run: Run, plant: Plant, observers: Sequence[LegendEntry], header: RecordingHeader) -> Iterator[Series]:
     """Make all time series of a run: tilt and gimbal angles in degrees, rates in rad/s, the integrator in rad s."""
-    t, rate_limit = run.trajectory, header.rate_limit_rad_s
-    time = t["time_s"]
+    t, time = run.trajectory, run.trajectory["time_s"]
     true, gyro = BASELINE_COLOURS["true"], BASELINE_COLOURS["gyro"]
     yield Series("tilt/measured", "measured", time, np.degrees(t["y1_rad"]), gyro, 1.0)
     yield Series("tilt/true", "true", time, np.degrees(t["x1_rad"]), true, 2.5)
@@ -149,8 +149,7 @@ def _series(run: Run, plant: Plant, observers: Sequence[LegendEntry], header: Re
     for observer in observers:
         yield from _estimates(run, observer)
     yield Series("command/u", "command", time, t["u_rad_s"], CONTROLLER)
-    if rate_limit is not None:
-        yield _bounds("command/limit", "rate limit", time, rate_limit)
+    yield _bounds("command/limit", "rate limit", time, header.rate_limit_rad_s)
     for i, module in enumerate(plant.axis.modules):
         color = MODULES[i % len(MODULES)]
         part = rr.escape_entity_path_part(module.short_name)

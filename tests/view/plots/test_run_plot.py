@@ -11,13 +11,16 @@ import numpy as np
 import pytest
 
 from cmg_mj.observers import OBSERVERS
+from cmg_mj.results.result import Outcome
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
-from cmg_mj.view.plots.run_plot import PAGE, plot_run
+from cmg_mj.view.plots.run_plot import plot_run
 from cmg_mj.view.plots.style import colour, hexadecimal
+from cmg_mj.view.recording import RecordingHeader, Run
 
 BAND, LIMIT = 1.0, 4.7
 PUSHES = [Push(0.2, 0.1)]
@@ -47,9 +50,10 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[matplotlib.figure.Figure]:
 
 
 def plot(path: Path, trajectory: Trajectory, summary: dict[str, Any], figures: list[Any], **events: Any) -> Any:
-    events = {"pushes": PUSHES, **events}
-    bounds = {"settle_band_deg": BAND, "rate_limit_rad_s": LIMIT}
-    plot_run(path / "plot.png", trajectory, "A title", summary, **bounds, **events)
+    no_plant: Any = None
+    header = RecordingHeader(no_plant, LIMIT, settings=MetricsSettings(BAND), **{"pushes": PUSHES, **events})
+    about = {"scenario": "A title", "observer": "homogeneous", "seed": 0, "differs": {}}
+    plot_run(path / "plot.png", header, Run("it", trajectory, about | summary, Outcome("done", 0.4)))
     assert (path / "plot.png").read_bytes().startswith(b"\x89PNG")
     return figures[-1]
 
@@ -65,8 +69,8 @@ def test_eleven_lines_on_one_page(
     trajectory, summary = all_observers
     figure = plot(tmp_path, trajectory, summary, figures)
     width, height = figure.get_size_inches()
-    assert width <= PAGE[0]
-    assert height <= PAGE[1]
+    assert width <= 9.0
+    assert height <= 12.7
     tilt, rate, error, _, command, *small = figure.axes
     assert len(small) == len(OBSERVERS) - 3
     assert min(axes.get_position().height * height for axes in figure.axes) > 0.7

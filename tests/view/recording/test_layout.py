@@ -70,7 +70,7 @@ def record(experiment: Experiment) -> Run:
 
 
 def write(path: Path, experiment: Experiment, runs: Sequence[Run]) -> Path:
-    header = RecordingHeader(experiment.plant, pushes=experiment.scenario.push, rate_limit_rad_s=4.7)
+    header = RecordingHeader(experiment.plant, 4.7, pushes=experiment.scenario.push)
     write_recording(path, header, runs)
     return path
 
@@ -107,7 +107,9 @@ def test_the_best_runs_are_on(all_observers: tuple[Experiment, Run], tmp_path: P
         assert [entity.split("/")[1] for entity in first.contents] == ["1_b", "2_a", "3_d", "4_c"]
         assert {entity.split("/")[1] for entity in first.off} == {"4_c"}
     assert {len(view.contents) for view in select(layout, "Phase")} == {1, 3}
-    header = RecordingHeader(experiment.plant, swings=[Swing(1.5, 0.3), Swing(2.0, 0.1, start_s=1.0, duration_s=2.0)])
+    header = RecordingHeader(
+        experiment.plant, 4.7, swings=[Swing(1.5, 0.3), Swing(2.0, 0.1, start_s=1.0, duration_s=2.0)]
+    )
     text = pages(header, make_branches(header, runs))["summary"]
     assert "0.1 N m at 2 Hz from 1 s for 2 s" in text
     assert [line.split("|")[1].strip() for line in text.splitlines() if line.startswith("| ")][1:5] == [
