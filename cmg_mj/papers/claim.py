@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, Literal
+
+import numpy as np
 
 from cmg_mj.view.plots.figure import Picture
 
@@ -44,6 +45,15 @@ OnShare = Callable[[float], None]
 """Called with the share of a section that is done."""
 
 
+def plain(value: Any) -> Any:
+    """Make figures what JSON can hold: text for names, lists for arrays, Python's numbers for NumPy's."""
+    if isinstance(value, Mapping):
+        return {str(name): plain(inner) for name, inner in value.items()}
+    if type(value) in (list, tuple):  # an interval stays one
+        return [plain(inner) for inner in value]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
 @dataclass(frozen=True, kw_only=True)
 class Claim:
     """One figure, table, remark, proof or statement. Its verdict follows from what was found and what is declared.
@@ -58,7 +68,7 @@ class Claim:
         missing_data: Data that the paper does not give and that decide the outcome, a whole sentence; empty if none.
         conditions: The misprint that was mended, or for which part it holds, a whole sentence; empty if neither.
         otherwise: Explanation where it does not hold, a whole sentence.
-        figures: The numbers found, by names that end in their unit, as JSON can hold them.
+        figures: The numbers found, by names that end in their unit; `plain` makes them what JSON can hold.
         pictures: Plots.
         is_ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
         measures: Measure -> true if the claim holds by it; empty if `holds` is one value.
@@ -81,6 +91,7 @@ class Claim:
         measures = self.holds if isinstance(self.holds, Mapping) else {}
         object.__setattr__(self, "measures", {name: bool(value) for name, value in measures.items()})
         object.__setattr__(self, "holds", all(measures.values()) if measures else bool(self.holds))
+        object.__setattr__(self, "figures", plain(self.figures))
 
     @property
     def verdict(self) -> str:
@@ -114,15 +125,15 @@ class Section:
     claims: Callable[[OnShare], list[Claim]]
 
 
-def obtain(parts: Sequence[Callable[[], Claim]], on_share: OnShare) -> list[Claim]:
-    """Obtain claims one by one, and report the share done before each."""
-    claims = []
-    for i, part in enumerate(parts):
-        on_share(i / len(parts))
-        claims.append(part())
-    return claims
+def section(title: str, seconds: float, *parts: Callable[[], Claim | list[Claim]]) -> Section:
+    """Make a section of parts that are obtained one by one; the share done is reported before each."""
 
+    def claims(on_share: OnShare) -> list[Claim]:
+        found = []
+        for i, part in enumerate(parts):
+            on_share(i / len(parts))
+            obtained = part()
+            found += obtained if isinstance(obtained, list) else [obtained]
+        return found
 
-def section(title: str, seconds: float, *parts: Callable[[], Claim]) -> Section:
-    """Make a section of claims that are obtained one by one."""
-    return Section(title, seconds, partial(obtain, parts))
+    return Section(title, seconds, claims)

@@ -23,6 +23,7 @@ import sympy as sp
 from sympy.polys.fields import sfield
 
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.cube import CUBE, inertias
 
 q1, q2 = q = sp.symbols("q1 q2", real=True)
 """Tilt and gimbal angle."""
@@ -164,13 +165,13 @@ class PrintedInertia(NamedTuple):
     place: str
     """Place at which it says that the system is not PLvCC."""
     gimbals: int
-    arm: str
+    arm: float
     """Distance from the tilt axis of the mass m, which J1 holds as m arm^2/gimbals [m]."""
 
 
 PRINTED: dict[Paper, PrintedInertia] = {
-    "aranovskiy2020": PrintedInertia("Appendix", 2, "0.19"),
-    "sokolov2019": PrintedInertia("Proposition 1", 1, "0.13"),
+    "aranovskiy2020": PrintedInertia("Appendix", 2, 0.19),
+    "sokolov2019": PrintedInertia("Proposition 1", 1, 0.13),
 }
 
 
@@ -182,10 +183,9 @@ def papers_m1(paper: Paper, numbers: bool = False) -> Any:
     m1 = gimbals * (J1 + J2 * sp.cos(q2) ** 2) / I_cd
     if not numbers:
         return m1
-    m, arm2 = sp.Rational("2.62"), sp.Rational(arm) ** 2 / gimbals
-    J_b, I_c, J_c, K_c = (sp.Rational(text) / 10**4 for text in ("130", "10", "2.6", "9.9"))
-    I_d, J_d = (sp.Rational(text) / 10**4 for text in ("5.6", "11"))
-    return m1.subs({J1: I_d + J_b + K_c + m * arm2, J2: J_c - I_d + J_d - K_c, I_cd: I_c + I_d})
+    exact = {name: sp.Rational(str(number)) for name, number in {**CUBE, "l": arm}.items()}
+    J1_number, J2_number = inertias(exact, gimbals)
+    return m1.subs({J1: J1_number, J2: J2_number, I_cd: exact["I_c"] + exact["I_d"]})
 
 
 def inertia_factor(paper: Paper) -> int:

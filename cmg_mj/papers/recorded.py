@@ -22,7 +22,7 @@ def trajectory_of(result: Result) -> Trajectory:
 def push_intervals(trajectory: Trajectory) -> list[tuple[float, float]]:
     """Find when the push acted on one world, as panels shade it [s]."""
     times = trajectory["time_s"][trajectory["push_n_m"] != 0.0]
-    return [(float(times[0]), float(times[-1]))] if len(times) else []
+    return [(times[0], times[-1])] if len(times) else []
 
 
 def rms(values: np.ndarray) -> np.ndarray:
@@ -109,7 +109,7 @@ def on_common_scales(claims: Sequence[Claim]) -> list[Claim]:
 
     def scaled(panel: Panel) -> Panel:
         drawn = np.concatenate(values[panel.y_label])
-        low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
+        low, high = np.nanmin(drawn), np.nanmax(drawn)
         return replace(panel, y_range=(low - ROOM * (high - low), high + ROOM * (high - low)))
 
     return [

@@ -25,6 +25,7 @@ from cmg_mj.papers.andrieu2009.simulation import (
     run_plant,
     study,
 )
+from cmg_mj.papers.aranovskiy2020.rig import push_recovery
 from cmg_mj.papers.claim import Claim
 from tests.papers.worlds import make_result
 
@@ -319,7 +320,7 @@ def test_escape_is_found_below_1_and_missed_beyond() -> None:
 
 def test_on_the_rig() -> None:
     """Three worlds of `high_gain` in the loop: it stands, and its gain does not move."""
-    result = on_the_rig.experiment("high_gain", 90_000).run_many(3)
+    result = push_recovery("high_gain", 90_000, duration_s=on_the_rig.DURATION_S).run_many(3)
     errors = result.values("velocity_rms_error_rad_s")
     assert np.isfinite(errors).all()
     assert 0.05 < errors.mean() < 0.085

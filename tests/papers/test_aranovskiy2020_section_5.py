@@ -33,7 +33,7 @@ WITHIN = "reproduced within stated conditions"
 
 
 def test_figure_4_other_seeds() -> None:
-    after_push, whole = section_5.figure_4(lambda share: None, 6, SEED)
+    after_push, whole = section_5.figure_4(6, SEED)
     assert (after_push.verdict, after_push.holds) == (whole.verdict, not whole.holds) == ("cannot be tested", False)
     errors = {name: after_push.figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
     assert errors["homogeneous"] > 1.3 * max(errors["linear"], errors["zero"])  # it misses the push

@@ -25,7 +25,7 @@ from cmg_mj.papers.andrieu2009.simulation import (
     window_means,
     window_spreads,
 )
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEEDS = 20
@@ -41,10 +41,9 @@ STRONG = 0.7
 """A rank correlation above this is called strong."""
 
 
-def claims(on_share: OnShare) -> list[Claim]:
+def claims() -> list[Claim]:
     """Judge section 3.1."""
     results = study(SEEDS)
-    on_share(0.7)
     parts = [figure_1, figure_2, bias, bias_of_constant_gain, bias_of_updated_gains, spread, correction, simple_copy]
     return [part(results) for part in parts]
 
@@ -83,9 +82,9 @@ def figure_1(study: Study) -> Claim:
         place="Fig. 1",
         statement="With noise, too, the means come as df2_max >= Omega_1 >= Omega_2 >= df2/dx2.",
         assumes=ASSUMED,
-        holds=bool(in_order.all()),
-        figures={f"{name}_mean_per_time": row.tolist() for name, row in zip(RATES, means, strict=True)}
-        | {"L_over_tracked_ratio": (gains / (PHI2 + PHI3 / PHI1 * means[1:3])).tolist()},
+        holds=in_order.all(),
+        figures={f"{name}_mean_per_time": row for name, row in zip(RATES, means, strict=True)}
+        | {"L_over_tracked_ratio": gains / (PHI2 + PHI3 / PHI1 * means[1:3])},
         pictures=[Picture("andrieu2009-fig-1", title, panels)],
     )
 
@@ -95,7 +94,7 @@ def figure_1(study: Study) -> Claim:
 
 def share_in_order(rms: np.ndarray) -> float:
     """Return the share of the seeds in which constant > updated > updated and homogeneous."""
-    return float((np.diff(rms, axis=0) < 0.0).all(axis=0).mean())
+    return (np.diff(rms, axis=0) < 0.0).all(axis=0).mean()
 
 
 def figure_2(study: Study) -> Claim:
@@ -109,7 +108,7 @@ def figure_2(study: Study) -> Claim:
     )
 
     def by_kind(values: np.ndarray) -> dict[str, float]:
-        return dict(zip(KINDS, values.tolist(), strict=True))
+        return dict(zip(KINDS, values, strict=True))
 
     curves = [study.nominal[kind].eta2_error[:, 0] for kind in KINDS]
     mean_of_first = uniform_filter1d(curves[0], round(1.0 / float(t[1] - t[0])), mode="nearest")
@@ -145,8 +144,8 @@ def bias(study: Study) -> Claim:
         place="Section 3.1, bias in Fig. 2",
         statement="The larger an observer's estimate of the rate, the larger the bias of its error.",
         assumes=ASSUMED,
-        holds=bool(np.all(np.diff([noisy, quiet], axis=1) <= 0.0)),
-        figures={"bias_eta2": noisy.tolist(), "bias_eta2_without_noise": quiet.tolist()},
+        holds=np.all(np.diff([noisy, quiet], axis=1) <= 0.0),
+        figures={"bias_eta2": noisy, "bias_eta2_without_noise": quiet},
     )
 
 
@@ -163,10 +162,10 @@ def bias_of_constant_gain(study: Study) -> Claim:
         place="Section 3.1, bias of the constant gain",
         statement="The bias of the observer with constant gain in Fig. 2 is due to the error in hbar.",
         assumes={**ASSUMED, "threshold": "due to it if less than half is left"},
-        holds=dict(zip(WINDOW_NAMES, (shares_left < HALF).tolist(), strict=True)),
+        holds=dict(zip(WINDOW_NAMES, shares_left < HALF, strict=True)),
         otherwise="It is made by the noise, which sends the estimate from end to end of the domain, where the limits "
         "cut off one side more than the other.",
-        figures={"share_left_with_exact_hbar": shares_left.tolist()},
+        figures={"share_left_with_exact_hbar": shares_left},
     )
 
 
@@ -184,7 +183,7 @@ def bias_of_updated_gains(study: Study) -> Claim:
         "the bias itself is small."
         if windows
         else "Half of it or more remains in every window.",
-        figures={"share_left_with_exact_hbar": dict(zip(KINDS[1:], shares_left.tolist(), strict=True))},
+        figures={"share_left_with_exact_hbar": dict(zip(KINDS[1:], shares_left, strict=True))},
     )
 
 
@@ -211,8 +210,8 @@ def spread(study: Study) -> Claim:
         conditions="" if overall >= STRONG else remark,
         otherwise=remark,
         figures={
-            "error_standard_deviation_eta2": spreads.tolist(),
-            "estimate_mean_per_time": rates.tolist(),
+            "error_standard_deviation_eta2": spreads,
+            "estimate_mean_per_time": rates,
             "rank_correlation_over_all": overall,
             "least_rank_correlation_in_a_window": in_window,
         },
@@ -229,9 +228,9 @@ def correction(study: Study) -> Claim:
     b_inside = 0.5 * largest_b(2, P, (P,))
     bounded = replay(HOMOGENEOUS, run, model, b=b_inside)
     late = run.t > 5.0
-    largest = float(nominal.argument[late].max())
-    rms, rms_linear, rms_inside = (float(rms_late(run, part.eta2_error).mean()) for part in (nominal, linear, bounded))
-    difference = float(np.abs(nominal.eta2_error - linear.eta2_error)[late].max())
+    largest = nominal.argument[late].max()
+    rms, rms_linear, rms_inside = (rms_late(run, part.eta2_error).mean() for part in (nominal, linear, bounded))
+    difference = np.abs(nominal.eta2_error - linear.eta2_error)[late].max()
     return Claim(
         place="Section 3.1, the homogeneous correction",
         statement="In Fig. 2 the homogeneous correction is linear for all that matters: the third observer is the best "
@@ -258,17 +257,17 @@ def correction(study: Study) -> Claim:
 def simple_copy(study: Study) -> Claim:
     """Judge Footnote 1."""
     run = study.run
-    errors = run.eta - integrate(Bioreactor(HBAR_OF_OBSERVERS), run.start, run.u, float(run.t[1]))
-    best_rms = float(rms_by_kind(run, study.nominal)[2].mean())
+    errors = run.eta - integrate(Bioreactor(HBAR_OF_OBSERVERS), run.start, run.u, run.t[1])
+    best_rms = rms_by_kind(run, study.nominal)[2].mean()
     # What the noise does: the same seed with noise and without.
     by_noise = {
-        kind: float(rms_late(run, part.eta2_error[:, 0] - study.quiet[kind].eta2_error[:, 0]))
+        kind: rms_late(run, part.eta2_error[:, 0] - study.quiet[kind].eta2_error[:, 0])
         for kind, part in study.nominal.items()
     }
     # (eta1 + eta2)' = u (1 - eta1 - eta2) whatever hbar is.
     start, end = np.searchsorted(run.t, (10.0, 20.0))
     total = np.abs(errors.sum(axis=0))
-    share_left = float(np.median(total[end] / total[start]))
+    share_left = np.median(total[end] / total[start])
     return Claim(
         place="Footnote 1",
         statement="A model of the plant that just runs along feels no noise, but how fast its error fades is not ours "
@@ -277,7 +276,7 @@ def simple_copy(study: Study) -> Claim:
         figures={
             "rms_change_by_noise_eta2": by_noise,
             "share_left_after_slow_input": share_left,
-            "rms_error_eta2_copy": float(rms_late(run, errors[1]).mean()),
+            "rms_error_eta2_copy": rms_late(run, errors[1]).mean(),
             "rms_error_eta2_best_observer": best_rms,
         },
     )

@@ -152,7 +152,7 @@ def replay(kind: str, run: Run, model: Bioreactor, *, p: float = P, b: float = B
     if kind != HOMOGENEOUS:
         p, b = 0.0, 1.0  # a linear correction
     observer = UpdatedHighGain(
-        dt=float(run.t[1]),
+        dt=run.t[1],
         f=f,
         correction=BiLimitCorrection((L1, L2), p),
         Omega=Omega,

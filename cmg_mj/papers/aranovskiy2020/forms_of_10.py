@@ -111,7 +111,7 @@ def compare(form: Observer, other_form: Observer, seed: int) -> Comparison:
     later = run["time_s"] > 0.2
     truth = run["x2_rad_s"][later]
     rate, other_rate = (replay(observer, run).x2[later] for observer in (form, other_form))
-    return Comparison(*(float(rms(error)) for error in (other_rate - rate, rate - truth, other_rate - truth)))
+    return Comparison(*(rms(error) for error in (other_rate - rate, rate - truth, other_rate - truth)))
 
 
 # --- by explicit Euler, on floats and arrays ---------------------------------------------------------------------

@@ -12,13 +12,11 @@ from scipy.optimize import minimize
 
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import K_E, K_E_ROUNDING, gimbal_rest, integrator_rest, printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT, push_recovery, replay_at_rest
-from cmg_mj.papers.assumed import PUSH_RECOVERY
-from cmg_mj.papers.claim import Assumption, Claim, OnShare
+from cmg_mj.papers.aranovskiy2020.rig import DT, PUSH_RECOVERY, replay_at_rest, run_loops
+from cmg_mj.papers.claim import Assumption, Claim
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 # --- inverse optimality -----------------------------------------------------------------------------------------
@@ -60,7 +58,7 @@ def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
     roots = np.roots(gap)
     crossings = [w for w in roots if abs(w.imag) < 1e-9 * (1.0 + abs(w)) and w.real > 0.0]
     grid = np.concatenate([np.logspace(-6, 8, 4001), [abs(w.real) for w in crossings]])
-    least = float(np.sqrt((np.polyval(_squared(p), grid) / np.polyval(_squared(d), grid)).min()))
+    least = np.sqrt((np.polyval(_squared(p), grid) / np.polyval(_squared(d), grid)).min())
     basis = np.column_stack([_squared(row) for row in numerators])[1:]
     diagonal = np.linalg.lstsq(basis, gap, rcond=None)[0]
     if np.polyval(gap, grid).min() < 0.0 or gap[-1] < 0.0:
@@ -70,7 +68,7 @@ def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
     factor = math.sqrt(abs(gap[0])) * np.real(np.poly(left_roots))
     c = np.linalg.solve(numerators[:, 1:].T, factor)
     Q = np.outer(c, c)
-    return Inverse(least, diagonal, Q, float(np.abs(lqr_gain(A, B, Q) / K - 1.0).max()))
+    return Inverse(least, diagonal, Q, np.abs(lqr_gain(A, B, Q) / K - 1.0).max())
 
 
 def _squared(polynomial: np.ndarray) -> np.ndarray:
@@ -113,7 +111,7 @@ def nearest_diagonal(
 
     def off(logarithms: np.ndarray) -> float:
         try:
-            return float((np.abs(lqr_gain(A, B, np.diag(weights(logarithms))) - K) / rounding).max())
+            return (np.abs(lqr_gain(A, B, np.diag(weights(logarithms))) - K) / rounding).max()
         except LinAlgError:  # Q with entries too far apart for the solver
             return math.inf
 
@@ -136,10 +134,10 @@ def lqr_gains() -> Claim:
         figures={
             "least_return_difference": inverse.least,
             "recovered_gain_relative_error": inverse.recovered,
-            "Q": None if inverse.Q is None else inverse.Q.tolist(),
-            "diagonal_candidate": inverse.diagonal.tolist(),
-            "diagonal_within_rounding": diagonal.tolist(),
-            "gain_within_rounding": lqr_gain(A, B, np.diag(diagonal)).tolist(),
+            "Q": inverse.Q,
+            "diagonal_candidate": inverse.diagonal,
+            "diagonal_within_rounding": diagonal,
+            "gain_within_rounding": lqr_gain(A, B, np.diag(diagonal)),
             "difference_by_rounding": off,
         },
     )
@@ -183,15 +181,12 @@ class Rest(NamedTuple):
         return abs(self.x1.mean) < BIAS_DEG / 20.0 and abs(self.x_e.mean / expected_x_e - 1.0) < 0.05
 
 
-def find_rests(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> list[Rest]:
-    """Let the rig come to rest, without a push: a case of `CASES`, how many worlds, and settings beside its own."""
+def find_rests(cases: Sequence[str], worlds: int, seed: int, *extra: str) -> list[Rest]:
+    """Let the rig come to rest, without a push, in some of `CASES`, with settings beside their own."""
     common = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
-    runs = []
-    for case, worlds, extra in cases:
-        observer, settings = CASES[case]
-        runs.append(run_of(push_recovery(observer, seed, [*common, *settings, *extra], DURATION_S), worlds))
-    results = run_jobs(runs)
-    return [_average(CASES[case][0], trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)]
+    loops = [(observer, [*common, *settings, *extra]) for observer, settings in (CASES[case] for case in cases)]
+    results = run_loops(loops, worlds, seed, DURATION_S)
+    return [_average(name, trajectory_of(result)) for (name, _), result in zip(loops, results, strict=True)]
 
 
 def _average(observer: str, run: Trajectory) -> Rest:
@@ -220,7 +215,7 @@ def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple
     noise = np.random.default_rng(seed).normal(0.0, sigma, (ticks, copies))
     noise = np.hstack([noise, -noise])  # whose mean is zero
     estimate = replay_at_rest(make_observer(observer, DT, printed_model()), noise - math.radians(e_deg))
-    return float(estimate.x1[settling:].mean()), float(estimate.x2[settling:].mean())
+    return estimate.x1[settling:].mean(), estimate.x2[settling:].mean()
 
 
 def expected_integrator(observer: str, sigma: float) -> float:
@@ -253,7 +248,7 @@ def laws_claim(rest: Rest, static: Rest) -> Claim:
 def observers_claim(rests: Mapping[str, Rest]) -> Claim:
     """Judge the rests by case, with an observer in the law, which the bias biases."""
     example = rests[TRUE_RATE].example
-    sigma = float(np.std(example["y1_rad"] - example["x1_rad"]))
+    sigma = np.std(example["y1_rad"] - example["x1_rad"])
     figures, at_zero = {}, []
     for case in list(CASES)[1:]:
         rest, expected = rests[case], expected_integrator(CASES[case][0], sigma)
@@ -287,10 +282,8 @@ def _picture(rests: Mapping[str, Rest]) -> Picture:
     )
 
 
-def rest_claims(on_share: OnShare) -> list[Claim]:
+def rest_claims() -> list[Claim]:
     """Judge the laws with the true rate, then with observers."""
-    without_integrator = (TRUE_RATE, 2, ["controller.gains=[35.0, 4.0, -1.0, 0.0]"])
-    *case_rests, static = find_rests([*((case, WORLDS, ()) for case in CASES), without_integrator], SEED)
-    on_share(0.9)
-    rests = dict(zip(CASES, case_rests, strict=True))
+    (static,) = find_rests([TRUE_RATE], 2, SEED, "controller.gains=[35.0, 4.0, -1.0, 0.0]")
+    rests = dict(zip(CASES, find_rests(list(CASES), WORLDS, SEED), strict=True))
     return [laws_claim(rests[TRUE_RATE], static), observers_claim(rests)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -60,18 +60,18 @@ class Decay(NamedTuple):
     def shrink_factor(self) -> float:
         """Mean factor by which a half turn of the error is quicker than the one before it."""
         spans = np.diff(self.time_s[self.turns])
-        return float((spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1)))
+        return (spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1))
 
     @property
     def decades_a_turn(self) -> float:
         """Powers of ten by which the size falls in a half turn."""
-        return float(np.diff(self.decades[self.turns]).mean())
+        return np.diff(self.decades[self.turns]).mean()
 
     @property
     def end_s(self) -> float:
         """Time at which the error is zero: the last turn plus the geometric series of all turns to come, or inf."""
         factor, (before, last) = self.shrink_factor, self.time_s[self.turns[-2:]]
-        return math.inf if factor > 0.99 else float(last + (last - before) * factor / (1.0 - factor))
+        return math.inf if factor > 0.99 else last + (last - before) * factor / (1.0 - factor)
 
 
 def decay(alpha: float) -> Decay:
@@ -104,7 +104,7 @@ def decay(alpha: float) -> Decay:
 
 def time_below(times: np.ndarray, rate: np.ndarray) -> float:
     """Return the time from which a rate stays below `SEEN` [s]."""
-    return float(times[np.flatnonzero(np.abs(rate) > SEEN)[-1] + 1])
+    return times[np.flatnonzero(np.abs(rate) > SEEN)[-1] + 1]
 
 
 def finite_time() -> Claim:
@@ -129,8 +129,8 @@ def finite_time() -> Claim:
         conditions="Tried with k1, k2 of Table 2 and alpha = 0.55, 0.7, 0.85, 1. For alpha below 1; the printed "
         "(1/2, 1] has 1 in it, with which the error fades exponentially.",
         figures={
-            "gone_after_s": {str(alpha): end for alpha, end in ends.items() if alpha < 1.0},
-            "time_of_a_half_turn_by_the_one_before": {str(alpha): d.shrink_factor for alpha, d in decays.items()},
+            "gone_after_s": {alpha: end for alpha, end in ends.items() if alpha < 1.0},
+            "time_of_a_half_turn_by_the_one_before": {alpha: d.shrink_factor for alpha, d in decays.items()},
             "fallen_to_a_thousandth_after_s": {"observer": observer_s, "equation": equation_s},
         },
         pictures=[
@@ -159,7 +159,7 @@ SEEN_RAD_S = 0.01
 
 def remaining_error(alpha: float, dt: float) -> float:
     """Return what is left after 3 s of a wrong rate of -1 rad/s at rest: the last 0.5 s' largest [rad/s]."""
-    return float(rates_at_rest(alpha, dt, 3.0, x1=0.05, x2=-1.0)[-round(0.5 / dt) :].max())
+    return rates_at_rest(alpha, dt, 3.0, x1=0.05, x2=-1.0)[-round(0.5 / dt) :].max()
 
 
 def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
@@ -185,10 +185,10 @@ def vicinity(seed: int = SEED) -> Claim:
     by_bias = {alpha: errors_at_rest(alpha, biased) for alpha in SETTLING}
     bounds = {alpha: np.array([bias_bound(alpha, e) for e in biases]) for alpha in SETTLING}
     by_noise = {alpha: errors_at_rest(alpha, noisy).reshape(len(NOISES_RAD), -1).mean(axis=1) for alpha in SETTLING}
-    pairs = [pair for alpha in SETTLING for pair in zip(by_bias[alpha].tolist(), bounds[alpha].tolist(), strict=True)]
+    pairs = [pair for alpha in SETTLING for pair in zip(by_bias[alpha], bounds[alpha], strict=True)]
     relative_difference = max(abs(x / b - 1.0) for x, b in pairs if b > SEEN_RAD_S)
     difference = max(abs(x - b) for x, b in pairs if b <= SEEN_RAD_S)
-    slopes = {a: float(np.polyfit(np.log(NOISES_RAD), np.log(error), 1)[0]) for a, error in by_noise.items()}
+    slopes = {a: np.polyfit(np.log(NOISES_RAD), np.log(error), 1)[0] for a, error in by_noise.items()}
     return Claim(
         place="After (11), the vicinity",
         statement="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
@@ -199,22 +199,18 @@ def vicinity(seed: int = SEED) -> Claim:
         "printed s^2 + k2 s + k1 has k1 and k2 exchanged, without consequence: either is Hurwitz just when both gains "
         "are positive.",
         figures={
-            "error_left_share": _by_name(errors),
-            "bias_deg": list(BIASES_DEG),
-            "rate_error_by_bias_rad_s": _by_name(by_bias),
-            "error_left_share_2000_hz": _by_name(fine_errors),
+            "error_left_share": errors,
+            "bias_deg": BIASES_DEG,
+            "rate_error_by_bias_rad_s": by_bias,
+            "error_left_share_2000_hz": fine_errors,
             "closed_form_relative_difference": relative_difference,
             "closed_form_difference_where_small_rad_s": difference,
-            "noise_rad": list(NOISES_RAD),
-            "rate_error_by_noise_rad_s": _by_name(by_noise),
-            "exponent_of_noise": _by_name(slopes),
+            "noise_rad": NOISES_RAD,
+            "rate_error_by_noise_rad_s": by_noise,
+            "exponent_of_noise": slopes,
         },
         pictures=[_vicinity_picture(by_bias, bounds, by_noise)],
     )
-
-
-def _by_name(by_alpha: Mapping[float, Any]) -> dict[str, Any]:
-    return {str(alpha): np.asarray(value).tolist() for alpha, value in by_alpha.items()}
 
 
 def _vicinity_picture(

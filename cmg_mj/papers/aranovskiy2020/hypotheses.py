@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery, run_on_rigs
-from cmg_mj.papers.assumed import PUSH_RECOVERY
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, push_recovery, run_on_rigs
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
 from cmg_mj.plant.plant import Plant, load_plant
@@ -136,7 +135,7 @@ def inertia_of(plant: Plant) -> Inertia:
     data = mujoco.MjData(plant.model)
     mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
     M, module = np.diag(mass_matrix(plant.model, data)), plant.axis.modules[0]
-    return Inertia(*(float(M[i]) for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
+    return Inertia(*(M[i] for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
 
 
 def carried_momentum(plant: Plant, trajectory: Trajectory) -> np.ndarray:
@@ -216,8 +215,8 @@ def measure_yaw(runs: MismatchRuns, mismatch: Mismatch, size: float) -> dict[str
     return {
         "turn_deg": _largest_deg(run["angle/yaw_rad"]),
         "turn_foreseen_deg": foreseen,
-        "largest_rate_rad_s": float(largest.mean()),
-        "conservation_miss": float((miss / largest).max()),
+        "largest_rate_rad_s": largest.mean(),
+        "conservation_miss": (miss / largest).max(),
         **{
             f"{name}_by_symmetric": ratio_interval(result.values(key), runs.symmetric.values(key))
             for name, key in (("velocity_rms_error", "velocity_rms_error_rad_s"), ("tilt_rms", "tilt_rms_deg"))
@@ -227,12 +226,12 @@ def measure_yaw(runs: MismatchRuns, mismatch: Mismatch, size: float) -> dict[str
 
 def _largest_deg(angle: np.ndarray) -> float:
     """Return the largest size of an angle, mean over the worlds, from (n_ticks, n_worlds) [rad]."""
-    return float(np.degrees(np.abs(angle).max(axis=0)).mean())
+    return np.degrees(np.abs(angle).max(axis=0)).mean()
 
 
 def symmetric_claim(runs: MismatchRuns) -> Claim:
     """Judge Hypotheses 1 and 2 kept."""
-    turn = float(np.degrees(np.abs(trajectory_of(runs.symmetric)["angle/yaw_rad"]).max()))
+    turn = np.degrees(np.abs(trajectory_of(runs.symmetric)["angle/yaw_rad"]).max())
     return Claim(
         place="Hypotheses 1 and 2",
         statement="With symmetric gimbals, flywheels and commands no torque acts on body A: it stands still.",
@@ -297,14 +296,14 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
 
     speeds = np.stack([np.abs(rate(module.flywheel)) for module in modules])
     nominal = abs(modules[0].speed)
-    speed_error = float(np.abs(speeds - nominal).max())
-    gimbal = max(float(np.abs(rate(module.gimbal)).max()) for module in modules)
-    tilt = float(np.abs(run["x2_rad_s"]).max())
+    speed_error = np.abs(speeds - nominal).max()
+    gimbal = max(np.abs(rate(module.gimbal)).max() for module in modules)
+    tilt = np.abs(run["x2_rad_s"]).max()
     spin_up = np.gradient(speeds[0], run["time_s"], axis=0)
     D = model.J1 + model.J2 * np.sin(run["x3_rad"]) ** 2
     omitted_term = model.J_d * np.sin(run["x3_rad"]) * spin_up / D
     acceleration = np.gradient(run["x2_rad_s"], run["time_s"], axis=0)
-    share = float(rms(omitted_term.ravel()) / rms(acceleration.ravel()))
+    share = rms(omitted_term.ravel()) / rms(acceleration.ravel())
     return Claim(
         place="Hypothesis 3",
         statement="The flywheels' speed is held constant and far above the rates of tilt and gimbals.",
@@ -319,8 +318,7 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
     )
 
 
-def claims(on_share: OnShare) -> list[Claim]:
+def claims() -> list[Claim]:
     """Judge Hypotheses 1 and 2 kept, then broken, and Hypothesis 3."""
     runs = run_all(MISMATCHES, WORLDS, SEED, DURATION_S)
-    on_share(0.9)
     return [symmetric_claim(runs), broken_claim(runs), hypothesis_3(runs)]

@@ -33,7 +33,7 @@ def trade(tau: float, seed: int = SEED) -> Trade:
     y1 = np.column_stack([acceleration * time**2 / 2.0, noise])
     x2 = replay_at_rest(make_observer("linear", DT, printed_model(), tau=tau), y1).x2
     late = time[-1] - x2[-1, 0] / acceleration
-    return Trade(float(late), float(np.sqrt(np.mean(x2[settling_ticks:, 1:] ** 2))))
+    return Trade(late, np.sqrt(np.mean(x2[settling_ticks:, 1:] ** 2)))
 
 
 def predict_trade(tau: float) -> Trade:
@@ -48,7 +48,7 @@ def predict_trade(tau: float) -> Trade:
     triangle = 1.0 - np.abs(np.arange(-fine, fine + 1)) / fine
     weights = np.convolve(response, triangle)[fine::fine] * DT / fine
     weights[0] -= response[0] / 2.0 * DT / fine  # trapezoidal rule at the response's jump
-    return Trade(2.0 * tau, float(np.sqrt(np.sum(weights**2))))
+    return Trade(2.0 * tau, np.sqrt(np.sum(weights**2)))
 
 
 def lag(seed: int = SEED) -> Claim:
@@ -69,10 +69,10 @@ def lag(seed: int = SEED) -> Claim:
     return Claim(
         place="(9), lag and noise",
         statement="A filter with the differentiator reduces noise, but lag distorts the estimate: tau trades them.",
-        holds=float(np.abs(lags / lags_foreseen - 1.0).max()) < 0.01
-        and float(np.abs(gains / gains_foreseen - 1.0).max()) < 0.05
+        holds=np.abs(lags / lags_foreseen - 1.0).max() < 0.01
+        and np.abs(gains / gains_foreseen - 1.0).max() < 0.05
         and sorted(gains, reverse=True) == list(gains),
-        figures={"tau_s": list(TAUS_S), "lag_s": list(lags), "noise_gain_1_s": list(gains)},
+        figures={"tau_s": TAUS_S, "lag_s": lags, "noise_gain_1_s": gains},
         pictures=[
             Picture(
                 "aranovskiy2020-eq-9",

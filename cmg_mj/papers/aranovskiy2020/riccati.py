@@ -32,7 +32,7 @@ from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 # --- delicacy ---------------------------------------------------------------------------------------------------
 
-RATES_HZ = tuple(float(rate) for rate in np.geomspace(20.0, 2000.0, 41))
+RATES_HZ = np.geomspace(20.0, 2000.0, 41).tolist()
 
 
 class Transient(NamedTuple):
@@ -66,11 +66,11 @@ def transient(method: str, rate_hz: float, kind: type = np.float64) -> Transient
         with np.errstate(all="ignore"):
             H = METHODS[method](H, A, h)
         truth = (E[3:, :3] + E[3:, 3:] @ truth) @ np.linalg.inv(E[:3, :3] + E[:3, 3:] @ truth)
-        path.append(float(H[0, 1]))
+        path.append(H[0, 1])
         if not np.isfinite(H).all():
             return Transient(-math.inf, math.inf, np.array(path))
-        least = min(least, float(np.linalg.eigvalsh(H.astype(float))[0]))
-        error = max(error, abs(float(H[0, 1]) - truth[0, 1]) / steady)
+        least = min(least, np.linalg.eigvalsh(H.astype(float))[0])
+        error = max(error, abs(H[0, 1] - truth[0, 1]) / steady)
     return Transient(least, error, np.array(path))
 
 
@@ -126,8 +126,8 @@ def delicacy() -> Claim:
             "rate_changed_by_euler_rad_s": comparison.difference,
             "rate_error_euler_rad_s": comparison.other_error,
             "rate_error_exact_rad_s": comparison.error,
-            "condition_along_run": float(np.linalg.cond(matrices).max()),
-            "least_eigenvalue_along_run": float(np.linalg.eigvalsh(matrices).min()),
+            "condition_along_run": np.linalg.cond(matrices).max(),
+            "least_eigenvalue_along_run": np.linalg.eigvalsh(matrices).min(),
         },
         pictures=[_picture(sweeps, at_200)],
     )
@@ -189,10 +189,10 @@ def misprint_claim(H: np.ndarray, printed_H: np.ndarray, rate: Comparison) -> Cl
         else "With A'^T for the printed A^T, which is that of (6): a misprint. The observer's rate is the same to less "
         "than a hundredth of its error, whichever of them was run.",
         figures={
-            "H12_printed": float(printed_H[0, 1]),
-            "H21_printed": float(printed_H[1, 0]),
-            "H12": float(H[0, 1]),
-            "largest_change_of_gain_share": float(np.abs((printed_H - H)[:, ::2]).max() / np.abs(H[:, ::2]).max()),
+            "H12_printed": printed_H[0, 1],
+            "H21_printed": printed_H[1, 0],
+            "H12": H[0, 1],
+            "largest_change_of_gain_share": np.abs((printed_H - H)[:, ::2]).max() / np.abs(H[:, ::2]).max(),
             "rate_changed_rad_s": rate.difference,
             "rate_error_rad_s": rate.error,
             "rate_error_printed_rad_s": rate.other_error,
@@ -236,7 +236,7 @@ def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, floa
         phi = np.concatenate([[0.0], np.cumsum(growth[:-1] * step)])
         gramian = np.array([[span_s, weights @ phi], [weights @ phi, weights @ phi**2]])
         values = np.linalg.eigvalsh(gramian)
-        least, largest = min(least, float(values[0]), span_s), max(largest, float(values[1]), span_s)
+        least, largest = min(least, values[0], span_s), max(largest, values[1], span_s)
     return least, largest
 
 
@@ -262,7 +262,7 @@ def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
             "rank_margin_without_tilt": margin_without_tilt,
             "largest_damping_1_s": max(map(abs, dampings)),
             "span_s": span_s,
-            "gramian_along_run": list(along_run),
-            "gramian_any_u": list(bounds),
+            "gramian_along_run": along_run,
+            "gramian_any_u": bounds,
         },
     )

@@ -8,8 +8,7 @@ import numpy as np
 
 from cmg_mj.features.tuning.simulations import window_of
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
-from cmg_mj.papers.assumed import PUSH_RECOVERY
+from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, run_loops
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import loop_panels, on_common_scales, open_loop_panels, rms, side_by_side, trajectory_of
 from cmg_mj.results.intervals import Interval, known_interval, mean_interval
@@ -17,7 +16,6 @@ from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import KEYS
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
-from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
@@ -37,7 +35,7 @@ COMPARABLE = 1.5
 """Errors within this factor count as comparable."""
 
 
-def figure_4(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED_4) -> list[Claim]:
+def figure_4(worlds: int = WORLDS, seed: int = SEED_4) -> list[Claim]:
     """Judge whether the three are comparable in open loop: from the push to a second after it, and over the whole run.
 
     Most of the whole run is stillness, where they are judged by their noise: there zero is closer than any.
@@ -99,9 +97,8 @@ def close_loops(
     observers: Sequence[str], angles: str, worlds: int, seed: int, duration_s: float = DURATION_S
 ) -> dict[str, Result]:
     """Close the loop on each observer, a push at 2 s."""
-    settings = [f'controller.angle_source="{angles}"']
-    runs = [run_of(push_recovery(observer, seed, settings, duration_s), worlds) for observer in observers]
-    return dict(zip(observers, run_jobs(runs), strict=True))
+    cases = [(observer, [f'controller.angle_source="{angles}"']) for observer in observers]
+    return dict(zip(observers, run_loops(cases, worlds, seed, duration_s), strict=True))
 
 
 def figure(name: str, results: Mapping[str, Result]) -> Claim:
@@ -111,8 +108,8 @@ def figure(name: str, results: Mapping[str, Result]) -> Claim:
         figures |= {
             f"velocity_rms_error_{angles}_angles_rad_s": known_interval(result.values(JUDGED)),
             f"tilt_rms_{angles}_angles_deg": known_interval(result.values("tilt_rms_deg")),
-            f"fell_fraction_{angles}_angles": float(result.fell.mean()),
-            f"settled_fraction_{angles}_angles": float(np.isfinite(result.values("settle_time_s")).mean()),
+            f"fell_fraction_{angles}_angles": result.fell.mean(),
+            f"settled_fraction_{angles}_angles": np.isfinite(result.values("settle_time_s")).mean(),
         }
     return Claim(
         place=FIGURES[name],
@@ -198,7 +195,7 @@ def _measures_picture(measures: Mapping[str, Mapping[str, Numbers]]) -> Picture:
     panels = []
     for key, by_angles in measures.items():
         is_first = key == JUDGED
-        most = max(float(np.nanmax(values)) for numbers in by_angles.values() for values in numbers.values())
+        most = max(np.nanmax(values) for numbers in by_angles.values() for values in numbers.values())
         for angles, numbers in by_angles.items():
             marks = [
                 Line(np.arange(len(numbers[name])), numbers[name], equation if is_first else "", "o", color=name)
@@ -232,8 +229,7 @@ FORMS: Mapping[str, tuple[str, Sequence[str]]] = {
 
 def errors_of(forms: Sequence[str], worlds: int, seed: int) -> dict[str, np.ndarray]:
     """Close the loop on some of `FORMS` as Figs 5 to 7 do: velocity RMS errors, (n_worlds,) [rad/s]."""
-    experiments = [push_recovery(observer, seed, settings) for observer, settings in (FORMS[form] for form in forms)]
-    results = run_jobs([run_of(experiment, worlds) for experiment in experiments], keep_trajectory=False)
+    results = run_loops([FORMS[form] for form in forms], worlds, seed, keep_trajectory=False)
     return {form: result.values(JUDGED) for form, result in zip(forms, results, strict=True)}
 
 

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery, run_on_rigs
-from cmg_mj.papers.assumed import PUSH_RECOVERY
+from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, push_recovery, run_on_rigs
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.plant.plant import Plant, load_plant
@@ -47,7 +46,7 @@ def in_velocity_mode(plant: Plant, deadband: float, lag_s: float = LAG_S) -> Non
     for module in plant.axis.modules:
         i = module.servo
         dof = int(model.jnt_dofadr[module.gimbal])
-        kv = float(model.dof_M0[dof]) / lag_s
+        kv = model.dof_M0[dof] / lag_s
         model.actuator_dyntype[i] = int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
         model.actuator_dynprm[i, 0] = COMMAND_LAG_S
         model.actuator_gainprm[i, 0] = kv
@@ -104,7 +103,7 @@ def servo_claim(servos: Servos) -> Claim:
         {d: ratio_interval(result.values(key), smooth.values(key)) for d, result in results.items()}
         for key in ("velocity_rms_error_rad_s", "tilt_rms_deg")
     )
-    falls = {d: float(result.fell.mean()) for d, result in results.items()}
+    falls = {d: result.fell.mean() for d, result in results.items()}
     errors = {d: measure_tracking(result) for d, result in results.items()}
     error = errors[RESOLUTION]
     changes = [abs(ratios[RESOLUTION].mean - 1.0) for ratios in (velocity, tilt)]
@@ -116,7 +115,7 @@ def servo_claim(servos: Servos) -> Claim:
         conditions="With a servo that stiff, up to a deadband of 0.05 rad/s, with which the estimate's error and the "
         "tilt stay within 10 %; the paper says nothing of one.",
         figures={
-            "deadband_rad_s": list(DEADBANDS),
+            "deadband_rad_s": DEADBANDS,
             "velocity_rms_error_by_none": list(velocity.values()),
             "tilt_rms_by_none": list(tilt.values()),
             "tracking_error_share": list(errors.values()),

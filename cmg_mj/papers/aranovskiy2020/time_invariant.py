@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from cmg_mj.papers.aranovskiy2020.paper import printed_model, settled_gains
-from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery
-from cmg_mj.papers.assumed import PUSH_RECOVERY
+from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, push_recovery
 from cmg_mj.papers.claim import Claim
 from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 from cmg_mj.view.plots.figure import Line, Panel, Picture
@@ -92,7 +91,7 @@ def find_fates(
     )
     return [
         {
-            e: Fate(float(group.fell.mean()), group.mean("velocity_rms_error_rad_s"))
+            e: Fate(group.fell.mean(), group.mean("velocity_rms_error_rad_s"))
             for e, group in zip(biases_deg, result.split(len(biases_deg)), strict=True)
         }
         for result in results

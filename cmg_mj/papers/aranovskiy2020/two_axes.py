@@ -122,10 +122,10 @@ def run(pushes_n_m: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
             u, integrators[axis] = law(*state)
             data.ctrl[places.servos] = np.multiply(places.signs, u)
             data.qfrc_applied[places.tilt] = pushes_n_m[axis] if pushing else 0.0
-        tilts.append([float(data.qpos[places.tilt]) for places in axes])
+        tilts.append([data.qpos[places.tilt] for places in axes])
         mujoco.mj_subtreeVel(model, data)
         arm, moving = data.subtree_com[torso], data.subtree_linvel[torso] * MASS_KG
-        momenta.append(float(data.subtree_angmom[torso][2] + arm[0] * moving[1] - arm[1] * moving[0]))
+        momenta.append(data.subtree_angmom[torso][2] + arm[0] * moving[1] - arm[1] * moving[0])
         mujoco.mj_step(model, data, steps)
     return np.array(tilts), np.diff(momenta) / DT
 
@@ -143,14 +143,14 @@ class Coupling(NamedTuple):
     @property
     def share(self) -> float:
         """Largest change by the other axis, by the largest tilt."""
-        return float(np.abs(self.joint_tilts - self.single_tilts).max() / np.abs(self.single_tilts).max())
+        return np.abs(self.joint_tilts - self.single_tilts).max() / np.abs(self.single_tilts).max()
 
 
 def coupling(push_n_m: float) -> Coupling:
     """Push both, then either."""
     tilts, vertical = run((push_n_m, push_n_m))
     pitch, roll = run((push_n_m, 0.0))[0], run((0.0, push_n_m))[0]
-    return Coupling(tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), float(np.abs(vertical).max()))
+    return Coupling(tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), np.abs(vertical).max())
 
 
 def one_axis_at_a_time() -> Claim:
@@ -175,7 +175,7 @@ def axes_claim(couplings: dict[float, Coupling]) -> Claim:
         "torque about the vertical when the other axis moves. The ground must take this torque.",
         figures={
             "push_n_m": list(couplings),
-            "largest_tilt_deg": [float(np.degrees(np.abs(c.single_tilts).max())) for c in couplings.values()],
+            "largest_tilt_deg": [np.degrees(np.abs(c.single_tilts).max()) for c in couplings.values()],
             "vertical_torque_n_m": [c.vertical_n_m for c in couplings.values()],
             "changed_by_the_other_axis_share": [c.share for c in couplings.values()],
         },

@@ -62,9 +62,9 @@ def _cycle(trajectory: Trajectory) -> Cycle:
     x2, t = last["x2_rad_s"][:, 0], last["time_s"]
     spectrum = np.abs(np.fft.rfft((x2 - x2.mean()) * np.hanning(len(x2)), 8 * len(x2)))
     return Cycle(
-        bool(is_sustained(trajectory, WINDOW_S)[0]),
-        float(np.degrees(np.ptp(last["x1_rad"][:, 0]))) / 2.0,
-        float(np.fft.rfftfreq(8 * len(x2), t[1] - t[0])[spectrum.argmax()]),
+        is_sustained(trajectory, WINDOW_S)[0],
+        np.degrees(np.ptp(last["x1_rad"][:, 0])) / 2.0,
+        np.fft.rfftfreq(8 * len(x2), t[1] - t[0])[spectrum.argmax()],
     )
 
 

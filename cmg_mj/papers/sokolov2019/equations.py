@@ -44,7 +44,7 @@ def equation_residual(plant: Plant, model: ReducedModel, states: int, seed: int)
         dw = rng.uniform(-100.0, 100.0, 3)
         data.qpos[:], data.qvel[:], data.qacc[:] = q, w, dw
         mujoco.mj_inverse(plant.model, data)
-        largest = max(largest, float(np.abs(data.qfrc_inverse - paper.torques(model, I_cd, q, w, dw)).max()))
+        largest = max(largest, np.abs(data.qfrc_inverse - paper.torques(model, I_cd, q, w, dw)).max())
     return largest
 
 

@@ -11,7 +11,7 @@ from scipy.signal import lsim, lti
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.replay import replay
 from cmg_mj.observers import Observer
-from cmg_mj.papers.claim import Assumption, Claim, OnShare
+from cmg_mj.papers.claim import Assumption, Claim
 from cmg_mj.papers.recorded import open_loop_panels, rms, trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS, TABLE_II
 from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, estimator, experiment
@@ -96,7 +96,7 @@ def y2_reaches_the_rate(prepared: Experiment) -> float:
         replay(observer, Trajectory({"y1_rad": y1, "u_rad_s": u, "y2_rad": y2})).x2
         for y2 in (np.zeros(200), rng.normal(size=200))
     )
-    return float(np.abs(noisy - still).max())
+    return np.abs(noisy - still).max()
 
 
 def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
@@ -136,7 +136,7 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
             "relative_error_with_y2": with_y2,
             "relative_error_without_y2": without_y2,
             "gain_by_y2": without_y2.mean - with_y2.mean,
-            "variance_explained_by_the_unknown_push": float(explained_share),
+            "variance_explained_by_the_unknown_push": explained_share,
         },
     )
 
@@ -149,8 +149,7 @@ def _picture(tuning: Tuning) -> Picture:
     return Picture("sokolov2019-fig-3", title, open_loop_panels(run, rates, OBSERVERS, tilt, (-1.0, 0.6)))
 
 
-def claims(on_share: OnShare) -> list[Claim]:
+def claims() -> list[Claim]:
     """Judge Fig. 3, and what Section V says of (9) there."""
     tuning = tuning_experiment()
-    on_share(0.8)
     return [misses_the_push(tuning, tuning.relative_errors), ignores_y2(tuning, tuning.relative_errors)]

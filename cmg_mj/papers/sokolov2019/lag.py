@@ -103,14 +103,14 @@ def lag_thresholds(sweeps: Mapping[str, Sweep]) -> dict[str, Threshold]:
     for observer, (lags, sustained, _) in sweeps.items():
         first = int(np.argmax(sustained))
         if not sustained.any():
-            thresholds[observer] = float(lags[-1]), None
+            thresholds[observer] = lags[-1], None
         elif first == 0:
-            thresholds[observer] = 0.0, float(lags[0])
+            thresholds[observer] = 0.0, lags[0]
         else:
             grid = np.linspace(lags[first - 1], lags[first], PARTS + 1)
             refined = releases({observer: [servo.damp(lag) for lag in grid[1:]]})[observer]
             i = int(np.argmax(is_sustained(refined)))  # the last of them is the sweep's own
-            thresholds[observer] = float(grid[i]), float(grid[i + 1])
+            thresholds[observer] = grid[i], grid[i + 1]
     return thresholds
 
 
@@ -123,7 +123,7 @@ def latency_threshold(observer: str) -> Threshold:
     def oscillates(steps: int) -> bool:
         latency = f"sensors.accelerometer.latency_s={steps / 1000}"
         result = experiment([*RELEASE, FINE, "sensors.accelerometer.rate_hz=1000.0", latency], observer).run()
-        return not result.stood.all() or bool(is_sustained(trajectory_of(result))[0])
+        return not result.stood.all() or is_sustained(trajectory_of(result))[0]
 
     low, high = 0, MAX_LATENCY_STEPS
     if not oscillates(high):
@@ -171,7 +171,7 @@ def predict(observer: str | None) -> dict[str, float | list[float] | None]:
     loop, servo, dt = linearise(observer)
 
     def growth(changed_servo: Servo, age_steps: int = 0) -> float:
-        return float(modes(loop(changed_servo, age_steps), dt)[0].real)
+        return modes(loop(changed_servo, age_steps), dt)[0].real
 
     latencies = range(MAX_LATENCY_STEPS + 1) if observer else ()
     pole = oscillation(loop(servo), dt)
@@ -189,7 +189,7 @@ def largest_tau() -> float | None:
 
     def growth(tau: float) -> float:
         loop, servo, dt = linearise("linear", tau=tau)
-        return float(modes(loop(servo), dt)[0].real)
+        return modes(loop(servo), dt)[0].real
 
     return first_crossing(growth, 0.01, 0.1)
 
@@ -229,9 +229,9 @@ def claim(results: Lags) -> Claim:
         holds=begin is not None and begin < min(others),
         conditions="It does with a slower servo or a later y1; at the model's servo lag the oscillation decays.",
         figures={
-            "servo_lag_of_the_model_s": float(results.sweeps["linear"].lags_s[0]),
-            "servo_lag_threshold_s": {name: list(threshold) for name, threshold in results.thresholds.items()},
-            "latency_threshold_s": {name: list(threshold) for name, threshold in results.latencies.items()},
+            "servo_lag_of_the_model_s": results.sweeps["linear"].lags_s[0],
+            "servo_lag_threshold_s": results.thresholds,
+            "latency_threshold_s": results.latencies,
             "predicted": results.predictions,
             "tau_threshold_s": largest_tau(),
         },
@@ -242,7 +242,7 @@ def claim(results: Lags) -> Claim:
 def _growth(observer: str, lags_s: np.ndarray) -> list[float]:
     """Return the growth of the tilt's oscillation over the servo lag [1/s]."""
     loop, servo, dt = linearise(observer)
-    return [oscillation(loop(servo.damp(float(lag))), dt).real for lag in lags_s]
+    return [oscillation(loop(servo.damp(lag)), dt).real for lag in lags_s]
 
 
 def _picture(results: Lags) -> Picture:

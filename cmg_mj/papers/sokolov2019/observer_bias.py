@@ -27,8 +27,8 @@ def find_rest(observer: str, e_deg: float, angles: str) -> tuple[float, float, f
     settings = [*NO_NOISE, f"plant.equilibrium_bias_deg={e_deg}", "plant.initial_tilt_deg=0.1", "push=[]"]
     result = experiment([*settings, f"duration_s={REST_S}", f"controller.angle_source={angles}"], observer).run()
     last = trajectory_of(result).between(REST_S - 1.0, REST_S)
-    x = max(float(np.abs(last[name]).max()) for name in ("x1_rad", "x2_rad_s", "x3_rad"))
-    return x, float(last[f"estimate/{observer}/x2_rad_s"].mean()), float(last["x_e_rad_times_s"].mean())
+    x = max(np.abs(last[name]).max() for name in ("x1_rad", "x2_rad_s", "x3_rad"))
+    return x, last[f"estimate/{observer}/x2_rad_s"].mean(), last["x_e_rad_times_s"].mean()
 
 
 def biased_luenberger(e_deg: float = 0.25) -> Claim:
@@ -48,7 +48,7 @@ def biased_luenberger(e_deg: float = 0.25) -> Claim:
         statement="A - L C is Hurwitz; with a bias e the estimate of (9) is off, but the integrator still brings x to "
         "zero.",
         assumes={"e": f"{e_deg:g} deg"},
-        holds=is_as_foreseen and float(np.real(poles).max()) < 0.0,
+        holds=is_as_foreseen and np.real(poles).max() < 0.0,
         conditions="With y1 = x1 - e the bias enters y as -C_e e and the error as +L C_e e; the other sign is printed.",
         figures={
             "largest_rest_state": max(x for x, _, _ in rests.values()),

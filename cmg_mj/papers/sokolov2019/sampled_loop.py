@@ -127,5 +127,5 @@ def first_crossing(value: Callable[[float], float], low: float, high: float) -> 
     for (a, at_a), (b, at_b) in pairwise(zip(grid, values, strict=True)):
         if at_a < 0.0 <= at_b:
             root: Any = brentq(value, a, b, xtol=1e-7)
-            return float(root)
+            return root
     return None

@@ -86,7 +86,7 @@ def main_frequency(result: Result) -> float:
     x2, t = _late_signal(result, "x2_rad_s"), trajectory_of(result)["time_s"]
     padded = 8 * len(x2)
     spectrum = (np.abs(np.fft.rfft(x2 - x2.mean(axis=0), padded, axis=0)) ** 2).mean(axis=1)
-    return float(np.fft.rfftfreq(padded, t[1] - t[0])[spectrum.argmax()])
+    return np.fft.rfftfreq(padded, t[1] - t[0])[spectrum.argmax()]
 
 
 def deviations(result: Result) -> np.ndarray:
@@ -99,7 +99,7 @@ def numbers(result: Result) -> dict[str, Any]:
     return {
         **{key: known_interval(result.values(key)) for key in KEYS},
         "late_tilt_deviation_deg": known_interval(deviations(result)),
-        "fell_fraction": float(result.fell.mean()),
+        "fell_fraction": result.fell.mean(),
     }
 
 
@@ -137,7 +137,7 @@ def _figures(loops: Loops, name: str, cycles: Cycles) -> dict:
         "with_backlash": numbers(gap),
         "main_frequency_hz": main_frequency(no_gap),
         "main_frequency_with_backlash_hz": main_frequency(gap),
-        "push_tail_deg": float(deviations(loops.quiet[name]).max()),
+        "push_tail_deg": deviations(loops.quiet[name]).max(),
         "cycle_amplitude_deg": cycle.amplitude_deg,
         "cycle_frequency_hz": cycle.frequency_hz,
         "cycle_is_sustained": cycle.sustained,
@@ -198,7 +198,7 @@ def figure_5(loops: Loops, lags: lag.Lags, cycles: Cycles) -> Claim:
         loops,
         cycles,
         {
-            "fell_fraction": {f"{e:g}_deg": float(of["luenberger"].fell.mean()) for e, of in loops.by_bias.items()},
+            "fell_fraction": {f"{e:g}_deg": of["luenberger"].fell.mean() for e, of in loops.by_bias.items()},
             "damping_ratio": lags.predictions["luenberger"]["damping_ratio"],
         },
     )
@@ -225,7 +225,7 @@ def cause_of_figure_5(cycles: Cycles) -> Claim:
 
 def figure_6(loops: Loops, cycles: Cycles) -> Claim:
     """Judge (10): stabilised."""
-    falls = max(float(by_name["homogeneous"].fell.mean()) for by_name in loops.all_settings.values())
+    falls = max(by_name["homogeneous"].fell.mean() for by_name in loops.all_settings.values())
     return Claim(
         place="Fig. 6",
         statement="With (10) in the loop the system is stabilised.",
