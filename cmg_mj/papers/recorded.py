@@ -31,7 +31,7 @@ def rms(values: np.ndarray) -> np.ndarray:
 
 
 def loop_panels(run: Trajectory, name: str, equation: str, title: str, noise_width: float) -> list[Panel]:
-    """Draw one world's tilt, tilt rate and command, the observer in the loop beside the truth.
+    """Draw one world's tilt, tilt rate, gimbal angle and command, the observer in the loop beside the truth.
 
     Args:
         run: Recording of one world.
@@ -41,7 +41,7 @@ def loop_panels(run: Trajectory, name: str, equation: str, title: str, noise_wid
         noise_width: Width of the measured tilt's line.
 
     Returns:
-        The three panels.
+        The four panels.
     """
     t, shaded = run["time_s"], push_intervals(run)
     tilt = [
@@ -55,13 +55,29 @@ def loop_panels(run: Trajectory, name: str, equation: str, title: str, noise_wid
     return [
         Panel("tilt [deg]", tilt, title, shaded=shaded),
         Panel("tilt rate [rad/s]", rates, shaded=shaded),
+        Panel("gimbal angle [deg]", [Line(t, np.degrees(run["x3_rad"]), "true x3", color=0)], shaded=shaded),
         Panel("command u [rad/s]", [Line(t, run["u_rad_s"], "u", color=3, width=0.6)], shaded=shaded),
     ]
 
 
-def side_by_side(name: str, title: str, columns: Sequence[Sequence[Panel]]) -> Picture:
-    """Lay out columns of panels."""
-    return Picture(name, title, [panel for row in zip(*columns, strict=True) for panel in row], columns=len(columns))
+def loop_picture(
+    picture: tuple[str, str], observer: tuple[str, str], runs: Mapping[str, Result], noise_width: float, gimbal: bool
+) -> Picture:
+    """Draw world 0 of each run in a column of its own.
+
+    Args:
+        picture: Name and title of the picture.
+        observer: Name of the observer in the loop, and its equation in the paper.
+        runs: Title of a column -> its run.
+        noise_width: Width of the measured tilt's line.
+        gimbal: Whether the gimbal angle is drawn, too.
+
+    Returns:
+        The picture.
+    """
+    columns = [loop_panels(trajectory_of(run).world(0), *observer, title, noise_width) for title, run in runs.items()]
+    rows = [row for i, row in enumerate(zip(*columns, strict=True)) if gimbal or i != 2]
+    return Picture(*picture, [panel for row in rows for panel in row], columns=len(columns))
 
 
 def open_loop_panels(

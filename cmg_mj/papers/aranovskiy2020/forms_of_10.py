@@ -176,13 +176,6 @@ class TenByEuler:
         ), estimate
 
 
-class Eleven(NamedTuple):
-    """The estimate."""
-
-    x1: Scalar
-    x2: Scalar
-
-
 @dataclass(frozen=True)
 class ElevenByEuler:
     """(11), one Euler step a sample at the newest measurement.
@@ -195,18 +188,19 @@ class ElevenByEuler:
     dt: float
     model: ReducedModel
 
-    def init(self, y: Measurement) -> Eleven:
+    def init(self, y: Measurement) -> Estimate:
         """Start at rest at the measured tilt."""
-        return Eleven(y.y1, 0.0 * y.y1)
+        return Estimate(y.y1, 0.0 * y.y1, y.y2)
 
-    def step(self, state: Eleven, y: Measurement, u: Scalar) -> tuple[Eleven, Estimate]:
+    def step(self, state: Estimate, y: Measurement, u: Scalar) -> tuple[Estimate, Estimate]:
         """Advance by one sample period."""
-        x1, x2 = state
+        x1, x2, _ = state
         k1, k2, alpha = TABLE_2["homogeneous"].values()
         drift, gain, damping = self.model.terms(*y)
         by_alpha, by_other = signed_powers(x1 - y.y1, alpha)
-        estimate = Eleven(
+        estimate = Estimate(
             x1 + self.dt * (x2 - k1 * by_alpha),
             x2 + self.dt * (drift + u * (gain - damping * x2) - k2 * by_other),
+            y.y2,
         )
-        return estimate, Estimate(estimate.x1, estimate.x2, y.y2)
+        return estimate, estimate

@@ -17,6 +17,7 @@ from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, push_rec
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix
 from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
+from cmg_mj.plant.elements import Module
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.intervals import ratio_interval
 from cmg_mj.results.result import Result
@@ -28,33 +29,30 @@ SEED, WORLDS = 75_000, 4
 # --- pairs whose halves differ ----------------------------------------------------------------------------------
 
 
-def slower_flywheel(plant: Plant, share: float) -> None:
+def slower_flywheel(model: mujoco.MjModel, key: int, module: Module, share: float) -> None:
     """Slow the second flywheel down by a share (Hypothesis 2 and 3: unequal speeds)."""
-    module, model = plant.axis.modules[1], plant.model
-    model.key_ctrl[plant.key, module.motor] *= 1.0 - share
-    model.key_qvel[plant.key, module.flywheel] *= 1.0 - share
+    model.key_ctrl[key, module.motor] *= 1.0 - share
+    model.key_qvel[key, module.flywheel] *= 1.0 - share
 
 
-def gimbal_offset(plant: Plant, offset_deg: float) -> None:
+def gimbal_offset(model: mujoco.MjModel, key: int, module: Module, offset_deg: float) -> None:
     """Start the second gimbal off its place (Hypothesis 2)."""
-    module, model = plant.axis.modules[1], plant.model
-    model.key_qpos[plant.key, module.gimbal] += module.direction * math.radians(offset_deg)
-    model.key_act[plant.key, model.actuator_actadr[module.servo]] += module.direction * math.radians(offset_deg)
+    offset = module.direction * math.radians(offset_deg)
+    model.key_qpos[key, module.gimbal] += offset
+    model.key_act[key, model.actuator_actadr[module.servo]] += offset
 
 
-def servo_gain(plant: Plant, share: float) -> None:
+def servo_gain(model: mujoco.MjModel, key: int, module: Module, share: float) -> None:
     """Let the second servo turn its gimbal farther than commanded, by a share (Hypothesis 1)."""
-    module, model = plant.axis.modules[1], plant.model
     gear = 1.0 / (1.0 + share)
-    zero = model.key_qpos[plant.key, module.gimbal]
     # Its setpoint counts in angle times gear, from where the gimbal starts.
     model.actuator_gear[module.servo, 0] = gear
-    model.key_act[plant.key, model.actuator_actadr[module.servo]] = gear * zero
+    model.key_act[key, model.actuator_actadr[module.servo]] = gear * model.key_qpos[key, module.gimbal]
 
 
-def gimbal_friction(plant: Plant, torque_n_m: float) -> None:
+def gimbal_friction(model: mujoco.MjModel, key: int, module: Module, torque_n_m: float) -> None:
     """Give the second gimbal dry friction, the first none (Hypothesis 1)."""
-    plant.model.dof_frictionloss[plant.axis.modules[1].gimbal] = torque_n_m
+    model.dof_frictionloss[module.gimbal] = torque_n_m
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ class Mismatch:
 
     Attributes:
         kind: Its name.
-        change: Function that breaks a rig so: makes its second cube differ by a size.
+        change: Function that breaks a rig so, (model, key, second module, size): its second cube differs by a size.
         sizes: Sizes of the mismatch that are tried.
         unit: Unit of the sizes.
         display_factor: Number by which a size is multiplied to be shown in that unit.
@@ -71,7 +69,7 @@ class Mismatch:
     """
 
     kind: str
-    change: Callable[[Plant, float], None]
+    change: Callable[[mujoco.MjModel, int, Module, float], None]
     sizes: Sequence[float]
     unit: str
     display_factor: float
@@ -110,7 +108,7 @@ def run_all(
     cases = [(mismatch, size) for mismatch in mismatches for size in mismatch.sizes]
     rigs = [load_plant(experiment.scenario.plant) for _ in range(1 + len(cases))]
     for rig, (mismatch, size) in zip(rigs[1:], cases, strict=True):
-        mismatch.change(rig, size)
+        mismatch.change(rig.model, rig.key, rig.axis.modules[1], size)
     symmetric, *broken = run_on_rigs(experiment, rigs, worlds)
     kinds = [(mismatch.kind, size) for mismatch, size in cases]
     return MismatchRuns(rigs[0], symmetric, dict(zip(kinds, broken, strict=True)))

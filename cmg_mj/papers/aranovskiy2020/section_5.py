@@ -10,7 +10,7 @@ from cmg_mj.features.tuning.simulations import window_of
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, run_loops
 from cmg_mj.papers.claim import Claim, OnShare
-from cmg_mj.papers.recorded import loop_panels, on_common_scales, open_loop_panels, rms, side_by_side, trajectory_of
+from cmg_mj.papers.recorded import loop_picture, on_common_scales, open_loop_panels, rms, trajectory_of
 from cmg_mj.results.intervals import Interval, known_interval, mean_interval
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import KEYS
@@ -126,16 +126,11 @@ def figure(name: str, results: Mapping[str, Result]) -> Claim:
 
 def _loop_picture(name: str, results: Mapping[str, Result]) -> Picture:
     """Draw two columns: the law on measured angles, the law on estimated ones."""
-    columns = []
-    for angles, result in results.items():
-        example = trajectory_of(result).world(0)
-        column = loop_panels(example, name, OBSERVERS[name], f"{angles} angles", 0.6)
-        gimbal = [Line(example["time_s"], np.degrees(example["x3_rad"]), "true x3", color=0)]
-        column.insert(2, Panel("gimbal angle [deg]", gimbal, shaded=column[0].shaded))
-        columns.append(column)
-    number = FIGURES[name].removeprefix("Fig. ")
-    title = f"the loop closed on {OBSERVERS[name]}, the law on measured and on estimated angles"
-    return side_by_side(f"aranovskiy2020-fig-{number}", f"aranovskiy2020, Fig. {number}: {title}", columns)
+    equation = OBSERVERS[name]
+    title = f"{FIGURES[name]}: the loop closed on {equation}, the law on measured and on estimated angles"
+    picture = f"aranovskiy2020-fig-{FIGURES[name][-1]}", f"aranovskiy2020, {title}"
+    runs = {f"{angles} angles": result for angles, result in results.items()}
+    return loop_picture(picture, (name, equation), runs, 0.6, gimbal=True)
 
 
 # --- the order --------------------------------------------------------------------------------------------------

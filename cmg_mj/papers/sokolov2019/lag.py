@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -125,13 +126,8 @@ def latency_threshold(observer: str) -> Threshold:
         result = experiment([*RELEASE, FINE, "sensors.accelerometer.rate_hz=1000.0", latency], observer).run()
         return not result.stood.all() or is_sustained(trajectory_of(result))[0]
 
-    low, high = 0, MAX_LATENCY_STEPS
-    if not oscillates(high):
-        return high / 1000, None
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if oscillates(middle) else (middle, high)
-    return low / 1000, high / 1000
+    steps = bisect_left(range(1, MAX_LATENCY_STEPS + 1), True, key=oscillates)
+    return steps / 1000, (steps + 1) / 1000 if steps < MAX_LATENCY_STEPS else None
 
 
 # --- the sampled loop -------------------------------------------------------------------------------------------

@@ -120,12 +120,14 @@ def oscillation(matrix: np.ndarray, dt: float) -> complex:
     return complex(next(s for s in modes(matrix, dt) if s.imag > 1.0))
 
 
-def first_crossing(value: Callable[[float], float], low: float, high: float) -> float | None:
-    """Return the smallest argument at which a function rises through zero; None if it does not."""
-    grid = np.linspace(low, high, 40).tolist()
+def first_crossing(
+    value: Callable[[float], float], low: float, high: float, points: int = 40, xtol: float = 1e-7
+) -> float | None:
+    """Return the smallest argument at which a function rises through zero, on a grid; None if it does not."""
+    grid = np.linspace(low, high, points).tolist()
     values = [value(x) for x in grid]
     for (a, at_a), (b, at_b) in pairwise(zip(grid, values, strict=True)):
         if at_a < 0.0 <= at_b:
-            root: Any = brentq(value, a, b, xtol=1e-7)
+            root: Any = brentq(value, a, b, xtol=xtol)
             return root
     return None

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cmg_mj.papers.claim import Assumption, Claim, OnShare
-from cmg_mj.papers.recorded import loop_panels, on_common_scales, side_by_side, trajectory_of
+from cmg_mj.papers.recorded import loop_picture, on_common_scales, trajectory_of
 from cmg_mj.papers.sokolov2019 import lag
-from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN, Cycles, cycles
+from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN, Cycles, cycles, peak_frequency
 from cmg_mj.papers.sokolov2019.figure_3 import WITH_Y2
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import NO_NOISE, PUSH_AND_NOISE, experiment
@@ -75,23 +75,23 @@ KEYS = {VELOCITY: "velocity RMS error", TILT: "tilt RMS"}
 """Measures that the estimators could be compared by; the paper names none."""
 
 
-def _late_signal(result: Result, name: str) -> np.ndarray:
-    """Return a signal over the last `LATE_S` of the worlds that stood, (n_ticks, n_stood)."""
-    t = trajectory_of(result)["time_s"]
-    return trajectory_of(result)[name].reshape(len(t), -1)[t >= t[-1] - LATE_S][:, result.stood]
+def _late_signal(result: Result, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the last `LATE_S`, (n_ticks,) [s], and a signal then of the worlds that stood, (n_ticks, n_stood)."""
+    run = trajectory_of(result)
+    t = run["time_s"]
+    late = t >= t[-1] - LATE_S
+    return t[late], run[name].reshape(len(t), -1)[late][:, result.stood]
 
 
 def main_frequency(result: Result) -> float:
     """Find the late peak of the tilt rate's spectrum, averaged over the worlds that stood [Hz]."""
-    x2, t = _late_signal(result, "x2_rad_s"), trajectory_of(result)["time_s"]
-    padded = 8 * len(x2)
-    spectrum = (np.abs(np.fft.rfft(x2 - x2.mean(axis=0), padded, axis=0)) ** 2).mean(axis=1)
-    return np.fft.rfftfreq(padded, t[1] - t[0])[spectrum.argmax()]
+    t, x2 = _late_signal(result, "x2_rad_s")
+    return peak_frequency(x2 - x2.mean(axis=0), t)
 
 
 def deviations(result: Result) -> np.ndarray:
     """Return the standard deviation of the tilt over the last `LATE_S`, one a world that stood [deg]."""
-    return np.degrees(_late_signal(result, "x1_rad")).std(axis=0)
+    return np.degrees(_late_signal(result, "x1_rad")[1]).std(axis=0)
 
 
 def numbers(result: Result) -> dict[str, Any]:
@@ -150,12 +150,9 @@ def picture(name: str, loops: Loops) -> Picture:
         "without backlash": loops.by_bias[SHOWN_DEG][name],
         f"{GAP_ARCMIN:g} arcmin of backlash": loops.gap[name],
     }
-    columns = [
-        loop_panels(trajectory_of(result).world(0), name, OBSERVERS[name], title, 0.5) for title, result in runs.items()
-    ]
-    number = NUMBERS[name]
-    title = f"sokolov2019, Fig. {number}: {OBSERVERS[name]} in the loop, a push at 1 s (e = {SHOWN_DEG} deg)"
-    return side_by_side(f"sokolov2019-fig-{number}", title, columns)
+    number, equation = NUMBERS[name], OBSERVERS[name]
+    title = f"sokolov2019, Fig. {number}: {equation} in the loop, a push at 1 s (e = {SHOWN_DEG} deg)"
+    return loop_picture((f"sokolov2019-fig-{number}", title), (name, equation), runs, 0.5, gimbal=False)
 
 
 def oscillation(
