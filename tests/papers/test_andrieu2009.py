@@ -12,17 +12,18 @@ from scipy.integrate import solve_ivp
 
 from cmg_mj.papers.andrieu2009 import bioreactor, figures, on_the_rig, theorem_1, theory
 from cmg_mj.papers.andrieu2009.bioreactor import Bioreactor, dilution
-from cmg_mj.papers.andrieu2009.figures import correction, simple_copy
-from cmg_mj.papers.andrieu2009.simulation import (
+from cmg_mj.papers.andrieu2009.figures import (
     CONSTANT,
     HOMOGENEOUS,
     UPDATED,
     Run,
     Study,
+    correction,
     replay,
     rms_by_kind,
     rms_late,
     run_plant,
+    simple_copy,
     study,
 )
 from cmg_mj.papers.aranovskiy2020.rig import push_recovery

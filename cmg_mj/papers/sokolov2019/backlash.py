@@ -10,10 +10,9 @@ import numpy as np
 
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.figure_3 import L1, WITH_Y2, stiffness
-from cmg_mj.papers.sokolov2019.lag import RELEASE, is_sustained, linearise
+from cmg_mj.papers.sokolov2019.lag import RELEASE, first_crossing, is_sustained, linearise
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
-from cmg_mj.papers.sokolov2019.sampled_loop import first_crossing
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.runs.side_by_side import run_jobs, run_of

@@ -1,24 +1,117 @@
-"""Section V: which lag makes the loop oscillate by itself: on MuJoCo, and by the eigenvalues of the sampled loop."""
+"""Section V: which lag makes the loop oscillate by itself: on MuJoCo, and by the eigenvalues of the sampled loop.
+
+From one control tick to the next the rig is linear near its equilibrium, and so are the linear observers and the law:
+the map of a period is a matrix, and the loop oscillates by itself when an eigenvalue leaves the unit circle. The
+matrix is made by running the observer and the law themselves on unit vectors, so it is the loop as implemented.
+"""
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
+from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
+from cmg_mj.laws.state_feedback import StateFeedback
+from cmg_mj.observers import Measurement, Observer
 from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
-from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, estimator, experiment, make_rig, read_servo
-from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
+from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, Servo, estimator, experiment, make_rig, read_servo
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 from cmg_mj.view.plots.figure import Line, Panel, Picture
+
+
+def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[np.ndarray, np.ndarray]:
+    """Linearise sokolov2019 (1) with the servo's torque upright: x' = A x + B u.
+
+    The state is tilt, tilt rate, gimbal angle, gimbal rate and setpoint. The flywheel's torque -J_d w_d x2 drives the
+    gimbal back.
+
+    Returns:
+        A (5, 5), B (5, 1).
+    """
+    h, J1, inertia = model.J_d * model.omega_d, model.J1, servo.inertia
+    A = np.zeros((5, 5))
+    A[0, 1] = 1.0
+    A[1, [0, 3]] = model.gravity_torque / J1, h / J1
+    A[2, 3] = 1.0
+    A[3, [1, 2, 3, 4]] = -h / inertia, -servo.kp / inertia, -servo.kv / inertia, servo.kp / inertia
+    B = np.zeros((5, 1))
+    B[4, 0] = 1.0
+    return A, B
+
+
+def period_map(
+    experiment: Experiment, servo: Servo, observer: Observer | None, age_steps: int, share: complex
+) -> np.ndarray:
+    """Return the matrix that takes the loop from one control tick to the next.
+
+    Args:
+        experiment: Its rig, but for the servo, and its law; the law's rate limit does not count.
+        servo: The gimbal's servo.
+        observer: A linear observer; None for the true rate in the law.
+        age_steps: Age of y1 at a tick [physics steps]: the latency of the accelerometers.
+        share: Share of the commanded rate that reaches the gimbal's setpoint: 1, or the describing function of a gap.
+
+    Returns:
+        A square matrix. Its state is that of the rig, the tilts not yet seen, the observer's, x_e and the last u.
+    """
+    assert isinstance(experiment.law, StateFeedback)
+    law, timestep = replace(experiment.law, rate_limit=math.inf), experiment.plant.model.opt.timestep
+    Phi, hold, _ = hold_matrices(*rig_matrices(experiment.plant.reduced, servo), timestep)
+    start: Any = observer.init(Measurement(0.0, 0.0)) if observer else ()
+    parts = np.cumsum([5, age_steps, len(start)])
+
+    def period(v: np.ndarray) -> np.ndarray:
+        rig, pending_tilts, observer_state, (x_e, u) = np.split(v, parts)
+        y1, y2 = (pending_tilts[-1] if age_steps else rig[0]), rig[2]
+        x2 = rig[1]
+        if observer:
+            state, estimate = observer.step(type(start)(*observer_state), Measurement(y1, y2), u)
+            observer_state, x2 = np.array(state), estimate.x2
+        u, x_e = law(y1, x2, y2, x_e)
+        for _ in range(round(law.dt / timestep)):
+            pending_tilts = np.concatenate([rig[:1], pending_tilts])[:age_steps]
+            rig = Phi @ rig + hold[:, 0] * (share * u)
+        return np.concatenate([rig, pending_tilts, observer_state, [x_e, u]])
+
+    return np.column_stack([period(unit) for unit in np.eye(parts[-1] + 2)])
+
+
+def modes(matrix: np.ndarray, dt: float) -> np.ndarray:
+    """Return the poles s = log(z)/dt of a period's map, the least damped first [1/s]."""
+    z = np.linalg.eigvals(matrix)
+    s = np.log(z[np.abs(z) > 1e-9].astype(complex)) / dt
+    return s[np.argsort(-s.real)]
+
+
+def oscillation(matrix: np.ndarray, dt: float) -> complex:
+    """Find the least damped oscillating pole with a frequency above 1 rad/s [1/s]: the integrator's pair is slower."""
+    return complex(next(s for s in modes(matrix, dt) if s.imag > 1.0))
+
+
+def first_crossing(
+    value: Callable[[float], float], low: float, high: float, points: int = 40, xtol: float = 1e-7
+) -> float | None:
+    """Return the smallest argument at which a function rises through zero, on a grid; None if it does not."""
+    grid = np.linspace(low, high, points).tolist()
+    values = [value(x) for x in grid]
+    for (a, at_a), (b, at_b) in pairwise(zip(grid, values, strict=True)):
+        if at_a < 0.0 <= at_b:
+            root: Any = brentq(value, a, b, xtol=xtol)
+            return root
+    return None
+
 
 # --- releases on MuJoCo -----------------------------------------------------------------------------------------
 
