@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -46,12 +47,14 @@ OnShare = Callable[[float], None]
 
 
 def plain(value: Any) -> Any:
-    """Make figures what JSON can hold: text for names, lists for arrays, Python's numbers for NumPy's."""
+    """Make figures what JSON can hold: text for names, lists for arrays, None for what is not finite."""
     if isinstance(value, Mapping):
         return {str(name): plain(inner) for name, inner in value.items()}
     if type(value) in (list, tuple):  # an interval stays one
         return [plain(inner) for inner in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @dataclass(frozen=True, kw_only=True)

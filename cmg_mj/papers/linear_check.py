@@ -33,13 +33,13 @@ def mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return M
 
 
-def finite_difference_error(model: ReducedModel, h: float = 1e-5) -> float:
+def finite_difference_error(model: ReducedModel) -> float:
     """Return the error of a model's A and B against central differences of its nonlinear form, by the largest entry."""
 
     def f(x: np.ndarray, u: float) -> np.ndarray:
         return np.array([x[1], model.tilt_acceleration(float(x[0]), float(x[1]), float(x[2]), u), u])
 
-    zero = np.zeros(3)
+    zero, h = np.zeros(3), 1e-5
     A = np.column_stack([(f(h * axis, 0.0) - f(-h * axis, 0.0)) / (2.0 * h) for axis in np.eye(3)])
     B = ((f(zero, h) - f(zero, -h)) / (2.0 * h))[:, None]
     return max(np.abs(A - model.A).max() / np.abs(A).max(), np.abs(B - model.B).max() / np.abs(B).max())

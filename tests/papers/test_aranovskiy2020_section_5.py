@@ -110,7 +110,7 @@ def test_every_figure_is_of_its_own_runs(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(
         section_5, "errors_of", lambda forms, worlds, seed: {form: np.full(3, by_euler[form]) for form in forms}
     )
-    *figures, by_error, _, _, _, cause = section_5.claims(lambda share: None)
+    *figures, by_error, _, _, _, cause = section_5.claims()
     assert [claim.place for claim in figures] == ["Fig. 5", "Fig. 6", "Fig. 7"]
     for claim, name in zip(figures, ("linear", "ltv", "homogeneous"), strict=True):
         assert claim.verdict == WITHIN  # the push, e and the noise are ours

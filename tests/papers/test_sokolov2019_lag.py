@@ -58,7 +58,7 @@ def test_pole_of_the_sampled_loop_is_mujocos(lag_ms: float) -> None:
 
 @pytest.fixture(scope="module")
 def lags() -> lag.Lags:
-    return lag.lags(lambda share: None)
+    return lag.lags()
 
 
 def test_thresholds_on_mujoco_are_the_predicted_ones(lags: lag.Lags) -> None:

@@ -177,19 +177,14 @@ def replays(run: Run, model: Bioreactor) -> Replays:
     return {kind: replay(kind, run, model) for kind in KINDS}
 
 
-def _windows(run: Run, values: Array) -> list[Array]:
+def windows_of(run: Run, values: Array) -> list[Array]:
     """Return the samples in each window, (samples, seeds)."""
     return [values[(run.t >= start) & (run.t < end)] for start, end in WINDOWS]
 
 
 def window_means(run: Run, values: Array) -> Array:
     """Return the mean over each window and all seeds, (4,)."""
-    return np.array([part.mean(axis=0) for part in _windows(run, values)]).mean(axis=1)
-
-
-def window_spreads(run: Run, values: Array) -> Array:
-    """Return the standard deviation over each window about a straight line through it, mean over seeds, (4,)."""
-    return np.array([detrend(part, axis=0).std(axis=0) for part in _windows(run, values)]).mean(axis=1)
+    return np.array([part.mean(axis=0) for part in windows_of(run, values)]).mean(axis=1)
 
 
 def rms_late(run: Run, values: Array) -> Array:
@@ -394,7 +389,9 @@ def bias_of_updated_gains(study: Study) -> Claim:
 
 def spread(study: Study) -> Claim:
     """Judge the thickness of the curves in Fig. 2: the standard deviation of the errors beside the estimates used."""
-    spreads = np.array([window_spreads(study.run, study.nominal[kind].eta2_error) for kind in KINDS])
+    # About a straight line through each window, mean over the seeds.
+    windows = [windows_of(study.run, study.nominal[kind].eta2_error) for kind in KINDS]
+    spreads = np.array([[detrend(part, axis=0).std(axis=0).mean() for part in parts] for parts in windows])
     rates = by_window(study.run, study.nominal, "rate")
 
     def correlation(columns: slice) -> float:

@@ -61,18 +61,6 @@ def gimbal_torque(x2: float, x3: float, gimbal_acceleration: float, omega_d: flo
     return inertial_torque + TABLE_1["J_d"] * x2 * omega_d * math.sin(q_c) + tilt_torque
 
 
-def gimbal_rest(e: float) -> float:
-    """x3 at which (7) rests: k1/k3 e, in the unit of e. After (7) it is printed with a minus."""
-    k1, _, k3, _ = K_E
-    return k1 / k3 * e
-
-
-def integrator_rest(e: float) -> float:
-    """x_e at which (8) rests: k_e1/k_e4 e, for e in rad [rad s]. After (8) it is printed with a minus."""
-    k1, _, _, k4 = K_E
-    return k1 / k4 * e
-
-
 def damping(u: float | np.ndarray, y2: float | np.ndarray) -> float | np.ndarray:
     """Return a = -u J2 sin(2 y2)/(J1 + J2 sin(y2)^2), the one entry of A' in (10) that varies [1/s]."""
     return -u * printed_model().terms(0.0, y2)[2]

@@ -11,7 +11,7 @@ import numpy as np
 from cmg_mj.features.tuning.simulations import window_of
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, push_recovery, run_loops
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.recorded import loop_picture, on_common_scales, open_loop_panels, rms, trajectory_of
 from cmg_mj.results.intervals import Interval, known_interval, mean_interval
 from cmg_mj.results.result import Result
@@ -258,12 +258,9 @@ def cause(errors: Numbers) -> Claim:
     )
 
 
-def claims(on_share: OnShare) -> list[Claim]:
+def claims() -> list[Claim]:
     """Judge Figs 5 to 7, and what Section V concludes from the same runs."""
-    results: dict[str, dict[str, Result]] = {}
-    for i, angles in enumerate(ANGLES):
-        results[angles] = close_loops(list(OBSERVERS), angles, WORLDS, SEED)
-        on_share((i + 1) / 3.0)
+    results = {angles: close_loops(list(OBSERVERS), angles, WORLDS, SEED) for angles in ANGLES}
     exact = {form: results["measured"][FORMS[form][0]].values(JUDGED) for form in (TEN, ELEVEN)}
     return [
         *on_common_scales([figure(name, {angles: results[angles][name] for angles in ANGLES}) for name in FIGURES]),

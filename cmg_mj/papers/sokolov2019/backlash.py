@@ -58,19 +58,19 @@ def find_cycles(releases: Sequence[Experiment]) -> list[Cycle]:
 
 def _cycle(trajectory: Trajectory) -> Cycle:
     last = trajectory.between(RELEASE_S - WINDOW_S, RELEASE_S)
-    x2 = last["x2_rad_s"]
+    x2, t = last["x2_rad_s"], last["time_s"]
     return Cycle(
         is_sustained(trajectory, WINDOW_S)[0],
         np.degrees(np.ptp(last["x1_rad"])) / 2.0,
-        peak_frequency(x2 - x2.mean(), last["time_s"], np.hanning(len(x2))),
+        peak_frequency(x2 - x2.mean(), t[1] - t[0], np.hanning(len(x2))),
     )
 
 
-def peak_frequency(signals: np.ndarray, t: np.ndarray, taper: np.ndarray | float = 1.0) -> float:
+def peak_frequency(signals: np.ndarray, dt: float, taper: np.ndarray | float = 1.0) -> float:
     """Find the peak of the spectrum of signals, (n_ticks, n_worlds), averaged over the worlds [Hz]."""
-    padded = 8 * len(t)
+    padded = 8 * len(signals)
     spectrum = (np.abs(np.fft.rfft((signals.T * taper).T, padded, axis=0)) ** 2).mean(axis=1)
-    return np.fft.rfftfreq(padded, t[1] - t[0])[spectrum.argmax()]
+    return np.fft.rfftfreq(padded, dt)[spectrum.argmax()]
 
 
 def cycles() -> Cycles:

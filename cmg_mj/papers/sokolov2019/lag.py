@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
 from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.observers import Measurement, Observer
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, Servo, estimator, experiment, make_rig, read_servo
@@ -296,14 +296,11 @@ class Lags(NamedTuple):
     """Predictions for the linear observers and, under `truth`, for the true rate."""
 
 
-def lags(on_share: OnShare) -> Lags:
+def lags() -> Lags:
     """Sweep, sharpen and predict all lags."""
     sweeps = sweep_lags()
     thresholds = lag_thresholds(sweeps)
-    latencies: dict[str, Threshold] = {}
-    for i, name in enumerate(OBSERVERS):
-        latencies[name] = latency_threshold(name)
-        on_share((i + 1) / 4.0)
+    latencies = {name: latency_threshold(name) for name in OBSERVERS}
     predictions = {name: predict(name) for name in ("linear", "luenberger")} | {"truth": predict(None)}
     return Lags(sweeps, thresholds, latencies, predictions)
 

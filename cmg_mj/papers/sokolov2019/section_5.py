@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.papers.claim import Assumption, Claim, OnShare
+from cmg_mj.papers.claim import Assumption, Claim
 from cmg_mj.papers.recorded import loop_picture, on_common_scales, trajectory_of
 from cmg_mj.papers.sokolov2019 import lag
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN, Cycles, cycles, peak_frequency
@@ -51,7 +51,7 @@ class Loops(NamedTuple):
         return {f"e = {e:g} deg": by_name for e, by_name in self.by_bias.items()} | {BEHIND_A_GAP: self.gap}
 
 
-def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Loops:
+def loops(worlds: int = WORLDS, seed: int = SEED) -> Loops:
     """Run them all; those with noise at once, the same seeds for every observer, at every bias and with the gap."""
     settings = [f"seed={seed}", f"duration_s={DURATION_S}", f"plant.equilibrium_bias_deg={SHOWN_DEG}"]
     cases = len(BIASES_DEG) + 1
@@ -62,7 +62,6 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Loops:
     runs = [BatchJob(experiment(settings, name).with_varied(values), [*range(worlds)] * cases) for name in OBSERVERS]
     by_case = zip(*(result.split(cases) for result in run_jobs(runs)), strict=True)
     *no_gap, gap = (dict(zip(OBSERVERS, results, strict=True)) for results in by_case)
-    on_share(0.8)
     quiet = {name: experiment([*settings, *NO_NOISE], name).run() for name in OBSERVERS}
     gyro = experiment(settings, feedback="fog").run_many(worlds)
     return Loops(dict(zip(BIASES_DEG, no_gap, strict=True)), gap, quiet, gyro)
@@ -75,23 +74,21 @@ KEYS = {VELOCITY: "velocity RMS error", TILT: "tilt RMS"}
 """Measures that the estimators could be compared by; the paper names none."""
 
 
-def _late_signal(result: Result, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the last `LATE_S`, (n_ticks,) [s], and a signal then of the worlds that stood, (n_ticks, n_stood)."""
-    run = trajectory_of(result)
-    t = run["time_s"]
-    late = t >= t[-1] - LATE_S
-    return t[late], run[name].reshape(len(t), -1)[late][:, result.stood]
+def _late_signal(result: Result, name: str) -> np.ndarray:
+    """Return a signal over the last `LATE_S` of the worlds that stood, (n_ticks, n_stood)."""
+    t = trajectory_of(result)["time_s"]
+    return trajectory_of(result)[name].reshape(len(t), -1)[t >= t[-1] - LATE_S][:, result.stood]
 
 
 def main_frequency(result: Result) -> float:
     """Find the late peak of the tilt rate's spectrum, averaged over the worlds that stood [Hz]."""
-    t, x2 = _late_signal(result, "x2_rad_s")
-    return peak_frequency(x2 - x2.mean(axis=0), t)
+    t, x2 = trajectory_of(result)["time_s"], _late_signal(result, "x2_rad_s")
+    return peak_frequency(x2 - x2.mean(axis=0), t[1] - t[0])
 
 
 def deviations(result: Result) -> np.ndarray:
     """Return the standard deviation of the tilt over the last `LATE_S`, one a world that stood [deg]."""
-    return np.degrees(_late_signal(result, "x1_rad")[1]).std(axis=0)
+    return np.degrees(_late_signal(result, "x1_rad")).std(axis=0)
 
 
 def numbers(result: Result) -> dict[str, Any]:
@@ -296,11 +293,9 @@ def model_based(loops: Loops, key: str) -> Claim:
     )
 
 
-def claims(on_share: OnShare) -> list[Claim]:
+def claims() -> list[Claim]:
     """Judge the loops; Figs 4 to 6 need the lags and the cycles, which show what oscillates without noise."""
-    lags = lag.lags(lambda share: on_share(0.2 * share))
-    ends = cycles()
-    results = loops(lambda share: on_share(0.3 + 0.7 * share))
+    lags, ends, results = lag.lags(), cycles(), loops()
     four, five, six = on_common_scales(
         [figure_4(results, lags, ends), figure_5(results, lags, ends), figure_6(results, ends)]
     )
