@@ -15,22 +15,21 @@ from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 WORLDS, SEED, DURATION_S = 20, 82_000, 15.0
 KINDS = {
-    "high_gain": (),
+    "high_gain": ("high_gain", ()),
     # The best l1, l2 for a linear correction: docs/studies/tune_high_gain.py.
-    "high_gain, d_inf = 0": ("observer.d_inf=0.0", "observer.l1=40.4", "observer.l2=39.3"),
-    "homogeneous": (),
-    "ltv": (),
-    "linear": (),
+    "high_gain, d_inf = 0": ("high_gain", ("observer.d_inf=0.0", "observer.l1=40.4", "observer.l2=39.3")),
+    "homogeneous": ("homogeneous", ()),
+    "ltv": ("ltv", ()),
+    "linear": ("linear", ()),
 }
-"""Label, which begins with the observer -> settings."""
+"""Label -> the observer, and its settings."""
 
 VELOCITY, TILT = "velocity_rms_error_rad_s", "tilt_rms_deg"
 
 
 def claims() -> list[Claim]:
     """Judge the velocity RMS errors beside those of aranovskiy2020's observers; how idle the update of the gain is."""
-    cases = [(label.split(",")[0], settings) for label, settings in KINDS.items()]
-    results = dict(zip(KINDS, run_loops(cases, WORLDS, SEED, DURATION_S), strict=True))
+    results = run_loops(KINDS, WORLDS, SEED, DURATION_S)
     return [comparison_claim(results), idle_claim(results["high_gain"])]
 
 

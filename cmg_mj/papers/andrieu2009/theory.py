@@ -61,14 +61,12 @@ def worst_quotient(p: float, size: float, bound: Callable[[np.ndarray, np.ndarra
     return (left_side[distinct] / bound(x2_hat, d)[distinct]).max()
 
 
-def quotient_of_3(p: float) -> float:
-    """Return the worst quotient of the two sides of (3), over sizes from 1e-4 to 1e4."""
-    return worst_quotient(p, 1e4, lambda x2_hat, d: (1.0 + p) * np.abs(x2_hat) ** p * d + d ** (1.0 + p))
-
-
 def increments() -> Claim:
     """Judge (2), (3)."""
-    quotients = {p: quotient_of_3(p) for p in (0.1, 0.5, 0.9, 1.0, 1.5, 2.0)}
+    quotients = {
+        p: worst_quotient(p, 1e4, lambda x2_hat, d, p=p: (1.0 + p) * np.abs(x2_hat) ** p * d + d ** (1.0 + p))
+        for p in (0.1, 0.5, 0.9, 1.0, 1.5, 2.0)
+    }
     return Claim(
         place="Section 1, (3)",
         statement="For 0 < p < 1 the increments of f2 = g(x1) x2 + x2^(1+p) + u are bounded by (|g| + (1+p) "

@@ -16,7 +16,7 @@ import numpy as np
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, push_recovery, run_on_rigs
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix
-from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
+from cmg_mj.papers.recorded import push_intervals, rms, trace, trajectory_of
 from cmg_mj.plant.elements import Module
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.intervals import Interval, known_interval, ratio_interval
@@ -261,9 +261,9 @@ def _picture(runs: MismatchRuns, yaws: Mapping[str, Mapping[str, Any]]) -> Pictu
     rates, turns, sweep = [], [], []
     for i, mismatch in enumerate(MISMATCHES):
         size, largest = mismatch.sizes[-2:]
-        run = trajectory_of(runs.broken[mismatch.kind, size])
-        rates.append(Line(t, run["rate/yaw_rad_s"][:, 0], mismatch.words(size), color=i))
-        turns.append(Line(t, np.degrees(run["angle/yaw_rad"][:, 0]), color=i))
+        run = trajectory_of(runs.broken[mismatch.kind, size]).world(0)
+        rates.append(trace(run, "rate/yaw_rad_s", mismatch.words(size), color=i))
+        turns.append(trace(run, "angle/yaw_rad", color=i))
         x, measured = [s / largest for s in mismatch.sizes], [yaws[mismatch.words(s)] for s in mismatch.sizes]
         label = mismatch.words(largest).replace(mismatch.kind, f"{mismatch.kind}, 1 is")
         sweep.append(Line(x, [yaw["turn_deg"] for yaw in measured], label, "o-", color=i))
@@ -444,8 +444,8 @@ def _servo_picture(servos: Servos) -> Picture:
     }
     for color, (label, result) in enumerate(results.items()):
         run = trajectory_of(result).world(0)
-        tilts.append(Line(run["time_s"], np.degrees(run["x1_rad"]), label, color=color, width=0.8))
-        turns.append(Line(run["time_s"], np.degrees(run["x3_rad"]), color=color, width=0.8))
+        tilts.append(trace(run, "x1_rad", label, color=color, width=0.8))
+        turns.append(trace(run, "x3_rad", color=color, width=0.8))
     return Picture(
         "aranovskiy2020-servo",
         "aranovskiy2020, Section II: the gimbals' servos in velocity mode, with a deadband, world 0",

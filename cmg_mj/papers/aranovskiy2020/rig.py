@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -45,15 +46,15 @@ def push_recovery(observer: str, seed: int, settings: Sequence[str] = (), durati
 
 
 def run_loops(
-    cases: Iterable[tuple[str, Sequence[str]]],
+    cases: Mapping[Any, tuple[str, Sequence[str]]],
     worlds: int,
     seed: int,
     duration_s: float = DURATION_S,
     keep_trajectory: bool = True,
-) -> list[Result]:
-    """Run `push_recovery` with observers and their settings, all at once: a result a case."""
-    jobs = [run_of(push_recovery(name, seed, settings, duration_s), worlds) for name, settings in cases]
-    return run_jobs(jobs, keep_trajectory=keep_trajectory)
+) -> dict[Any, Result]:
+    """Run `push_recovery` with observers and their settings, all at once: case -> result."""
+    jobs = [run_of(push_recovery(name, seed, settings, duration_s), worlds) for name, settings in cases.values()]
+    return dict(zip(cases, run_jobs(jobs, keep_trajectory=keep_trajectory), strict=True))
 
 
 @cache

@@ -12,7 +12,7 @@ from cmg_mj.features.tuning.simulations import window_of
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, push_recovery, run_loops
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.recorded import loop_picture, on_common_scales, open_loop_panels, rms, trajectory_of
+from cmg_mj.papers.recorded import loop_picture, on_common_scales, open_loop_panels, rms, trace, trajectory_of
 from cmg_mj.results.intervals import Interval, known_interval, mean_interval
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import KEYS
@@ -82,7 +82,7 @@ def comparable(span: str, rms_errors: Numbers, suffix: str = "", pictures: Seque
 
 
 def _open_loop_picture(example: Trajectory) -> Picture:
-    tilt = Line(example["time_s"], np.degrees(example["y1_rad"]), "measured", width=0.7)
+    tilt = trace(example, "y1_rad", "measured", width=0.7)
     rates = {name: example[f"estimate/{name}/x2_rad_s"] for name in OBSERVERS}
     return Picture(
         "aranovskiy2020-fig-4",
@@ -100,8 +100,8 @@ def close_loops(
     observers: Sequence[str], angles: str, worlds: int, seed: int, duration_s: float = DURATION_S
 ) -> dict[str, Result]:
     """Close the loop on each observer, a push at 2 s."""
-    cases = [(observer, [f'controller.angle_source="{angles}"']) for observer in observers]
-    return dict(zip(observers, run_loops(cases, worlds, seed, duration_s), strict=True))
+    cases = {observer: (observer, [f'controller.angle_source="{angles}"']) for observer in observers}
+    return run_loops(cases, worlds, seed, duration_s)
 
 
 def figure(name: str, results: Mapping[str, Result]) -> Claim:
@@ -227,8 +227,8 @@ FORMS: Mapping[str, tuple[str, Sequence[str]]] = {
 
 def errors_of(forms: Sequence[str], worlds: int, seed: int) -> dict[str, np.ndarray]:
     """Close the loop on some of `FORMS` as Figs 5 to 7 do: velocity RMS errors, (n_worlds,) [rad/s]."""
-    results = run_loops([FORMS[form] for form in forms], worlds, seed, keep_trajectory=False)
-    return {form: result.values(JUDGED) for form, result in zip(forms, results, strict=True)}
+    results = run_loops({form: FORMS[form] for form in forms}, worlds, seed, keep_trajectory=False)
+    return {form: result.values(JUDGED) for form, result in results.items()}
 
 
 def cause(errors: Numbers) -> Claim:

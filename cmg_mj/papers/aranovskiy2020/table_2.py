@@ -114,15 +114,16 @@ def loop_ratios(
         worlds: Number of worlds.
         seed: Seed of the noise.
     """
-    cases = []
-    for observer, level, push in trials:
+    cases = {}
+    for i, (observer, level, push) in enumerate(trials):
         noise = f"sensors.accelerometer.noise_density_ug_rthz={level.noise_ug_rthz}"
         names = dict.fromkeys(name.partition("[")[0] for name in level.sizes)
         tuned_settings = [f"observer.{name}={json.dumps(level.parameters[name])}" for name in names]
-        cases += [(observer, [*push, noise]), (observer, [*push, noise, *tuned_settings])]
+        cases[i, "table"] = observer, [*push, noise]
+        cases[i, "tuned"] = observer, [*push, noise, *tuned_settings]
     results = run_loops(cases, worlds, seed, keep_trajectory=False)
-    errors = [result.values("velocity_rms_error_rad_s") for result in results]
-    return [ratio_interval(table, tuned) for table, tuned in zip(errors[::2], errors[1::2], strict=True)]
+    errors = {case: result.values("velocity_rms_error_rad_s") for case, result in results.items()}
+    return [ratio_interval(errors[i, "table"], errors[i, "tuned"]) for i in range(len(trials))]
 
 
 Loops = Sequence[tuple[JointExperiment, Mapping[str, Interval]]]

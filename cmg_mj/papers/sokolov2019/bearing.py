@@ -22,7 +22,7 @@ import numpy as np
 from cmg_mj.laws import StateFeedback
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix, poles_as_pairs
-from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
+from cmg_mj.papers.recorded import push_intervals, rms, trace, trajectory_of
 from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, experiment, read_servo
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.intervals import mean_interval
@@ -203,7 +203,7 @@ def claim(runs: Study) -> Claim:
 
 def _picture(runs: Study, plant: Plant) -> Picture:
     example, free = runs.locked[0], trajectory_of(runs.free[PUSHED]).world(0)
-    t, s, push = example.time_s, free["time_s"], push_intervals(free)
+    t, push = example.time_s, push_intervals(free)
     x1, x3 = example.motion.q[:, 0] - plant.tilt_zero, example.motion.q[:, 1] - plant.axis.modules[0].gimbal_zero
     torques = [
         Line(t, example.torque, "on the bearing", color=1, width=0.5),
@@ -212,11 +212,11 @@ def _picture(runs: Study, plant: Plant) -> Picture:
     ]
     panels = [
         Panel("tilt [deg]", [Line(t, np.degrees(x1), color=0)], "locked bearing", shaded=push),
-        Panel("tilt [deg]", [Line(s, np.degrees(free["x1_rad"]), color=0)], "free bearing", shaded=push),
+        Panel("tilt [deg]", [trace(free, "x1_rad", color=0)], "free bearing", shaded=push),
         Panel("gimbal angle [deg]", [Line(t, np.degrees(x3), color=0)], shaded=push),
-        Panel("gimbal angle [deg]", [Line(s, np.degrees(free["x3_rad"]), color=0)], shaded=push),
+        Panel("gimbal angle [deg]", [trace(free, "x3_rad", color=0)], shaded=push),
         Panel("torque about the\nvertical [N m]", torques, shaded=push),
-        Panel("yaw rate [rad/s]", [Line(s, free["rate/yaw_rad_s"], color=1)], shaded=push),
+        Panel("yaw rate [rad/s]", [trace(free, "rate/yaw_rad_s", color=1)], shaded=push),
     ]
     title = "sokolov2019, Fig. 2: one gimbal on its thrust bearing, the exact rate in the law, a push at 1 s"
     return Picture("sokolov2019-bearing", title, panels, columns=2)

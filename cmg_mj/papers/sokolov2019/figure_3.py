@@ -12,7 +12,7 @@ from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.replay import replay
 from cmg_mj.observers import Observer
 from cmg_mj.papers.claim import Assumption, Claim, OnShare
-from cmg_mj.papers.recorded import open_loop_panels, rms, trajectory_of
+from cmg_mj.papers.recorded import open_loop_panels, rms, trace, trajectory_of
 from cmg_mj.papers.retuned import Pushes, Studies, figures_of, tune_all
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS, TABLE_II
 from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, estimator, experiment
@@ -20,7 +20,7 @@ from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.view.plots.figure import Line, Picture
+from cmg_mj.view.plots.figure import Picture
 
 SEED, WORLDS = 82_000, 20
 AFTER_S = 0.5
@@ -145,7 +145,7 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
 
 def _picture(tuning: Tuning) -> Picture:
     run = tuning.trajectory.world(0).between(0.0, 3.0)
-    tilt = Line(run["time_s"], np.degrees(run["y1_rad"]), "y1", color=7, width=0.8)
+    tilt = trace(run, "y1_rad", "y1", color=7, width=0.8)
     rates = {name: rate[: len(tilt.x), 0] for name, rate in tuning.rates.items()}
     title = "sokolov2019, Fig. 3: the law fed by the gyro, a push at 1 s (0.5 N m, 0.1 s; e = 0.5 deg)"
     return Picture("sokolov2019-fig-3", title, open_loop_panels(run, rates, OBSERVERS, tilt, (-1.0, 0.6)))

@@ -11,7 +11,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -52,14 +52,14 @@ def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[np.ndarray, np.ndar
 
 
 def period_map(
-    experiment: Experiment, servo: Servo, observer: Observer | None, age_steps: int, share: complex
+    experiment: Experiment, observer: Observer | None, servo: Servo, age_steps: int = 0, share: complex = 1.0
 ) -> np.ndarray:
     """Return the matrix that takes the loop from one control tick to the next.
 
     Args:
         experiment: Its rig, but for the servo, and its law; the law's rate limit does not count.
-        servo: The gimbal's servo.
         observer: A linear observer; None for the true rate in the law.
+        servo: The gimbal's servo.
         age_steps: Age of y1 at a tick [physics steps]: the latency of the accelerometers.
         share: Share of the commanded rate that reaches the gimbal's setpoint: 1, or the describing function of a gap.
 
@@ -242,11 +242,7 @@ def linearise(observer: str | None, **parameters: float) -> tuple[Loop, Servo, f
     """Linearise the sampled loop with an observer, or with the true rate (None); parameters differ from Table II's."""
     prepared = _rig()
     o = None if observer is None else estimator(observer, prepared, **parameters)
-
-    def loop(servo: Servo, age_steps: int = 0, share: complex = 1.0) -> np.ndarray:
-        return period_map(prepared, servo, o, age_steps, share)
-
-    return loop, read_servo(prepared.plant), prepared.law.dt
+    return partial(period_map, prepared, o), read_servo(prepared.plant), prepared.law.dt
 
 
 def predict(observer: str | None) -> dict[str, float | list[float] | None]:
