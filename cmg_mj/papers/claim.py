@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -20,27 +20,6 @@ VERDICTS = {
     "not reproduced": "the claim does not hold, for the reason in its row",
 }
 """Verdict -> its meaning: the rule of `Claim.verdict` in words."""
-
-Assumption = Literal[
-    "push",
-    "e",
-    "noise",
-    "drive",
-    "servo",
-    "backlash",
-    "bearing",
-    "body",
-    "mismatch",
-    "friction",
-    "control rate",
-    "method",
-    "gains",
-    "initial values",
-    "duration",
-    "signal",
-    "threshold",
-]
-"""An assumption of ours: a claim depends on it, and the paper does not print it."""
 
 OnShare = Callable[[float], None]
 """Called with the share of a section that is done."""
@@ -66,7 +45,8 @@ class Claim:
         statement: Statement of the paper there, in our words.
         holds: True if the figures confirm the claim, computed from them; or such a value for each of several
             measures, all of which must hold.
-        assumes: Assumptions of ours that the claim depends on, each with its size in a few words.
+        assumes: Assumptions of ours, which the paper does not print and the claim depends on, such as `push`, `noise`
+            or `method`, each with its size in a few words.
         is_general: Whether the statement is a general one, which was tried on some systems and not proved.
         missing_data: Data that the paper does not give and that decide the outcome, a whole sentence; empty if none.
         conditions: The misprint that was mended, or for which part it holds, a whole sentence; empty if neither.
@@ -80,7 +60,7 @@ class Claim:
     place: str
     statement: str
     holds: bool | Mapping[str, bool]
-    assumes: Mapping[Assumption, str] = field(default_factory=dict)
+    assumes: Mapping[str, str] = field(default_factory=dict)
     is_general: bool = False
     missing_data: str = ""
     conditions: str = ""

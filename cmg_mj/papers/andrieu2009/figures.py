@@ -25,7 +25,7 @@ from cmg_mj.papers.andrieu2009.bioreactor import (
     dilution,
 )
 from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, Signals, UpdatedHighGain, largest_b
-from cmg_mj.papers.claim import Assumption, Claim
+from cmg_mj.papers.claim import Claim
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 Array = np.ndarray
@@ -40,7 +40,7 @@ TIME = "time [normalised]"
 WINDOWS = ((5.0, 10.0), (15.0, 20.0), (28.0, 35.0), (42.0, 50.0))
 """The later part of each of the four inputs."""
 
-ASSUMED: Mapping[Assumption, str] = {
+ASSUMED: Mapping[str, str] = {
     "initial values": "drawn from M_eta for each seed",
     "noise": "a new value every 10 ms, straight in between",
 }
@@ -372,8 +372,8 @@ def bias_of_constant_gain(study: Study) -> Claim:
 def bias_of_updated_gains(study: Study) -> Claim:
     """Judge the cause of the biases of the two observers with updated gain."""
     shares_left = bias_left(study)[1:]
-    due = dict(zip(WINDOW_NAMES, np.all(shares_left < HALF, axis=0).tolist(), strict=True))
-    windows, other_windows = (", ".join(name for name in due if due[name] is is_due) for is_due in (True, False))
+    due = dict(zip(WINDOW_NAMES, np.all(shares_left < HALF, axis=0), strict=True))
+    windows, other_windows = (", ".join(name for name in due if due[name] == is_due) for is_due in (True, False))
     return Claim(
         place="Section 3.1, bias of the updated gains",
         statement="The biases of the observers with updated gain in Fig. 2 are due to the error in hbar.",

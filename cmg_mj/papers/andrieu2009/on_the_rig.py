@@ -36,7 +36,7 @@ def claims() -> list[Claim]:
 def comparison_claim(results: dict[str, Result]) -> Claim:
     """Compare the errors of `KINDS` in the loop."""
     errors = {label: result.values(VELOCITY) for label, result in results.items()}
-    standing_counts = {label: int(result.stood.sum()) for label, result in results.items()}
+    standing_counts = {label: result.stood.sum() for label, result in results.items()}
     best, worlds = errors["high_gain"], len(errors["high_gain"])
     excess = {label: known_interval(best - errors[label]) for label in list(errors)[1:]}
     top = 1.1 * max(np.nanmax(values) for values in errors.values())

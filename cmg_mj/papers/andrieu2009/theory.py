@@ -111,25 +111,19 @@ def exponent_of_6() -> Claim:
 # --- (13), (21) and (22) ---
 
 
-def is_a_bound_on_b() -> bool:
-    """Check exactly that (21) is (i + 1 - j)(1 - d (n - 1) - b d) > 0, once multiplied out.
-
-    Both sides have at most the degree 2 in each of n, i, j, b and d = d_inf: equal at four values of each, they are
-    the same.
-    """
-    return all(
-        (i + b) * (1 - d * (n - j)) - (j - 1 + b) * (1 - d * (n - i - 1)) == (i + 1 - j) * (1 - d * (n - 1) - b * d)
-        for n, i, j, b, d in itertools.product(range(4), repeat=5)
-    )
-
-
 def scaling_conditions() -> Claim:
     """Judge (21), (22), which a small enough b must satisfy; section 3.1's b is beside them."""
     bound = largest_b(2, P, (P,))
+    # (21) is (i + 1 - j)(1 - d (n - 1) - b d) > 0, once multiplied out. Both sides have at most the degree 2 in each of
+    # n, i, j, b and d = d_inf: equal at four values of each, they are the same.
+    is_a_bound_on_b = all(
+        (i + b) * (1 - d * (n - j)) - (j - 1 + b) * (1 - d * (n - i - 1)) == (i + 1 - j) * (1 - d * (n - 1) - b * d)
+        for n, i, j, b, d in itertools.product(range(4), repeat=5)
+    )
     return Claim(
         place="Section 4.3, (21), (22)",
         statement="Every small enough b satisfies (21) and (22), whichever d_inf and v_j Theorem 1 allows.",
-        holds=is_a_bound_on_b() and math.isclose(bound, 1.0 / P - 1.0, rel_tol=1e-9),
+        holds=is_a_bound_on_b and math.isclose(bound, 1.0 / P - 1.0, rel_tol=1e-9),
         figures={"b": B, "largest_b": bound, "violated_count": len(list_violations(2, P, B, (P,)))},
     )
 

@@ -20,7 +20,7 @@ SECTIONS: list[Section] = [
     section("constants and reduced model", 0.2, model.claims),
     section("linearisation", 0.1, model.linearisation, model.law_equilibria),
     section("Hypotheses 1 to 3 kept and broken", 3.0, hypotheses.claims),
-    section("servos with a deadband", 5.0, hypotheses.velocity_servos),
+    section("servos with a deadband", 5.0, lambda: hypotheses.servo_claim(hypotheses.run_servos())),
     section("the law's gains", 0.5, gains.lqr_gains),
     section("where the loop rests", 4.0, gains.rest_claims),
     section("observability", 1.0, riccati.observability),

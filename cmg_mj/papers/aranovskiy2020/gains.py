@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import K_E, K_E_ROUNDING, printed_model
 from cmg_mj.papers.aranovskiy2020.rig import DT, PUSH_RECOVERY, replay_at_rest, run_loops
-from cmg_mj.papers.claim import Assumption, Claim
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.recorded import trace, trajectory_of
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
@@ -150,7 +150,7 @@ DURATION_S = 26.0
 AVERAGED_S = 6.0
 """The last so many seconds are averaged [s]; the slowest poles, -0.2 +- 0.29j 1/s, have then faded to 2 %."""
 BIAS_DEG = 0.5
-ASSUMED: Mapping[Assumption, str] = {"e": f"{BIAS_DEG:g} deg", "noise": PUSH_RECOVERY["noise"]}
+ASSUMED: Mapping[str, str] = {"e": f"{BIAS_DEG:g} deg", "noise": PUSH_RECOVERY["noise"]}
 
 TRUE_RATE = "the true rate, (8)"
 ESTIMATED = ['controller.angle_source="estimated"']

@@ -136,28 +136,22 @@ def inertia_of(plant: Plant) -> Inertia:
     return Inertia(*(M[i] for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
 
 
-def carried_momentum(plant: Plant, trajectory: Trajectory) -> np.ndarray:
-    """Return the momentum of gimbals and flywheels about the vertical, (n_ticks, ...) [N m s].
+def balanced_yaw_rate(plant: Plant, trajectory: Trajectory) -> np.ndarray:
+    """Body A's rate by conservation: no torque acts about the vertical, so I q_a' + what is carried stays [rad/s].
 
-    The gimbals' axis is b_x, whose vertical part is -sin q_b; the flywheels' is b_y cos q_c + b_z sin q_c, whose
-    vertical part is cos q_b sin q_c.
+    Gimbals and flywheels carry momentum. The gimbals' axis is b_x, whose vertical part is -sin q_b; the flywheels' is
+    b_y cos q_c + b_z sin q_c, whose vertical part is cos q_b sin q_c.
     """
     parts, names = inertia_of(plant), plant.joint_names
     tilt = trajectory[f"angle/{names[plant.tilt]}_rad"]
-    total = np.zeros_like(tilt)
+    momentum = np.zeros_like(tilt)
     for module in plant.axis.modules:
         angle = trajectory[f"angle/{names[module.gimbal]}_rad"]
         turning = trajectory[f"rate/{names[module.gimbal]}_rad_s"]
         spinning = trajectory[f"rate/{names[module.flywheel]}_rad_s"]
-        total = total - parts.gimbal * turning * np.sin(tilt)
-        total = total + parts.spin * spinning * np.cos(tilt) * np.sin(angle)
-    return total
-
-
-def balanced_yaw_rate(plant: Plant, trajectory: Trajectory) -> np.ndarray:
-    """Body A's rate by conservation: no torque acts about the vertical, so I q_a' + carried stays [rad/s]."""
-    momentum = carried_momentum(plant, trajectory)
-    return (momentum[0] - momentum) / inertia_of(plant).yaw
+        momentum = momentum - parts.gimbal * turning * np.sin(tilt)
+        momentum = momentum + parts.spin * spinning * np.cos(tilt) * np.sin(angle)
+    return (momentum[0] - momentum) / parts.yaw
 
 
 def predict_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajectory) -> np.ndarray:
@@ -353,9 +347,9 @@ def in_velocity_mode(plant: Plant, deadband: float, lag_s: float = LAG_S) -> Non
     model = plant.model
     for module in plant.axis.modules:
         i = module.servo
-        dof = int(model.jnt_dofadr[module.gimbal])
+        dof = model.jnt_dofadr[module.gimbal]
         kv = model.dof_M0[dof] / lag_s
-        model.actuator_dyntype[i] = int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
+        model.actuator_dyntype[i] = mujoco.mjtDyn.mjDYN_FILTEREXACT
         model.actuator_dynprm[i, 0] = COMMAND_LAG_S
         model.actuator_gainprm[i, 0] = kv
         model.actuator_biasprm[i, :3] = 0.0, 0.0, -kv
@@ -397,11 +391,6 @@ def measure_tracking(result: Result) -> Interval | None:
     command[-1] = run["u_rad_s"][ends[-2] : ends[-1]].mean(axis=0)
     relative_errors = np.sqrt(np.mean((rates - command) ** 2, axis=0) / np.mean(command**2, axis=0))
     return known_interval(np.where(result.stood, relative_errors, np.nan))
-
-
-def velocity_servos() -> Claim:
-    """Judge whether the commanded velocity can be taken for the gimbal's."""
-    return servo_claim(run_servos())
 
 
 def servo_claim(servos: Servos) -> Claim:

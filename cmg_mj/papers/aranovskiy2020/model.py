@@ -55,7 +55,7 @@ def residuals(states: int = STATES, seed: int = SEED) -> dict[str, float]:
     """
     plant = load_plant(equilibrium_bias_deg=0.0)
     model, reduced, first = copy(plant.model), plant.reduced, plant.axis.modules[0]
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
     data, rng, rows = mujoco.MjData(model), np.random.default_rng(seed), []
     for _ in range(states):
         x1, x3 = rng.uniform(-0.4, 0.4), rng.uniform(-1.2, 1.2)

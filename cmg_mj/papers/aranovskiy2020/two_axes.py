@@ -63,10 +63,10 @@ class Addresses(NamedTuple):
 def addresses(model: mujoco.MjModel, axis: int) -> Addresses:
     """Find those of pitch, driven by the first two cubes, or of roll, by the others."""
     cubes = (2 * axis, 2 * axis + 1)
-    tilt = int(model.joint(AXES[axis]).qposadr[0])
-    gimbals = [int(model.joint(f"c{i}/gimbal").qposadr[0]) for i in cubes]
-    servos = [int(model.actuator(f"c{i}/gimbal_servo").id) for i in cubes]
-    wheels = [int(model.joint(f"c{i}/flywheel").dofadr[0]) for i in cubes]
+    tilt = model.joint(AXES[axis]).qposadr[0]
+    gimbals = [model.joint(f"c{i}/gimbal").qposadr[0] for i in cubes]
+    servos = [model.actuator(f"c{i}/gimbal_servo").id for i in cubes]
+    wheels = [model.joint(f"c{i}/flywheel").dofadr[0] for i in cubes]
     data = at_rest(model)
     data.qpos[gimbals] -= math.pi / 2.0  # the wheel's momentum lies along the tilt axis: u > 0 turns it away
     M = mass_matrix(model, data)
@@ -112,7 +112,7 @@ def run(pushes_n_m: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     laws = [StateFeedback(DT, lqr_gains(reduced(model, axis), WEIGHTS, 1.0)) for axis in range(2)]  # type: ignore[arg-type]
     integrators, steps = [0.0, 0.0], round(DT / model.opt.timestep)
     tilts, momenta = [], []
-    torso = int(model.body("torso").id)
+    torso = model.body("torso").id
     for tick in range(round(DURATION_S / DT)):
         pushing = PUSH_FROM_S <= tick * DT < PUSH_FROM_S + PUSH_S - 1e-9
         for axis, (places, law) in enumerate(zip(axes, laws, strict=True)):

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from cmg_mj.papers.claim import Assumption, Claim
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.observer import Array, FriedlandTacker
 from cmg_mj.view.plots.figure import Line, Panel, Picture
@@ -20,7 +20,7 @@ SIGMAS = (*paper.SIGMAS, 10_000.0)
 SETTLED = 0.1
 """Settled: the errors of theta1, theta2 and d, as a vector of their numbers in the units of Fig. 3, stay below this."""
 
-ASSUMED: Mapping[Assumption, str] = {"initial values": "ten motions", "duration": "200 s"}
+ASSUMED: Mapping[str, str] = {"initial values": "ten motions", "duration": "200 s"}
 UNSTATED = (
     "The paper gives neither time span nor initial values: ten motions with angles within half a turn and rates within "
     "2 rad/s, observers started from zero, 200 s, with the corrected L = -[1; 1]."
@@ -268,7 +268,7 @@ def settling_order(study: Study) -> Claim:
     times, early = (exogenous_settle_times(study.proposed, band)[:3] for band in (SETTLED, 1.0))
     ten, thousand, tenth = times
     in_order = (thousand < ten) & (ten <= tenth) & np.isfinite(thousand)
-    faster_early, n = int(np.sum(early[1] < early[0])), len(ten)
+    faster_early, n = np.sum(early[1] < early[0]), len(ten)
     meaning = (
         f"{UNSTATED} Settled means that the errors of (theta1, theta2, d), as a vector of their "
         f"numbers in 1/s^2, 1/(kg m^2) and rad/s^2, stay below {SETTLED}. The "
@@ -288,7 +288,7 @@ def settling_order(study: Study) -> Claim:
         holds=in_order.sum() >= 0.9 * n,
         conditions=meaning,
         figures={f"settles_below_0_1_sigma_{sigma:g}_s": row for sigma, row in zip(paper.SIGMAS, times, strict=True)}
-        | {"motions_ordered": int(in_order.sum()), "motions_faster_into_band_1_at_1000": faster_early, "motions": n},
+        | {"motions_ordered": in_order.sum(), "motions_faster_into_band_1_at_1000": faster_early, "motions": n},
         pictures=[Picture("dao2023-fig-3", title, panels)],
     )
 

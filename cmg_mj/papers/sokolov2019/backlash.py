@@ -110,7 +110,7 @@ def predict_cycle(observer: str) -> Cycle | None:
     def turning(c: float) -> tuple[complex, np.ndarray]:
         """Return the least damped motion that turns forward faster than 1 rad/s: its factor a period, its shape."""
         factors, shapes = np.linalg.eig(loop(servo, share=describing_function(c)))
-        index = int(np.argmax(np.where(np.angle(factors) > dt, np.abs(factors), 0.0)))
+        index = np.argmax(np.where(np.angle(factors) > dt, np.abs(factors), 0.0))
         return complex(factors[index]), shapes[:, index]
 
     def growth(c: float) -> float:

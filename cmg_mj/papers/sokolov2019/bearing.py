@@ -220,8 +220,3 @@ def _picture(runs: Study, plant: Plant) -> Picture:
     ]
     title = "sokolov2019, Fig. 2: one gimbal on its thrust bearing, the exact rate in the law, a push at 1 s"
     return Picture("sokolov2019-bearing", title, panels, columns=2)
-
-
-def bearing_claim() -> Claim:
-    """Judge Fig. 2."""
-    return claim(study())

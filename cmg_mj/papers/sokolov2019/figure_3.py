@@ -11,7 +11,7 @@ from scipy.signal import lsim, lti
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.replay import replay
 from cmg_mj.observers import Observer
-from cmg_mj.papers.claim import Assumption, Claim, OnShare
+from cmg_mj.papers.claim import Claim, OnShare
 from cmg_mj.papers.recorded import open_loop_panels, rms, trace, trajectory_of
 from cmg_mj.papers.retuned import Pushes, Studies, figures_of, tune_all
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS, TABLE_II
@@ -25,7 +25,7 @@ from cmg_mj.view.plots.figure import Picture
 SEED, WORLDS = 82_000, 20
 AFTER_S = 0.5
 """The push's window ends so long after the push."""
-ASSUMED: Mapping[Assumption, str] = {**PUSH_AND_NOISE, "e": "0.5 deg"}
+ASSUMED: Mapping[str, str] = {**PUSH_AND_NOISE, "e": "0.5 deg"}
 WITH_Y2 = "luenberger and y2"
 L1, L2 = (row[0] for row in TABLE_II["luenberger"]["L"][:2])
 """Gains of (9) on y1 less its estimate [1/s, 1/s^2]."""
@@ -104,7 +104,7 @@ def y2_reaches_the_rate(prepared: Experiment) -> float:
 def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
     """Judge Fig. 3: (9) must be worse than an estimate of zero and than the others, beyond chance."""
     (push,) = tuning.prepared.scenario.push
-    at_end = int(np.argmin(np.abs(tuning.trajectory["time_s"] - push.end_s)))
+    at_end = np.argmin(np.abs(tuning.trajectory["time_s"] - push.end_s))
     return Claim(
         place="Fig. 3",
         statement="At the push, (9) fails completely to estimate x2.",

@@ -195,7 +195,7 @@ def lag_thresholds(sweeps: Mapping[str, Sweep]) -> dict[str, Threshold]:
     thresholds: dict[str, Threshold] = {}
     servo = read_servo(experiment().plant)
     for observer, (lags, sustained, _) in sweeps.items():
-        first = int(np.argmax(sustained))
+        first = np.argmax(sustained)
         if not sustained.any():
             thresholds[observer] = lags[-1], None
         elif first == 0:
@@ -203,7 +203,7 @@ def lag_thresholds(sweeps: Mapping[str, Sweep]) -> dict[str, Threshold]:
         else:
             grid = np.linspace(lags[first - 1], lags[first], PARTS + 1)
             refined = releases({observer: [servo.damp(lag) for lag in grid[1:]]})[observer]
-            i = int(np.argmax(is_sustained(refined)))  # the last of them is the sweep's own
+            i = np.argmax(is_sustained(refined))  # the last of them is the sweep's own
             thresholds[observer] = grid[i], grid[i + 1]
     return thresholds
 

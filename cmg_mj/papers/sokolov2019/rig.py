@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from cmg_mj.observers import Observer, make_observer
-from cmg_mj.papers.claim import Assumption
 from cmg_mj.papers.sokolov2019.paper import TABLE_II
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -21,7 +20,7 @@ NO_NOISE = (
     "sensors.fog.angle_random_walk_deg_rth=0.0",
 )
 
-PUSH_AND_NOISE: Mapping[Assumption, str] = {"push": "0.5 N m for 0.1 s", "noise": "400 ug/rtHz"}
+PUSH_AND_NOISE: Mapping[str, str] = {"push": "0.5 N m for 0.1 s", "noise": "400 ug/rtHz"}
 """Data of its experiments that the paper does not give, beside e: the scenario single_gimbal."""
 
 FINE = "plant.timestep_s=0.001"
@@ -80,7 +79,7 @@ def read_servo(plant: Plant) -> Servo:
     """Read the gimbal servo off the model file."""
     (servo,) = plant.axis.servos
     (module,) = plant.axis.modules
-    dof = int(plant.model.jnt_dofadr[module.gimbal])
+    dof = plant.model.jnt_dofadr[module.gimbal]
     return Servo(
         float(plant.model.actuator_gainprm[servo, 0]),
         float(-plant.model.actuator_biasprm[servo, 2]),
@@ -90,5 +89,4 @@ def read_servo(plant: Plant) -> Servo:
 
 def make_rig(settings: PlantSettings, servo: Servo) -> Plant:
     """Load the rig with another servo."""
-    servo_settings = {"servo_stiffness_n_m_rad": servo.kp, "servo_damping_n_m_s_rad": servo.kv}
-    return load_plant(replace(settings, **servo_settings))
+    return load_plant(replace(settings, servo_stiffness_n_m_rad=servo.kp, servo_damping_n_m_s_rad=servo.kv))

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.papers.claim import Assumption, Claim
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.recorded import loop_picture, on_common_scales, trajectory_of
 from cmg_mj.papers.sokolov2019 import lag
 from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN, Cycles, cycles, peak_frequency
@@ -110,7 +110,7 @@ def is_better(a: Result, b: Result, key: str = VELOCITY) -> bool:
 
 # --- Figs 4 to 6 --------------------------------------------------------------------------------------------
 
-LET_GO: Mapping[Assumption, str] = {
+LET_GO: Mapping[str, str] = {
     "backlash": f"{GAP_ARCMIN:g} arcmin",
     "friction": "it holds the gimbal in the gap",
 }
@@ -118,7 +118,7 @@ HELD = (
     f"With {GAP_ARCMIN:g} arcmin of backlash behind the servo's motor, as its datasheet has it, and friction that "
     "holds the gimbal in the gap. The paper mentions neither."
 )
-ALL_SETTINGS: Mapping[Assumption, str] = {
+ALL_SETTINGS: Mapping[str, str] = {
     **PUSH_AND_NOISE,
     "e": f"up to {max(BIASES_DEG):g} deg",
     "backlash": f"0 and {GAP_ARCMIN:g} arcmin",
