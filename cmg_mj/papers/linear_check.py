@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.papers.recorded import largest_size
 
 
 def rank_margin(matrix: np.ndarray) -> float:
@@ -42,7 +43,7 @@ def finite_difference_error(model: ReducedModel) -> float:
     zero, h = np.zeros(3), 1e-5
     A = np.column_stack([(f(h * axis, 0.0) - f(-h * axis, 0.0)) / (2.0 * h) for axis in np.eye(3)])
     B = ((f(zero, h) - f(zero, -h)) / (2.0 * h))[:, None]
-    return max(np.abs(A - model.A).max() / np.abs(A).max(), np.abs(B - model.B).max() / np.abs(B).max())
+    return max(largest_size(A - model.A) / largest_size(A), largest_size(B - model.B) / largest_size(B))
 
 
 def model_difference(model: ReducedModel, reference: ReducedModel) -> float:
@@ -93,7 +94,7 @@ def law_rests(model: ReducedModel, K_e: Sequence[float], static: int, integral: 
     rest, poles = equilibrium(model.A, model.B, K[:3], 1.0)
     rest_e, poles_e = equilibrium(model.A_e, model.B_e, K, 1.0)
     x3, x_e = K[0] / K[2], K[0] / K[3]
-    miss = max(np.abs(rest - [0.0, 0.0, x3]).max() / abs(x3), np.abs(rest_e - [0.0, 0.0, 0.0, x_e]).max() / x_e)
+    miss = max(largest_size(rest - [0.0, 0.0, x3]) / abs(x3), largest_size(rest_e - [0.0, 0.0, 0.0, x_e]) / x_e)
     return miss < 1e-9 and max(np.real(poles).max(), np.real(poles_e).max()) < 0.0, {
         f"gimbal_rest_of_{static}_rad_per_rad": rest[2],
         f"integrator_rest_of_{integral}_s_per_rad": rest_e[3],

@@ -31,6 +31,11 @@ def rms(values: np.ndarray) -> np.ndarray:
     return np.sqrt(np.mean(values**2, axis=0))
 
 
+def largest_size(values: np.ndarray) -> float:
+    """Return the largest absolute value."""
+    return np.abs(values).max()
+
+
 def trace(run: Trajectory, column: str, label: str = "", **style: Any) -> Line:
     """Draw a column of one world over the time, angles in degrees."""
     values = run[column]

@@ -11,6 +11,7 @@ import numpy as np
 
 from cmg_mj.core.arrays import Scalar, clip, signed_power
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.recorded import largest_size
 
 # --- andrieu2009 as printed: system (1), and the bioreactor's and its observers' parameters of section 3 ---
 
@@ -112,7 +113,7 @@ class Bioreactor:
     @cached_property
     def df2_max(self) -> float:
         """df_2max: the largest |df2/dx2| over M_u x M_x, for the constant gain."""
-        return np.abs(self.f2_slope(*self.domain(120))).max()
+        return largest_size(self.f2_slope(*self.domain(120)))
 
     def Omega1(self, u: Array, x1: Array, x2_hat: Array) -> Array:
         """Return Omega_1, for the updated gain: the largest |slope of a secant of f2 from x2_hat|.
@@ -215,8 +216,8 @@ def coordinate_errors(hbar: float) -> tuple[float, float]:
     slope1, slope2 = reactor.slope(eta1, eta2, u)
     ahead, behind = (reactor.to_x2(eta1 + h * slope1, eta2 + h * slope2) for h in (span, -span))
     numeric_slope = (ahead - behind) / (2.0 * span)
-    error = np.abs(reactor.f2(u, eta1, x2) - numeric_slope).max() / np.abs(numeric_slope).max()
-    return error, np.abs(reactor.to_eta2(eta1, x2) / eta2 - 1.0).max()
+    error = largest_size(reactor.f2(u, eta1, x2) - numeric_slope) / largest_size(numeric_slope)
+    return error, largest_size(reactor.to_eta2(eta1, x2) / eta2 - 1.0)
 
 
 def coordinates() -> Claim:

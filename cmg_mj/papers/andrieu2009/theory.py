@@ -17,6 +17,7 @@ from cmg_mj.papers.andrieu2009 import bioreactor
 from cmg_mj.papers.andrieu2009.bioreactor import B, P
 from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, largest_b, list_violations, weights
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.recorded import largest_size
 
 # --- Sections 1 and 2: the increments of f2 of system (1), their bounds (2), (3), and the exponent in (6) ---
 
@@ -204,8 +205,8 @@ def limits_error(correction: BiLimitCorrection, scale: float) -> float:
     dilated = correction(e1 / scale), correction(scale ** r[0] * e1)
     for i, l_i in enumerate(correction.l):
         linear, power = l_i * linear, signed_power(l_i * power, r[i + 1] / r[i])
-        errors.append(np.abs(scale * dilated[0][i] + linear).max() / np.abs(linear).max())
-        errors.append(np.abs(dilated[1][i] / scale ** r[i + 1] + power).max() / np.abs(power).max())
+        errors.append(largest_size(scale * dilated[0][i] + linear) / largest_size(linear))
+        errors.append(largest_size(dilated[1][i] / scale ** r[i + 1] + power) / largest_size(power))
     return max(errors)
 
 

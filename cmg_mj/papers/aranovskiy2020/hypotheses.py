@@ -16,7 +16,7 @@ import numpy as np
 from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, push_recovery, run_on_rigs
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix
-from cmg_mj.papers.recorded import push_intervals, rms, trace, trajectory_of
+from cmg_mj.papers.recorded import largest_size, push_intervals, rms, trace, trajectory_of
 from cmg_mj.plant.elements import Module
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.intervals import Interval, known_interval, ratio_interval
@@ -223,7 +223,7 @@ def _largest_deg(angle: np.ndarray) -> float:
 
 def symmetric_claim(runs: MismatchRuns) -> Claim:
     """Judge Hypotheses 1 and 2 kept."""
-    turn = np.degrees(np.abs(trajectory_of(runs.symmetric)["angle/yaw_rad"]).max())
+    turn = np.degrees(largest_size(trajectory_of(runs.symmetric)["angle/yaw_rad"]))
     return Claim(
         place="Hypotheses 1 and 2",
         statement="With symmetric gimbals, flywheels and commands no torque acts on body A: it stands still.",
@@ -288,9 +288,9 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
 
     speeds = np.stack([np.abs(rate(module.flywheel)) for module in modules])
     nominal = abs(modules[0].speed)
-    speed_error = np.abs(speeds - nominal).max()
-    gimbal = max(np.abs(rate(module.gimbal)).max() for module in modules)
-    tilt = np.abs(run["x2_rad_s"]).max()
+    speed_error = largest_size(speeds - nominal)
+    gimbal = max(largest_size(rate(module.gimbal)) for module in modules)
+    tilt = largest_size(run["x2_rad_s"])
     spin_up = np.gradient(speeds[0], run["time_s"], axis=0)
     D = model.J1 + model.J2 * np.sin(run["x3_rad"]) ** 2
     omitted_term = model.J_d * np.sin(run["x3_rad"]) * spin_up / D

@@ -30,6 +30,7 @@ from cmg_mj.papers.aranovskiy2020.paper import H_0, OBSERVERS, A_prime, C, Q, da
 from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import rank_margin
+from cmg_mj.papers.recorded import largest_size
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.benchmark import time_of_update
 from cmg_mj.view.plots.figure import Line, Panel, Picture
@@ -196,7 +197,7 @@ def misprint_claim(H: np.ndarray, printed_H: np.ndarray, rate: Comparison) -> Cl
             "H12_printed": printed_H[0, 1],
             "H21_printed": printed_H[1, 0],
             "H12": H[0, 1],
-            "largest_change_of_gain_share": np.abs((printed_H - H)[:, ::2]).max() / np.abs(H[:, ::2]).max(),
+            "largest_change_of_gain_share": largest_size((printed_H - H)[:, ::2]) / largest_size(H[:, ::2]),
             "rate_changed_rad_s": rate.difference,
             "rate_error_rad_s": rate.error,
             "rate_error_printed_rad_s": rate.other_error,

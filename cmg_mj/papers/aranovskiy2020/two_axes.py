@@ -16,6 +16,7 @@ from cmg_mj.papers.aranovskiy2020.paper import TABLE_1
 from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix
+from cmg_mj.papers.recorded import largest_size
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 AXES = ("pitch", "roll")
@@ -143,14 +144,14 @@ class Coupling(NamedTuple):
     @property
     def share(self) -> float:
         """Largest change by the other axis, by the largest tilt."""
-        return np.abs(self.joint_tilts - self.single_tilts).max() / np.abs(self.single_tilts).max()
+        return largest_size(self.joint_tilts - self.single_tilts) / largest_size(self.single_tilts)
 
 
 def coupling(push_n_m: float) -> Coupling:
     """Push both, then either."""
     tilts, vertical = run((push_n_m, push_n_m))
     pitch, roll = run((push_n_m, 0.0))[0], run((0.0, push_n_m))[0]
-    return Coupling(tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), np.abs(vertical).max())
+    return Coupling(tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), largest_size(vertical))
 
 
 def one_axis_at_a_time() -> Claim:
@@ -175,7 +176,7 @@ def axes_claim(couplings: dict[float, Coupling]) -> Claim:
         "torque about the vertical when the other axis moves. The ground must take this torque.",
         figures={
             "push_n_m": list(couplings),
-            "largest_tilt_deg": [np.degrees(np.abs(c.single_tilts).max()) for c in couplings.values()],
+            "largest_tilt_deg": [np.degrees(largest_size(c.single_tilts)) for c in couplings.values()],
             "vertical_torque_n_m": [c.vertical_n_m for c in couplings.values()],
             "changed_by_the_other_axis_share": [c.share for c in couplings.values()],
         },

@@ -22,7 +22,7 @@ import numpy as np
 from cmg_mj.laws import StateFeedback
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix, poles_as_pairs
-from cmg_mj.papers.recorded import push_intervals, rms, trace, trajectory_of
+from cmg_mj.papers.recorded import largest_size, push_intervals, rms, trace, trajectory_of
 from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, experiment, read_servo
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.intervals import mean_interval
@@ -170,9 +170,9 @@ def stiffness() -> dict[str, float | list]:
 def claim(runs: Study) -> Claim:
     """Judge the thrust bearing, which the model of one tilt angle leaves out."""
     plant, worlds = experiment([BALANCED]).plant, len(runs.locked)
-    error = max(np.abs(vertical_torque(plant, run.motion) - run.torque).max() for run in runs.locked)
-    peak = mean_interval([np.abs(run.torque_between(1.0, 1.6)).max() for run in runs.locked])
-    pair = np.abs(runs.pair.torque).max()
+    error = max(largest_size(vertical_torque(plant, run.motion) - run.torque) for run in runs.locked)
+    peak = mean_interval([largest_size(run.torque_between(1.0, 1.6)) for run in runs.locked])
+    pair = largest_size(runs.pair.torque)
     free = {
         case: {
             "fell_fraction": result.fell.mean(),
@@ -189,7 +189,7 @@ def claim(runs: Study) -> Claim:
         "vertical, and the law lets the rig fall.",
         figures={
             "peak_torque_at_push_n_m": peak,
-            "peak_of_the_mean_torque_n_m": np.abs(runs.mean_torque).max(),
+            "peak_of_the_mean_torque_n_m": largest_size(runs.mean_torque),
             "rms_torque_before_push_n_m": mean_interval([rms(run.torque_between(0.5, 1.0)) for run in runs.locked]),
             "closed_form_error_n_m": error,
             "peak_torque_of_the_pair_n_m": pair,

@@ -19,7 +19,7 @@ from cmg_mj.papers.linear_check import (
     model_difference,
     poles_as_pairs,
 )
-from cmg_mj.papers.recorded import trajectory_of
+from cmg_mj.papers.recorded import largest_size, trajectory_of
 from cmg_mj.papers.sokolov2019 import paper
 from cmg_mj.papers.sokolov2019.rig import NO_NOISE, experiment, read_servo
 from cmg_mj.plant.plant import Plant
@@ -47,7 +47,7 @@ def equation_residual(plant: Plant, model: ReducedModel, states: int, seed: int)
         dw = rng.uniform(-100.0, 100.0, 3)
         data.qpos[:], data.qvel[:], data.qacc[:] = q, w, dw
         mujoco.mj_inverse(plant.model, data)
-        largest = max(largest, np.abs(data.qfrc_inverse - paper.torques(model, I_cd, q, w, dw)).max())
+        largest = max(largest, largest_size(data.qfrc_inverse - paper.torques(model, I_cd, q, w, dw)))
     return largest
 
 
@@ -95,7 +95,7 @@ def find_rest(observer: str, e_deg: float, angles: str) -> tuple[float, float, f
     settings = [*NO_NOISE, f"plant.equilibrium_bias_deg={e_deg}", "plant.initial_tilt_deg=0.1", "push=[]"]
     result = experiment([*settings, f"duration_s={REST_S}", f"controller.angle_source={angles}"], observer).run()
     last = trajectory_of(result).between(REST_S - 1.0, REST_S)
-    x = max(np.abs(last[name]).max() for name in ("x1_rad", "x2_rad_s", "x3_rad"))
+    x = max(largest_size(last[name]) for name in ("x1_rad", "x2_rad_s", "x3_rad"))
     return x, last[f"estimate/{observer}/x2_rad_s"].mean(), last["x_e_rad_times_s"].mean()
 
 
