@@ -251,21 +251,21 @@ def claims() -> list[Claim]:
 # --- Fig. 1: the local incremental rate of f2 and its three estimates ---
 
 
-def by_window(run: Run, replays: Replays, field: str) -> np.ndarray:
+def by_window(study: Study, replays: Replays, field: str) -> np.ndarray:
     """Return the mean of a field of `Replay`, (3 observers, 4 windows)."""
-    return np.array([window_means(run, getattr(replays[kind], field)) for kind in KINDS])
+    return np.array([window_means(study.run, getattr(replays[kind], field)) for kind in KINDS])
 
 
 def ordered_rates(study: Study) -> tuple[np.ndarray, np.ndarray]:
     """Return the means of `RATES` over windows and seeds, (4 rates, 4 windows), and the windows in order."""
-    means = np.vstack([by_window(study.run, study.nominal, "rate"), window_means(study.run, study.rate)])
+    means = np.vstack([by_window(study, study.nominal, "rate"), window_means(study.run, study.rate)])
     return means, np.all(np.diff(means, axis=0) <= 0.0, axis=0)
 
 
 def figure_1(study: Study) -> Claim:
     """Judge the estimates of the local incremental rate."""
     means, in_order = ordered_rates(study)
-    gains = by_window(study.run, study.nominal, "L")[1:]
+    gains = by_window(study, study.nominal, "L")[1:]
     curves = [*(study.nominal[kind].rate[:, 0] for kind in KINDS), study.rate[:, 0]]
     middles = [(start + end) / 2.0 for start, end in WINDOWS]
 
@@ -339,7 +339,7 @@ def figure_2(study: Study) -> Claim:
 
 def bias(study: Study) -> Claim:
     """Judge the order of the biases in Fig. 2."""
-    noisy, quiet = (by_window(study.run, replays, "eta2_error") for replays in (study.nominal, study.quiet))
+    noisy, quiet = (by_window(study, replays, "eta2_error") for replays in (study.nominal, study.quiet))
     return Claim(
         place="Section 3.1, bias in Fig. 2",
         statement="The larger an observer's estimate of the rate, the larger the bias of its error.",
@@ -351,7 +351,7 @@ def bias(study: Study) -> Claim:
 
 def bias_left(study: Study) -> np.ndarray:
     """Return the share of the bias that is left where the observers know hbar, (3 observers, 4 windows)."""
-    exact, nominal = (by_window(study.run, replays, "eta2_error") for replays in (study.exact, study.nominal))
+    exact, nominal = (by_window(study, replays, "eta2_error") for replays in (study.exact, study.nominal))
     return np.abs(exact / nominal)
 
 
@@ -392,7 +392,7 @@ def spread(study: Study) -> Claim:
     # About a straight line through each window, mean over the seeds.
     windows = [windows_of(study.run, study.nominal[kind].eta2_error) for kind in KINDS]
     spreads = np.array([[detrend(part, axis=0).std(axis=0).mean() for part in parts] for parts in windows])
-    rates = by_window(study.run, study.nominal, "rate")
+    rates = by_window(study, study.nominal, "rate")
 
     def correlation(columns: slice) -> float:
         a, b = rates[:, columns].ravel().round(6), spreads[:, columns].ravel()

@@ -157,11 +157,6 @@ SEEN_RAD_S = 0.01
 """Biases of the rate above this one are compared with the closed form by their ratio, those below by the difference."""
 
 
-def remaining_error(alpha: float, dt: float) -> float:
-    """Return what is left after 3 s of a wrong rate of -1 rad/s at rest: the last 0.5 s' largest [rad/s]."""
-    return rates_at_rest(alpha, dt, 3.0, x1=0.05, x2=-1.0)[-round(0.5 / dt) :].max()
-
-
 def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
     """Return the RMS of the rate estimated at rest, (n_worlds,) [rad/s], from y1, (n_ticks, n_worlds) [rad]."""
     observer = make_observer("homogeneous", DT, printed_model(), alpha=alpha)
@@ -177,7 +172,11 @@ def bias_bound(alpha: float, e_rad: float) -> float:
 
 def vicinity(seed: int = SEED) -> Claim:
     """Judge convergence to a vicinity of the origin, and how large it is."""
-    errors, fine_errors = ({alpha: remaining_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
+    # What is left after 3 s of a wrong rate of -1 rad/s at rest: the last 0.5 s' largest.
+    errors, fine_errors = (
+        {a: rates_at_rest(a, dt, 3.0, x1=0.05, x2=-1.0)[-round(0.5 / dt) :].max() for a in ALPHAS}
+        for dt in (DT, DT / 10.0)
+    )
     # Sampled, (11) chatters with an amplitude that falls as dt^(alpha/(1 - alpha)), by homogeneity.
     converges = all(errors[a] < VANISHED or fine_errors[a] < errors[a] / 10.0 for a in ALPHAS)
     biases, noise = np.radians(BIASES_DEG), np.random.default_rng(seed).normal(0.0, 1.0, (TICKS, 16))

@@ -321,19 +321,13 @@ def claim(results: Lags) -> Claim:
     )
 
 
-def _growth(observer: str, lags_s: np.ndarray) -> list[float]:
-    """Return the growth of the tilt's oscillation over the servo lag [1/s]."""
-    loop, servo, dt = linearise(observer)
-    return [oscillation(loop(servo.damp(lag)), dt).real for lag in lags_s]
-
-
 def _picture(results: Lags) -> Picture:
     grid, x_label = np.linspace(5e-3, 0.07, 66), "servo lag [ms]"
-    rates = [
-        Line(1e3 * grid, _growth(name, grid), f"{OBSERVERS[name]} {name}", color=name)
-        for name in ("linear", "luenberger")
-    ]
-    rates.append(Line([5.0, 70.0], [0.0, 0.0], style="k:", width=0.8))
+    rates = [Line([5.0, 70.0], [0.0, 0.0], style="k:", width=0.8)]
+    for name in ("linear", "luenberger"):
+        loop, servo, dt = linearise(name)
+        growth = [oscillation(loop(servo.damp(lag)), dt).real for lag in grid]
+        rates.insert(-1, Line(1e3 * grid, growth, f"{OBSERVERS[name]} {name}", color=name))
     tilts = [
         Line(1e3 * s.lags_s, s.amplitude_deg, f"{OBSERVERS[name]} {name}", "os^"[i] + "-", color=name)
         for i, (name, s) in enumerate(results.sweeps.items())
