@@ -59,7 +59,7 @@ class Claim:
 
     place: str
     statement: str
-    holds: bool | Mapping[str, bool]
+    holds: bool | np.bool_ | Mapping[str, bool]
     assumes: Mapping[str, str] = field(default_factory=dict)
     is_general: bool = False
     missing_data: str = ""

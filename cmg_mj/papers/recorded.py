@@ -26,7 +26,7 @@ def push_intervals(trajectory: Trajectory) -> list[tuple[float, float]]:
     return [(times[0], times[-1])] if len(times) else []
 
 
-def rms(values: np.ndarray) -> np.ndarray:
+def rms(values: np.ndarray) -> Any:
     """Return the root of the mean square over the ticks, (n_ticks, ...) -> (...)."""
     return np.sqrt(np.mean(values**2, axis=0))
 

@@ -104,7 +104,7 @@ def decay(alpha: float) -> Decay:
 
 def time_below(times: np.ndarray, rate: np.ndarray) -> float:
     """Return the time from which a rate stays below `SEEN` [s]."""
-    return times[np.flatnonzero(np.abs(rate) > SEEN)[-1] + 1]
+    return float(times[np.flatnonzero(np.abs(rate) > SEEN)[-1] + 1])
 
 
 def finite_time() -> Claim:

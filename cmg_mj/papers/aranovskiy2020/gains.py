@@ -248,7 +248,7 @@ def laws_claim(rest: Rest, static: Rest) -> Claim:
 def observers_claim(rests: Mapping[str, Rest]) -> Claim:
     """Judge the rests by case, with an observer in the law, which the bias biases."""
     example = rests[TRUE_RATE].example
-    sigma = np.std(example["y1_rad"] - example["x1_rad"])
+    sigma = float(np.std(example["y1_rad"] - example["x1_rad"]))
     figures, at_zero = {}, []
     for case in list(CASES)[1:]:
         rest, expected = rests[case], expected_integrator(CASES[case][0], sigma)

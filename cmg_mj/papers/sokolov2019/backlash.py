@@ -70,7 +70,7 @@ def peak_frequency(signals: np.ndarray, dt: float, taper: np.ndarray | float = 1
     """Find the peak of the spectrum of signals, (n_ticks, n_worlds), averaged over the worlds [Hz]."""
     padded = 8 * len(signals)
     spectrum = (np.abs(np.fft.rfft((signals.T * taper).T, padded, axis=0)) ** 2).mean(axis=1)
-    return np.fft.rfftfreq(padded, dt)[spectrum.argmax()]
+    return float(np.fft.rfftfreq(padded, dt)[spectrum.argmax()])
 
 
 def cycles() -> Cycles:

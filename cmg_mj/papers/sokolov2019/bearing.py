@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -145,7 +145,7 @@ def study(worlds: int = WORLDS, seed: int = SEED) -> Study:
     return Study(locked, pair, free)
 
 
-def stiffness() -> dict[str, float | list]:
+def stiffness() -> dict[str, Any]:
     """Read a free bearing's numbers off the model.
 
     Returns:
