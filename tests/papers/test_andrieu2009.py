@@ -26,8 +26,8 @@ from cmg_mj.papers.andrieu2009.figures import (
     simple_copy,
     study,
 )
-from cmg_mj.papers.aranovskiy2020.rig import push_recovery
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.pair import push_recovery
 from tests.papers.worlds import make_result
 
 SEEDS, FIRST = 6, 500

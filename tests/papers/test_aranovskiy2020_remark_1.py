@@ -16,7 +16,7 @@ from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.papers.aranovskiy2020 import forms_of_10, riccati
 from cmg_mj.papers.aranovskiy2020.paper import A_prime, C, Q, printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.riccati import transient
-from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
+from cmg_mj.papers.pair import DT, run_of_10
 from cmg_mj.results.trajectory import Trajectory
 
 SEED = 910_000

@@ -6,8 +6,8 @@ import numpy as np
 
 from cmg_mj.observers import make_observer
 from cmg_mj.observers.high_gain import HighGain, updated_gain
-from cmg_mj.papers.aranovskiy2020.rig import PUSH_RECOVERY, push_recovery, run_loops
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.pair import PUSH_RECOVERY, push_recovery, run_loops
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.result import Result

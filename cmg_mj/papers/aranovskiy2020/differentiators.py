@@ -11,8 +11,8 @@ import numpy as np
 from cmg_mj.core.arrays import signed_power
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT, replay_at_rest
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.pair import DT, replay_at_rest
 from cmg_mj.papers.recorded import largest_size, rms
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 

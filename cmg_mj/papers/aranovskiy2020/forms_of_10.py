@@ -15,7 +15,7 @@ from cmg_mj.features.replay import replay
 from cmg_mj.observers import Estimate, Measurement, Observer
 from cmg_mj.observers.ltv import LinearTimeVarying, State, exact_step, map_of_one
 from cmg_mj.papers.aranovskiy2020.paper import H_0, TABLE_2, A_prime, C, printed_model, riccati_slope
-from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
+from cmg_mj.papers.pair import DT, run_of_10
 from cmg_mj.papers.recorded import rms
 
 Method = Callable[[np.ndarray, np.ndarray, float], np.ndarray]

@@ -12,8 +12,8 @@ from scipy.optimize import minimize
 
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import K_E, K_E_ROUNDING, printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT, PUSH_RECOVERY, replay_at_rest, run_loops
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.pair import DT, PUSH_RECOVERY, replay_at_rest, run_loops
 from cmg_mj.papers.recorded import trace, trajectory_of
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory

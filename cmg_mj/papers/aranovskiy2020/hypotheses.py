@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, push_recovery, run_on_rigs
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix
+from cmg_mj.papers.pair import DURATION_S, PUSH_RECOVERY, push_recovery, run_on_rigs
 from cmg_mj.papers.recorded import largest_size, push_intervals, rms, trace, trajectory_of
 from cmg_mj.plant.elements import Module
 from cmg_mj.plant.plant import Plant, load_plant

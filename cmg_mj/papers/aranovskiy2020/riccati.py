@@ -27,9 +27,9 @@ from cmg_mj.papers.aranovskiy2020.forms_of_10 import (
     rk4_as_printed,
 )
 from cmg_mj.papers.aranovskiy2020.paper import H_0, OBSERVERS, A_prime, C, Q, damping, printed_model, settled_gains
-from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import rank_margin
+from cmg_mj.papers.pair import DT, SEED_OF_10, run_of_10
 from cmg_mj.papers.recorded import largest_size
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.benchmark import time_of_update

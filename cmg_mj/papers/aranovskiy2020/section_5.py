@@ -10,8 +10,8 @@ import numpy as np
 
 from cmg_mj.features.tuning.simulations import window_of
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, printed_model, settled_gains
-from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, PUSH_RECOVERY, push_recovery, run_loops
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.pair import DURATION_S, PUSH_RECOVERY, push_recovery, run_loops
 from cmg_mj.papers.recorded import loop_picture, on_common_scales, open_loop_panels, rms, trace, trajectory_of
 from cmg_mj.results.intervals import Interval, known_interval, mean_interval
 from cmg_mj.results.result import Result

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from cmg_mj.features.tuning import NoiseLevelResult
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.papers.aranovskiy2020.rig import run_loops
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.pair import run_loops
 from cmg_mj.papers.retuned import Pushes, Studies, figures_of, tune_all
 from cmg_mj.results.intervals import Interval, ratio_interval
 from cmg_mj.scenario.loading import load_scenario

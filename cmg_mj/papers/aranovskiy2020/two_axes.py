@@ -13,9 +13,9 @@ from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.inputs.files import find
 from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_1
-from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix
+from cmg_mj.papers.pair import DT
 from cmg_mj.papers.recorded import largest_size
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 

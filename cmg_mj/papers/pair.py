@@ -1,4 +1,4 @@
-"""The experiments of Section V on the six bodies: one way to set them up, and what is read off their runs."""
+"""The experiments on the scissored pair of six bodies: one way to set them up, and what is read off their runs."""
 
 from __future__ import annotations
 
