@@ -23,7 +23,7 @@ from cmg_mj.features.board.processor import run_on
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS as PAPER_OBSERVERS
-from cmg_mj.papers.aranovskiy2020.update_cost import PLAIN, RECORDED
+from cmg_mj.papers.aranovskiy2020.riccati import PLAIN, RECORDED
 from cmg_mj.results.result import Result
 from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare

@@ -86,16 +86,16 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
     try:
         for entry in entries:
             for section in sections[entry.paper]:
-                label, begin, seconds = f"{entry.paper}: {section.title}", done, section.seconds
+                label, span = f"{entry.paper}: {section.title}", section.seconds / total
 
-                def on_share(share: float, label: str = label, begin: float = begin, span: float = seconds) -> None:
-                    on_progress(label, (begin + share * span) / total)
+                def on_share(share: float, label: str = label, begin: float = done, span: float = span) -> None:
+                    on_progress(label, begin + share * span)
 
                 on_share(0.0)
                 start = time.perf_counter()
                 entry.claims += section.claims(on_share)
                 entry.seconds += time.perf_counter() - start
-                done += seconds
+                done += span
             entry.complete = True
     except KeyboardInterrupt:
         pass

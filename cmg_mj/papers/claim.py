@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
-from typing import Any, Literal
+from typing import Any
+
+import numpy as np
 
 from cmg_mj.view.plots.figure import Picture
 
@@ -19,29 +21,19 @@ VERDICTS = {
 }
 """Verdict -> its meaning: the rule of `Claim.verdict` in words."""
 
-Assumption = Literal[
-    "push",
-    "e",
-    "noise",
-    "drive",
-    "servo",
-    "backlash",
-    "bearing",
-    "body",
-    "mismatch",
-    "friction",
-    "control rate",
-    "method",
-    "gains",
-    "initial values",
-    "duration",
-    "signal",
-    "threshold",
-]
-"""An assumption of ours: a claim depends on it, and the paper does not print it."""
-
 OnShare = Callable[[float], None]
 """Called with the share of a section that is done."""
+
+
+def plain(value: Any) -> Any:
+    """Make figures what JSON can hold: text for names, lists for arrays, None for what is not finite."""
+    if isinstance(value, Mapping):
+        return {str(name): plain(inner) for name, inner in value.items()}
+    if type(value) in (list, tuple):  # an interval stays one
+        return [plain(inner) for inner in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,12 +45,13 @@ class Claim:
         statement: Statement of the paper there, in our words.
         holds: True if the figures confirm the claim, computed from them; or such a value for each of several
             measures, all of which must hold.
-        assumes: Assumptions of ours that the claim depends on, each with its size in a few words.
+        assumes: Assumptions of ours, which the paper does not print and the claim depends on, such as `push`, `noise`
+            or `method`, each with its size in a few words.
         is_general: Whether the statement is a general one, which was tried on some systems and not proved.
         missing_data: Data that the paper does not give and that decide the outcome, a whole sentence; empty if none.
         conditions: The misprint that was mended, or for which part it holds, a whole sentence; empty if neither.
         otherwise: Explanation where it does not hold, a whole sentence.
-        figures: The numbers found, by names that end in their unit, as JSON can hold them.
+        figures: The numbers found, by names that end in their unit; `plain` makes them what JSON can hold.
         pictures: Plots.
         is_ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
         measures: Measure -> true if the claim holds by it; empty if `holds` is one value.
@@ -66,8 +59,8 @@ class Claim:
 
     place: str
     statement: str
-    holds: bool | Mapping[str, bool]
-    assumes: Mapping[Assumption, str] = field(default_factory=dict)
+    holds: bool | np.bool_ | Mapping[str, bool]
+    assumes: Mapping[str, str] = field(default_factory=dict)
     is_general: bool = False
     missing_data: str = ""
     conditions: str = ""
@@ -81,6 +74,7 @@ class Claim:
         measures = self.holds if isinstance(self.holds, Mapping) else {}
         object.__setattr__(self, "measures", {name: bool(value) for name, value in measures.items()})
         object.__setattr__(self, "holds", all(measures.values()) if measures else bool(self.holds))
+        object.__setattr__(self, "figures", plain(self.figures))
 
     @property
     def verdict(self) -> str:
@@ -114,15 +108,15 @@ class Section:
     claims: Callable[[OnShare], list[Claim]]
 
 
-def obtain(parts: Sequence[Callable[[], Claim]], on_share: OnShare) -> list[Claim]:
-    """Obtain claims one by one, and report the share done before each."""
-    claims = []
-    for i, part in enumerate(parts):
-        on_share(i / len(parts))
-        claims.append(part())
-    return claims
+def section(title: str, seconds: float, *parts: Callable[[], Claim | list[Claim]]) -> Section:
+    """Make a section of parts that are obtained one by one; the share done is reported before each."""
 
+    def claims(on_share: OnShare) -> list[Claim]:
+        found = []
+        for i, part in enumerate(parts):
+            on_share(i / len(parts))
+            obtained = part()
+            found += obtained if isinstance(obtained, list) else [obtained]
+        return found
 
-def section(title: str, seconds: float, *parts: Callable[[], Claim]) -> Section:
-    """Make a section of claims that are obtained one by one."""
-    return Section(title, seconds, partial(obtain, parts))
+    return Section(title, seconds, claims)

@@ -9,12 +9,13 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.papers.recorded import largest_size
 
 
 def rank_margin(matrix: np.ndarray) -> float:
     """Return the least singular value by the largest: zero for a matrix without full rank."""
     values = np.linalg.svd(matrix, compute_uv=False)
-    return float(values[-1] / values[0])
+    return values[-1] / values[0]
 
 
 def controllability_margin(A: np.ndarray, B: np.ndarray) -> float:
@@ -33,16 +34,16 @@ def mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return M
 
 
-def finite_difference_error(model: ReducedModel, h: float = 1e-5) -> float:
+def finite_difference_error(model: ReducedModel) -> float:
     """Return the error of a model's A and B against central differences of its nonlinear form, by the largest entry."""
 
     def f(x: np.ndarray, u: float) -> np.ndarray:
         return np.array([x[1], model.tilt_acceleration(float(x[0]), float(x[1]), float(x[2]), u), u])
 
-    zero = np.zeros(3)
+    zero, h = np.zeros(3), 1e-5
     A = np.column_stack([(f(h * axis, 0.0) - f(-h * axis, 0.0)) / (2.0 * h) for axis in np.eye(3)])
     B = ((f(zero, h) - f(zero, -h)) / (2.0 * h))[:, None]
-    return float(max(np.abs(A - model.A).max() / np.abs(A).max(), np.abs(B - model.B).max() / np.abs(B).max()))
+    return max(largest_size(A - model.A) / largest_size(A), largest_size(B - model.B) / largest_size(B))
 
 
 def model_difference(model: ReducedModel, reference: ReducedModel) -> float:
@@ -79,7 +80,7 @@ def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[
 
 def poles_as_pairs(poles: np.ndarray) -> list[list[float]]:
     """List poles, (n,), as [real part, imaginary part], which JSON can hold."""
-    return [[float(p.real), float(p.imag)] for p in poles]
+    return [[p.real, p.imag] for p in poles]
 
 
 def law_rests(model: ReducedModel, K_e: Sequence[float], static: int, integral: int) -> tuple[bool, dict[str, Any]]:
@@ -93,8 +94,8 @@ def law_rests(model: ReducedModel, K_e: Sequence[float], static: int, integral: 
     rest, poles = equilibrium(model.A, model.B, K[:3], 1.0)
     rest_e, poles_e = equilibrium(model.A_e, model.B_e, K, 1.0)
     x3, x_e = K[0] / K[2], K[0] / K[3]
-    miss = max(np.abs(rest - [0.0, 0.0, x3]).max() / abs(x3), np.abs(rest_e - [0.0, 0.0, 0.0, x_e]).max() / x_e)
-    return bool(miss < 1e-9 and max(np.real(poles).max(), np.real(poles_e).max()) < 0.0), {
+    miss = max(largest_size(rest - [0.0, 0.0, x3]) / abs(x3), largest_size(rest_e - [0.0, 0.0, 0.0, x_e]) / x_e)
+    return miss < 1e-9 and max(np.real(poles).max(), np.real(poles_e).max()) < 0.0, {
         f"gimbal_rest_of_{static}_rad_per_rad": rest[2],
         f"integrator_rest_of_{integral}_s_per_rad": rest_e[3],
         f"poles_of_{static}_1_s": poles_as_pairs(poles),

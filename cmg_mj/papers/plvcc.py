@@ -23,6 +23,7 @@ import sympy as sp
 from sympy.polys.fields import sfield
 
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.cube import CUBE, inertias
 
 q1, q2 = q = sp.symbols("q1 q2", real=True)
 """Tilt and gimbal angle."""
@@ -164,13 +165,13 @@ class PrintedInertia(NamedTuple):
     place: str
     """Place at which it says that the system is not PLvCC."""
     gimbals: int
-    arm: str
+    arm: float
     """Distance from the tilt axis of the mass m, which J1 holds as m arm^2/gimbals [m]."""
 
 
 PRINTED: dict[Paper, PrintedInertia] = {
-    "aranovskiy2020": PrintedInertia("Appendix", 2, "0.19"),
-    "sokolov2019": PrintedInertia("Proposition 1", 1, "0.13"),
+    "aranovskiy2020": PrintedInertia("Appendix", 2, 0.19),
+    "sokolov2019": PrintedInertia("Proposition 1", 1, 0.13),
 }
 
 
@@ -182,10 +183,9 @@ def papers_m1(paper: Paper, numbers: bool = False) -> Any:
     m1 = gimbals * (J1 + J2 * sp.cos(q2) ** 2) / I_cd
     if not numbers:
         return m1
-    m, arm2 = sp.Rational("2.62"), sp.Rational(arm) ** 2 / gimbals
-    J_b, I_c, J_c, K_c = (sp.Rational(text) / 10**4 for text in ("130", "10", "2.6", "9.9"))
-    I_d, J_d = (sp.Rational(text) / 10**4 for text in ("5.6", "11"))
-    return m1.subs({J1: I_d + J_b + K_c + m * arm2, J2: J_c - I_d + J_d - K_c, I_cd: I_c + I_d})
+    exact = {name: sp.Rational(str(number)) for name, number in {**CUBE, "l": arm}.items()}
+    J1_number, J2_number = inertias(exact, gimbals)
+    return m1.subs({J1: J1_number, J2: J2_number, I_cd: exact["I_c"] + exact["I_d"]})
 
 
 def inertia_factor(paper: Paper) -> int:
@@ -251,12 +251,6 @@ def mixed_derivatives() -> bool:
     return vanishes(2 * m1 * difference + demanded)
 
 
-def zero_d_is_singular() -> bool:
-    """Return true if d = 0 with a constant b, the appendix's trivial solution, leaves a singular Psi (it does not)."""
-    Psi = sp.Matrix([[0, 1], [1, 0]])
-    return not (all(is_skew(B(i, Psi, sp.eye(2))) for i in range(2)) and Psi.det() != 0)
-
-
 def proof_steps() -> dict[str, bool]:
     """Check the proof step by step: step in words -> whether it was found so."""
     A, D, k = sp.symbols("A D k", positive=True)
@@ -279,6 +273,9 @@ def claim(paper: Paper) -> Claim:
     k, steps = sp.Symbol("k", positive=True), proof_steps()
     symbolic, numeric = decide(papers_m1(paper)), decide(papers_m1(paper, numbers=True))
     plvcc = [decide(m1) for m1 in (sp.Symbol("J1", positive=True), sp.exp(2 * k * q2), sp.cosh(k * q2) ** 2)]
+    # d = 0 with a constant b: the appendix takes its Psi for singular.
+    trivial = sp.Matrix([[0, 1], [1, 0]])
+    is_solution = all(is_skew(B(i, trivial, sp.eye(2))) for i in range(2))
     on_printed_proof = (
         "The printed proof has a gap: d = 0 alone does not make Psi singular (m1 = 1, Psi = [[0, 1], [1, 0]]). The "
         "same argument for c, from B_(1), closes the gap: m1 (m1'/m1)' not constant makes both c and d zero. The "
@@ -300,7 +297,7 @@ def claim(paper: Paper) -> Claim:
             "papers_m1": symbolic.figures,
             "table_numbers": numeric.figures,
             "counter_checks": [c.figures | {"Psi": str(c.Psi.tolist())} for c in plvcc if c.Psi is not None],
-            "d_zero_alone_is_singular": zero_d_is_singular(),
+            "d_zero_alone_is_singular": not (is_solution and trivial.det() != 0),
             "factor_of_m1_by_the_equations": inertia_factor(paper),
             "factor_of_m1_printed": PRINTED[paper].gimbals,
         },

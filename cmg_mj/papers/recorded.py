@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -22,46 +23,62 @@ def trajectory_of(result: Result) -> Trajectory:
 def push_intervals(trajectory: Trajectory) -> list[tuple[float, float]]:
     """Find when the push acted on one world, as panels shade it [s]."""
     times = trajectory["time_s"][trajectory["push_n_m"] != 0.0]
-    return [(float(times[0]), float(times[-1]))] if len(times) else []
+    return [(times[0], times[-1])] if len(times) else []
 
 
-def rms(values: np.ndarray) -> np.ndarray:
+def rms(values: np.ndarray) -> Any:
     """Return the root of the mean square over the ticks, (n_ticks, ...) -> (...)."""
     return np.sqrt(np.mean(values**2, axis=0))
 
 
-def loop_panels(run: Trajectory, name: str, equation: str, title: str, noise_width: float) -> list[Panel]:
-    """Draw one world's tilt, tilt rate and command, the observer in the loop beside the truth.
+def largest_size(values: np.ndarray) -> float:
+    """Return the largest absolute value."""
+    return np.abs(values).max()
+
+
+def trace(run: Trajectory, column: str, label: str = "", **style: Any) -> Line:
+    """Draw a column of one world over the time, angles in degrees."""
+    values = run[column]
+    return Line(run["time_s"], np.degrees(values) if column.endswith("_rad") else values, label, **style)
+
+
+def loop_picture(
+    picture: tuple[str, str], observer: tuple[str, str], runs: Mapping[str, Result], noise_width: float, gimbal: bool
+) -> Picture:
+    """Draw world 0 of each run in a column of its own, the observer in the loop beside the truth.
 
     Args:
-        run: Recording of one world.
-        name: Name of the observer.
-        equation: Equation of the observer in the paper.
-        title: Title above the tilt.
+        picture: Name and title of the picture.
+        observer: Name of the observer, and its equation in the paper.
+        runs: Title of a column -> its run.
         noise_width: Width of the measured tilt's line.
+        gimbal: Whether the gimbal angle is drawn, too.
 
     Returns:
-        The three panels.
+        The picture.
     """
-    t, shaded = run["time_s"], push_intervals(run)
-    tilt = [
-        Line(t, np.degrees(run["y1_rad"]), "measured y1", color=7, width=noise_width),
-        Line(t, np.degrees(run["x1_rad"]), "true x1", color=0),
-    ]
-    rates = [
-        Line(t, run[f"estimate/{name}/x2_rad_s"], f"estimate of {equation}", color=1, width=0.6),
-        Line(t, run["x2_rad_s"], "true x2", color=0),
-    ]
-    return [
-        Panel("tilt [deg]", tilt, title, shaded=shaded),
-        Panel("tilt rate [rad/s]", rates, shaded=shaded),
-        Panel("command u [rad/s]", [Line(t, run["u_rad_s"], "u", color=3, width=0.6)], shaded=shaded),
-    ]
-
-
-def side_by_side(name: str, title: str, columns: Sequence[Sequence[Panel]]) -> Picture:
-    """Lay out columns of panels."""
-    return Picture(name, title, [panel for row in zip(*columns, strict=True) for panel in row], columns=len(columns))
+    (name, equation), columns = observer, []
+    for title, result in runs.items():
+        run = trajectory_of(result).world(0)
+        shaded = push_intervals(run)
+        tilts = [
+            trace(run, "y1_rad", "measured y1", color=7, width=noise_width),
+            trace(run, "x1_rad", "true x1", color=0),
+        ]
+        rates = [
+            trace(run, f"estimate/{name}/x2_rad_s", f"estimate of {equation}", color=1, width=0.6),
+            trace(run, "x2_rad_s", "true x2", color=0),
+        ]
+        angles = Panel("gimbal angle [deg]", [trace(run, "x3_rad", "true x3", color=0)], shaded=shaded)
+        columns.append(
+            [
+                Panel("tilt [deg]", tilts, title, shaded=shaded),
+                Panel("tilt rate [rad/s]", rates, shaded=shaded),
+                *[angles] * gimbal,
+                Panel("command u [rad/s]", [trace(run, "u_rad_s", "u", color=3, width=0.6)], shaded=shaded),
+            ]
+        )
+    return Picture(*picture, [panel for row in zip(*columns, strict=True) for panel in row], columns=len(columns))
 
 
 def open_loop_panels(
@@ -83,15 +100,15 @@ def open_loop_panels(
     Returns:
         The panels.
     """
-    t, shaded = run["time_s"], push_intervals(run)
+    shaded = push_intervals(run)
     panels = [
         Panel("tilt y1 [deg]", [tilt], "(a)", shaded=shaded),
-        Panel("command u [rad/s]", [Line(t, run["u_rad_s"], "u", color=3, width=tilt.width)], shaded=shaded),
+        Panel("command u [rad/s]", [trace(run, "u_rad_s", "u", color=3, width=tilt.width)], shaded=shaded),
     ]
     for name, equation in observers.items():
         lines = [
-            Line(t, rates[name], f"{equation} {name}", color=name, width=tilt.width),
-            Line(t, run["fog_rad_s"], "gyro", "k-", width=1.0),
+            Line(tilt.x, rates[name], f"{equation} {name}", color=name, width=tilt.width),
+            trace(run, "fog_rad_s", "gyro", style="k-"),
         ]
         panels.append(Panel("tilt rate [rad/s]", lines, "" if panels[2:] else "(b)", shaded=shaded, y_range=y_range))
     return panels
@@ -109,7 +126,7 @@ def on_common_scales(claims: Sequence[Claim]) -> list[Claim]:
 
     def scaled(panel: Panel) -> Panel:
         drawn = np.concatenate(values[panel.y_label])
-        low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
+        low, high = np.nanmin(drawn), np.nanmax(drawn)
         return replace(panel, y_range=(low - ROOM * (high - low), high + ROOM * (high - low)))
 
     return [

@@ -10,8 +10,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from cmg_mj.papers import PAPERS, Reproduction
 from cmg_mj.papers.claim import VERDICTS, Claim
 from cmg_mj.results.folder import RunFolder, Writers, claimed, write_text
@@ -41,13 +39,13 @@ def _figures_of_claim(claim: Claim) -> dict[str, Any]:
         "says": claim.statement,
         "found": found(claim),
         "verdict": claim.verdict,
-        "measures": dict(claim.measures),
-        "assumes": dict(claim.assumes),
+        "measures": claim.measures,
+        "assumes": claim.assumes,
         "general": claim.is_general,
         "missing": claim.missing_data,
         "why": claim.reason,
         "ours": claim.is_ours,
-        "figures": dict(claim.figures),
+        "figures": claim.figures,
         "pictures": [f"{picture.name}.png" for picture in claim.pictures],
     }
 
@@ -61,7 +59,7 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, str]]:
     if isinstance(value, Mapping):
         for key, inner in value.items():
             yield from _flat(f"{name} {key}".strip(), inner)
-    elif not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
+    elif not isinstance(value, Sequence) or isinstance(value, str):
         yield name, f"{value:.4g}" if isinstance(value, float) else "none" if value is None else str(value)
     elif len(value) and isinstance(value[0], Mapping):
         for i, inner in enumerate(value):

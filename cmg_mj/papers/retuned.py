@@ -63,7 +63,7 @@ def figures_of(levels: Sequence[NoiseLevelResult]) -> dict[str, Any]:
         "noise_density_ug_rthz": [level.noise_ug_rthz for level in levels],
         "tuned": [dict(level.sizes) for level in levels],
         "table_2_by_tuned_error": [level.ratio for level in levels],
-        "tuned_error_rad_s": [float(level.rms.mean()) for level in levels],
+        "tuned_error_rad_s": [level.rms.mean() for level in levels],
         "zero_estimate_error_rad_s": [level.zero_rms for level in levels],
         "tuned_is": [level.verdict for level in levels],
     }

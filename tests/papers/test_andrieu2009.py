@@ -12,20 +12,22 @@ from scipy.integrate import solve_ivp
 
 from cmg_mj.papers.andrieu2009 import bioreactor, figures, on_the_rig, theorem_1, theory
 from cmg_mj.papers.andrieu2009.bioreactor import Bioreactor, dilution
-from cmg_mj.papers.andrieu2009.figures import correction, simple_copy
-from cmg_mj.papers.andrieu2009.simulation import (
+from cmg_mj.papers.andrieu2009.figures import (
     CONSTANT,
     HOMOGENEOUS,
     UPDATED,
     Run,
     Study,
+    correction,
     replay,
     rms_by_kind,
     rms_late,
     run_plant,
+    simple_copy,
     study,
 )
 from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.pair import push_recovery
 from tests.papers.worlds import make_result
 
 SEEDS, FIRST = 6, 500
@@ -319,7 +321,7 @@ def test_escape_is_found_below_1_and_missed_beyond() -> None:
 
 def test_on_the_rig() -> None:
     """Three worlds of `high_gain` in the loop: it stands, and its gain does not move."""
-    result = on_the_rig.experiment("high_gain", 90_000).run_many(3)
+    result = push_recovery("high_gain", 90_000, duration_s=on_the_rig.DURATION_S).run_many(3)
     errors = result.values("velocity_rms_error_rad_s")
     assert np.isfinite(errors).all()
     assert 0.05 < errors.mean() < 0.085

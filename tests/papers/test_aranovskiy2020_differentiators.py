@@ -6,21 +6,21 @@ import math
 
 import pytest
 
-from cmg_mj.papers.aranovskiy2020 import homogeneous, lag
+from cmg_mj.papers.aranovskiy2020 import differentiators
 
 SEED = 910_000
 
 
 @pytest.mark.parametrize("tau", [0.01, 0.02, 0.05])
 def test_lag_and_noise_of_the_linear_differentiator(tau: float) -> None:
-    result, expected = lag.trade(tau, SEED), lag.predict_trade(tau)
+    result, expected = differentiators.trade(tau, SEED), differentiators.predict_trade(tau)
     assert result.lag_s == pytest.approx(2.0 * tau, rel=1e-3)
     assert result.noise_gain_1_s == pytest.approx(expected.noise_gain_1_s, rel=0.04)
-    assert lag.lag(SEED).verdict == "reproduced"
+    assert differentiators.lag(SEED).verdict == "reproduced"
 
 
 def test_vicinity_of_the_homogeneous_differentiator() -> None:
-    claim = homogeneous.vicinity(SEED)
+    claim = differentiators.vicinity(SEED)
     assert claim.verdict == "illustrated"
     # By homogeneity the chatter of the sampled observer falls as dt^(alpha/(1 - alpha)).
     coarse, fine = (claim.figures[f"error_left_share{rate}"]["0.55"] for rate in ("", "_2000_hz"))
@@ -28,16 +28,16 @@ def test_vicinity_of_the_homogeneous_differentiator() -> None:
 
 
 def test_the_error_is_gone_in_finite_time() -> None:
-    claim = homogeneous.finite_time()
+    claim = differentiators.finite_time()
     assert claim.verdict == "illustrated"
     gone = list(claim.figures["gone_after_s"].values())
     assert gone == sorted(gone)
-    assert math.isinf(homogeneous.decay(1.0).end_s)
+    assert math.isinf(differentiators.decay(1.0).end_s)
 
 
 def test_decay_of_the_linear_observer_in_closed_form() -> None:
     """alpha = 1: poles -10 +- sqrt(50) j, half a turn pi/sqrt(50), in which the size falls by exp(-10 pi/sqrt(50))."""
-    result = homogeneous.decay(1.0)
+    result = differentiators.decay(1.0)
     half_turn = math.pi / math.sqrt(50.0)
     spans = result.time_s[result.turns]
     assert spans[2] - spans[1] == pytest.approx(half_turn, rel=2e-3)

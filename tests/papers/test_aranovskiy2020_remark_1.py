@@ -13,10 +13,10 @@ from scipy.linalg import solve_continuous_are
 
 from cmg_mj.features.replay import replay
 from cmg_mj.observers import Estimate, Measurement, make_observer
-from cmg_mj.papers.aranovskiy2020 import forms_of_10, riccati, update_cost
+from cmg_mj.papers.aranovskiy2020 import forms_of_10, riccati
 from cmg_mj.papers.aranovskiy2020.paper import A_prime, C, Q, printed_model, settled_gains
 from cmg_mj.papers.aranovskiy2020.riccati import transient
-from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
+from cmg_mj.papers.pair import DT, run_of_10
 from cmg_mj.results.trajectory import Trajectory
 
 SEED = 910_000
@@ -94,15 +94,15 @@ def test_eleven_by_euler_approaches_the_benchs() -> None:
 
 def test_the_cost_of_an_update(tmp_path: Path) -> None:
     """As the instructions are recorded, (11) is the dearest; were its powers for nothing, (10) would be."""
-    recorded = json.loads(update_cost.RECORDED.read_text())
-    claim = update_cost.cost()
+    recorded = json.loads(riccati.RECORDED.read_text())
+    claim = riccati.cost()
     assert claim.verdict == "not reproduced"
     times = claim.figures["update_us"]
     assert times["ltv, plain Runge-Kutta 4"] > times["ltv, plain Euler"]
     assert times["ltv"] > times["homogeneous"] > times["linear"] > 0.0
     path = tmp_path / "cheap.json"
     path.write_text(json.dumps(recorded | {"homogeneous": 2.0 * recorded["linear"]}))
-    assert update_cost.cost(path).verdict == "reproduced"
+    assert riccati.cost(path).verdict == "reproduced"
 
 
 def test_settled_gains_solve_the_algebraic_riccati_equation() -> None:

@@ -14,7 +14,7 @@ SEED = 910_000
 
 def test_the_rig_rests_at_zero_with_a_biased_observer() -> None:
     case = "(10), estimated angles"
-    (result,) = gains.find_rests([(case, 4, ())], SEED)
+    result = gains.find_rests([case], 4, SEED)[case]
     expected = gains.expected_integrator("ltv", math.radians(0.4))
     assert result.x2_estimated.high < -0.01  # biased it is
     assert result.is_at_zero(expected)

@@ -33,7 +33,7 @@ WITHIN = "reproduced within stated conditions"
 
 
 def test_figure_4_other_seeds() -> None:
-    after_push, whole = section_5.figure_4(lambda share: None, 6, SEED)
+    after_push, whole = section_5.figure_4(6, SEED)
     assert (after_push.verdict, after_push.holds) == (whole.verdict, not whole.holds) == ("cannot be tested", False)
     errors = {name: after_push.figures[f"rms_after_push_{name}_rad_s"].mean for name in (*OBSERVERS, "zero")}
     assert errors["homogeneous"] > 1.3 * max(errors["linear"], errors["zero"])  # it misses the push
@@ -110,7 +110,7 @@ def test_every_figure_is_of_its_own_runs(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(
         section_5, "errors_of", lambda forms, worlds, seed: {form: np.full(3, by_euler[form]) for form in forms}
     )
-    *figures, by_error, _, _, _, cause = section_5.claims(lambda share: None)
+    *figures, by_error, _, _, _, cause = section_5.claims()
     assert [claim.place for claim in figures] == ["Fig. 5", "Fig. 6", "Fig. 7"]
     for claim, name in zip(figures, ("linear", "ltv", "homogeneous"), strict=True):
         assert claim.verdict == WITHIN  # the push, e and the noise are ours

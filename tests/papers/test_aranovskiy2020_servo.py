@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from cmg_mj.papers.aranovskiy2020 import servo, two_axes
+from cmg_mj.papers.aranovskiy2020 import hypotheses, two_axes
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_1
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.plant.plant import load_plant
@@ -22,7 +22,7 @@ SEED = 910_000
 def test_a_gimbal_with_a_deadband_of_a_tenth(command: float, expected: float) -> None:
     """Upright without a push, after a few lags: it stands, or turns slower by the deadband."""
     plant = load_plant(timestep_s=0.001, initial_tilt_deg=0.0, equilibrium_bias_deg=0.0)
-    servo.in_velocity_mode(plant, 0.1)
+    hypotheses.in_velocity_mode(plant, 0.1)
     data = plant.new_data()
     for module in plant.axis.modules:
         data.ctrl[module.servo] = module.direction * command
@@ -32,12 +32,12 @@ def test_a_gimbal_with_a_deadband_of_a_tenth(command: float, expected: float) ->
 
 
 @pytest.fixture(scope="module")
-def servos() -> servo.Servos:
-    return servo.run(2, SEED, 4.0)
+def servos() -> hypotheses.Servos:
+    return hypotheses.run_servos(2, SEED, 4.0)
 
 
-def test_servos_of_a_small_deadband_are_not_noticed(servos: servo.Servos) -> None:
-    claim = servo.servo_claim(servos)
+def test_servos_of_a_small_deadband_are_not_noticed(servos: hypotheses.Servos) -> None:
+    claim = hypotheses.servo_claim(servos)
     assert claim.verdict == "reproduced within stated conditions"
     tilts = [ratio.mean for ratio in claim.figures["tilt_rms_by_none"]]
     assert tilts[0] == pytest.approx(1.0)
@@ -46,20 +46,20 @@ def test_servos_of_a_small_deadband_are_not_noticed(servos: servo.Servos) -> Non
     assert soft > 2.0 * stiff
 
 
-def test_a_servo_that_is_noticed_is_not_reproduced(servos: servo.Servos) -> None:
+def test_a_servo_that_is_noticed_is_not_reproduced(servos: hypotheses.Servos) -> None:
     """In the tilt alone, in the estimate alone, or in what the gimbal does."""
-    small = servos.velocity[servo.RESOLUTION]
+    small = servos.velocity[hypotheses.RESOLUTION]
     for key in ("tilt_rms_deg", "velocity_rms_error_rad_s"):
         figures: list[dict[str, Any]] = small.summaries
         summaries = [summary | {key: 1.2 * summary[key]} for summary in figures]
-        swapped = dict(servos.velocity) | {servo.RESOLUTION: dataclasses.replace(small, summaries=summaries)}
-        assert servo.servo_claim(servos._replace(velocity=swapped)).verdict == "not reproduced"
-    loose = dataclasses.replace(small, trajectory=servos.velocity[servo.DEADBANDS[-1]].trajectory)
-    swapped = dict(servos.velocity) | {servo.RESOLUTION: loose}
-    assert servo.servo_claim(servos._replace(velocity=swapped)).verdict == "not reproduced"
+        swapped = dict(servos.velocity) | {hypotheses.RESOLUTION: dataclasses.replace(small, summaries=summaries)}
+        assert hypotheses.servo_claim(servos._replace(velocity=swapped)).verdict == "not reproduced"
+    loose = dataclasses.replace(small, trajectory=servos.velocity[hypotheses.DEADBANDS[-1]].trajectory)
+    swapped = dict(servos.velocity) | {hypotheses.RESOLUTION: loose}
+    assert hypotheses.servo_claim(servos._replace(velocity=swapped)).verdict == "not reproduced"
 
 
-def test_tracking_is_the_rate_less_the_command(servos: servo.Servos) -> None:
+def test_tracking_is_the_rate_less_the_command(servos: hypotheses.Servos) -> None:
     """A recording whose gimbal turns at 0.9 of the command is a tenth off."""
     run = trajectory_of(servos.soft)
     time = run["time_s"]
@@ -67,7 +67,7 @@ def test_tracking_is_the_rate_less_the_command(servos: servo.Servos) -> None:
     angle = 0.9 * np.vstack([np.zeros((1, 2)), np.cumsum(command, axis=0)[:-1]]) * (time[1] - time[0])
     columns = dict(run.columns) | {"u_rad_s": command, "x3_rad": angle}
     result = Result(servos.soft.outcomes, servos.soft.summaries, dataclasses.replace(run, columns=columns))
-    error = servo.measure_tracking(result)
+    error = hypotheses.measure_tracking(result)
     assert error is not None
     assert error.mean == pytest.approx(0.1, rel=1e-6)
 

@@ -11,10 +11,10 @@ import pytest
 
 from cmg_mj.features.replay import replay
 from cmg_mj.observers import make_observer
-from cmg_mj.papers.aranovskiy2020 import time_invariant as ti
+from cmg_mj.papers.aranovskiy2020 import section_5 as ti
 from cmg_mj.papers.aranovskiy2020.paper import printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT
-from cmg_mj.papers.aranovskiy2020.time_invariant import BIASES_DEG, FROZEN, GAINS, LINEAR, MEASURED, MODELS, PREDECESSOR
+from cmg_mj.papers.aranovskiy2020.section_5 import BIASES_DEG, FROZEN, GAINS, LINEAR, MEASURED, MODELS, PREDECESSOR
+from cmg_mj.papers.pair import DT
 from cmg_mj.results.trajectory import Trajectory
 
 SEED = 910_000

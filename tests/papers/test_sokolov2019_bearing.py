@@ -48,7 +48,7 @@ def test_the_yaw_takes_up_the_tilt_like_a_spring() -> None:
 
 @pytest.fixture(scope="module")
 def study() -> bearing.Study:
-    return bearing.study(lambda share: None, worlds=3, seed=SEED)
+    return bearing.study(worlds=3, seed=SEED)
 
 
 def test_claim_of_the_bearing_on_other_seeds(study: bearing.Study) -> None:

@@ -38,7 +38,7 @@ WITHIN, NOT = "reproduced within stated conditions", "not reproduced"
 
 @pytest.fixture(scope="module")
 def runs() -> Loops:
-    return loops(lambda share: None, worlds=4, seed=SEED)
+    return loops(worlds=4, seed=SEED)
 
 
 @pytest.fixture(scope="module")

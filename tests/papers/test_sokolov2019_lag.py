@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.papers.sokolov2019 import lag, sampled_loop
-from cmg_mj.papers.sokolov2019.rig import experiment, read_servo
-from cmg_mj.papers.sokolov2019.sampled_loop import Servo, oscillation, rig_matrices
+from cmg_mj.papers.sokolov2019 import lag
+from cmg_mj.papers.sokolov2019.lag import oscillation, rig_matrices
+from cmg_mj.papers.sokolov2019.rig import Servo, experiment, read_servo
 from cmg_mj.results.trajectory import Trajectory
 from tests.plant import paper_model
 
@@ -58,7 +58,7 @@ def test_pole_of_the_sampled_loop_is_mujocos(lag_ms: float) -> None:
 
 @pytest.fixture(scope="module")
 def lags() -> lag.Lags:
-    return lag.lags(lambda share: None)
+    return lag.lags()
 
 
 def test_thresholds_on_mujoco_are_the_predicted_ones(lags: lag.Lags) -> None:
@@ -82,7 +82,7 @@ def test_the_flywheels_torque_on_the_gimbal_counts(lags: lag.Lags, monkeypatch: 
         A[3, 1] = 0.0
         return A, B
 
-    monkeypatch.setattr(sampled_loop, "rig_matrices", matrices_without)
+    monkeypatch.setattr(lag, "rig_matrices", matrices_without)
     prediction = lag.predict("linear")["servo_lag_s"]
     assert isinstance(prediction, float)
     assert abs(prediction - lags.thresholds["linear"][0]) > 1e-3

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar, clip, signed_power
-from cmg_mj.papers.claim import Claim, OnShare, obtain
+from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.recorded import largest_size
 
 # --- andrieu2009 as printed: system (1), and the bioreactor's and its observers' parameters of section 3 ---
 
@@ -112,7 +113,7 @@ class Bioreactor:
     @cached_property
     def df2_max(self) -> float:
         """df_2max: the largest |df2/dx2| over M_u x M_x, for the constant gain."""
-        return float(np.abs(self.f2_slope(*self.domain(120))).max())
+        return largest_size(self.f2_slope(*self.domain(120)))
 
     def Omega1(self, u: Array, x1: Array, x2_hat: Array) -> Array:
         """Return Omega_1, for the updated gain: the largest |slope of a secant of f2 from x2_hat|.
@@ -176,11 +177,6 @@ def _not_zero(m: Array) -> Array:
 ROUNDING = 1e-9
 
 
-def claims(on_share: OnShare) -> list[Claim]:
-    """Judge (14), (15), Omega_1, Omega_2 and their order, the noise."""
-    return obtain([invariance, coordinates, increments, order_of_bounds, noise_level], on_share)
-
-
 def least_inflow(reactor: Bioreactor, u_min: float, u_max: float) -> float:
     """Return the least component of the flow into M_eta over its boundary and all inputs, not below 0 if invariant."""
     u = np.linspace(u_min, u_max, 401)[:, None]
@@ -189,13 +185,13 @@ def least_inflow(reactor: Bioreactor, u_min: float, u_max: float) -> float:
     left_inflow, _ = reactor.slope(eps1, eps2 + along, u)
     _, lower_inflow = reactor.slope(eps1 + along, eps2, u)
     outer_flow = np.add(*reactor.slope(eps1 + along, 1.0 - (eps1 + along), u))
-    return float(min(left_inflow.min(), lower_inflow.min(), -outer_flow.max()))
+    return min(left_inflow.min(), lower_inflow.min(), -outer_flow.max())
 
 
 def invariance() -> Claim:
     """Judge M_eta."""
     reactor = Bioreactor(HBAR)
-    inflow = {str(hbar): least_inflow(Bioreactor(hbar), U_MIN, U_MAX) for hbar in (HBAR, HBAR_OF_OBSERVERS)}
+    inflow = {hbar: least_inflow(Bioreactor(hbar), U_MIN, U_MAX) for hbar in (HBAR, HBAR_OF_OBSERVERS)}
     return Claim(
         place="Section 3, (14), M_eta",
         statement="M_eta = {eta1 >= eps1, eta2 >= eps2, eta1 + eta2 <= 1} is forward invariant for u in [u_min, "
@@ -220,8 +216,8 @@ def coordinate_errors(hbar: float) -> tuple[float, float]:
     slope1, slope2 = reactor.slope(eta1, eta2, u)
     ahead, behind = (reactor.to_x2(eta1 + h * slope1, eta2 + h * slope2) for h in (span, -span))
     numeric_slope = (ahead - behind) / (2.0 * span)
-    error = np.abs(reactor.f2(u, eta1, x2) - numeric_slope).max() / np.abs(numeric_slope).max()
-    return float(error), float(np.abs(reactor.to_eta2(eta1, x2) / eta2 - 1.0).max())
+    error = largest_size(reactor.f2(u, eta1, x2) - numeric_slope) / largest_size(numeric_slope)
+    return error, largest_size(reactor.to_eta2(eta1, x2) / eta2 - 1.0)
 
 
 def coordinates() -> Claim:
@@ -258,7 +254,7 @@ def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> dict[
     increment = np.where(distinct, np.abs(reactor.f2(u, x1, x2) - reactor.f2(u, x1, x2_hat)), 0.0)
     local = reactor.local_c_inf(u, x1, x2, x2_hat, p)
     any_x2_hat = np.linspace(reactor.x2_bounds(reactor.eps1)[0], reactor.x2_bounds(1.0 - reactor.eps2)[1], points)
-    c_inf = float(reactor.local_c_inf(u, x1, x2, any_x2_hat, p).max())
+    c_inf = reactor.local_c_inf(u, x1, x2, any_x2_hat, p).max()
     # The bounds do not depend on x2: one value of it will do.
     point = u[:, :1], x1[:, :1], x2_hat[:, :1]
     Omega1 = reactor.Omega1(*point)
@@ -267,7 +263,7 @@ def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> dict[
     ratio = Omega2 / Omega1
 
     def largest_quotient(Omega: np.ndarray, c: np.ndarray | float) -> float:
-        return float((increment / np.where(distinct, Omega * d + c * d ** (1.0 + p), 1.0)).max())
+        return (increment / np.where(distinct, Omega * d + c * d ** (1.0 + p), 1.0)).max()
 
     return {
         "by_Omega1_ratio": largest_quotient(Omega1, 0.0),
@@ -276,11 +272,11 @@ def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> dict[
         "by_Omega2_local_ratio": largest_quotient(Omega2, local),
         "by_Omega2_local_printed_ratio": largest_quotient(printed, local),
         "c_inf": c_inf,
-        "slope_over_Omega2_ratio": float((slope / Omega2).max()),
-        "slope_over_Omega2_printed_ratio": float((slope / printed).max()),
-        "Omega2_over_Omega1_ratio": float(ratio.max()),
-        "share_Omega2_above_Omega1_ratio": float((ratio > 1.0 + ROUNDING).mean()),
-        "Omega1_over_largest_ratio": float(Omega1.max() / reactor.df2_max),
+        "slope_over_Omega2_ratio": (slope / Omega2).max(),
+        "slope_over_Omega2_printed_ratio": (slope / printed).max(),
+        "Omega2_over_Omega1_ratio": ratio.max(),
+        "share_Omega2_above_Omega1_ratio": (ratio > 1.0 + ROUNDING).mean(),
+        "Omega1_over_largest_ratio": Omega1.max() / reactor.df2_max,
     }
 
 

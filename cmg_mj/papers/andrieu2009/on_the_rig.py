@@ -6,51 +6,40 @@ import numpy as np
 
 from cmg_mj.observers import make_observer
 from cmg_mj.observers.high_gain import HighGain, updated_gain
-from cmg_mj.papers.assumed import PUSH_RECOVERY
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.pair import PUSH_RECOVERY, push_recovery, run_loops
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.result import Result
-from cmg_mj.runs.experiment import Experiment, prepare
-from cmg_mj.runs.side_by_side import run_jobs, run_of
-from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
-WORLDS, SEED = 20, 82_000
+WORLDS, SEED, DURATION_S = 20, 82_000, 15.0
 KINDS = {
-    "high_gain": (),
+    "high_gain": ("high_gain", ()),
     # The best l1, l2 for a linear correction: docs/studies/tune_high_gain.py.
-    "high_gain, d_inf = 0": ("observer.d_inf=0.0", "observer.l1=40.4", "observer.l2=39.3"),
-    "homogeneous": (),
-    "ltv": (),
-    "linear": (),
+    "high_gain, d_inf = 0": ("high_gain", ("observer.d_inf=0.0", "observer.l1=40.4", "observer.l2=39.3")),
+    "homogeneous": ("homogeneous", ()),
+    "ltv": ("ltv", ()),
+    "linear": ("linear", ()),
 }
-"""Label, which begins with the observer -> settings."""
+"""Label -> the observer, and its settings."""
 
 VELOCITY, TILT = "velocity_rms_error_rad_s", "tilt_rms_deg"
 
 
-def claims(on_share: OnShare) -> list[Claim]:
+def claims() -> list[Claim]:
     """Judge the velocity RMS errors beside those of aranovskiy2020's observers; how idle the update of the gain is."""
-    on_share(0.0)
-    runs = [run_of(experiment(label, SEED), WORLDS) for label in KINDS]
-    results = dict(zip(KINDS, run_jobs(runs), strict=True))
+    results = run_loops(KINDS, WORLDS, SEED, DURATION_S)
     return [comparison_claim(results), idle_claim(results["high_gain"])]
-
-
-def experiment(label: str, seed: int) -> Experiment:
-    """Prepare one of `KINDS` in the loop of push_recovery, e = 0.5 degrees."""
-    settings = [f"seed={seed}", "open_loop_observers=[]", *KINDS[label]]
-    return prepare(load_scenario("push_recovery", settings, label.split(",")[0]))
 
 
 def comparison_claim(results: dict[str, Result]) -> Claim:
     """Compare the errors of `KINDS` in the loop."""
     errors = {label: result.values(VELOCITY) for label, result in results.items()}
-    standing_counts = {label: int(result.stood.sum()) for label, result in results.items()}
+    standing_counts = {label: result.stood.sum() for label, result in results.items()}
     best, worlds = errors["high_gain"], len(errors["high_gain"])
     excess = {label: known_interval(best - errors[label]) for label in list(errors)[1:]}
-    top = 1.1 * max(float(np.nanmax(values)) for values in errors.values())
+    top = 1.1 * max(np.nanmax(values) for values in errors.values())
     lines = [Line(np.arange(worlds), values, label, "o") for label, values in errors.items()]
     panel = Panel("velocity RMS error\n[rad/s]", lines, x_label="world", y_range=(0.0, top))
     title = "andrieu2009, on the six-body rig: velocity RMS error in the closed loop, push_recovery, e = 0.5 deg"
@@ -69,7 +58,7 @@ def comparison_claim(results: dict[str, Result]) -> Claim:
             "stood_count": standing_counts,
             VELOCITY: {label: result.mean(VELOCITY) for label, result in results.items()},
             TILT: {label: result.mean(TILT) for label, result in results.items()},
-            "high_gain_less_other_rad_s": {label: d and list(d) for label, d in excess.items()},
+            "high_gain_less_other_rad_s": excess,
         },
         pictures=[Picture("andrieu2009-rig", title, [panel])],
         is_ours=True,
@@ -78,7 +67,7 @@ def comparison_claim(results: dict[str, Result]) -> Claim:
 
 def idle_claim(result: Result) -> Claim:
     """Judge whether the update of the gain has nothing to do."""
-    trajectory, rig = trajectory_of(result), experiment("high_gain", SEED)
+    trajectory, rig = trajectory_of(result), push_recovery("high_gain", SEED)
     observer = make_observer("high_gain", rig.law.dt, rig.plant.reduced)
     assert isinstance(observer, HighGain)
     _, _, damping = rig.plant.reduced.terms(trajectory["y1_rad"], trajectory["y2_rad"])
@@ -86,16 +75,16 @@ def idle_claim(result: Result) -> Claim:
     gains = [np.full(Omega.shape[1], observer.phi2)]
     for row in np.nan_to_num(Omega):  # the observer's own update along the runs
         gains.append(updated_gain(gains[-1], row, rig.law.dt, observer.phi1, observer.phi2, observer.phi3))
-    largest_L = float(np.max(gains))
-    fastest = float(np.abs(np.roots([1.0, observer.l1, observer.l1 * observer.l2])).max())
+    largest_L = np.max(gains)
+    fastest = np.abs(np.roots([1.0, observer.l1, observer.l1 * observer.l2])).max()
     return Claim(
         place="On the rig, the gain",
         statement="On the scissored pair, whose f2 hardly depends on the rate, the update of the gain is idle.",
         assumes=PUSH_RECOVERY,
         holds=largest_L < 1.05 * observer.phi2,
         figures={
-            "largest_Omega_1_s": float(np.nanmax(Omega)),
-            "rms_Omega_1_s": float(np.sqrt(np.nanmean(Omega**2))),
+            "largest_Omega_1_s": np.nanmax(Omega),
+            "rms_Omega_1_s": np.sqrt(np.nanmean(Omega**2)),
             "largest_L": largest_L,
             "linear_rate_1_s": fastest,
         },

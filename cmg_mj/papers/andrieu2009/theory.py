@@ -16,16 +16,8 @@ from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.papers.andrieu2009 import bioreactor
 from cmg_mj.papers.andrieu2009.bioreactor import B, P
 from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, largest_b, list_violations, weights
-from cmg_mj.papers.andrieu2009.theorem_1 import equations_11_12_claims, no_observer_beyond_1, theorem_1
-from cmg_mj.papers.claim import Claim, OnShare, obtain
-
-
-def theory_claims(on_share: OnShare) -> list[Claim]:
-    """Judge sections 1, 2 and 4."""
-    parts = [linear_increments, increments, exponent_of_6, no_observer_beyond_1, scaling_conditions, gain_tracking]
-    parts += [theorem_2, equations_19_20, theorem_1]
-    return [*obtain(parts, on_share), *equations_11_12_claims()]
-
+from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.recorded import largest_size
 
 # --- Sections 1 and 2: the increments of f2 of system (1), their bounds (2), (3), and the exponent in (6) ---
 
@@ -38,7 +30,7 @@ def increments_of_2(p: float, seed: int = 0) -> float:
     left_side = np.abs(bioreactor.f2(g, x2, u, p) - bioreactor.f2(g, x2_hat, u, p))
     right_side = np.abs(g + 1.0) * np.abs(x2 - x2_hat)
     reliable = right_side > 1e-3 * (np.abs(x2) + np.abs(x2_hat) + np.abs(u))  # nearer, the left side is rounding errors
-    return float((left_side[reliable] / right_side[reliable]).max())
+    return (left_side[reliable] / right_side[reliable]).max()
 
 
 def linear_increments() -> Claim:
@@ -67,23 +59,21 @@ def worst_quotient(p: float, size: float, bound: Callable[[np.ndarray, np.ndarra
     d = np.abs(x2 - x2_hat)
     left_side = np.abs(signed_power(x2, 1.0 + p) - signed_power(x2_hat, 1.0 + p))
     distinct = d > 1e-6 * np.maximum(np.abs(x2), np.abs(x2_hat))  # nearer, the left side is rounding errors
-    return float((left_side[distinct] / bound(x2_hat, d)[distinct]).max())
-
-
-def quotient_of_3(p: float) -> float:
-    """Return the worst quotient of the two sides of (3), over sizes from 1e-4 to 1e4."""
-    return worst_quotient(p, 1e4, lambda x2_hat, d: (1.0 + p) * np.abs(x2_hat) ** p * d + d ** (1.0 + p))
+    return (left_side[distinct] / bound(x2_hat, d)[distinct]).max()
 
 
 def increments() -> Claim:
     """Judge (2), (3)."""
-    quotients = {str(p): quotient_of_3(p) for p in (0.1, 0.5, 0.9, 1.0, 1.5, 2.0)}
+    quotients = {
+        p: worst_quotient(p, 1e4, lambda x2_hat, d, p=p: (1.0 + p) * np.abs(x2_hat) ** p * d + d ** (1.0 + p))
+        for p in (0.1, 0.5, 0.9, 1.0, 1.5, 2.0)
+    }
     return Claim(
         place="Section 1, (3)",
         statement="For 0 < p < 1 the increments of f2 = g(x1) x2 + x2^(1+p) + u are bounded by (|g| + (1+p) "
         "|x2_hat|^p) |x2 - x2_hat| + |x2 - x2_hat|^(1+p).",
         is_general=True,
-        holds=max(quotients[p] for p in ("0.1", "0.5", "0.9")) <= 1.0 + 1e-9,
+        holds=max(quotient for p, quotient in quotients.items() if p < 1.0) <= 1.0 + 1e-9,
         conditions="For all p in (0, 1), of which three were tried.",
         figures={"worst_quotient_by_p": quotients},
     )
@@ -102,8 +92,8 @@ def exponent_of_6() -> Claim:
         d_inf = p
         exponent = (1.0 - d_inf * (n - i - 1)) / (1.0 - d_inf * (n - j))  # of section 2.1 and (28)
         printed_exponent = (1.0 - d_inf * (n - i)) / (1.0 - d_inf * (n - j))
-        quotients[str(p)] = quotient_of_6(exponent, p, 1e8)
-        printed[str(p)] = [quotient_of_6(printed_exponent, p, size) for size in (1e4, 1e8)]
+        quotients[p] = quotient_of_6(exponent, p, 1e8)
+        printed[p] = [quotient_of_6(printed_exponent, p, size) for size in (1e4, 1e8)]
     corrected = (
         "With the exponent that section 2.1 and (28) have, (1 - d_inf (n - i - 1))/(1 - d_inf (n - j)). In the copy at "
         "hand (6) has n - i for n - i - 1. "
@@ -122,25 +112,19 @@ def exponent_of_6() -> Claim:
 # --- (13), (21) and (22) ---
 
 
-def is_a_bound_on_b() -> bool:
-    """Check exactly that (21) is (i + 1 - j)(1 - d (n - 1) - b d) > 0, once multiplied out.
-
-    Both sides have at most the degree 2 in each of n, i, j, b and d = d_inf: equal at four values of each, they are
-    the same.
-    """
-    return all(
-        (i + b) * (1 - d * (n - j)) - (j - 1 + b) * (1 - d * (n - i - 1)) == (i + 1 - j) * (1 - d * (n - 1) - b * d)
-        for n, i, j, b, d in itertools.product(range(4), repeat=5)
-    )
-
-
 def scaling_conditions() -> Claim:
     """Judge (21), (22), which a small enough b must satisfy; section 3.1's b is beside them."""
     bound = largest_b(2, P, (P,))
+    # (21) is (i + 1 - j)(1 - d (n - 1) - b d) > 0, once multiplied out. Both sides have at most the degree 2 in each of
+    # n, i, j, b and d = d_inf: equal at four values of each, they are the same.
+    is_a_bound_on_b = all(
+        (i + b) * (1 - d * (n - j)) - (j - 1 + b) * (1 - d * (n - i - 1)) == (i + 1 - j) * (1 - d * (n - 1) - b * d)
+        for n, i, j, b, d in itertools.product(range(4), repeat=5)
+    )
     return Claim(
         place="Section 4.3, (21), (22)",
         statement="Every small enough b satisfies (21) and (22), whichever d_inf and v_j Theorem 1 allows.",
-        holds=is_a_bound_on_b() and math.isclose(bound, 1.0 / P - 1.0, rel_tol=1e-9),
+        holds=is_a_bound_on_b and math.isclose(bound, 1.0 / P - 1.0, rel_tol=1e-9),
         figures={"b": B, "largest_b": bound, "violated_count": len(list_violations(2, P, B, (P,)))},
     )
 
@@ -154,7 +138,7 @@ def tracking_error(rate: float) -> tuple[float, float]:
     for value in Omega[:-1].tolist():
         gains.append(updated_gain(gains[-1], value, dt, phi1, phi2, phi3))
     L = np.array(gains)
-    return float(np.abs(L - phi2 - phi3 / phi1 * Omega)[t > 20.0].max()), float((L - phi2).min())
+    return np.abs(L - phi2 - phi3 / phi1 * Omega)[t > 20.0].max(), (L - phi2).min()
 
 
 def gain_tracking() -> Claim:
@@ -170,7 +154,7 @@ def gain_tracking() -> Claim:
         assumes={"signal": "Omega = 2 + sin(w t)", "gains": "phi1 = 0.5, phi2 = 1, phi3 = 1"},
         holds=is_proportional and min(least) >= 0.0,
         conditions="For any Omega along a solution, of which one was tried.",
-        figures={"omega_rate_rad_per_time": list(rates), "largest_error_of_L": list(errors)},
+        figures={"omega_rate_rad_per_time": rates, "largest_error_of_L": errors},
     )
 
 
@@ -221,9 +205,9 @@ def limits_error(correction: BiLimitCorrection, scale: float) -> float:
     dilated = correction(e1 / scale), correction(scale ** r[0] * e1)
     for i, l_i in enumerate(correction.l):
         linear, power = l_i * linear, signed_power(l_i * power, r[i + 1] / r[i])
-        errors.append(np.abs(scale * dilated[0][i] + linear).max() / np.abs(linear).max())
-        errors.append(np.abs(dilated[1][i] / scale ** r[i + 1] + power).max() / np.abs(power).max())
-    return float(max(errors))
+        errors.append(largest_size(scale * dilated[0][i] + linear) / largest_size(linear))
+        errors.append(largest_size(dilated[1][i] / scale ** r[i + 1] + power) / largest_size(power))
+    return max(errors)
 
 
 def chain_errors(correction: BiLimitCorrection, sizes: Sequence[float]) -> float:
@@ -251,7 +235,7 @@ def chain_errors(correction: BiLimitCorrection, sizes: Sequence[float]) -> float
             solution = solve_ivp(slope, (0.0, 40.0), start, "LSODA", rtol=1e-6, atol=1e-9 * size)
         except OverflowError:
             return math.inf
-        end = float(np.linalg.norm(solution.y[:, -1]))
+        end = np.linalg.norm(solution.y[:, -1])
         largest_ratio = max(largest_ratio, end / size if solution.success and math.isfinite(end) else math.inf)
     return largest_ratio
 
@@ -361,7 +345,7 @@ def decay(W: Lyapunov, b: float, spread: float = 0.0, grid: np.ndarray | None = 
     largest = sum(np.maximum((1.0 - spread) * part, (1.0 + spread) * part) for part in slopes)
     bound = value + value ** ((W.d_W + W.K.d_inf) / W.d_W)
     growth = by_e1 * b * e1 + by_e2 * (1.0 + b) * e2
-    return float((-largest / bound).min()), float((growth / value).min())
+    return (-largest / bound).min(), (growth / value).min()
 
 
 class Pair(NamedTuple):
@@ -385,7 +369,7 @@ def search(d_inf: float) -> Pair | None:
 
 def equations_19_20() -> Claim:
     """Judge (19) and (20)."""
-    pairs = {str(d_inf): pair for d_inf in DEGREES if (pair := search(d_inf)) is not None}
+    pairs = {d_inf: pair for d_inf in DEGREES if (pair := search(d_inf)) is not None}
     return Claim(
         place="Section 4.2, (19) and (20)",
         statement="There are K and a proper W, homogeneous in the bi-limit, that satisfy (19) and (20) for all A(t) "

@@ -15,7 +15,7 @@ from cmg_mj.features.replay import replay
 from cmg_mj.observers import Estimate, Measurement, Observer
 from cmg_mj.observers.ltv import LinearTimeVarying, State, exact_step, map_of_one
 from cmg_mj.papers.aranovskiy2020.paper import H_0, TABLE_2, A_prime, C, printed_model, riccati_slope
-from cmg_mj.papers.aranovskiy2020.rig import DT, run_of_10
+from cmg_mj.papers.pair import DT, run_of_10
 from cmg_mj.papers.recorded import rms
 
 Method = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
@@ -45,11 +45,10 @@ def rk4_as_printed(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
 
 def exact_method(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
     """Take one sample of this package's observer at rest, where A is that of `A_prime()`."""
-    observer = make_exact(h)
-    rest_measurement = Measurement(0.0, 0.0)
-    entries = {"h11": H[0, 0], "h12": H[0, 1], "h22": H[1, 1], "h33": H[2, 2]}
-    state = observer.init(rest_measurement)._replace(**{name: float(value) for name, value in entries.items()})
-    return matrix_of(observer.step(state, rest_measurement, 0.0)[0])
+    observer, at_rest = make_exact(h), Measurement(0.0, 0.0)
+    (h11, h12, _), (_, h22, _), (*_, h33) = H.tolist()
+    state = observer.init(at_rest)._replace(h11=h11, h12=h12, h22=h22, h33=h33)
+    return matrix_of(observer.step(state, at_rest, 0.0)[0])
 
 
 METHODS: dict[str, Method] = {
@@ -73,12 +72,17 @@ def matrix_of(state: State) -> np.ndarray:
     return np.array([[state.h11, state.h12, 0.0], [state.h12, state.h22, 0.0], [0.0, 0.0, state.h33]], dtype=float)
 
 
+@dataclass
 class Plain:
-    """(10) as it is printed: one step of twelve equations a sample, matrices of NumPy."""
+    """(10) as it is printed: one step of twelve equations a sample, matrices of NumPy.
 
-    def __init__(self, method: Method, dt: float = DT) -> None:
-        self.method, self.dt = method, dt
-        self.model = printed_model()
+    Attributes:
+        method: Method for H.
+        dt: Sample period [s].
+    """
+
+    method: Method
+    dt: float = DT
 
     def init(self, y: Measurement) -> tuple[np.ndarray, np.ndarray]:
         """Start at rest, with H = H_0."""
@@ -87,7 +91,7 @@ class Plain:
     def step(self, state: tuple[np.ndarray, np.ndarray], y: Measurement, u: float) -> tuple[Any, Any]:
         """Advance by one sample period: H by the method, the estimate by Euler."""
         x, H = state
-        drift, gain, damping = self.model.terms(y.y1, y.y2)
+        drift, gain, damping = printed_model().terms(*y)
         A = A_prime(-u * damping)
         b = np.array([0.0, drift + u * gain, u])
         x = x + self.dt * (A @ x + b - H @ C.T @ (C @ x - np.array(y)))
@@ -111,7 +115,7 @@ def compare(form: Observer, other_form: Observer, seed: int) -> Comparison:
     later = run["time_s"] > 0.2
     truth = run["x2_rad_s"][later]
     rate, other_rate = (replay(observer, run).x2[later] for observer in (form, other_form))
-    return Comparison(*(float(rms(error)) for error in (other_rate - rate, rate - truth, other_rate - truth)))
+    return Comparison(*(rms(error) for error in (other_rate - rate, rate - truth, other_rate - truth)))
 
 
 # --- by explicit Euler, on floats and arrays ---------------------------------------------------------------------
@@ -176,13 +180,6 @@ class TenByEuler:
         ), estimate
 
 
-class Eleven(NamedTuple):
-    """The estimate."""
-
-    x1: Scalar
-    x2: Scalar
-
-
 @dataclass(frozen=True)
 class ElevenByEuler:
     """(11), one Euler step a sample at the newest measurement.
@@ -195,18 +192,19 @@ class ElevenByEuler:
     dt: float
     model: ReducedModel
 
-    def init(self, y: Measurement) -> Eleven:
+    def init(self, y: Measurement) -> Estimate:
         """Start at rest at the measured tilt."""
-        return Eleven(y.y1, 0.0 * y.y1)
+        return Estimate(y.y1, 0.0 * y.y1, y.y2)
 
-    def step(self, state: Eleven, y: Measurement, u: Scalar) -> tuple[Eleven, Estimate]:
+    def step(self, state: Estimate, y: Measurement, u: Scalar) -> tuple[Estimate, Estimate]:
         """Advance by one sample period."""
-        x1, x2 = state
+        x1, x2, _ = state
         k1, k2, alpha = TABLE_2["homogeneous"].values()
         drift, gain, damping = self.model.terms(*y)
         by_alpha, by_other = signed_powers(x1 - y.y1, alpha)
-        estimate = Eleven(
+        estimate = Estimate(
             x1 + self.dt * (x2 - k1 * by_alpha),
             x2 + self.dt * (drift + u * (gain - damping * x2) - k2 * by_other),
+            y.y2,
         )
-        return estimate, Estimate(estimate.x1, estimate.x2, y.y2)
+        return estimate, estimate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,15 +11,13 @@ from scipy.linalg import LinAlgError, solve_continuous_are
 from scipy.optimize import minimize
 
 from cmg_mj.observers import make_observer
-from cmg_mj.papers.aranovskiy2020.paper import K_E, K_E_ROUNDING, gimbal_rest, integrator_rest, printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT, push_recovery, replay_at_rest
-from cmg_mj.papers.assumed import PUSH_RECOVERY
-from cmg_mj.papers.claim import Assumption, Claim, OnShare
-from cmg_mj.papers.recorded import trajectory_of
+from cmg_mj.papers.aranovskiy2020.paper import K_E, K_E_ROUNDING, printed_model
+from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.pair import DT, PUSH_RECOVERY, replay_at_rest, run_loops
+from cmg_mj.papers.recorded import trace, trajectory_of
 from cmg_mj.results.intervals import Interval, mean_interval
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs.side_by_side import run_jobs, run_of
-from cmg_mj.view.plots.figure import Line, Panel, Picture
+from cmg_mj.view.plots.figure import Panel, Picture
 
 # --- inverse optimality -----------------------------------------------------------------------------------------
 
@@ -60,7 +58,7 @@ def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
     roots = np.roots(gap)
     crossings = [w for w in roots if abs(w.imag) < 1e-9 * (1.0 + abs(w)) and w.real > 0.0]
     grid = np.concatenate([np.logspace(-6, 8, 4001), [abs(w.real) for w in crossings]])
-    least = float(np.sqrt((np.polyval(_squared(p), grid) / np.polyval(_squared(d), grid)).min()))
+    least = np.sqrt((np.polyval(_squared(p), grid) / np.polyval(_squared(d), grid)).min())
     basis = np.column_stack([_squared(row) for row in numerators])[1:]
     diagonal = np.linalg.lstsq(basis, gap, rcond=None)[0]
     if np.polyval(gap, grid).min() < 0.0 or gap[-1] < 0.0:
@@ -70,7 +68,7 @@ def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
     factor = math.sqrt(abs(gap[0])) * np.real(np.poly(left_roots))
     c = np.linalg.solve(numerators[:, 1:].T, factor)
     Q = np.outer(c, c)
-    return Inverse(least, diagonal, Q, float(np.abs(lqr_gain(A, B, Q) / K - 1.0).max()))
+    return Inverse(least, diagonal, Q, np.abs(lqr_gain(A, B, Q) / K - 1.0).max())
 
 
 def _squared(polynomial: np.ndarray) -> np.ndarray:
@@ -113,7 +111,7 @@ def nearest_diagonal(
 
     def off(logarithms: np.ndarray) -> float:
         try:
-            return float((np.abs(lqr_gain(A, B, np.diag(weights(logarithms))) - K) / rounding).max())
+            return (np.abs(lqr_gain(A, B, np.diag(weights(logarithms))) - K) / rounding).max()
         except LinAlgError:  # Q with entries too far apart for the solver
             return math.inf
 
@@ -136,10 +134,10 @@ def lqr_gains() -> Claim:
         figures={
             "least_return_difference": inverse.least,
             "recovered_gain_relative_error": inverse.recovered,
-            "Q": None if inverse.Q is None else inverse.Q.tolist(),
-            "diagonal_candidate": inverse.diagonal.tolist(),
-            "diagonal_within_rounding": diagonal.tolist(),
-            "gain_within_rounding": lqr_gain(A, B, np.diag(diagonal)).tolist(),
+            "Q": inverse.Q,
+            "diagonal_candidate": inverse.diagonal,
+            "diagonal_within_rounding": diagonal,
+            "gain_within_rounding": lqr_gain(A, B, np.diag(diagonal)),
             "difference_by_rounding": off,
         },
     )
@@ -152,7 +150,7 @@ DURATION_S = 26.0
 AVERAGED_S = 6.0
 """The last so many seconds are averaged [s]; the slowest poles, -0.2 +- 0.29j 1/s, have then faded to 2 %."""
 BIAS_DEG = 0.5
-ASSUMED: Mapping[Assumption, str] = {"e": f"{BIAS_DEG:g} deg", "noise": PUSH_RECOVERY["noise"]}
+ASSUMED: Mapping[str, str] = {"e": f"{BIAS_DEG:g} deg", "noise": PUSH_RECOVERY["noise"]}
 
 TRUE_RATE = "the true rate, (8)"
 ESTIMATED = ['controller.angle_source="estimated"']
@@ -183,15 +181,12 @@ class Rest(NamedTuple):
         return abs(self.x1.mean) < BIAS_DEG / 20.0 and abs(self.x_e.mean / expected_x_e - 1.0) < 0.05
 
 
-def find_rests(cases: Sequence[tuple[str, int, Sequence[str]]], seed: int) -> list[Rest]:
-    """Let the rig come to rest, without a push: a case of `CASES`, how many worlds, and settings beside its own."""
+def find_rests(cases: Iterable[str], worlds: int, seed: int, *extra: str) -> dict[str, Rest]:
+    """Let the rig come to rest, without a push, in some of `CASES`, with settings beside their own."""
     common = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
-    runs = []
-    for case, worlds, extra in cases:
-        observer, settings = CASES[case]
-        runs.append(run_of(push_recovery(observer, seed, [*common, *settings, *extra], DURATION_S), worlds))
-    results = run_jobs(runs)
-    return [_average(CASES[case][0], trajectory_of(result)) for (case, *_), result in zip(cases, results, strict=True)]
+    loops = {case: (CASES[case][0], [*common, *CASES[case][1], *extra]) for case in cases}
+    results = run_loops(loops, worlds, seed, DURATION_S)
+    return {case: _average(CASES[case][0], trajectory_of(result)) for case, result in results.items()}
 
 
 def _average(observer: str, run: Trajectory) -> Rest:
@@ -202,7 +197,7 @@ def _average(observer: str, run: Trajectory) -> Rest:
     return Rest(x1, x3, x_e, x2, run.world(0))
 
 
-def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple[float, float]:
+def steady(observer: str, e_deg: float, sigma: float) -> tuple[float, float]:
     """Replay an observer on the rig at rest on average: y2 = 0, u = 0, y1 = -e and white noise.
 
     The noise matters to (11) alone: its gains fall with the size of its error, so that noise adds to its bias.
@@ -211,16 +206,15 @@ def steady(observer: str, e_deg: float, sigma: float, seed: int = SEED) -> tuple
         observer: Its name.
         e_deg: The bias [deg].
         sigma: Standard deviation of y1's noise [rad].
-        seed: Seed of the noise.
 
     Returns:
         The means of its x1 [rad] and x2 [rad/s].
     """
     ticks, settling, copies = 1200, 400, 64
-    noise = np.random.default_rng(seed).normal(0.0, sigma, (ticks, copies))
+    noise = np.random.default_rng(SEED).normal(0.0, sigma, (ticks, copies))
     noise = np.hstack([noise, -noise])  # whose mean is zero
     estimate = replay_at_rest(make_observer(observer, DT, printed_model()), noise - math.radians(e_deg))
-    return float(estimate.x1[settling:].mean()), float(estimate.x2[settling:].mean())
+    return estimate.x1[settling:].mean(), estimate.x2[settling:].mean()
 
 
 def expected_integrator(observer: str, sigma: float) -> float:
@@ -232,7 +226,8 @@ def expected_integrator(observer: str, sigma: float) -> float:
 
 def laws_claim(rest: Rest, static: Rest) -> Claim:
     """Judge (8), and (7), which has no integrator."""
-    x_e, x3 = integrator_rest(math.radians(BIAS_DEG)), gimbal_rest(BIAS_DEG)
+    k1, _, k3, k4 = K_E
+    x_e, x3 = k1 / k4 * math.radians(BIAS_DEG), k1 / k3 * BIAS_DEG
     return Claim(
         place="(7), (8) on the rig",
         statement="Without the integrator the gimbal rests away from zero; with it x converges to zero.",
@@ -277,9 +272,8 @@ def observers_claim(rests: Mapping[str, Rest]) -> Claim:
 def _picture(rests: Mapping[str, Rest]) -> Picture:
     integrators, tilts = [], []
     for i, (case, rest) in enumerate(rests.items()):
-        t = rest.example["time_s"]
-        integrators.append(Line(t, rest.example["x_e_rad_times_s"], case, color=i))
-        tilts.append(Line(t, np.degrees(rest.example["x1_rad"]), color=i, width=0.5))
+        integrators.append(trace(rest.example, "x_e_rad_times_s", case, color=i))
+        tilts.append(trace(rest.example, "x1_rad", color=i, width=0.5))
     return Picture(
         "aranovskiy2020-equilibrium",
         f"aranovskiy2020, Section III and after (10): the way to rest from the upright, e = {BIAS_DEG:g} deg, world 0",
@@ -287,10 +281,8 @@ def _picture(rests: Mapping[str, Rest]) -> Picture:
     )
 
 
-def rest_claims(on_share: OnShare) -> list[Claim]:
+def rest_claims() -> list[Claim]:
     """Judge the laws with the true rate, then with observers."""
-    without_integrator = (TRUE_RATE, 2, ["controller.gains=[35.0, 4.0, -1.0, 0.0]"])
-    *case_rests, static = find_rests([*((case, WORLDS, ()) for case in CASES), without_integrator], SEED)
-    on_share(0.9)
-    rests = dict(zip(CASES, case_rests, strict=True))
-    return [laws_claim(rests[TRUE_RATE], static), observers_claim(rests)]
+    static = find_rests([TRUE_RATE], 2, SEED, "controller.gains=[35.0, 4.0, -1.0, 0.0]")
+    rests = find_rests(CASES, WORLDS, SEED)
+    return [laws_claim(rests[TRUE_RATE], static[TRUE_RATE]), observers_claim(rests)]

@@ -1,6 +1,6 @@
-"""Hypotheses 1 to 3 kept, and broken on purpose: pairs whose halves differ, and the turn of body A that follows.
+"""Section II: Hypotheses 1 to 3 kept, and broken on purpose, and servos that track a velocity.
 
-The controller and the observers do not know the change.
+Pairs whose halves differ turn body A. The controller and the observers do not know the change.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from cmg_mj.papers.aranovskiy2020.rig import DURATION_S, push_recovery, run_on_rigs
-from cmg_mj.papers.assumed import PUSH_RECOVERY
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix
-from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
+from cmg_mj.papers.pair import DURATION_S, PUSH_RECOVERY, push_recovery, run_on_rigs
+from cmg_mj.papers.recorded import largest_size, push_intervals, rms, trace, trajectory_of
+from cmg_mj.plant.elements import Module
 from cmg_mj.plant.plant import Plant, load_plant
-from cmg_mj.results.intervals import ratio_interval
+from cmg_mj.results.intervals import Interval, known_interval, ratio_interval
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.view.plots.figure import Line, Panel, Picture
@@ -29,33 +29,30 @@ SEED, WORLDS = 75_000, 4
 # --- pairs whose halves differ ----------------------------------------------------------------------------------
 
 
-def slower_flywheel(plant: Plant, share: float) -> None:
+def slower_flywheel(model: mujoco.MjModel, key: int, module: Module, share: float) -> None:
     """Slow the second flywheel down by a share (Hypothesis 2 and 3: unequal speeds)."""
-    module, model = plant.axis.modules[1], plant.model
-    model.key_ctrl[plant.key, module.motor] *= 1.0 - share
-    model.key_qvel[plant.key, module.flywheel] *= 1.0 - share
+    model.key_ctrl[key, module.motor] *= 1.0 - share
+    model.key_qvel[key, module.flywheel] *= 1.0 - share
 
 
-def gimbal_offset(plant: Plant, offset_deg: float) -> None:
+def gimbal_offset(model: mujoco.MjModel, key: int, module: Module, offset_deg: float) -> None:
     """Start the second gimbal off its place (Hypothesis 2)."""
-    module, model = plant.axis.modules[1], plant.model
-    model.key_qpos[plant.key, module.gimbal] += module.direction * math.radians(offset_deg)
-    model.key_act[plant.key, model.actuator_actadr[module.servo]] += module.direction * math.radians(offset_deg)
+    offset = module.direction * math.radians(offset_deg)
+    model.key_qpos[key, module.gimbal] += offset
+    model.key_act[key, model.actuator_actadr[module.servo]] += offset
 
 
-def servo_gain(plant: Plant, share: float) -> None:
+def servo_gain(model: mujoco.MjModel, key: int, module: Module, share: float) -> None:
     """Let the second servo turn its gimbal farther than commanded, by a share (Hypothesis 1)."""
-    module, model = plant.axis.modules[1], plant.model
     gear = 1.0 / (1.0 + share)
-    zero = model.key_qpos[plant.key, module.gimbal]
     # Its setpoint counts in angle times gear, from where the gimbal starts.
     model.actuator_gear[module.servo, 0] = gear
-    model.key_act[plant.key, model.actuator_actadr[module.servo]] = gear * zero
+    model.key_act[key, model.actuator_actadr[module.servo]] = gear * model.key_qpos[key, module.gimbal]
 
 
-def gimbal_friction(plant: Plant, torque_n_m: float) -> None:
+def gimbal_friction(model: mujoco.MjModel, key: int, module: Module, torque_n_m: float) -> None:
     """Give the second gimbal dry friction, the first none (Hypothesis 1)."""
-    plant.model.dof_frictionloss[plant.axis.modules[1].gimbal] = torque_n_m
+    model.dof_frictionloss[module.gimbal] = torque_n_m
 
 
 @dataclass(frozen=True)
@@ -64,7 +61,7 @@ class Mismatch:
 
     Attributes:
         kind: Its name.
-        change: Function that breaks a rig so: makes its second cube differ by a size.
+        change: Function that breaks a rig so, (model, key, second module, size): its second cube differs by a size.
         sizes: Sizes of the mismatch that are tried.
         unit: Unit of the sizes.
         display_factor: Number by which a size is multiplied to be shown in that unit.
@@ -72,7 +69,7 @@ class Mismatch:
     """
 
     kind: str
-    change: Callable[[Plant, float], None]
+    change: Callable[[mujoco.MjModel, int, Module, float], None]
     sizes: Sequence[float]
     unit: str
     display_factor: float
@@ -111,7 +108,7 @@ def run_all(
     cases = [(mismatch, size) for mismatch in mismatches for size in mismatch.sizes]
     rigs = [load_plant(experiment.scenario.plant) for _ in range(1 + len(cases))]
     for rig, (mismatch, size) in zip(rigs[1:], cases, strict=True):
-        mismatch.change(rig, size)
+        mismatch.change(rig.model, rig.key, rig.axis.modules[1], size)
     symmetric, *broken = run_on_rigs(experiment, rigs, worlds)
     kinds = [(mismatch.kind, size) for mismatch, size in cases]
     return MismatchRuns(rigs[0], symmetric, dict(zip(kinds, broken, strict=True)))
@@ -136,31 +133,25 @@ def inertia_of(plant: Plant) -> Inertia:
     data = mujoco.MjData(plant.model)
     mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
     M, module = np.diag(mass_matrix(plant.model, data)), plant.axis.modules[0]
-    return Inertia(*(float(M[i]) for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
+    return Inertia(*(M[i] for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
 
 
-def carried_momentum(plant: Plant, trajectory: Trajectory) -> np.ndarray:
-    """Return the momentum of gimbals and flywheels about the vertical, (n_ticks, ...) [N m s].
+def balanced_yaw_rate(plant: Plant, trajectory: Trajectory) -> np.ndarray:
+    """Body A's rate by conservation: no torque acts about the vertical, so I q_a' + what is carried stays [rad/s].
 
-    The gimbals' axis is b_x, whose vertical part is -sin q_b; the flywheels' is b_y cos q_c + b_z sin q_c, whose
-    vertical part is cos q_b sin q_c.
+    Gimbals and flywheels carry momentum. The gimbals' axis is b_x, whose vertical part is -sin q_b; the flywheels' is
+    b_y cos q_c + b_z sin q_c, whose vertical part is cos q_b sin q_c.
     """
     parts, names = inertia_of(plant), plant.joint_names
     tilt = trajectory[f"angle/{names[plant.tilt]}_rad"]
-    total = np.zeros_like(tilt)
+    momentum = np.zeros_like(tilt)
     for module in plant.axis.modules:
         angle = trajectory[f"angle/{names[module.gimbal]}_rad"]
         turning = trajectory[f"rate/{names[module.gimbal]}_rad_s"]
         spinning = trajectory[f"rate/{names[module.flywheel]}_rad_s"]
-        total = total - parts.gimbal * turning * np.sin(tilt)
-        total = total + parts.spin * spinning * np.cos(tilt) * np.sin(angle)
-    return total
-
-
-def balanced_yaw_rate(plant: Plant, trajectory: Trajectory) -> np.ndarray:
-    """Body A's rate by conservation: no torque acts about the vertical, so I q_a' + carried stays [rad/s]."""
-    momentum = carried_momentum(plant, trajectory)
-    return (momentum[0] - momentum) / inertia_of(plant).yaw
+        momentum = momentum - parts.gimbal * turning * np.sin(tilt)
+        momentum = momentum + parts.spin * spinning * np.cos(tilt) * np.sin(angle)
+    return (momentum[0] - momentum) / parts.yaw
 
 
 def predict_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajectory) -> np.ndarray:
@@ -216,8 +207,8 @@ def measure_yaw(runs: MismatchRuns, mismatch: Mismatch, size: float) -> dict[str
     return {
         "turn_deg": _largest_deg(run["angle/yaw_rad"]),
         "turn_foreseen_deg": foreseen,
-        "largest_rate_rad_s": float(largest.mean()),
-        "conservation_miss": float((miss / largest).max()),
+        "largest_rate_rad_s": largest.mean(),
+        "conservation_miss": (miss / largest).max(),
         **{
             f"{name}_by_symmetric": ratio_interval(result.values(key), runs.symmetric.values(key))
             for name, key in (("velocity_rms_error", "velocity_rms_error_rad_s"), ("tilt_rms", "tilt_rms_deg"))
@@ -227,12 +218,12 @@ def measure_yaw(runs: MismatchRuns, mismatch: Mismatch, size: float) -> dict[str
 
 def _largest_deg(angle: np.ndarray) -> float:
     """Return the largest size of an angle, mean over the worlds, from (n_ticks, n_worlds) [rad]."""
-    return float(np.degrees(np.abs(angle).max(axis=0)).mean())
+    return np.degrees(np.abs(angle).max(axis=0)).mean()
 
 
 def symmetric_claim(runs: MismatchRuns) -> Claim:
     """Judge Hypotheses 1 and 2 kept."""
-    turn = float(np.degrees(np.abs(trajectory_of(runs.symmetric)["angle/yaw_rad"]).max()))
+    turn = np.degrees(largest_size(trajectory_of(runs.symmetric)["angle/yaw_rad"]))
     return Claim(
         place="Hypotheses 1 and 2",
         statement="With symmetric gimbals, flywheels and commands no torque acts on body A: it stands still.",
@@ -264,9 +255,9 @@ def _picture(runs: MismatchRuns, yaws: Mapping[str, Mapping[str, Any]]) -> Pictu
     rates, turns, sweep = [], [], []
     for i, mismatch in enumerate(MISMATCHES):
         size, largest = mismatch.sizes[-2:]
-        run = trajectory_of(runs.broken[mismatch.kind, size])
-        rates.append(Line(t, run["rate/yaw_rad_s"][:, 0], mismatch.words(size), color=i))
-        turns.append(Line(t, np.degrees(run["angle/yaw_rad"][:, 0]), color=i))
+        run = trajectory_of(runs.broken[mismatch.kind, size]).world(0)
+        rates.append(trace(run, "rate/yaw_rad_s", mismatch.words(size), color=i))
+        turns.append(trace(run, "angle/yaw_rad", color=i))
         x, measured = [s / largest for s in mismatch.sizes], [yaws[mismatch.words(s)] for s in mismatch.sizes]
         label = mismatch.words(largest).replace(mismatch.kind, f"{mismatch.kind}, 1 is")
         sweep.append(Line(x, [yaw["turn_deg"] for yaw in measured], label, "o-", color=i))
@@ -297,14 +288,14 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
 
     speeds = np.stack([np.abs(rate(module.flywheel)) for module in modules])
     nominal = abs(modules[0].speed)
-    speed_error = float(np.abs(speeds - nominal).max())
-    gimbal = max(float(np.abs(rate(module.gimbal)).max()) for module in modules)
-    tilt = float(np.abs(run["x2_rad_s"]).max())
+    speed_error = largest_size(speeds - nominal)
+    gimbal = max(largest_size(rate(module.gimbal)) for module in modules)
+    tilt = largest_size(run["x2_rad_s"])
     spin_up = np.gradient(speeds[0], run["time_s"], axis=0)
     D = model.J1 + model.J2 * np.sin(run["x3_rad"]) ** 2
     omitted_term = model.J_d * np.sin(run["x3_rad"]) * spin_up / D
     acceleration = np.gradient(run["x2_rad_s"], run["time_s"], axis=0)
-    share = float(rms(omitted_term.ravel()) / rms(acceleration.ravel()))
+    share = rms(omitted_term.ravel()) / rms(acceleration.ravel())
     return Claim(
         place="Hypothesis 3",
         statement="The flywheels' speed is held constant and far above the rates of tilt and gimbals.",
@@ -319,8 +310,133 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
     )
 
 
-def claims(on_share: OnShare) -> list[Claim]:
+def claims() -> list[Claim]:
     """Judge Hypotheses 1 and 2 kept, then broken, and Hypothesis 3."""
     runs = run_all(MISMATCHES, WORLDS, SEED, DURATION_S)
-    on_share(0.9)
     return [symmetric_claim(runs), broken_claim(runs), hypothesis_3(runs)]
+
+
+# --- servos that track a velocity, and how far a deadband of theirs may go ----------------------------------------
+
+SERVO_SEED, SERVO_WORLDS = 78_000, 4
+LAG_S, SOFT_LAG_S = 0.001, 0.005
+"""I/kv, in which a free gimbal comes near a new velocity: a stiff servo and a soft one [s]; the paper has neither."""
+COMMAND_LAG_S = 0.0005
+"""Half a physics step: Runge-Kutta 4 follows nothing much faster [s]."""
+RESOLUTION = 0.0119
+"""0.114 rev/min, the unit of the speed command of the MX-106 in wheel mode (e-Manual, MX-106) [rad/s]."""
+DEADBANDS = (0.0, RESOLUTION, 0.05, 0.1, 0.2, 0.4)
+"""Speeds below which the gimbal stands still [rad/s]; the paper says nothing of one."""
+MEANS_S = 0.1
+"""Over which rate and command are compared: the command's noise changes from period to period [s]."""
+WITHIN = 0.1
+"""An estimate and a rig that change by less have not noticed."""
+
+
+def in_velocity_mode(plant: Plant, deadband: float, lag_s: float = LAG_S) -> None:
+    """Give both gimbals a servo with the torque kv (u - rate), and dry friction that makes a deadband of it.
+
+    With the friction kv times the deadband the gimbal stands while |u| is less, and turns slower by it otherwise.
+    MuJoCo's velocity servo has no state; here the state that the bench's has is the command, late by `COMMAND_LAG_S`.
+
+    Args:
+        plant: A rig of its own, nothing has run on it.
+        deadband: Speed below which the gimbal stands still [rad/s].
+        lag_s: I/kv [s].
+    """
+    model = plant.model
+    for module in plant.axis.modules:
+        i = module.servo
+        dof = model.jnt_dofadr[module.gimbal]
+        kv = model.dof_M0[dof] / lag_s
+        model.actuator_dyntype[i] = mujoco.mjtDyn.mjDYN_FILTEREXACT
+        model.actuator_dynprm[i, 0] = COMMAND_LAG_S
+        model.actuator_gainprm[i, 0] = kv
+        model.actuator_biasprm[i, :3] = 0.0, 0.0, -kv
+        model.dof_frictionloss[dof] = kv * deadband
+        # MuJoCo's friction creeps, unless it is as hard as the step allows.
+        model.dof_solref[dof], model.dof_solimp[dof, :2] = (2.0 * model.opt.timestep, 1.0), 0.9999
+        model.key_act[plant.key, model.actuator_actadr[i]] = 0.0
+
+
+class Servos(NamedTuple):
+    """The runs, the same worlds each."""
+
+    position: Result
+    """Runs with the bench's servo."""
+    velocity: Mapping[float, Result]
+    """Deadband [rad/s] -> runs with the servo in velocity mode."""
+    soft: Result
+    """Runs of the soft servo in velocity mode, without a deadband."""
+
+
+def run_servos(worlds: int = SERVO_WORLDS, seed: int = SERVO_SEED, duration_s: float = DURATION_S) -> Servos:
+    """Close the loop on (11), with the push of Figs 5 to 7, on every servo."""
+    experiment = push_recovery("homogeneous", seed, ["plant.timestep_s=0.001"], duration_s)
+    cases = [*((deadband, LAG_S) for deadband in DEADBANDS), (0.0, SOFT_LAG_S)]
+    rigs = [load_plant(experiment.scenario.plant) for _ in cases]
+    for rig, case in zip(rigs, cases, strict=True):
+        in_velocity_mode(rig, *case)
+    *groups, soft = run_on_rigs(experiment, rigs, worlds)
+    return Servos(experiment.run_many(worlds), dict(zip(DEADBANDS, groups, strict=True)), soft)
+
+
+def measure_tracking(result: Result) -> Interval | None:
+    """RMS of the gimbals' rate less the command, means over `MEANS_S`, by that of the command; worlds that stood."""
+    run = trajectory_of(result)
+    span = round(MEANS_S / float(run["time_s"][1] - run["time_s"][0]))
+    ends = np.arange(0, len(run["time_s"]), span)
+    rates = np.diff(run["x3_rad"][ends], axis=0) / MEANS_S
+    command = np.add.reduceat(run["u_rad_s"], ends[:-1])[: len(rates)] / span
+    command[-1] = run["u_rad_s"][ends[-2] : ends[-1]].mean(axis=0)
+    relative_errors = np.sqrt(np.mean((rates - command) ** 2, axis=0) / np.mean(command**2, axis=0))
+    return known_interval(np.where(result.stood, relative_errors, np.nan))
+
+
+def servo_claim(servos: Servos) -> Claim:
+    """Judge the runs: a deadband of the servo's resolution must be felt neither in the estimate nor in the tilt."""
+    results, smooth = servos.velocity, servos.velocity[0.0]
+    velocity, tilt = (
+        {d: ratio_interval(result.values(key), smooth.values(key)) for d, result in results.items()}
+        for key in ("velocity_rms_error_rad_s", "tilt_rms_deg")
+    )
+    falls = {d: result.fell.mean() for d, result in results.items()}
+    errors = {d: measure_tracking(result) for d, result in results.items()}
+    error = errors[RESOLUTION]
+    changes = [abs(ratios[RESOLUTION].mean - 1.0) for ratios in (velocity, tilt)]
+    return Claim(
+        place="After (2), the servos",
+        statement="The gimbals' servos ensure velocity tracking, so that omega_c can be taken for an input.",
+        assumes={**PUSH_RECOVERY, "servo": f"a lag of {1e3 * LAG_S:g} ms", "friction": "a deadband"},
+        holds=falls[RESOLUTION] == 0.0 and max(changes) < WITHIN and error is not None and error.mean < WITHIN,
+        conditions="With a servo that stiff, up to a deadband of 0.05 rad/s, with which the estimate's error and the "
+        "tilt stay within 10 %; the paper says nothing of one.",
+        figures={
+            "deadband_rad_s": DEADBANDS,
+            "velocity_rms_error_by_none": list(velocity.values()),
+            "tilt_rms_by_none": list(tilt.values()),
+            "tracking_error_share": list(errors.values()),
+            "tracking_error_share_soft": measure_tracking(servos.soft),
+            "fell_fraction": list(falls.values()),
+            "bench_servo_velocity_rms_error_by_none": ratio_interval(
+                *(result.values("velocity_rms_error_rad_s") for result in (servos.position, smooth))
+            ),
+        },
+        pictures=[_servo_picture(servos)],
+    )
+
+
+def _servo_picture(servos: Servos) -> Picture:
+    tilts, turns = [], []
+    results = {"the bench's servo": servos.position} | {
+        f"deadband {d:g} rad/s": servos.velocity[d] for d in (0.0, DEADBANDS[3], DEADBANDS[-1])
+    }
+    for color, (label, result) in enumerate(results.items()):
+        run = trajectory_of(result).world(0)
+        tilts.append(trace(run, "x1_rad", label, color=color, width=0.8))
+        turns.append(trace(run, "x3_rad", color=color, width=0.8))
+    return Picture(
+        "aranovskiy2020-servo",
+        "aranovskiy2020, Section II: the gimbals' servos in velocity mode, with a deadband, world 0",
+        [Panel("tilt x1 [deg]", tilts), Panel("gimbal angle x3 [deg]", turns)],
+    )

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.papers.aranovskiy2020.paper import K_E, gimbal_torque, printed_model
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import (
     constants_of,
     controllability_margin,
@@ -55,7 +55,7 @@ def residuals(states: int = STATES, seed: int = SEED) -> dict[str, float]:
     """
     plant = load_plant(equilibrium_bias_deg=0.0)
     model, reduced, first = copy(plant.model), plant.reduced, plant.axis.modules[0]
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
     data, rng, rows = mujoco.MjData(model), np.random.default_rng(seed), []
     for _ in range(states):
         x1, x3 = rng.uniform(-0.4, 0.4), rng.uniform(-1.2, 1.2)
@@ -95,7 +95,7 @@ def residuals(states: int = STATES, seed: int = SEED) -> dict[str, float]:
             }
         )
     rms = np.sqrt(np.mean(np.square([list(row.values()) for row in rows]), axis=0))
-    return dict(zip(rows[0], rms.tolist(), strict=True))
+    return dict(zip(rows[0], rms, strict=True))
 
 
 def equations_2_to_4(r: Mapping[str, float]) -> Claim:
@@ -120,7 +120,7 @@ def gimbals_line(r: Mapping[str, float]) -> Claim:
     )
 
 
-def claims(on_share: OnShare) -> list[Claim]:
+def claims() -> list[Claim]:
     """Judge Table 1, and (2) to (4)."""
     r = residuals()
     return [table_1(), equations_2_to_4(r), gimbals_line(r)]

@@ -9,19 +9,9 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.papers.cube import CUBE, reduced_model
 
-TABLE_1 = {
-    "m": 2.62,
-    "l": 0.19,
-    "J_b": 13e-3,
-    "I_c": 10e-4,
-    "J_c": 2.6e-4,
-    "K_c": 9.9e-4,
-    "I_d": 5.6e-4,
-    "J_d": 11e-4,
-    "omega_d": 314.0,
-    "g": 9.81,
-}
+TABLE_1 = {**CUBE, "l": 0.19}
 """Table 1 [kg, m, kg m^2, rad/s], and the standard gravity that it does not give [m/s^2]."""
 
 K_E = (35.0, 4.0, -1.0, 0.3)
@@ -50,14 +40,7 @@ C = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 @cache
 def printed_model() -> ReducedModel:
     """Return J1, J2, J_d omega_d and m g l/sqrt(2) by the closed forms below (2), from Table 1's numbers alone."""
-    t = TABLE_1
-    return ReducedModel(
-        J1=t["I_d"] + t["J_b"] + t["K_c"] + t["m"] * t["l"] ** 2 / 2.0,
-        J2=t["J_c"] - t["I_d"] + t["J_d"] - t["K_c"],
-        J_d=t["J_d"],
-        omega_d=t["omega_d"],
-        gravity_torque=t["m"] * t["g"] * t["l"] / math.sqrt(2.0),
-    )
+    return reduced_model(TABLE_1, 2)
 
 
 def gimbal_torque(x2: float, x3: float, gimbal_acceleration: float, omega_d: float) -> float:
@@ -76,18 +59,6 @@ def gimbal_torque(x2: float, x3: float, gimbal_acceleration: float, omega_d: flo
     inertial_torque = (TABLE_1["I_c"] + TABLE_1["I_d"]) * gimbal_acceleration
     tilt_torque = 0.5 * printed_model().J2 * math.sin(2.0 * q_c) * x2**2
     return inertial_torque + TABLE_1["J_d"] * x2 * omega_d * math.sin(q_c) + tilt_torque
-
-
-def gimbal_rest(e: float) -> float:
-    """x3 at which (7) rests: k1/k3 e, in the unit of e. After (7) it is printed with a minus."""
-    k1, _, k3, _ = K_E
-    return k1 / k3 * e
-
-
-def integrator_rest(e: float) -> float:
-    """x_e at which (8) rests: k_e1/k_e4 e, for e in rad [rad s]. After (8) it is printed with a minus."""
-    k1, _, _, k4 = K_E
-    return k1 / k4 * e
 
 
 def damping(u: float | np.ndarray, y2: float | np.ndarray) -> float | np.ndarray:

@@ -1,16 +1,19 @@
-"""The Riccati equation of (10): how delicate it is, its misprint, and whether the pair (A', C) is observable."""
+"""Remark 1 and the Riccati equation of (10): cost, delicacy, misprint, and whether (A', C) is observable."""
 
 from __future__ import annotations
 
+import json
 import math
+import statistics
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
 
 from cmg_mj.laws.state_feedback import StateFeedback
-from cmg_mj.observers import Measurement
+from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import (
     METHODS,
     Comparison,
@@ -23,16 +26,18 @@ from cmg_mj.papers.aranovskiy2020.forms_of_10 import (
     rk4,
     rk4_as_printed,
 )
-from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, Q, damping, settled_gains
-from cmg_mj.papers.aranovskiy2020.rig import DT, SEED_OF_10, run_of_10
+from cmg_mj.papers.aranovskiy2020.paper import H_0, OBSERVERS, A_prime, C, Q, damping, printed_model, settled_gains
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import rank_margin
+from cmg_mj.papers.pair import DT, SEED_OF_10, run_of_10
+from cmg_mj.papers.recorded import largest_size
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.benchmark import time_of_update
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 # --- delicacy ---------------------------------------------------------------------------------------------------
 
-RATES_HZ = tuple(float(rate) for rate in np.geomspace(20.0, 2000.0, 41))
+RATES_HZ = np.geomspace(20.0, 2000.0, 41).tolist()
 
 
 class Transient(NamedTuple):
@@ -66,11 +71,11 @@ def transient(method: str, rate_hz: float, kind: type = np.float64) -> Transient
         with np.errstate(all="ignore"):
             H = METHODS[method](H, A, h)
         truth = (E[3:, :3] + E[3:, 3:] @ truth) @ np.linalg.inv(E[:3, :3] + E[:3, 3:] @ truth)
-        path.append(float(H[0, 1]))
+        path.append(H[0, 1])
         if not np.isfinite(H).all():
             return Transient(-math.inf, math.inf, np.array(path))
-        least = min(least, float(np.linalg.eigvalsh(H.astype(float))[0]))
-        error = max(error, abs(float(H[0, 1]) - truth[0, 1]) / steady)
+        least = min(least, np.linalg.eigvalsh(H.astype(float))[0])
+        error = max(error, abs(H[0, 1] - truth[0, 1]) / steady)
     return Transient(least, error, np.array(path))
 
 
@@ -126,8 +131,8 @@ def delicacy() -> Claim:
             "rate_changed_by_euler_rad_s": comparison.difference,
             "rate_error_euler_rad_s": comparison.other_error,
             "rate_error_exact_rad_s": comparison.error,
-            "condition_along_run": float(np.linalg.cond(matrices).max()),
-            "least_eigenvalue_along_run": float(np.linalg.eigvalsh(matrices).min()),
+            "condition_along_run": np.linalg.cond(matrices).max(),
+            "least_eigenvalue_along_run": np.linalg.eigvalsh(matrices).min(),
         },
         pictures=[_picture(sweeps, at_200)],
     )
@@ -163,9 +168,9 @@ HARMLESS = 0.05
 """Share of the rate's error: if the misprint changes the rate by less, either equation may have been run."""
 
 
-def settle(method: Method, h: float = 1e-3) -> np.ndarray:
+def settle(method: Method) -> np.ndarray:
     """Return H where a method settles at rest, (3, 3)."""
-    H = H_0
+    H, h = H_0, 1e-3
     for _ in range(round(SETTLING_S / h)):
         H = method(H, A_prime(), h)
     return H
@@ -189,10 +194,10 @@ def misprint_claim(H: np.ndarray, printed_H: np.ndarray, rate: Comparison) -> Cl
         else "With A'^T for the printed A^T, which is that of (6): a misprint. The observer's rate is the same to less "
         "than a hundredth of its error, whichever of them was run.",
         figures={
-            "H12_printed": float(printed_H[0, 1]),
-            "H21_printed": float(printed_H[1, 0]),
-            "H12": float(H[0, 1]),
-            "largest_change_of_gain_share": float(np.abs((printed_H - H)[:, ::2]).max() / np.abs(H[:, ::2]).max()),
+            "H12_printed": printed_H[0, 1],
+            "H21_printed": printed_H[1, 0],
+            "H12": H[0, 1],
+            "largest_change_of_gain_share": largest_size((printed_H - H)[:, ::2]) / largest_size(H[:, ::2]),
             "rate_changed_rad_s": rate.difference,
             "rate_error_rad_s": rate.error,
             "rate_error_printed_rad_s": rate.other_error,
@@ -236,13 +241,13 @@ def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, floa
         phi = np.concatenate([[0.0], np.cumsum(growth[:-1] * step)])
         gramian = np.array([[span_s, weights @ phi], [weights @ phi, weights @ phi**2]])
         values = np.linalg.eigvalsh(gramian)
-        least, largest = min(least, float(values[0]), span_s), max(largest, float(values[1]), span_s)
+        least, largest = min(least, values[0], span_s), max(largest, values[1], span_s)
     return least, largest
 
 
-def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
+def observability(seed: int = SEED_OF_10) -> Claim:
     """Judge the uniform observability that (10) needs."""
-    limit = StateFeedback.rate_limit
+    limit, span_s = StateFeedback.rate_limit, 0.5
     u, y2 = np.meshgrid(np.linspace(-limit, limit, 21), np.linspace(-math.pi, math.pi, 41))
     dampings = np.ravel(damping(u, y2)).tolist()
     margin = min(observability_margin(a) for a in dampings)
@@ -262,7 +267,57 @@ def observability(seed: int = SEED_OF_10, span_s: float = 0.5) -> Claim:
             "rank_margin_without_tilt": margin_without_tilt,
             "largest_damping_1_s": max(map(abs, dampings)),
             "span_s": span_s,
-            "gramian_along_run": list(along_run),
-            "gramian_any_u": list(bounds),
+            "gramian_along_run": along_run,
+            "gramian_any_u": bounds,
+        },
+    )
+
+
+CLOCK_MHZ = 216.0
+"""Clock of the rig's processor, an STM32F746 [MHz]."""
+
+RECORDED = Path(__file__).with_name("on_the_board.json")
+"""Instructions of an update of the observer alone, by observer, as far as an emulator of that processor can say;
+`python benchmarks/board.py --paper` writes it."""
+
+PLAIN = {"ltv, plain Euler": euler, "ltv, plain Runge-Kutta 4": rk4}
+"""(10) written out with 3x3 matrices, by the method for H."""
+
+
+def update_times(worlds: int | None, turns: int, updates: int) -> dict[str, float]:
+    """Measure the median time of an update [us], the observers taking turns.
+
+    With worlds, arrays of so many; without (None) floats, and then the plain forms of (10) too.
+    """
+    cases: dict[str, Any] = {name: make_observer(name, DT, printed_model()) for name in OBSERVERS}
+    if worlds is None:
+        cases |= {name: Plain(method) for name, method in PLAIN.items()}
+    value: Any = 0.01 if worlds is None else np.full(worlds, 0.01)
+    y1, y2, acceleration, u = ([factor * value] * updates for factor in (1.0, 2.0, 0.0, 3.0))
+    times = [
+        {name: time_of_update(observer, y1, y2, acceleration, u) for name, observer in cases.items()}
+        for _ in range(turns)
+    ]
+    return {name: statistics.median(turn[name] for turn in times) for name in cases}
+
+
+def cost(recorded: Path = RECORDED) -> Claim:
+    """Instructions of an update of (10) beside those of (9) and (11) on the rig's processor; times on this one."""
+    board = json.loads(recorded.read_text(encoding="utf-8"))
+    single_times, batch_times = update_times(None, turns=3, updates=200), update_times(4096, turns=1, updates=4)
+    dearest = max(board[name] for name in ("ltv", *PLAIN))
+    return Claim(
+        place="Remark 1, cost",
+        statement="The observer (10) is computationally heavy in embedded systems: its gain takes differential "
+        "equations solved online.",
+        holds=dearest > board["homogeneous"] > board["linear"],
+        otherwise="On this processor it turns round: the powers in (11) cost more than a step of the equations of H, "
+        "whichever way that is taken.",
+        figures={
+            "instructions": board,
+            "share_of_period": dearest / CLOCK_MHZ / (1e6 * DT),
+            "update_us": single_times,
+            "update_by_linear": {name: time / single_times["linear"] for name, time in single_times.items()},
+            "update_by_linear_4096_worlds": {name: time / batch_times["linear"] for name, time in batch_times.items()},
         },
     )

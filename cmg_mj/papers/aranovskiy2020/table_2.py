@@ -8,11 +8,10 @@ from typing import NamedTuple
 
 from cmg_mj.features.tuning import NoiseLevelResult
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS
-from cmg_mj.papers.aranovskiy2020.rig import push_recovery
-from cmg_mj.papers.claim import Assumption, Claim, OnShare
+from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.pair import run_loops
 from cmg_mj.papers.retuned import Pushes, Studies, figures_of, tune_all
 from cmg_mj.results.intervals import Interval, ratio_interval
-from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.view.plots.figure import Line, Panel, Picture
@@ -55,7 +54,7 @@ def is_best(level: NoiseLevelResult) -> bool:
 
 def beats_zero(level: NoiseLevelResult) -> bool:
     """Return true if the tuned observer is closer to the gyro than an estimate of zero, on the held-out worlds."""
-    return float(level.rms.mean()) < level.zero_rms
+    return level.rms.mean() < level.zero_rms
 
 
 class JointExperiment(NamedTuple):
@@ -82,7 +81,7 @@ class JointExperiment(NamedTuple):
         return all(map(beats_zero, self.levels.values()))
 
     @property
-    def assumed(self) -> dict[Assumption, str]:
+    def assumed(self) -> dict[str, str]:
         """The push, with its e, and the noise as assumptions."""
         return {
             "push": self.push,
@@ -115,15 +114,16 @@ def loop_ratios(
         worlds: Number of worlds.
         seed: Seed of the noise.
     """
-    runs = []
-    for observer, level, push in trials:
+    cases = {}
+    for i, (observer, level, push) in enumerate(trials):
         noise = f"sensors.accelerometer.noise_density_ug_rthz={level.noise_ug_rthz}"
         names = dict.fromkeys(name.partition("[")[0] for name in level.sizes)
         tuned_settings = [f"observer.{name}={json.dumps(level.parameters[name])}" for name in names]
-        for settings in ([], tuned_settings):
-            runs.append(run_of(push_recovery(observer, seed, [*push, noise, *settings]), worlds))
-    errors = [result.values("velocity_rms_error_rad_s") for result in run_jobs(runs, keep_trajectory=False)]
-    return [ratio_interval(table, tuned) for table, tuned in zip(errors[::2], errors[1::2], strict=True)]
+        cases[i, "table"] = observer, [*push, noise]
+        cases[i, "tuned"] = observer, [*push, noise, *tuned_settings]
+    results = run_loops(cases, worlds, seed, keep_trajectory=False)
+    errors = {case: result.values("velocity_rms_error_rad_s") for case, result in results.items()}
+    return [ratio_interval(errors[i, "table"], errors[i, "tuned"]) for i in range(len(trials))]
 
 
 Loops = Sequence[tuple[JointExperiment, Mapping[str, Interval]]]
@@ -149,15 +149,13 @@ def procedure_claim(studies: Studies, loops: Loops) -> Claim:
     candidates = experiments(studies)
     levels = [level for experiment in candidates for level in experiment.levels.values()]
     noises = [level.noise_ug_rthz for level in levels]
-    figures: dict = {
-        "held_out_by_fitted_error_largest": max(float(level.rms.mean()) / level.fit_rms for level in levels)
-    }
+    figures: dict = {"held_out_by_fitted_error_largest": max(level.rms.mean() / level.fit_rms for level in levels)}
     for experiment, ratios in loops:
         by_name = experiment.levels.items()
         figures[experiment.words] = {
             "fitted_error_rad_s": {name: level.fit_rms for name, level in by_name},
-            "held_out_error_rad_s": {name: float(level.rms.mean()) for name, level in by_name},
-            "table_2_error_rad_s": {name: float(level.given_rms.mean()) for name, level in by_name},
+            "held_out_error_rad_s": {name: level.rms.mean() for name, level in by_name},
+            "table_2_error_rad_s": {name: level.given_rms.mean() for name, level in by_name},
             "zero_estimate_error_rad_s": {name: level.zero_rms for name, level in by_name},
             "in_the_loop_table_2_by_tuned_error": dict(ratios),
         }
@@ -207,7 +205,7 @@ def line_claim(observer: str, studies: Studies, experiment: JointExperiment) -> 
         otherwise="The best experiment for this line is not the best for the other two.",
         figures={
             push: figures_of(by_name[observer])
-            | {"table_2_error_rad_s": [float(level.given_rms.mean()) for level in by_name[observer]]}
+            | {"table_2_error_rad_s": [level.given_rms.mean() for level in by_name[observer]]}
             for push, by_name in studies.items()
         },
     )

@@ -13,9 +13,10 @@ from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.inputs.files import find
 from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_1
-from cmg_mj.papers.aranovskiy2020.rig import DT
 from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix
+from cmg_mj.papers.pair import DT
+from cmg_mj.papers.recorded import largest_size
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 AXES = ("pitch", "roll")
@@ -63,10 +64,10 @@ class Addresses(NamedTuple):
 def addresses(model: mujoco.MjModel, axis: int) -> Addresses:
     """Find those of pitch, driven by the first two cubes, or of roll, by the others."""
     cubes = (2 * axis, 2 * axis + 1)
-    tilt = int(model.joint(AXES[axis]).qposadr[0])
-    gimbals = [int(model.joint(f"c{i}/gimbal").qposadr[0]) for i in cubes]
-    servos = [int(model.actuator(f"c{i}/gimbal_servo").id) for i in cubes]
-    wheels = [int(model.joint(f"c{i}/flywheel").dofadr[0]) for i in cubes]
+    tilt = model.joint(AXES[axis]).qposadr[0]
+    gimbals = [model.joint(f"c{i}/gimbal").qposadr[0] for i in cubes]
+    servos = [model.actuator(f"c{i}/gimbal_servo").id for i in cubes]
+    wheels = [model.joint(f"c{i}/flywheel").dofadr[0] for i in cubes]
     data = at_rest(model)
     data.qpos[gimbals] -= math.pi / 2.0  # the wheel's momentum lies along the tilt axis: u > 0 turns it away
     M = mass_matrix(model, data)
@@ -112,7 +113,7 @@ def run(pushes_n_m: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     laws = [StateFeedback(DT, lqr_gains(reduced(model, axis), WEIGHTS, 1.0)) for axis in range(2)]  # type: ignore[arg-type]
     integrators, steps = [0.0, 0.0], round(DT / model.opt.timestep)
     tilts, momenta = [], []
-    torso = int(model.body("torso").id)
+    torso = model.body("torso").id
     for tick in range(round(DURATION_S / DT)):
         pushing = PUSH_FROM_S <= tick * DT < PUSH_FROM_S + PUSH_S - 1e-9
         for axis, (places, law) in enumerate(zip(axes, laws, strict=True)):
@@ -122,10 +123,10 @@ def run(pushes_n_m: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
             u, integrators[axis] = law(*state)
             data.ctrl[places.servos] = np.multiply(places.signs, u)
             data.qfrc_applied[places.tilt] = pushes_n_m[axis] if pushing else 0.0
-        tilts.append([float(data.qpos[places.tilt]) for places in axes])
+        tilts.append([data.qpos[places.tilt] for places in axes])
         mujoco.mj_subtreeVel(model, data)
         arm, moving = data.subtree_com[torso], data.subtree_linvel[torso] * MASS_KG
-        momenta.append(float(data.subtree_angmom[torso][2] + arm[0] * moving[1] - arm[1] * moving[0]))
+        momenta.append(data.subtree_angmom[torso][2] + arm[0] * moving[1] - arm[1] * moving[0])
         mujoco.mj_step(model, data, steps)
     return np.array(tilts), np.diff(momenta) / DT
 
@@ -143,14 +144,14 @@ class Coupling(NamedTuple):
     @property
     def share(self) -> float:
         """Largest change by the other axis, by the largest tilt."""
-        return float(np.abs(self.joint_tilts - self.single_tilts).max() / np.abs(self.single_tilts).max())
+        return largest_size(self.joint_tilts - self.single_tilts) / largest_size(self.single_tilts)
 
 
 def coupling(push_n_m: float) -> Coupling:
     """Push both, then either."""
     tilts, vertical = run((push_n_m, push_n_m))
     pitch, roll = run((push_n_m, 0.0))[0], run((0.0, push_n_m))[0]
-    return Coupling(tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), float(np.abs(vertical).max()))
+    return Coupling(tilts, np.column_stack([pitch[:, 0], roll[:, 1]]), largest_size(vertical))
 
 
 def one_axis_at_a_time() -> Claim:
@@ -175,7 +176,7 @@ def axes_claim(couplings: dict[float, Coupling]) -> Claim:
         "torque about the vertical when the other axis moves. The ground must take this torque.",
         figures={
             "push_n_m": list(couplings),
-            "largest_tilt_deg": [float(np.degrees(np.abs(c.single_tilts).max())) for c in couplings.values()],
+            "largest_tilt_deg": [np.degrees(largest_size(c.single_tilts)) for c in couplings.values()],
             "vertical_torque_n_m": [c.vertical_n_m for c in couplings.values()],
             "changed_by_the_other_axis_share": [c.share for c in couplings.values()],
         },

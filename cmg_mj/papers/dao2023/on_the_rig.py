@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmg_mj.papers.claim import Claim, OnShare, obtain
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.recorded import rms, trajectory_of
 from cmg_mj.results.intervals import mean_interval
 from cmg_mj.results.result import Result
@@ -23,11 +23,6 @@ WITHIN_DEG = 0.15
 """The bias counts as found up to this RMS error [deg]."""
 GAIT_N_M, GAIT_HZ, PIECE_S = 0.3, 1.0, 0.005
 """A sinusoidal torque on the rig, made of short pushes."""
-
-
-def claims(on_share: OnShare) -> list[Claim]:
-    """Judge the bias, the velocity, torques."""
-    return obtain([bias, velocity, torques], on_share)
 
 
 # --- The runs ---
@@ -87,14 +82,14 @@ def bias(seed: int = 50_000, worlds: int = 20) -> Claim:
         statement=f"`adaptive` finds the equilibrium bias together with the state, to {WITHIN_DEG} degrees RMS over "
         "seconds 5 to 10.",
         assumes={"push": "none", "e": "0.3 to 1.5 deg", "noise": "400 ug/rtHz"},
-        holds=bool(np.mean(errors <= WITHIN_DEG) >= 0.95 and np.all(offset_errors <= WITHIN_DEG)),
+        holds=np.mean(errors <= WITHIN_DEG) >= 0.95 and np.all(offset_errors <= WITHIN_DEG),
         conditions=remark,
         figures={
             "bias_deg": biases,
-            "bias_rms_error_deg": errors.tolist(),
+            "bias_rms_error_deg": errors,
             "accelerometer_bias_mg": offset_mg,
-            "found_less_e_deg": excess.tolist(),
-            "expected_less_e_deg": expected_excess.tolist(),
+            "found_less_e_deg": excess,
+            "expected_less_e_deg": expected_excess,
         },
         pictures=[Picture("dao2023-rig-bias", title, [Panel("estimate of e [deg]", lines)])],
         is_ours=True,
@@ -125,7 +120,7 @@ def velocity(seed: int = 51_000, worlds: int = 5, biases: Sequence[float] = (0.0
         assumes={"push": "none", "e": "0.5 to 1.5 deg", "noise": "400 ug/rtHz"},
         holds=all((by_observer["adaptive"] < by_observer[name])[1:].all() for name in OBSERVERS[1:]),
         conditions=remark,
-        figures={"bias_deg": list(biases)}
+        figures={"bias_deg": biases}
         | {f"{name}_velocity_rms_error_rad_s": values for name, values in means.items()}
         | {f"{name}_half_interval_rad_s": values for name, values in halves.items()},
         pictures=[Picture("dao2023-rig-velocity", title, [panel])],
@@ -160,9 +155,8 @@ def torques(seed: int = 52_000, worlds: int = 4) -> Claim:
         statement="`adaptive` finds a sinusoidal torque of known frequency, and the state in spite of it; a constant "
         "torque too.",
         assumes={"push": "0.3 N m at 1 Hz, or 0.1 N m", "e": "0.3 to 1.5 deg", "noise": "400 ug/rtHz"},
-        holds=bool(better and gait["disturbance_n_m"].max() < 0.06 and constant.max() < 0.02),
+        holds=better and gait["disturbance_n_m"].max() < 0.06 and constant.max() < 0.02,
         conditions=remark,
-        figures={name: values.tolist() for name, values in gait.items()}
-        | {"constant_torque_rms_error_n_m": constant.tolist()},
+        figures={**gait, "constant_torque_rms_error_n_m": constant},
         is_ours=True,
     )

@@ -7,11 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.figure_3 import L1, WITH_Y2, stiffness
-from cmg_mj.papers.sokolov2019.lag import RELEASE, is_sustained, linearise
+from cmg_mj.papers.sokolov2019.lag import RELEASE, first_crossing, is_sustained, linearise
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.results.trajectory import Trajectory
@@ -59,13 +58,19 @@ def find_cycles(releases: Sequence[Experiment]) -> list[Cycle]:
 
 def _cycle(trajectory: Trajectory) -> Cycle:
     last = trajectory.between(RELEASE_S - WINDOW_S, RELEASE_S)
-    x2, t = last["x2_rad_s"][:, 0], last["time_s"]
-    spectrum = np.abs(np.fft.rfft((x2 - x2.mean()) * np.hanning(len(x2)), 8 * len(x2)))
+    x2, t = last["x2_rad_s"], last["time_s"]
     return Cycle(
-        bool(is_sustained(trajectory, WINDOW_S)[0]),
-        float(np.degrees(np.ptp(last["x1_rad"][:, 0]))) / 2.0,
-        float(np.fft.rfftfreq(8 * len(x2), t[1] - t[0])[spectrum.argmax()]),
+        is_sustained(trajectory, WINDOW_S)[0],
+        np.degrees(np.ptp(last["x1_rad"])) / 2.0,
+        peak_frequency(x2 - x2.mean(), t[1] - t[0], np.hanning(len(x2))),
     )
+
+
+def peak_frequency(signals: np.ndarray, dt: float, taper: np.ndarray | float = 1.0) -> float:
+    """Find the peak of the spectrum of signals, (n_ticks, n_worlds), averaged over the worlds [Hz]."""
+    padded = 8 * len(signals)
+    spectrum = (np.abs(np.fft.rfft((signals.T * taper).T, padded, axis=0)) ** 2).mean(axis=1)
+    return float(np.fft.rfftfreq(padded, dt)[spectrum.argmax()])
 
 
 def cycles() -> Cycles:
@@ -91,12 +96,11 @@ def describing_function(c: float) -> complex:
     return complex(0.5 - (math.asin(c) + c * root) / math.pi, -root * root / math.pi)
 
 
-def predict_cycle(observer: str, points: int = 60) -> Cycle | None:
+def predict_cycle(observer: str) -> Cycle | None:
     """Return the largest motion that neither grows nor decays, of which larger ones decay and smaller ones grow.
 
     Args:
         observer: A linear one, in the loop.
-        points: Number of points of the grid.
 
     Returns:
         The cycle; None if there is none.
@@ -106,18 +110,15 @@ def predict_cycle(observer: str, points: int = 60) -> Cycle | None:
     def turning(c: float) -> tuple[complex, np.ndarray]:
         """Return the least damped motion that turns forward faster than 1 rad/s: its factor a period, its shape."""
         factors, shapes = np.linalg.eig(loop(servo, share=describing_function(c)))
-        index = int(np.argmax(np.where(np.angle(factors) > dt, np.abs(factors), 0.0)))
+        index = np.argmax(np.where(np.angle(factors) > dt, np.abs(factors), 0.0))
         return complex(factors[index]), shapes[:, index]
 
     def growth(c: float) -> float:
         return math.log(abs(turning(c)[0])) / dt
 
-    grid = np.linspace(-1.0, 0.98, points).tolist()
-    rates = [growth(c) for c in grid]
-    first = next((i for i in range(1, points) if rates[i - 1] < 0.0 <= rates[i]), None)
-    if first is None:
+    c = first_crossing(growth, -1.0, 0.98, 60, 1e-9)
+    if c is None:
         return None
-    c = float(brentq(growth, grid[first - 1], grid[first], xtol=1e-9))  # type: ignore[arg-type]
     factor, shape = turning(c)
     rate = math.atan2(factor.imag, factor.real) / dt
     motor = math.radians(GAP_ARCMIN / ARCMIN_A_DEGREE) / (1.0 + c)

@@ -14,15 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from cmg_mj.laws import StateFeedback
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.linear_check import mass_matrix, poles_as_pairs
-from cmg_mj.papers.recorded import push_intervals, rms, trajectory_of
+from cmg_mj.papers.recorded import largest_size, push_intervals, rms, trace, trajectory_of
 from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, experiment, read_servo
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.intervals import mean_interval
@@ -107,7 +107,7 @@ def locked_run(prepared: Experiment, world: int = 0) -> Locked:
             mujoco.mj_inverse(free.model, inverse)
             times.append(data.time)
             rows.append([tick_data.qpos.copy(), tick_data.qvel.copy(), tick_data.qacc.copy()])
-            torques.append(float(inverse.qfrc_inverse[free.yaw]))
+            torques.append(inverse.qfrc_inverse[free.yaw])
         mujoco.mj_step(plant.model, data)
     return Locked(np.array(times), Motion(*np.swapaxes(np.array(rows), 0, 1)), np.array(torques))
 
@@ -131,14 +131,11 @@ class Study(NamedTuple):
         return np.mean([run.torque for run in self.locked], axis=0)
 
 
-def study(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Study:
+def study(worlds: int = WORLDS, seed: int = SEED) -> Study:
     """Run them all."""
     settings = [f"seed={seed}", *LOCKED]
     prepared = experiment(settings, feedback="truth")
-    locked = []
-    for world in range(worlds):
-        locked.append(locked_run(prepared, world))
-        on_share(0.6 * (world + 1) / worlds)
+    locked = [locked_run(prepared, world) for world in range(worlds)]
     pair_settings = ["plant.model=scissored_pair.xml", "plant.lock_thrust_bearing=true"]
     pair = locked_run(experiment([*settings, *pair_settings], feedback="truth"))
     free = {
@@ -148,7 +145,7 @@ def study(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Study:
     return Study(locked, pair, free)
 
 
-def stiffness() -> dict[str, float | list]:
+def stiffness() -> dict[str, Any]:
     """Read a free bearing's numbers off the model.
 
     Returns:
@@ -158,7 +155,7 @@ def stiffness() -> dict[str, float | list]:
     plant = load_plant(model="single_gimbal.xml", equilibrium_bias_deg=0.0, initial_tilt_deg=0.0)
     r, law = plant.reduced, experiment().law
     assert isinstance(law, StateFeedback)
-    I_z = float(mass_matrix(plant.model, plant.new_data())[plant.yaw, plant.yaw])
+    I_z = mass_matrix(plant.model, plant.new_data())[plant.yaw, plant.yaw]
     gyroscopic = (r.J_d * r.omega_d) ** 2 / (2.0 * I_z)
     A_e = r.A_e.copy()
     A_e[1, 0] = (r.gravity_torque - gyroscopic) / r.J1
@@ -173,12 +170,12 @@ def stiffness() -> dict[str, float | list]:
 def claim(runs: Study) -> Claim:
     """Judge the thrust bearing, which the model of one tilt angle leaves out."""
     plant, worlds = experiment([BALANCED]).plant, len(runs.locked)
-    error = float(max(np.abs(vertical_torque(plant, run.motion) - run.torque).max() for run in runs.locked))
-    peak = mean_interval([float(np.abs(run.torque_between(1.0, 1.6)).max()) for run in runs.locked])
-    pair = float(np.abs(runs.pair.torque).max())
+    error = max(largest_size(vertical_torque(plant, run.motion) - run.torque) for run in runs.locked)
+    peak = mean_interval([largest_size(run.torque_between(1.0, 1.6)) for run in runs.locked])
+    pair = largest_size(runs.pair.torque)
     free = {
         case: {
-            "fell_fraction": float(result.fell.mean()),
+            "fell_fraction": result.fell.mean(),
             "end_time_s": mean_interval([trajectory_of(result).world(i)["time_s"][-1] for i in range(worlds)]),
         }
         for case, result in runs.free.items()
@@ -192,10 +189,8 @@ def claim(runs: Study) -> Claim:
         "vertical, and the law lets the rig fall.",
         figures={
             "peak_torque_at_push_n_m": peak,
-            "peak_of_the_mean_torque_n_m": float(np.abs(runs.mean_torque).max()),
-            "rms_torque_before_push_n_m": mean_interval(
-                [float(rms(run.torque_between(0.5, 1.0))) for run in runs.locked]
-            ),
+            "peak_of_the_mean_torque_n_m": largest_size(runs.mean_torque),
+            "rms_torque_before_push_n_m": mean_interval([rms(run.torque_between(0.5, 1.0)) for run in runs.locked]),
             "closed_form_error_n_m": error,
             "peak_torque_of_the_pair_n_m": pair,
             **stiffness(),
@@ -208,7 +203,7 @@ def claim(runs: Study) -> Claim:
 
 def _picture(runs: Study, plant: Plant) -> Picture:
     example, free = runs.locked[0], trajectory_of(runs.free[PUSHED]).world(0)
-    t, s, push = example.time_s, free["time_s"], push_intervals(free)
+    t, push = example.time_s, push_intervals(free)
     x1, x3 = example.motion.q[:, 0] - plant.tilt_zero, example.motion.q[:, 1] - plant.axis.modules[0].gimbal_zero
     torques = [
         Line(t, example.torque, "on the bearing", color=1, width=0.5),
@@ -217,16 +212,11 @@ def _picture(runs: Study, plant: Plant) -> Picture:
     ]
     panels = [
         Panel("tilt [deg]", [Line(t, np.degrees(x1), color=0)], "locked bearing", shaded=push),
-        Panel("tilt [deg]", [Line(s, np.degrees(free["x1_rad"]), color=0)], "free bearing", shaded=push),
+        Panel("tilt [deg]", [trace(free, "x1_rad", color=0)], "free bearing", shaded=push),
         Panel("gimbal angle [deg]", [Line(t, np.degrees(x3), color=0)], shaded=push),
-        Panel("gimbal angle [deg]", [Line(s, np.degrees(free["x3_rad"]), color=0)], shaded=push),
+        Panel("gimbal angle [deg]", [trace(free, "x3_rad", color=0)], shaded=push),
         Panel("torque about the\nvertical [N m]", torques, shaded=push),
-        Panel("yaw rate [rad/s]", [Line(s, free["rate/yaw_rad_s"], color=1)], shaded=push),
+        Panel("yaw rate [rad/s]", [trace(free, "rate/yaw_rad_s", color=1)], shaded=push),
     ]
     title = "sokolov2019, Fig. 2: one gimbal on its thrust bearing, the exact rate in the law, a push at 1 s"
     return Picture("sokolov2019-bearing", title, panels, columns=2)
-
-
-def claims(on_share: OnShare) -> list[Claim]:
-    """Judge Fig. 2."""
-    return [claim(study(on_share))]

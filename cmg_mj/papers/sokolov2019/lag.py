@@ -1,23 +1,117 @@
-"""Section V: which lag makes the loop oscillate by itself: on MuJoCo, and by the eigenvalues of the sampled loop."""
+"""Section V: which lag makes the loop oscillate by itself: on MuJoCo, and by the eigenvalues of the sampled loop.
+
+From one control tick to the next the rig is linear near its equilibrium, and so are the linear observers and the law:
+the map of a period is a matrix, and the loop oscillates by itself when an eigenvalue leaves the unit circle. The
+matrix is made by running the observer and the law themselves on unit vectors, so it is the loop as implemented.
+"""
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
-from typing import NamedTuple
+from functools import cache, partial
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
+from cmg_mj.laws.state_feedback import StateFeedback
+from cmg_mj.observers import Measurement, Observer
+from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
-from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, estimator, experiment, make_rig, read_servo
-from cmg_mj.papers.sokolov2019.sampled_loop import Servo, first_crossing, modes, oscillation, period_map
+from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, Servo, estimator, experiment, make_rig, read_servo
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 from cmg_mj.view.plots.figure import Line, Panel, Picture
+
+
+def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[np.ndarray, np.ndarray]:
+    """Linearise sokolov2019 (1) with the servo's torque upright: x' = A x + B u.
+
+    The state is tilt, tilt rate, gimbal angle, gimbal rate and setpoint. The flywheel's torque -J_d w_d x2 drives the
+    gimbal back.
+
+    Returns:
+        A (5, 5), B (5, 1).
+    """
+    h, J1, inertia = model.J_d * model.omega_d, model.J1, servo.inertia
+    A = np.zeros((5, 5))
+    A[0, 1] = 1.0
+    A[1, [0, 3]] = model.gravity_torque / J1, h / J1
+    A[2, 3] = 1.0
+    A[3, [1, 2, 3, 4]] = -h / inertia, -servo.kp / inertia, -servo.kv / inertia, servo.kp / inertia
+    B = np.zeros((5, 1))
+    B[4, 0] = 1.0
+    return A, B
+
+
+def period_map(
+    experiment: Experiment, observer: Observer | None, servo: Servo, age_steps: int = 0, share: complex = 1.0
+) -> np.ndarray:
+    """Return the matrix that takes the loop from one control tick to the next.
+
+    Args:
+        experiment: Its rig, but for the servo, and its law; the law's rate limit does not count.
+        observer: A linear observer; None for the true rate in the law.
+        servo: The gimbal's servo.
+        age_steps: Age of y1 at a tick [physics steps]: the latency of the accelerometers.
+        share: Share of the commanded rate that reaches the gimbal's setpoint: 1, or the describing function of a gap.
+
+    Returns:
+        A square matrix. Its state is that of the rig, the tilts not yet seen, the observer's, x_e and the last u.
+    """
+    assert isinstance(experiment.law, StateFeedback)
+    law, timestep = replace(experiment.law, rate_limit=math.inf), experiment.plant.model.opt.timestep
+    Phi, hold, _ = hold_matrices(*rig_matrices(experiment.plant.reduced, servo), timestep)
+    start: Any = observer.init(Measurement(0.0, 0.0)) if observer else ()
+    parts = np.cumsum([5, age_steps, len(start)])
+
+    def period(v: np.ndarray) -> np.ndarray:
+        rig, pending_tilts, observer_state, (x_e, u) = np.split(v, parts)
+        y1, y2 = (pending_tilts[-1] if age_steps else rig[0]), rig[2]
+        x2 = rig[1]
+        if observer:
+            state, estimate = observer.step(type(start)(*observer_state), Measurement(y1, y2), u)
+            observer_state, x2 = np.array(state), estimate.x2
+        u, x_e = law(y1, x2, y2, x_e)
+        for _ in range(round(law.dt / timestep)):
+            pending_tilts = np.concatenate([rig[:1], pending_tilts])[:age_steps]
+            rig = Phi @ rig + hold[:, 0] * (share * u)
+        return np.concatenate([rig, pending_tilts, observer_state, [x_e, u]])
+
+    return np.column_stack([period(unit) for unit in np.eye(parts[-1] + 2)])
+
+
+def modes(matrix: np.ndarray, dt: float) -> np.ndarray:
+    """Return the poles s = log(z)/dt of a period's map, the least damped first [1/s]."""
+    z = np.linalg.eigvals(matrix)
+    s = np.log(z[np.abs(z) > 1e-9].astype(complex)) / dt
+    return s[np.argsort(-s.real)]
+
+
+def oscillation(matrix: np.ndarray, dt: float) -> complex:
+    """Find the least damped oscillating pole with a frequency above 1 rad/s [1/s]: the integrator's pair is slower."""
+    return complex(next(s for s in modes(matrix, dt) if s.imag > 1.0))
+
+
+def first_crossing(
+    value: Callable[[float], float], low: float, high: float, points: int = 40, xtol: float = 1e-7
+) -> float | None:
+    """Return the smallest argument at which a function rises through zero, on a grid; None if it does not."""
+    grid = np.linspace(low, high, points).tolist()
+    values = [value(x) for x in grid]
+    for (a, at_a), (b, at_b) in pairwise(zip(grid, values, strict=True)):
+        if at_a < 0.0 <= at_b:
+            root: Any = brentq(value, a, b, xtol=xtol)
+            return root
+    return None
+
 
 # --- releases on MuJoCo -----------------------------------------------------------------------------------------
 
@@ -101,16 +195,16 @@ def lag_thresholds(sweeps: Mapping[str, Sweep]) -> dict[str, Threshold]:
     thresholds: dict[str, Threshold] = {}
     servo = read_servo(experiment().plant)
     for observer, (lags, sustained, _) in sweeps.items():
-        first = int(np.argmax(sustained))
+        first = np.argmax(sustained)
         if not sustained.any():
-            thresholds[observer] = float(lags[-1]), None
+            thresholds[observer] = lags[-1], None
         elif first == 0:
-            thresholds[observer] = 0.0, float(lags[0])
+            thresholds[observer] = 0.0, lags[0]
         else:
             grid = np.linspace(lags[first - 1], lags[first], PARTS + 1)
             refined = releases({observer: [servo.damp(lag) for lag in grid[1:]]})[observer]
-            i = int(np.argmax(is_sustained(refined)))  # the last of them is the sweep's own
-            thresholds[observer] = float(grid[i]), float(grid[i + 1])
+            i = np.argmax(is_sustained(refined))  # the last of them is the sweep's own
+            thresholds[observer] = grid[i], grid[i + 1]
     return thresholds
 
 
@@ -123,15 +217,10 @@ def latency_threshold(observer: str) -> Threshold:
     def oscillates(steps: int) -> bool:
         latency = f"sensors.accelerometer.latency_s={steps / 1000}"
         result = experiment([*RELEASE, FINE, "sensors.accelerometer.rate_hz=1000.0", latency], observer).run()
-        return not result.stood.all() or bool(is_sustained(trajectory_of(result))[0])
+        return not result.stood.all() or is_sustained(trajectory_of(result))[0]
 
-    low, high = 0, MAX_LATENCY_STEPS
-    if not oscillates(high):
-        return high / 1000, None
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if oscillates(middle) else (middle, high)
-    return low / 1000, high / 1000
+    steps = bisect_left(range(1, MAX_LATENCY_STEPS + 1), True, key=oscillates)
+    return steps / 1000, (steps + 1) / 1000 if steps < MAX_LATENCY_STEPS else None
 
 
 # --- the sampled loop -------------------------------------------------------------------------------------------
@@ -153,11 +242,7 @@ def linearise(observer: str | None, **parameters: float) -> tuple[Loop, Servo, f
     """Linearise the sampled loop with an observer, or with the true rate (None); parameters differ from Table II's."""
     prepared = _rig()
     o = None if observer is None else estimator(observer, prepared, **parameters)
-
-    def loop(servo: Servo, age_steps: int = 0, share: complex = 1.0) -> np.ndarray:
-        return period_map(prepared, servo, o, age_steps, share)
-
-    return loop, read_servo(prepared.plant), prepared.law.dt
+    return partial(period_map, prepared, o), read_servo(prepared.plant), prepared.law.dt
 
 
 def predict(observer: str | None) -> dict[str, float | list[float] | None]:
@@ -171,7 +256,7 @@ def predict(observer: str | None) -> dict[str, float | list[float] | None]:
     loop, servo, dt = linearise(observer)
 
     def growth(changed_servo: Servo, age_steps: int = 0) -> float:
-        return float(modes(loop(changed_servo, age_steps), dt)[0].real)
+        return modes(loop(changed_servo, age_steps), dt)[0].real
 
     latencies = range(MAX_LATENCY_STEPS + 1) if observer else ()
     pole = oscillation(loop(servo), dt)
@@ -189,7 +274,7 @@ def largest_tau() -> float | None:
 
     def growth(tau: float) -> float:
         loop, servo, dt = linearise("linear", tau=tau)
-        return float(modes(loop(servo), dt)[0].real)
+        return modes(loop(servo), dt)[0].real
 
     return first_crossing(growth, 0.01, 0.1)
 
@@ -207,14 +292,11 @@ class Lags(NamedTuple):
     """Predictions for the linear observers and, under `truth`, for the true rate."""
 
 
-def lags(on_share: OnShare) -> Lags:
+def lags() -> Lags:
     """Sweep, sharpen and predict all lags."""
     sweeps = sweep_lags()
     thresholds = lag_thresholds(sweeps)
-    latencies: dict[str, Threshold] = {}
-    for i, name in enumerate(OBSERVERS):
-        latencies[name] = latency_threshold(name)
-        on_share((i + 1) / 4.0)
+    latencies = {name: latency_threshold(name) for name in OBSERVERS}
     predictions = {name: predict(name) for name in ("linear", "luenberger")} | {"truth": predict(None)}
     return Lags(sweeps, thresholds, latencies, predictions)
 
@@ -229,9 +311,9 @@ def claim(results: Lags) -> Claim:
         holds=begin is not None and begin < min(others),
         conditions="It does with a slower servo or a later y1; at the model's servo lag the oscillation decays.",
         figures={
-            "servo_lag_of_the_model_s": float(results.sweeps["linear"].lags_s[0]),
-            "servo_lag_threshold_s": {name: list(threshold) for name, threshold in results.thresholds.items()},
-            "latency_threshold_s": {name: list(threshold) for name, threshold in results.latencies.items()},
+            "servo_lag_of_the_model_s": results.sweeps["linear"].lags_s[0],
+            "servo_lag_threshold_s": results.thresholds,
+            "latency_threshold_s": results.latencies,
             "predicted": results.predictions,
             "tau_threshold_s": largest_tau(),
         },
@@ -239,19 +321,13 @@ def claim(results: Lags) -> Claim:
     )
 
 
-def _growth(observer: str, lags_s: np.ndarray) -> list[float]:
-    """Return the growth of the tilt's oscillation over the servo lag [1/s]."""
-    loop, servo, dt = linearise(observer)
-    return [oscillation(loop(servo.damp(float(lag))), dt).real for lag in lags_s]
-
-
 def _picture(results: Lags) -> Picture:
     grid, x_label = np.linspace(5e-3, 0.07, 66), "servo lag [ms]"
-    rates = [
-        Line(1e3 * grid, _growth(name, grid), f"{OBSERVERS[name]} {name}", color=name)
-        for name in ("linear", "luenberger")
-    ]
-    rates.append(Line([5.0, 70.0], [0.0, 0.0], style="k:", width=0.8))
+    rates = [Line([5.0, 70.0], [0.0, 0.0], style="k:", width=0.8)]
+    for name in ("linear", "luenberger"):
+        loop, servo, dt = linearise(name)
+        growth = [oscillation(loop(servo.damp(lag)), dt).real for lag in grid]
+        rates.insert(-1, Line(1e3 * grid, growth, f"{OBSERVERS[name]} {name}", color=name))
     tilts = [
         Line(1e3 * s.lags_s, s.amplitude_deg, f"{OBSERVERS[name]} {name}", "os^"[i] + "-", color=name)
         for i, (name, s) in enumerate(results.sweeps.items())

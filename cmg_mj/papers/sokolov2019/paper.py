@@ -9,19 +9,10 @@ import numpy as np
 
 from cmg_mj.core.arrays import signed_power
 from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.papers.cube import CUBE, reduced_model
 
-TABLE_I = {
-    "m": 2.62,
-    "l": 0.13,
-    "J_b": 13e-3,
-    "J_c": 2.6e-4,
-    "K_c": 9.9e-4,
-    "I_d": 5.6e-4,
-    "J_d": 11e-4,
-    "omega_d": 314.0,
-    "g": 9.81,
-}
-"""Table I [kg, m, kg m^2, rad/s], as far as J1 and J2 need it, and the gravity that it does not give [m/s^2]."""
+TABLE_I = {**CUBE, "l": 0.13}
+"""Table I [kg, m, kg m^2, rad/s], as far as the claims need it, and the gravity that it does not give [m/s^2]."""
 
 K_E = (35.0, 4.0, -1.0, 0.3)
 """Table II: the gains of (7), on [y1, x2, y2, x_e]."""
@@ -39,14 +30,7 @@ OBSERVERS = {"linear": "(8)", "luenberger": "(9)", "homogeneous": "(10)"}
 
 def printed_model() -> ReducedModel:
     """Return J1 and J2 below (1), J_d w_d and m g l, from Table I's numbers alone."""
-    t = TABLE_I
-    return ReducedModel(
-        J1=t["I_d"] + t["J_b"] + t["K_c"] + t["m"] * t["l"] ** 2,
-        J2=t["J_c"] - t["I_d"] + t["J_d"] - t["K_c"],
-        J_d=t["J_d"],
-        omega_d=t["omega_d"],
-        gravity_torque=t["m"] * t["g"] * t["l"],
-    )
+    return reduced_model(TABLE_I, 1)
 
 
 def torques(model: ReducedModel, I_cd: float, q: np.ndarray, w: np.ndarray, dw: np.ndarray) -> np.ndarray:

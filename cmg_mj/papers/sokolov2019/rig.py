@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from cmg_mj.observers import Observer, make_observer
-from cmg_mj.papers.claim import Assumption
 from cmg_mj.papers.sokolov2019.paper import TABLE_II
-from cmg_mj.papers.sokolov2019.sampled_loop import Servo
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
@@ -22,11 +20,40 @@ NO_NOISE = (
     "sensors.fog.angle_random_walk_deg_rth=0.0",
 )
 
-PUSH_AND_NOISE: Mapping[Assumption, str] = {"push": "0.5 N m for 0.1 s", "noise": "400 ug/rtHz"}
+PUSH_AND_NOISE: Mapping[str, str] = {"push": "0.5 N m for 0.1 s", "noise": "400 ug/rtHz"}
 """Data of its experiments that the paper does not give, beside e: the scenario single_gimbal."""
 
 FINE = "plant.timestep_s=0.001"
 """A servo that is slow because of its damping is stiff: it asks for a smaller step than the rig's own."""
+
+
+@dataclass(frozen=True)
+class Servo:
+    """A gimbal's position loop; its setpoint is the integral of the commanded rate.
+
+    Attributes:
+        kp: Stiffness [N m/rad].
+        kv: Damping [N m s/rad].
+        inertia: I_c + I_d [kg m^2].
+    """
+
+    kp: float
+    kv: float
+    inertia: float
+
+    @property
+    def lag_s(self) -> float:
+        """Delay of the angle behind a setpoint that moves steadily [s]."""
+        return self.kv / self.kp
+
+    def damp(self, lag_s: float) -> Servo:
+        """Return a servo as stiff, with another lag: more damping."""
+        return replace(self, kv=lag_s * self.kp)
+
+    def soften(self, lag_s: float) -> Servo:
+        """Return a critically damped servo with another lag: less stiffness."""
+        kp = 4.0 * self.inertia / lag_s**2
+        return replace(self, kp=kp, kv=lag_s * kp)
 
 
 def experiment(settings: Sequence[str] = (), observer: str = "homogeneous", feedback: str = "observer") -> Experiment:
@@ -52,7 +79,7 @@ def read_servo(plant: Plant) -> Servo:
     """Read the gimbal servo off the model file."""
     (servo,) = plant.axis.servos
     (module,) = plant.axis.modules
-    dof = int(plant.model.jnt_dofadr[module.gimbal])
+    dof = plant.model.jnt_dofadr[module.gimbal]
     return Servo(
         float(plant.model.actuator_gainprm[servo, 0]),
         float(-plant.model.actuator_biasprm[servo, 2]),
@@ -62,5 +89,4 @@ def read_servo(plant: Plant) -> Servo:
 
 def make_rig(settings: PlantSettings, servo: Servo) -> Plant:
     """Load the rig with another servo."""
-    servo_settings = {"servo_stiffness_n_m_rad": servo.kp, "servo_damping_n_m_s_rad": servo.kv}
-    return load_plant(dataclasses.replace(settings, **servo_settings))
+    return load_plant(replace(settings, servo_stiffness_n_m_rad=servo.kp, servo_damping_n_m_s_rad=servo.kv))

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.papers.claim import Assumption, Claim, OnShare
-from cmg_mj.papers.recorded import loop_panels, on_common_scales, side_by_side, trajectory_of
+from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.recorded import loop_picture, on_common_scales, trajectory_of
 from cmg_mj.papers.sokolov2019 import lag
-from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN, Cycles, cycles
+from cmg_mj.papers.sokolov2019.backlash import GAP_ARCMIN, Cycles, cycles, peak_frequency
 from cmg_mj.papers.sokolov2019.figure_3 import WITH_Y2
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import NO_NOISE, PUSH_AND_NOISE, experiment
@@ -51,7 +51,7 @@ class Loops(NamedTuple):
         return {f"e = {e:g} deg": by_name for e, by_name in self.by_bias.items()} | {BEHIND_A_GAP: self.gap}
 
 
-def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Loops:
+def loops(worlds: int = WORLDS, seed: int = SEED) -> Loops:
     """Run them all; those with noise at once, the same seeds for every observer, at every bias and with the gap."""
     settings = [f"seed={seed}", f"duration_s={DURATION_S}", f"plant.equilibrium_bias_deg={SHOWN_DEG}"]
     cases = len(BIASES_DEG) + 1
@@ -62,7 +62,6 @@ def loops(on_share: OnShare, worlds: int = WORLDS, seed: int = SEED) -> Loops:
     runs = [BatchJob(experiment(settings, name).with_varied(values), [*range(worlds)] * cases) for name in OBSERVERS]
     by_case = zip(*(result.split(cases) for result in run_jobs(runs)), strict=True)
     *no_gap, gap = (dict(zip(OBSERVERS, results, strict=True)) for results in by_case)
-    on_share(0.8)
     quiet = {name: experiment([*settings, *NO_NOISE], name).run() for name in OBSERVERS}
     gyro = experiment(settings, feedback="fog").run_many(worlds)
     return Loops(dict(zip(BIASES_DEG, no_gap, strict=True)), gap, quiet, gyro)
@@ -83,10 +82,8 @@ def _late_signal(result: Result, name: str) -> np.ndarray:
 
 def main_frequency(result: Result) -> float:
     """Find the late peak of the tilt rate's spectrum, averaged over the worlds that stood [Hz]."""
-    x2, t = _late_signal(result, "x2_rad_s"), trajectory_of(result)["time_s"]
-    padded = 8 * len(x2)
-    spectrum = (np.abs(np.fft.rfft(x2 - x2.mean(axis=0), padded, axis=0)) ** 2).mean(axis=1)
-    return float(np.fft.rfftfreq(padded, t[1] - t[0])[spectrum.argmax()])
+    t, x2 = trajectory_of(result)["time_s"], _late_signal(result, "x2_rad_s")
+    return peak_frequency(x2 - x2.mean(axis=0), t[1] - t[0])
 
 
 def deviations(result: Result) -> np.ndarray:
@@ -99,7 +96,7 @@ def numbers(result: Result) -> dict[str, Any]:
     return {
         **{key: known_interval(result.values(key)) for key in KEYS},
         "late_tilt_deviation_deg": known_interval(deviations(result)),
-        "fell_fraction": float(result.fell.mean()),
+        "fell_fraction": result.fell.mean(),
     }
 
 
@@ -113,7 +110,7 @@ def is_better(a: Result, b: Result, key: str = VELOCITY) -> bool:
 
 # --- Figs 4 to 6 --------------------------------------------------------------------------------------------
 
-LET_GO: Mapping[Assumption, str] = {
+LET_GO: Mapping[str, str] = {
     "backlash": f"{GAP_ARCMIN:g} arcmin",
     "friction": "it holds the gimbal in the gap",
 }
@@ -121,7 +118,7 @@ HELD = (
     f"With {GAP_ARCMIN:g} arcmin of backlash behind the servo's motor, as its datasheet has it, and friction that "
     "holds the gimbal in the gap. The paper mentions neither."
 )
-ALL_SETTINGS: Mapping[Assumption, str] = {
+ALL_SETTINGS: Mapping[str, str] = {
     **PUSH_AND_NOISE,
     "e": f"up to {max(BIASES_DEG):g} deg",
     "backlash": f"0 and {GAP_ARCMIN:g} arcmin",
@@ -137,7 +134,7 @@ def _figures(loops: Loops, name: str, cycles: Cycles) -> dict:
         "with_backlash": numbers(gap),
         "main_frequency_hz": main_frequency(no_gap),
         "main_frequency_with_backlash_hz": main_frequency(gap),
-        "push_tail_deg": float(deviations(loops.quiet[name]).max()),
+        "push_tail_deg": deviations(loops.quiet[name]).max(),
         "cycle_amplitude_deg": cycle.amplitude_deg,
         "cycle_frequency_hz": cycle.frequency_hz,
         "cycle_is_sustained": cycle.sustained,
@@ -150,12 +147,9 @@ def picture(name: str, loops: Loops) -> Picture:
         "without backlash": loops.by_bias[SHOWN_DEG][name],
         f"{GAP_ARCMIN:g} arcmin of backlash": loops.gap[name],
     }
-    columns = [
-        loop_panels(trajectory_of(result).world(0), name, OBSERVERS[name], title, 0.5) for title, result in runs.items()
-    ]
-    number = NUMBERS[name]
-    title = f"sokolov2019, Fig. {number}: {OBSERVERS[name]} in the loop, a push at 1 s (e = {SHOWN_DEG} deg)"
-    return side_by_side(f"sokolov2019-fig-{number}", title, columns)
+    number, equation = NUMBERS[name], OBSERVERS[name]
+    title = f"sokolov2019, Fig. {number}: {equation} in the loop, a push at 1 s (e = {SHOWN_DEG} deg)"
+    return loop_picture((f"sokolov2019-fig-{number}", title), (name, equation), runs, 0.5, gimbal=False)
 
 
 def oscillation(
@@ -198,7 +192,7 @@ def figure_5(loops: Loops, lags: lag.Lags, cycles: Cycles) -> Claim:
         loops,
         cycles,
         {
-            "fell_fraction": {f"{e:g}_deg": float(of["luenberger"].fell.mean()) for e, of in loops.by_bias.items()},
+            "fell_fraction": {f"{e:g}_deg": of["luenberger"].fell.mean() for e, of in loops.by_bias.items()},
             "damping_ratio": lags.predictions["luenberger"]["damping_ratio"],
         },
     )
@@ -225,7 +219,7 @@ def cause_of_figure_5(cycles: Cycles) -> Claim:
 
 def figure_6(loops: Loops, cycles: Cycles) -> Claim:
     """Judge (10): stabilised."""
-    falls = max(float(by_name["homogeneous"].fell.mean()) for by_name in loops.all_settings.values())
+    falls = max(by_name["homogeneous"].fell.mean() for by_name in loops.all_settings.values())
     return Claim(
         place="Fig. 6",
         statement="With (10) in the loop the system is stabilised.",
@@ -299,11 +293,9 @@ def model_based(loops: Loops, key: str) -> Claim:
     )
 
 
-def claims(on_share: OnShare) -> list[Claim]:
+def claims() -> list[Claim]:
     """Judge the loops; Figs 4 to 6 need the lags and the cycles, which show what oscillates without noise."""
-    lags = lag.lags(lambda share: on_share(0.2 * share))
-    ends = cycles()
-    results = loops(lambda share: on_share(0.3 + 0.7 * share))
+    lags, ends, results = lag.lags(), cycles(), loops()
     four, five, six = on_common_scales(
         [figure_4(results, lags, ends), figure_5(results, lags, ends), figure_6(results, ends)]
     )

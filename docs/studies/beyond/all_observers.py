@@ -10,8 +10,8 @@ import numpy as np
 
 from beyond.league import MEANS, league
 from beyond.push_recovery import ERROR
-from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.pair import PUSH_RECOVERY
 from cmg_mj.results.intervals import Interval
 from cmg_mj.results.summary_keys import format_figure, heading
 from cmg_mj.results.tables import markdown_table

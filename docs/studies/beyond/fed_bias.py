@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from beyond.push_recovery import ERROR, gain, on_rigs, push_recovery
-from cmg_mj.papers.assumed import PUSH_RECOVERY
 from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.pair import PUSH_RECOVERY
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 

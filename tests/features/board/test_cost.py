@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from cmg_mj.features.board.image import available
-from cmg_mj.papers.aranovskiy2020 import update_cost
+from cmg_mj.papers.aranovskiy2020 import riccati
 from tests.command import HANGS_AFTER_S, ROOT
 
 SCRIPT = ROOT / "benchmarks" / "board.py"
@@ -35,7 +35,7 @@ def test_what_they_cost() -> None:
         assert 100 <= row["flash_bytes"] <= 20_000
         # The recorded ones are of half a second; another compiler or C library makes some per cent more or less.
         assert row["step_instructions"] == pytest.approx(
-            json.loads(update_cost.RECORDED.read_text())[row["observer"]], rel=0.1
+            json.loads(riccati.RECORDED.read_text())[row["observer"]], rel=0.1
         )
     # Of the observer tilt, rate and last sample; integrator, last command, whether it has started, status.
     assert linear["state_bytes"] == 7 * 4

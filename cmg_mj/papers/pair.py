@@ -1,9 +1,10 @@
-"""The experiments of Section V on the six bodies: one way to set them up, and what is read off their runs."""
+"""The experiments on the scissored pair of six bodies: one way to set them up, and what is read off their runs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +15,15 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
+from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.scenario.loading import load_scenario
 
 DT = 0.005
 """The bench's control period [s]; the paper does not give its own."""
 DURATION_S = 10.0
 """Duration of the runs that Figs 5 to 7 and their variations are made of [s]."""
+PUSH_RECOVERY: Mapping[str, str] = {"push": "1 N m for 0.1 s", "e": "0.5 deg", "noise": "400 ug/rtHz"}
+"""The push, e and the noise that the papers do not give: those of push_recovery and observer_tuning."""
 SEED_OF_10 = 71_000
 """Seed of the run with (10) in the loop that several sections replay."""
 
@@ -38,6 +42,18 @@ def push_recovery(observer: str, seed: int, settings: Sequence[str] = (), durati
     """
     common = [f"seed={seed}", f"duration_s={duration_s}", "open_loop_observers=[]"]
     return prepare(load_scenario("push_recovery", [*common, *settings], observer))
+
+
+def run_loops(
+    cases: Mapping[Any, tuple[str, Sequence[str]]],
+    worlds: int,
+    seed: int,
+    duration_s: float = DURATION_S,
+    keep_trajectory: bool = True,
+) -> dict[Any, Result]:
+    """Run `push_recovery` with observers and their settings, all at once: case -> result."""
+    jobs = [run_of(push_recovery(name, seed, settings, duration_s), worlds) for name, settings in cases.values()]
+    return dict(zip(cases, run_jobs(jobs, keep_trajectory=keep_trajectory), strict=True))
 
 
 @cache

@@ -1,19 +1,19 @@
-"""The homogeneous differentiator (11): is its error gone in finite time, and where does it converge to?"""
+"""The differentiators: lag and noise of (9); whether the error of (11) is gone in finite time, and where it ends."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cmg_mj.core.arrays import signed_power
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
-from cmg_mj.papers.aranovskiy2020.rig import DT, replay_at_rest
 from cmg_mj.papers.claim import Claim
-from cmg_mj.papers.recorded import rms
+from cmg_mj.papers.pair import DT, replay_at_rest
+from cmg_mj.papers.recorded import largest_size, rms
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 ALPHAS = (0.55, 0.7, 0.85, 1.0)
@@ -60,18 +60,18 @@ class Decay(NamedTuple):
     def shrink_factor(self) -> float:
         """Mean factor by which a half turn of the error is quicker than the one before it."""
         spans = np.diff(self.time_s[self.turns])
-        return float((spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1)))
+        return (spans[-1] / spans[0]) ** (1.0 / (len(spans) - 1))
 
     @property
     def decades_a_turn(self) -> float:
         """Powers of ten by which the size falls in a half turn."""
-        return float(np.diff(self.decades[self.turns]).mean())
+        return np.diff(self.decades[self.turns]).mean()
 
     @property
     def end_s(self) -> float:
         """Time at which the error is zero: the last turn plus the geometric series of all turns to come, or inf."""
         factor, (before, last) = self.shrink_factor, self.time_s[self.turns[-2:]]
-        return math.inf if factor > 0.99 else float(last + (last - before) * factor / (1.0 - factor))
+        return math.inf if factor > 0.99 else last + (last - before) * factor / (1.0 - factor)
 
 
 def decay(alpha: float) -> Decay:
@@ -129,8 +129,8 @@ def finite_time() -> Claim:
         conditions="Tried with k1, k2 of Table 2 and alpha = 0.55, 0.7, 0.85, 1. For alpha below 1; the printed "
         "(1/2, 1] has 1 in it, with which the error fades exponentially.",
         figures={
-            "gone_after_s": {str(alpha): end for alpha, end in ends.items() if alpha < 1.0},
-            "time_of_a_half_turn_by_the_one_before": {str(alpha): d.shrink_factor for alpha, d in decays.items()},
+            "gone_after_s": {alpha: end for alpha, end in ends.items() if alpha < 1.0},
+            "time_of_a_half_turn_by_the_one_before": {alpha: d.shrink_factor for alpha, d in decays.items()},
             "fallen_to_a_thousandth_after_s": {"observer": observer_s, "equation": equation_s},
         },
         pictures=[
@@ -157,11 +157,6 @@ SEEN_RAD_S = 0.01
 """Biases of the rate above this one are compared with the closed form by their ratio, those below by the difference."""
 
 
-def remaining_error(alpha: float, dt: float) -> float:
-    """Return what is left after 3 s of a wrong rate of -1 rad/s at rest: the last 0.5 s' largest [rad/s]."""
-    return float(rates_at_rest(alpha, dt, 3.0, x1=0.05, x2=-1.0)[-round(0.5 / dt) :].max())
-
-
 def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
     """Return the RMS of the rate estimated at rest, (n_worlds,) [rad/s], from y1, (n_ticks, n_worlds) [rad]."""
     observer = make_observer("homogeneous", DT, printed_model(), alpha=alpha)
@@ -177,7 +172,11 @@ def bias_bound(alpha: float, e_rad: float) -> float:
 
 def vicinity(seed: int = SEED) -> Claim:
     """Judge convergence to a vicinity of the origin, and how large it is."""
-    errors, fine_errors = ({alpha: remaining_error(alpha, dt) for alpha in ALPHAS} for dt in (DT, DT / 10.0))
+    # What is left after 3 s of a wrong rate of -1 rad/s at rest: the last 0.5 s' largest.
+    errors, fine_errors = (
+        {a: rates_at_rest(a, dt, 3.0, x1=0.05, x2=-1.0)[-round(0.5 / dt) :].max() for a in ALPHAS}
+        for dt in (DT, DT / 10.0)
+    )
     # Sampled, (11) chatters with an amplitude that falls as dt^(alpha/(1 - alpha)), by homogeneity.
     converges = all(errors[a] < VANISHED or fine_errors[a] < errors[a] / 10.0 for a in ALPHAS)
     biases, noise = np.radians(BIASES_DEG), np.random.default_rng(seed).normal(0.0, 1.0, (TICKS, 16))
@@ -185,10 +184,10 @@ def vicinity(seed: int = SEED) -> Claim:
     by_bias = {alpha: errors_at_rest(alpha, biased) for alpha in SETTLING}
     bounds = {alpha: np.array([bias_bound(alpha, e) for e in biases]) for alpha in SETTLING}
     by_noise = {alpha: errors_at_rest(alpha, noisy).reshape(len(NOISES_RAD), -1).mean(axis=1) for alpha in SETTLING}
-    pairs = [pair for alpha in SETTLING for pair in zip(by_bias[alpha].tolist(), bounds[alpha].tolist(), strict=True)]
+    pairs = [pair for alpha in SETTLING for pair in zip(by_bias[alpha], bounds[alpha], strict=True)]
     relative_difference = max(abs(x / b - 1.0) for x, b in pairs if b > SEEN_RAD_S)
     difference = max(abs(x - b) for x, b in pairs if b <= SEEN_RAD_S)
-    slopes = {a: float(np.polyfit(np.log(NOISES_RAD), np.log(error), 1)[0]) for a, error in by_noise.items()}
+    slopes = {a: np.polyfit(np.log(NOISES_RAD), np.log(error), 1)[0] for a, error in by_noise.items()}
     return Claim(
         place="After (11), the vicinity",
         statement="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
@@ -199,22 +198,18 @@ def vicinity(seed: int = SEED) -> Claim:
         "printed s^2 + k2 s + k1 has k1 and k2 exchanged, without consequence: either is Hurwitz just when both gains "
         "are positive.",
         figures={
-            "error_left_share": _by_name(errors),
-            "bias_deg": list(BIASES_DEG),
-            "rate_error_by_bias_rad_s": _by_name(by_bias),
-            "error_left_share_2000_hz": _by_name(fine_errors),
+            "error_left_share": errors,
+            "bias_deg": BIASES_DEG,
+            "rate_error_by_bias_rad_s": by_bias,
+            "error_left_share_2000_hz": fine_errors,
             "closed_form_relative_difference": relative_difference,
             "closed_form_difference_where_small_rad_s": difference,
-            "noise_rad": list(NOISES_RAD),
-            "rate_error_by_noise_rad_s": _by_name(by_noise),
-            "exponent_of_noise": _by_name(slopes),
+            "noise_rad": NOISES_RAD,
+            "rate_error_by_noise_rad_s": by_noise,
+            "exponent_of_noise": slopes,
         },
         pictures=[_vicinity_picture(by_bias, bounds, by_noise)],
     )
-
-
-def _by_name(by_alpha: Mapping[float, Any]) -> dict[str, Any]:
-    return {str(alpha): np.asarray(value).tolist() for alpha, value in by_alpha.items()}
 
 
 def _vicinity_picture(
@@ -235,4 +230,78 @@ def _vicinity_picture(
             Panel("RMS rate error\n[rad/s]", noisy, "with noise, no bias", sigma, "log", "log"),
         ],
         share_x=False,
+    )
+
+
+LAG_SEED = 76_000
+TAUS_S = (0.01, 0.015, 0.02, 0.03, 0.05, 0.08)
+
+
+class Trade(NamedTuple):
+    """Lag and noise gain of (9) with one time constant."""
+
+    lag_s: float
+    """Delay of the estimate of a steadily rising rate [s]."""
+    noise_gain_1_s: float
+    """RMS of the estimate by that of a white noise measured [1/s]."""
+
+
+def trade(tau: float, seed: int = LAG_SEED) -> Trade:
+    """Replay (9) on a steadily accelerated tilt, and on noise."""
+    time, settling_ticks = np.arange(2000) * DT, 400
+    acceleration = 0.3
+    noise = np.random.default_rng(seed).normal(0.0, 1.0, (len(time), 8))
+    y1 = np.column_stack([acceleration * time**2 / 2.0, noise])
+    x2 = replay_at_rest(make_observer("linear", DT, printed_model(), tau=tau), y1).x2
+    late = time[-1] - x2[-1, 0] / acceleration
+    return Trade(late, np.sqrt(np.mean(x2[settling_ticks:, 1:] ** 2)))
+
+
+def predict_trade(tau: float) -> Trade:
+    """Predict the trade by G = s/(tau s + 1)^2, whose phase falls with the slope 2 tau.
+
+    A sample of noise is a triangle in time, two samples wide: the weights are the impulse response's means over it. For
+    samples short beside tau their squares add up to dt/(4 tau^3).
+    """
+    fine = 50
+    time = np.arange(fine * (round(30.0 * tau / DT) + 1)) * DT / fine
+    response = (1.0 - time / tau) * np.exp(-time / tau) / tau**2
+    triangle = 1.0 - np.abs(np.arange(-fine, fine + 1)) / fine
+    weights = np.convolve(response, triangle)[fine::fine] * DT / fine
+    weights[0] -= response[0] / 2.0 * DT / fine  # trapezoidal rule at the response's jump
+    return Trade(2.0 * tau, np.sqrt(np.sum(weights**2)))
+
+
+def lag(seed: int = LAG_SEED) -> Claim:
+    """Judge a longer tau: less noise, more lag."""
+    lags, gains = zip(*(trade(tau, seed) for tau in TAUS_S), strict=True)
+    lags_foreseen, gains_foreseen = np.array([predict_trade(tau) for tau in TAUS_S]).T
+    fine = np.geomspace(TAUS_S[0], TAUS_S[-1], 50)
+    fine_lags, fine_gains = np.array([predict_trade(tau) for tau in fine]).T
+    lag_lines = [
+        Line(TAUS_S, 1e3 * np.array(lags), "measured", "o", color=1),
+        Line(fine, 1e3 * fine_lags, "2 tau", color=7),
+    ]
+    noise_lines = [
+        Line(TAUS_S, gains, "measured", "o", color=1),
+        Line(fine, fine_gains, "of the transfer function", color=7),
+    ]
+    x = "tau [s]"
+    return Claim(
+        place="(9), lag and noise",
+        statement="A filter with the differentiator reduces noise, but lag distorts the estimate: tau trades them.",
+        holds=largest_size(lags / lags_foreseen - 1.0) < 0.01
+        and largest_size(gains / gains_foreseen - 1.0) < 0.05
+        and sorted(gains, reverse=True) == list(gains),
+        figures={"tau_s": TAUS_S, "lag_s": lags, "noise_gain_1_s": gains},
+        pictures=[
+            Picture(
+                "aranovskiy2020-eq-9",
+                "aranovskiy2020, (9): the lag of the linear differentiator against its noise",
+                [
+                    Panel("lag [ms]", lag_lines, "", x, "log", "log"),
+                    Panel("noise gain [1/s]", noise_lines, "", x, "log", "log"),
+                ],
+            )
+        ],
     )
