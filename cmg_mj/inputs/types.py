@@ -60,10 +60,6 @@ class OfOneLaw:
     """Marks a field that another law does not take over."""
 
 
-class WhateverTheLaw:
-    """Marks a field of the loop around the law, which stays when Studio changes the law."""
-
-
 class NoEffect:
     """Marks a field on which no number of a run depends."""
 

@@ -31,7 +31,6 @@ from cmg_mj.inputs.types import (
     Positive,
     Rate,
     Section,
-    WhateverTheLaw,
     marked_fields,
 )
 from cmg_mj.inputs.user_classes import as_json
@@ -74,15 +73,15 @@ class ControllerSettings(BaseModel):
     """Weights of a quadratic cost; the law then solves for its gains, instead of `gains`."""
     rate_limit_rad_s: Annotated[Positive, Batched(law_field="rate_limit")] = 4.7
     """Largest gimbal rate that the law commands."""
-    feedback: Annotated[Feedback, WhateverTheLaw()] = "observer"
+    feedback: Feedback = "observer"
     """Tilt rate that the law uses: the observer's estimate, the fibre-optic gyro's reading, or the exact rate."""
     angle_source: AngleSource = "measured"
     """Angles that the law uses: measured, as in (8), or the observer's, as in the text after (10)."""
-    compensate_turning: Annotated[bool, OnAllAxes(), WhateverTheLaw()] = True
+    compensate_turning: Annotated[bool, OnAllAxes()] = True
     """On a rig of several axes, compensate the torques that a turn about the vertical couples into each axis."""
     bias_trim_s: Instant = 0.0
     """Time from the start in which the law holds its integrator at the value for the estimated bias."""
-    notch_hz: Annotated[NonNegative, WhateverTheLaw()] = 0.0
+    notch_hz: NonNegative = 0.0
     """Centre frequency of a notch filter on the command, for a frame that bends; 0 for no notch."""
 
     @model_validator(mode="after")
@@ -119,8 +118,6 @@ COMMON_LAW_FIELDS = tuple(name for name in ControllerSettings.model_fields if na
 """Fields of [controller] that every law has."""
 ALL_AXES_LAW_FIELDS = tuple(marked_fields(ControllerSettings, OnAllAxes))
 """Fields of [controller] that are the same on all axes."""
-LOOP_FIELDS = tuple(marked_fields(ControllerSettings, WhateverTheLaw))
-"""Fields of [controller] that stay when Studio changes the law."""
 
 
 class ObserverSettings(BaseModel):
