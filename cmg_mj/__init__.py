@@ -69,11 +69,11 @@ if TYPE_CHECKING:
     from cmg_mj.scenario.schema import LqrSettings as LqrSettings
     from cmg_mj.scenario.schema import ObserverSettings as ObserverSettings
     from cmg_mj.scenario.schema import Scenario as Scenario
+    from cmg_mj.sensors import Sensors as Sensors
     from cmg_mj.sensors.accelerometer import Accelerometer as Accelerometer
     from cmg_mj.sensors.accelerometer import Encoder as Encoder
     from cmg_mj.sensors.gyros import Fog as Fog
     from cmg_mj.sensors.gyros import MemsGyro as MemsGyro
-    from cmg_mj.sensors.sampled import Sensors as Sensors
     from cmg_mj.stages.push import Push as Push
     from cmg_mj.stages.swing import Swing as Swing
     from cmg_mj.view.recording.save import show_recording as show_recording

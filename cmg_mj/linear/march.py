@@ -13,8 +13,8 @@ from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.core.types import IdealReading
 from cmg_mj.linear.plant import LinearPlant
 from cmg_mj.scenario.design import Design
+from cmg_mj.sensors import Sensors
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.sampled import Sensors
 
 STARTS_RAD_S = (0.01, 0.05)
 """Tilt rates from which the motion has to decay: observers that are not linear answer to sizes."""

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.results.intervals import finite_values
 from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, as_table, open_loop_figures
 from cmg_mj.results.trajectory import NamedColumns, Trajectory, frame_of
 
@@ -110,7 +109,8 @@ class Result(NamedColumns):
 
     def mean(self, key: str, estimator: str | None = None) -> float | None:
         """Return the mean of `values` over the worlds that have one; None if no world has."""
-        known = finite_values(self.values(key, estimator))
+        values = self.values(key, estimator)
+        known = values[np.isfinite(values)]
         return statistics.fmean(known) if len(known) else None
 
     @property

@@ -23,7 +23,7 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.runs.disturbances import Outsides, outsides
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.schema import Scenario
-from cmg_mj.sensors.sampled import Sensors
+from cmg_mj.sensors import Sensors
 from cmg_mj.stages.backlash import backlash
 
 T = TypeVar("T")

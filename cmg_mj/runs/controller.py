@@ -12,7 +12,7 @@ from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import StageOptions, make_controller
 from cmg_mj.scenario.schema import ObserverSettings
-from cmg_mj.sensors.sampled import Sensors
+from cmg_mj.sensors import Sensors
 from cmg_mj.stages.turning import compensation
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmg_mj.core.outside import Disturbance
+from cmg_mj.core.loop import Disturbance
 from cmg_mj.inputs.features import entries
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.schema import Scenario

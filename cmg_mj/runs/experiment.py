@@ -42,7 +42,6 @@ from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.time_grid import time_grid
-from cmg_mj.stages.turning import compensation
 
 if TYPE_CHECKING:
     import control
@@ -122,6 +121,8 @@ class Experiment:
         """Join the controllers of the axes; of one axis its controller itself."""
         if len(controllers) == 1:
             return controllers[0]
+        from cmg_mj.stages.turning import compensation  # most rigs have one axis
+
         compensates = self.scenario.controller.compensate_turning
         between = compensation(self.plant.turning, self.scenario.sensors.mems_gyro) if compensates else None
         return MultiAxisController(controllers, between)

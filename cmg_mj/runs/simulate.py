@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -24,7 +24,6 @@ from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.batch import unstack
-from cmg_mj.runs.callback import CallbackLoop, control_callback
 from cmg_mj.runs.disturbances import Outsides, disturbances
 from cmg_mj.runs.recorder import TickRecorder
 from cmg_mj.scenario.schema import MetricsSettings
@@ -101,11 +100,15 @@ def simulate(
     if on_start := options.get("on_start"):
         on_start(since)
     physics = OneWorld(plants[0]) if single else ManyWorlds(plants, options.get("threads", 0))
-    kind = CallbackLoop if driver == "callback" else loop
-    ticks = kind(physics, controller, steps, acting, np.radians(settings.fall_angle_deg).item())
+    driving: AbstractContextManager = nullcontext()
+    if driver == "callback":
+        from cmg_mj.runs.callback import CallbackLoop, control_callback  # the loop needs no callback of MuJoCo's
+
+        loop, driving = CallbackLoop, control_callback(plants[0], controller)
+    ticks = loop(physics, controller, steps, acting, np.radians(settings.fall_angle_deg).item())
     rest = Outcome("done", duration_s)
     try:
-        with control_callback(plants[0], controller) if kind is CallbackLoop else nullcontext():
+        with driving:
             _record(ticks, controller, list(recorders.values()), timestep, options.get("on_progress"))
     except RunStopped as error:
         rest = Outcome("stopped", ticks.step * timestep, str(error), len(plants) > 1)

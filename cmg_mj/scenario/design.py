@@ -16,7 +16,7 @@ from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
 from cmg_mj.laws import LAW_CLASSES, LAWS, Law
 from cmg_mj.observers import OBSERVER_CLASSES, Observer, make_observer
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
-from cmg_mj.sensors.sampled import Sensors
+from cmg_mj.sensors import Sensors
 from cmg_mj.stages.notch import notch
 from cmg_mj.stages.trim import integrator_trim, trim
 

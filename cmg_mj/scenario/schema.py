@@ -37,7 +37,7 @@ from cmg_mj.inputs.user_classes import as_json
 from cmg_mj.laws import LAW_CLASSES, LAWS, Law, lqr_gains, make_law, scaled_gains
 from cmg_mj.observers import OBSERVERS, Observer, make_observer
 from cmg_mj.scenario.plant_settings import PlantSettings
-from cmg_mj.sensors.sampled import Sensors
+from cmg_mj.sensors import Sensors
 from cmg_mj.stages.push import Push
 from cmg_mj.stages.swing import Swing
 

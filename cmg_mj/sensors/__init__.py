@@ -1,1 +1,65 @@
 """Turns the true motion into what a real rig's sensors show, and when: accelerometers, encoders, gyros."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.sensor import SampledSensor, Site
+from cmg_mj.core.types import Forces
+from cmg_mj.inputs.types import STRICT
+from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
+from cmg_mj.sensors.gyros import Fog, MemsGyro
+
+
+@dataclass(frozen=True, config=STRICT)
+class Sensors:
+    """The rig's sensors.
+
+    Attributes:
+        accelerometer: The two accelerometers of the tilt estimate.
+        encoder: The gimbals' encoders.
+        fog: The fibre-optic gyro.
+        mems_gyro: A cheap gyro that estimates are judged beside; nothing else uses it.
+    """
+
+    accelerometer: Accelerometer = Field(default_factory=Accelerometer)
+    encoder: Encoder = Field(default_factory=Encoder)
+    fog: Fog = Field(default_factory=Fog)
+    mems_gyro: MemsGyro = Field(default_factory=MemsGyro)
+
+    def with_noise_density(self, ug_rthz: float) -> Sensors:
+        """Return the sensors with another noise density of the accelerometers [ug/sqrt(Hz)]."""
+        return replace(self, accelerometer=replace(self.accelerometer, noise_density_ug_rthz=ug_rthz))
+
+    def at_work(
+        self, timestep: float, seed: int, worlds: int | Sequence[int], axis: int = 0
+    ) -> tuple[SampledSensor[Forces], SampledSensor[Sequence[Scalar]], SampledSensor[Scalar]]:
+        """Start the sensors that the controller reads: the accelerometers, the encoders, the fibre-optic gyro.
+
+        Args:
+            timestep: Physics step [s].
+            seed: The run's seed.
+            worlds: The number of one world, on floats, or the numbers of many, on arrays.
+            axis: The number of the axis whose they are: each has noise of its own.
+
+        Returns:
+            The sensors, sampled.
+
+        Raises:
+            InputError: A rate or a time does not fit the physics step.
+        """
+
+        def noise(stream: NoiseStream, channels: int) -> Iterator[Sequence[Scalar]]:
+            return normals(seed, worlds, stream.on_axis(axis), channels)
+
+        def site(name: str) -> Site:
+            return Site(f"sensors.{name}", timestep, noise)
+
+        pair, encoder, fog = self.accelerometer, self.encoder, self.fog
+        return pair.at_work(site("accelerometer")), encoder.at_work(site("encoder")), fog.at_work(site("fog"))

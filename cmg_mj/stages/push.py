@@ -9,7 +9,7 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, where
-from cmg_mj.core.outside import Outside
+from cmg_mj.core.loop import Outside
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.inputs.types import STRICT, Batched, GridDuration, GridInstant, Section, Start
 

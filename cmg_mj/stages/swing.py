@@ -10,7 +10,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.outside import Outside
+from cmg_mj.core.loop import Outside
 from cmg_mj.inputs.types import STRICT, Duration, Held, Instant, Section, Start
 
 

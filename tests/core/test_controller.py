@@ -21,9 +21,9 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.design import make_controller
 from cmg_mj.scenario.loading import parse_scenario
+from cmg_mj.sensors import Sensors
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
 from cmg_mj.sensors.gyros import Fog
-from cmg_mj.sensors.sampled import Sensors
 from tests.observers.reference import DT, GRAVITY_TORQUE, J1, J2, PAPER
 from tests.plant import paper_model as paper
 from tests.recorded import push_recovery, recorded

@@ -13,9 +13,9 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.runs.batch import BATCHED_FIELDS, stack_worlds, world_value
 from cmg_mj.runs.experiment import Experiment, run_batch
 from cmg_mj.scenario.schema import Scenario
+from cmg_mj.sensors import Sensors
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.gyros import Fog
-from cmg_mj.sensors.sampled import Sensors
 from tests.recorded import assert_same_bits, push_recovery, recorded
 
 N = 6

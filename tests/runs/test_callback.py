@@ -24,8 +24,8 @@ from cmg_mj.plant.plant import load_plant
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.callback import control, control_callback
 from cmg_mj.runs.experiment import Experiment
+from cmg_mj.sensors import Sensors
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.sampled import Sensors
 from tests.recorded import push_recovery, recorded
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1")

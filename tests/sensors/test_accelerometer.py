@@ -22,8 +22,8 @@ from cmg_mj.core.noise import NoiseStream
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.plant.plant import load_plant
+from cmg_mj.sensors import Sensors
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.stages.low_pass import noise_gain
 from tests.recorded import assert_same_bits, push_recovery, recorded
 from tests.sensors.test_sampled import G, assert_sigma, measuring

@@ -13,8 +13,8 @@ from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.core.types import STANDARD_GRAVITY, IdealReading
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.sensors import Sensors
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.sensors.sampled import Sensors
 from cmg_mj.stages.vibration import BroadbandVibration, WheelTones
 from tests.recorded import push_recovery, recorded
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Collection, Sequence
 
 from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.loop import Outside
 from cmg_mj.core.noise import NoiseStream, normals
-from cmg_mj.core.outside import Outside
 from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.pivot_track import read_track
 

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, RunStopped
-from cmg_mj.core.outside import Outside
+from cmg_mj.core.loop import Outside
 from cmg_mj.features.studio.settings import FieldValues, changed_fields
 from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.inputs.types import MAX_TIME_S

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.outside import Outside, instants
+from cmg_mj.core.loop import Outside, instants
 from cmg_mj.core.types import IdealReading
 from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.moving_pivot import pivot_directions
