@@ -97,7 +97,7 @@ def test_the_field_of_contributing_is_one(tmp_path: Path) -> None:
         lines = textwrap.indent(textwrap.dedent(block), indent * " ")
         path.write_text(content.replace(before, lines + before), encoding="utf-8")
 
-    insert("scenario/schema.py", field, "    feedback: Annotated[Feedback", 4)
+    insert("scenario/schema.py", field, "    feedback: Feedback", 4)
     insert("scenario/schema.py", use, "        return make_law(", 8)
     (law_field,) = re.findall(r"`(dead_band_rad_s: float = 0\.0)`", recipe)
     insert("laws/state_feedback.py", law_field + "\n", "\n    @property\n    def trim_gain", 4)
