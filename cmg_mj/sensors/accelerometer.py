@@ -86,5 +86,5 @@ class Encoder:
     def at_work(self, site: Site) -> SampledSensor[Sequence[Scalar]]:
         """Start the encoders."""
         step = 2.0 * math.pi / self.counts_per_revolution if self.counts_per_revolution else 0.0
-        stages = [Shown(math.inf, step)] if step else []
+        stages: list[SensorStage] = [Shown(math.inf, step)] if step else []
         return SampledSensor(self.rate_hz, self.latency_s, site, lambda ideal: ideal.gimbals, stages)
