@@ -155,21 +155,21 @@ def _written(
     strict = rr.strict_mode()
     rr.set_strict_mode(True)  # rerun would only warn
     try:
-        with (
-            whole_file(path) as temporary,
-            pipe_into(temporary) as pipe,
-            rr.RecordingStream(_application_name(branches)) as rec,
-        ):
+        with rr.RecordingStream(_application_name(branches)) as rec:
             require_enabled(rec)
-            rec.save(pipe)
-            rec.send_blueprint(blueprint, make_active=False, make_default=True)
-            set_up(rec, title)
-            for branch in branches:
-                log_styles(rec, branch)
-                log_values(rec, branch)
-            for name, text in texts.items():
-                rec.log(name, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
-            yield rec
+            with whole_file(path) as temporary, pipe_into(temporary) as pipe:
+                rec.save(pipe)
+                try:
+                    rec.send_blueprint(blueprint, make_active=False, make_default=True)
+                    set_up(rec, title)
+                    for branch in branches:
+                        log_styles(rec, branch)
+                        log_values(rec, branch)
+                    for name, text in texts.items():
+                        rec.log(name, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+                    yield rec
+                finally:
+                    rec.disconnect()  # the pipe ends only then
     finally:
         rr.set_strict_mode(strict)
 
