@@ -337,12 +337,15 @@ def load_scenario_plant(scenario: Scenario, grid: TimeGrid, like: Plant | None =
     """
     settings, axes = scenario.plant, scenario.axis_scenarios
     sections = {name: scenario.section(name) for name in entries("edit")}
-    path = find("models", settings.model, ".xml", "plant.model =")
     same = like is not None and like.sections == sections and like.settings.compiled_alike(settings)
     with set_control_callback(None):  # compiling a model runs it
-        filed = like.filed if like and same else build(path, settings, sections)
+        if like is not None and same:  # whose file may be gone
+            filed = like.filed
+        else:
+            path = find("models", settings.model, ".xml", "plant.model =")
+            filed = build(path, settings, sections)
         plant = Plant(filed, settings, sections, {name: axis.plant for name, axis in axes.items()}, grid)
-    if not same and path.resolve().parent != folder("models").resolve():
+    if not same and plant.path.resolve().parent != folder("models").resolve():
         _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
     return plant
 
