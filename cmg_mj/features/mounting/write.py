@@ -7,6 +7,7 @@ import re
 import time
 import tomllib
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -184,7 +185,8 @@ def _sufficient_scale(
         pass
     finally:
         for file in (trial, trial.with_suffix(".toml")):
-            file.unlink(missing_ok=True)
+            with suppress(OSError):
+                file.unlink()
     return None
 
 
