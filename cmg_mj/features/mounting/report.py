@@ -92,7 +92,9 @@ def _simulated(simulated: SimulatedPush | None) -> str:
             reason = f"not even {MIN_SHARE:.0%} of any controller's push"
         return f"stands in MuJoCo only unpushed ({reason}); "
     others = f"and all of {OTHER_WORLDS} others"
-    more = others if simulated.complete else f"{MAX_SEARCH_S:g} s did not suffice for one that {OTHER_WORLDS} others stand"
+    more = (
+        others if simulated.complete else f"{MAX_SEARCH_S:g} s did not suffice for one that {OTHER_WORLDS} others stand"
+    )
     return (
         f"stands a push of {simulated.impulse / PUSH_S:.3g} N m for {PUSH_S:g} s either way (MuJoCo, all of {WORLDS} "
         f"worlds, less a tenth; {more}); "
