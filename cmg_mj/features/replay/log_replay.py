@@ -25,7 +25,6 @@ from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.trajectory import ESTIMATES, Layout, NamedColumns, Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay_all
-from cmg_mj.scenario.design import design
 from cmg_mj.scenario.loading import parse_scenario
 
 if TYPE_CHECKING:
@@ -285,9 +284,9 @@ def observer_inputs(
     noises, parameters = noises or {}, dict(parameters or {})
     if log.scenario is None:
         return ObserverInputs(model, noise_of(log, noises), parameters)
-    scenario = parse_scenario(dict(log.scenario), log.name)
-    plant, loop = prepare(scenario).plant.parameters, scenario.observer
-    _, run_model, noise = design(scenario, plant).constructor_arguments
+    part = prepare(parse_scenario(dict(log.scenario), log.name)).require_single_axis("replay")
+    scenario, plant, loop = part.scenario, part.plant.parameters, part.scenario.observer
+    _, run_model, noise = part.design.constructor_arguments
     if "accelerometer" in noises:  # the sensors' other errors stay
         if len(noises) > 1:
             raise InputError("--noise: for two accelerometers give accelerometer [ug/rtHz]; the others follow from it")

@@ -487,7 +487,7 @@ def scenario_of(name: str, file: StudyFile, settings: Sequence[str] = ()) -> Sce
     fields = {key: value for key, value in copy.deepcopy(file.scenario).items() if key != "versions"}
     for setting in settings:
         override(fields, setting)
-    scenario = parse_scenario(fields, name)
+    scenario = parse_scenario(fields, f"{name} with --set {' --set '.join(settings)}" if settings else name)
     beside = find("scenarios", name, ".toml", "scenario").parent
     if not any(setting.partition("=")[0].strip() == "plant.model" for setting in settings):
         scenario = find_model(scenario, beside)
