@@ -762,7 +762,7 @@ COMMANDS: dict[str, Notes] = {
     ),
     "replay": Notes("about four seconds for a log of 40 seconds.", (f"cmg-mj replay {LOG} {COLUMNS}",), "replay.md"),
     "mount": Notes(
-        "up to a minute, or two seconds with `--quick`; `--tune` adds up to two minutes.",
+        "up to a minute, or two seconds with `--quick`.",
         (f"cmg-mj mount {TORSO} -o balanced.xml", "cmg-mj run balanced.toml"),
         "mount.md",
     ),

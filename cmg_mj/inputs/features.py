@@ -126,7 +126,7 @@ FEATURES = {
                 "cmg_mj.features.mounting.command:mount", "Mount a scissored pair on your own robot, with a scenario."
             )
         },
-        needs=("plugin", "tuning"),
+        needs=("plugin",),
     ),
 }
 """Name of the folder -> its row."""

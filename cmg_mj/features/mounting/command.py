@@ -8,8 +8,7 @@ from typing import Any
 import click
 
 from cmg_mj.cli.arguments import json_option, observer_option
-from cmg_mj.cli.terminal import CtrlC, end_interrupted, note, note_hints, progress, shell_command, show, users_code
-from cmg_mj.core.errors import InputError
+from cmg_mj.cli.terminal import CtrlC, note, note_hints, progress, shell_command, show, users_code
 
 
 @click.command(short_help="Mount a scissored pair on your own robot, with a scenario.")
@@ -68,13 +67,6 @@ from cmg_mj.core.errors import InputError
     is_flag=True,
     help="Print only the reduced model's limits, without the trials in MuJoCo (up to a minute).",
 )
-@click.option(
-    "--tune",
-    "with_tuning",
-    is_flag=True,
-    help="Then tune the observer's parameters on the robot in MuJoCo (up to two minutes), and write them if they are "
-    "better on other worlds and withstand no smaller push.",
-)
 @json_option()
 @click.option("--overwrite", is_flag=True, help="Replace the files of an earlier mount.")
 @users_code()
@@ -84,7 +76,6 @@ def mount(
     observer: str,
     with_plugin: bool,
     quick: bool,
-    with_tuning: bool,
     as_json: bool,
     overwrite: bool,
     **request: Any,
@@ -98,10 +89,8 @@ def mount(
     from cmg_mj.features.mounting.push import MAX_SEARCH_S, TimeLimit
     from cmg_mj.features.mounting.report import mount_report_lines
     from cmg_mj.features.mounting.request import MountRequest
-    from cmg_mj.features.mounting.write import mount_and_write, tune_mounted
+    from cmg_mj.features.mounting.write import mount_and_write
 
-    if with_tuning and with_plugin:
-        raise InputError("--tune: not with --plugin, which would keep the old parameters; use cmg-mj plugin afterwards")
     with CtrlC() as ctrl_c, nullcontext() if quick else progress("no push", MAX_SEARCH_S, ctrl_c) as on_progress:
         time_limit = None if quick else TimeLimit(on_progress=on_progress)
         result = mount_and_write(
@@ -113,19 +102,7 @@ def mount(
             time_limit=time_limit,
             with_plugin=with_plugin,
         )
-    lines, figures, error, interrupted = [*mount_report_lines(result)], result.figures(), None, False
-    if with_tuning:  # a Ctrl-C ends the search, and a second one leaves all as it was
-        with CtrlC() as ctrl_c, progress(f"tuning {observer}", 1.0) as on_progress:
-            try:
-                tuning = tune_mounted(result.scenario_path, stop=lambda: ctrl_c.noted, on_share=on_progress)
-                lines.append(tuning.line())
-                figures |= tuning.figures()
-            except InputError as wrong:
-                error = InputError(f"mounted, but --tune: {wrong}")
-            except KeyboardInterrupt:
-                interrupted = True
-        interrupted = interrupted or ctrl_c.noted
-    show(figures, "\n".join(lines), as_json)
+    show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:
         note_hints(result.prospects.hints)
         run_it = shell_command("cmg-mj", "run", result.scenario_path)
@@ -133,7 +110,3 @@ def mount(
         if result.plugin:
             example = result.plugin.model.with_name(f"{result.plugin.model.stem}_example.py")
             note(f"wrote {result.plugin.model.parent}; try: {shell_command('python', example)}")
-    if error:
-        raise error
-    if interrupted:
-        end_interrupted(f"interrupted; {result.path} and {result.scenario_path} are whole")

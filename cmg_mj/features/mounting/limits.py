@@ -16,7 +16,7 @@ from cmg_mj.core.loop import ControlLoop, Joints
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.core.types import IdealReading
-from cmg_mj.features.mounting.stance import overlap, simulated_pole
+from cmg_mj.features.mounting.stance import simulated_pole
 from cmg_mj.linear.verdict import SlidingPoles, sliding_poles
 from cmg_mj.plant.mjcf import quiet, set_control_callback
 from cmg_mj.plant.plant import Plant
@@ -258,7 +258,6 @@ class Prospects:
         limit: Limits for any controller.
         push_margin: Pushes that the scenario's law, observer and sensors recover from.
         pole: Unstable pole of the simulated robot, uncontrolled and with its flywheels at rest [1/s].
-        overlap: Clause on geoms that overlap where it stands; "" if there are none.
         sliding_poles: Slowest poles of the loop of a rig whose pivot slides freely; None for a pivot at rest.
     """
 
@@ -266,7 +265,6 @@ class Prospects:
     limit: RecoverableLimit
     push_margin: PushMargin
     pole: float
-    overlap: str = ""
     sliding_poles: SlidingPoles | None = None
 
     @property
@@ -294,13 +292,10 @@ class Prospects:
         """Clauses on what is likely to make the robot fall, though it is no mistake."""
         hints = []
         if not abs(self.pole / self.limit.pole - 1.0) < POLE_DIFFERENCE:
-            reason = self.overlap or (
-                "its support rolls or is soft (soft contacts, or joints held softly), or the hinge that it "
-                "tilts about has a spring or damping"
-            )
             hints.append(
                 f"the robot starts to fall with a pole of {self.pole:.3g} 1/s, its reduced model's is "
-                f"{self.limit.pole:.3g}: {reason}"
+                f"{self.limit.pole:.3g}: its support rolls or is soft (soft contacts, or joints held softly), the "
+                "hinge that it tilts about has a spring or damping, or geoms overlap"
             )
         if self.noisy:
             share = self.push_margin.worst_impulse / self.push_margin.median_impulse
@@ -350,10 +345,9 @@ def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = Tru
     limit = ceiling(plant.reduced, experiment.law.rate_limit)
     with set_control_callback(None), quiet():
         pole = simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias)
-        touching = overlap(plant.model, plant.key, plant.axis.line, pole)
     margin = push_margin(experiment.design) if with_margin else PushMargin(0.0, 0.0)
     poles = sliding_poles(experiment.law, plant)
-    return Prospects(plant.reduced, limit, margin, pole, touching, poles)
+    return Prospects(plant.reduced, limit, margin, pole, poles)
 
 
 SPIN_UP_S = 60.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,7 @@ class OutOfTimeError(Exception):
     """The search has taken as long as it may."""
 
 
+@dataclass
 class TimeLimit:
     """The time that a search may take.
 
@@ -56,14 +58,12 @@ class TimeLimit:
         clock: Returns the time [s].
     """
 
-    def __init__(
-        self,
-        longest_s: float = MAX_SEARCH_S,
-        on_progress: SearchProgress | None = None,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self.longest_s, self._on_progress, self._clock = longest_s, on_progress, clock
-        self._start = clock()
+    longest_s: float = MAX_SEARCH_S
+    on_progress: SearchProgress = lambda *_: None
+    clock: Callable[[], float] = time.monotonic
+
+    def __post_init__(self) -> None:
+        self._start = self.clock()
 
     def check(self, now: str) -> None:
         """Show the progress.
@@ -71,9 +71,8 @@ class TimeLimit:
         Raises:
             OutOfTimeError: The time is over.
         """
-        passed = self._clock() - self._start
-        if self._on_progress is not None:
-            self._on_progress(min(passed, self.longest_s), now)
+        passed = self.clock() - self._start
+        self.on_progress(min(passed, self.longest_s), now)
         if passed > self.longest_s:
             raise OutOfTimeError
 
@@ -118,11 +117,18 @@ def simulated_push(
     """
     time_limit = time_limit or TimeLimit()
     worlds = WORLDS
+
+    def unpushed(numbers: range) -> int:
+        """Count the worlds that stand without a push, from the tilt that a scenario starts with."""
+        start, pushes = _tilted(experiment, limits.start_tilt_deg, axis), [(world, 0.0) for world in numbers]
+        attempt = _attempt(start, pushes, UNPUSHED_S, axis, time_limit, "no push", early=False)
+        return len(numbers) - attempt.fallen
+
     try:
-        standing = standing_unpushed(experiment, limits, axis, time_limit)
+        standing = unpushed(range(WORLDS))
         if standing == WORLDS and limits.noisy:
             worlds += OTHER_WORLDS
-            standing += standing_unpushed(experiment, limits, axis, time_limit, range(WORLDS, worlds))
+            standing += unpushed(range(WORLDS, worlds))
     except OutOfTimeError:
         return SimulatedPush(None, complete=False)
     if standing < worlds:
@@ -134,54 +140,28 @@ def simulated_push(
     expected = limits.push_margin.median_impulse or 0.5 * limits.limit_push_impulse
     low, high = 0.0, FIRST_SHARE * expected
 
-    def attempt(impulse: float, worlds: range, after: float) -> _Attempt:
+    def attempt(impulse: float, worlds: range = range(WORLDS), after: float = after) -> _Attempt:
         text = f"a push of {impulse / PUSH_S:.3g} N m"
         pushes = [(world, sign * impulse) for sign in (1.0, -1.0) for world in worlds]
         return _attempt(upright, pushes, BEFORE_S + PUSH_S + after, axis, time_limit, text)
 
-    def all_stand(impulse: float) -> bool:
-        return attempt(impulse, range(WORLDS), after).all_stand
-
     found = 0.0
     try:
-        if all_stand(high):
+        if not attempt(high).fallen:
             low, high = high, expected
-            while high < MAX_CEILINGS * limits.limit_push_impulse and all_stand(high):
+            while high < MAX_CEILINGS * limits.limit_push_impulse and not attempt(high).fallen:
                 low, high = high, GROWTH * high
         while high - low > max(RESOLUTION * high, least):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if all_stand(middle) else (low, middle)
+            low, high = (low, middle) if attempt(middle).fallen else (middle, high)
         while (found := (1.0 - MARGIN) * (found or low)) > least:
             longer = min(AFTER_LONGER * after, MAX_AFTER_S)
             result = attempt(found, range(WORLDS, WORLDS + OTHER_WORLDS), longer)
-            if result.all_stand:
+            if not result.fallen:
                 return SimulatedPush(standing, found, True, result.servo_torque, result.servo_rate, worlds=worlds)
     except OutOfTimeError:
         return SimulatedPush(standing, found or (1.0 - MARGIN) * low, complete=False, worlds=worlds)
     return SimulatedPush(standing, worlds=worlds)
-
-
-def standing_unpushed(
-    experiment: Experiment, limits: Prospects, axis: str, time_limit: TimeLimit, numbers: Sequence[int] = range(WORLDS)
-) -> int:
-    """Count the worlds that stand without a push, from the tilt that a scenario starts with.
-
-    Args:
-        experiment: The robot and its controller.
-        limits: The limits by the reduced model.
-        axis: Name of the axis, if there are several.
-        time_limit: The time that the search may take.
-        numbers: The worlds, ten by default.
-
-    Returns:
-        The number of worlds.
-
-    Raises:
-        OutOfTimeError: The time is over.
-    """
-    start = _tilted(experiment, limits.start_tilt_deg, axis)
-    worlds = [(world, 0.0) for world in numbers]
-    return _attempt(start, worlds, UNPUSHED_S, axis, time_limit, "no push", early=False).standing
 
 
 def _tilted(experiment: Experiment, tilt_deg: float, axis: str) -> Experiment:
@@ -192,15 +172,9 @@ def _tilted(experiment: Experiment, tilt_deg: float, axis: str) -> Experiment:
 class _Attempt(NamedTuple):
     """The outcome of pushes."""
 
-    worlds: int
-    standing: int
+    fallen: int
     servo_torque: float
     servo_rate: float
-
-    @property
-    def all_stand(self) -> bool:
-        """True if no world fell."""
-        return self.standing == self.worlds
 
 
 @quiet()
@@ -237,4 +211,4 @@ def _attempt(
             loop.advance()
             torque = max(torque, float(np.abs(forces[:, servos]).max()))
             rate = max(rate, float(np.abs(np.asarray(tick.v)[gimbals]).max()))
-    return _Attempt(len(pushes), len(pushes) - len(loop.endings), torque, rate)
+    return _Attempt(len(loop.endings), torque, rate)

@@ -55,7 +55,10 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
         f"{result.prospects.fraction_of_limit:.0%} of any controller's"
     )
     yield f"  {result.observer}: {_simulated(result.simulated)}{reduced}"
-    yield from _scale(result)
+    low = math.degrees(result.prospects.limit.tilt) < LOW_LIMIT_DEG
+    if low or (result.simulated and result.simulated.falls):
+        reason = f"any controller recovers less than {LOW_LIMIT_DEG:g} deg" if low else "it does not stand"
+        yield f"  with a pair of this size {reason}; take a larger --scale"
     yield from _demands(result)
 
 
@@ -99,21 +102,6 @@ def _simulated(simulated: SimulatedPush | None) -> str:
         f"stands a push of {simulated.impulse / PUSH_S:.3g} N m for {PUSH_S:g} s either way (MuJoCo, all of {WORLDS} "
         f"worlds, less a tenth; {more}); "
     )
-
-
-def _scale(result: MountResult) -> Iterator[str]:
-    """Say whether the pair is too small, and which scale was tried that is not."""
-    simulated, scale = result.simulated, result.sufficient_scale
-    low = math.degrees(result.prospects.limit.tilt) < LOW_LIMIT_DEG
-    if not (low or (simulated and simulated.falls)):
-        return
-    reason = f"any controller recovers less than {LOW_LIMIT_DEG:g} deg" if low else "it does not stand"
-    if scale is not None:
-        yield f"  with a pair of this size {reason}; with --scale {scale:g}, tried in MuJoCo, it stands"
-    elif simulated is None:
-        yield f"  with a pair of this size {reason}; --quick tries no larger --scale"
-    else:
-        yield f"  with a pair of this size {reason}; no larger --scale was found with which it stands"
 
 
 def _demands(result: MountResult) -> Iterator[str]:

@@ -217,7 +217,6 @@ def test_the_command_prints_what_the_pair_can_do(monkeypatch: pytest.MonkeyPatch
     figures = json.loads(outcome.out)
     assert figures["held"] == ["front_hip", "rear_hip"]
     assert figures["limit_tilt_deg"] < 2.0
-    assert figures["scale_that_suffices"] == 1.21
     assert (
         0.0
         < figures["push_margin_worst_impulse_n_m_s"]

@@ -198,7 +198,7 @@ def test_what_only_drives_a_joint_does_not_hold_it(drive: str) -> None:
         (
             {"after": '<equality><joint name="e" joint1="hip"/></equality>'},
             {},
-            "does not start to fall from a tilt of 0.05 deg: it stands by itself",
+            "falls too slowly from a tilt of 0.05 deg, with 0 1/s; .*: it stands by itself",
         ),
         ({"option": 'gravity="0 0 9.81"'}, {}, 'gravity="0 0 9.81"/> does not pull down: there is nothing to balance'),
     ],
@@ -265,9 +265,6 @@ def test_stiff_contacts_with_a_margin_do_not_throw_a_robot(tyre: str) -> None:
 def test_a_cart_that_its_rail_overlaps_is_told_so() -> None:
     """Released, the contact with the rail holds the cart; held, the pole falls as if there were no rail."""
     spec = mujoco.MjSpec.from_string(CART_POLE.format(rails=RAIL))
-    message = (
-        "does not start to fall from a tilt of 0.05 deg: its geoms 'rail' and 'cart' overlap by 20 mm, and contact"
-    )
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(InputError, match=r"falls too slowly from a tilt .* geoms that overlap hold it"):
         mount(spec, "pole", axis="hinge", release=["slider"])
     mount(mujoco.MjSpec.from_string(CART_POLE.format(rails="")), "pole", axis="hinge", release=["slider"])
