@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -83,15 +82,6 @@ class Axis:
         return [module.direction for module in self.modules]
 
     @cached_property
-    def _forces_of(self) -> Callable[[list[float]], Sequence[float]]:
-        return itemgetter(*self.forces)
-
-    @cached_property
-    def _encoders_of(self) -> Callable[[list[float]], Sequence[float]]:
-        (only, *others) = self.encoders
-        return itemgetter(*self.encoders) if others else lambda sensordata: (sensordata[only],)
-
-    @cached_property
     def _spins(self) -> list[int]:
         return [module.flywheel_dof for module in self.modules]
 
@@ -112,10 +102,9 @@ class Axis:
         Returns:
             The ideal readings, of the elements' own type (float, or array (n_worlds,)).
         """
-        if isinstance(sensordata, list):  # of one world, at every tick
-            forces, encoders = self._forces_of(sensordata), self._encoders_of(sensordata)
-        else:
-            forces, encoders = sensordata[self.forces], [sensordata[address] for address in self.encoders]
+        many = isinstance(sensordata, np.ndarray)
+        forces = sensordata[self.forces] if many else [sensordata[address] for address in self.forces]
+        encoders = [sensordata[address] for address in self.encoders]
         wheels = [qvel[dof] for dof in self._spins]
         return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel), wheels))
 
@@ -254,7 +243,10 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     line.tilt(data, QUARTER_TURN)
     mujoco.mj_forward(model, data)
     gravity_torque = -(line.motion(model, data) @ data.qfrc_bias) / n
-    arm = _pivot_arm(model, key, axis, upright.rates)
+    across, about = pivot_rows(model, key, axis)
+    arm = -float(across @ upright.rates)  # how far the pivot slides back for a tilt of 1 rad
+    if not (arm > MIN_ARM_M and abs(float(about @ upright.rates) - 1.0) <= TURNS_ALIKE):
+        arm = 0.0  # it is at rest, or the body that carries the hinge turns with the tilt
     return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n, arm)
 
 
@@ -276,15 +268,3 @@ def pivot_rows(model: mujoco.MjModel, key: int, axis: Axis) -> tuple[np.ndarray,
     mujoco.mj_jac(model, data, slides, turns, data.xpos[axis.frame] + turn @ axis.point, axis.frame)
     line = turn @ axis.direction
     return np.cross(line, UP) @ slides, line @ turns
-
-
-def _pivot_arm(model: mujoco.MjModel, key: int, axis: Axis, rates: np.ndarray) -> float:
-    """Find how far the pivot slides back, across the axis, for a tilt of 1 rad while the joints have these rates [m].
-
-    This is 0 if the pivot is at rest. It is also 0 if the body that carries the hinge turns with the tilt.
-    """
-    across, about = pivot_rows(model, key, axis)
-    if abs(float(about @ rates) - 1.0) > TURNS_ALIKE:
-        return 0.0
-    arm = -float(across @ rates)
-    return arm if arm > MIN_ARM_M else 0.0

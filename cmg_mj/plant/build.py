@@ -20,9 +20,6 @@ from cmg_mj.scenario.plant_settings import PlantSettings
 
 _HAS_PLUGIN = "the model has the plugin {}, which is left out here: the scenario's own controller takes its place"
 
-Finish = Callable[[mujoco.MjModel], None]
-"""The end of an edit: sets numbers that depend on the compiled model."""
-
 
 def build(path: Path, settings: PlantSettings, sections: Mapping[str, Any]) -> ResolvedModel:
     """Read and compile a rig, without what is only seen.
@@ -75,13 +72,11 @@ def edit(
     Returns:
         The rig, edited.
     """
-    edits: list[Callable[[mujoco.MjSpec, ResolvedModel], Finish | None]] = []
-    if settings.locked_axes:
-        edits.append(partial(lock_axes, settings=settings))
+    edits: list[Callable[..., Any]] = [partial(lock_axes, settings=settings)] if settings.locked_axes else []
     edits += [partial(entries("edit")[name], settings=settings, section=section) for name, section in sections.items()]
     for change in edits:
         finish = change(spec, rig)
-        if finish is not None:
+        if finish is not None:  # sets numbers that depend on the compiled model
             rig = resolve(rig.path, compile_model(spec, rig.path), rig.modules, settings.locked_axes)
             finish(rig.model)
     return rig

@@ -79,7 +79,7 @@ class RigChecker:
         data, what = self.data, axis.prefix + TILT_ELEMENT
         turn = data.xmat[axis.frame].reshape(3, 3)
         along, pivot, radial = turn @ axis.direction, data.xpos[axis.frame] + turn @ axis.point, UP
-        if abs(_degrees_between(along, UP) - 90.0) > MOUNTED_DEG:
+        if not _is_square(along, UP):
             yield f"{what!r} must lie along a horizontal axis"
         else:
             centre = data.subtree_com[self.model.jnt_bodyid[axis.line.joint]] - pivot
@@ -181,8 +181,7 @@ class RigChecker:
         """Check that the flywheels' momenta cancel on a free thrust bearing; else the rig turns with every tilt."""
         model, data = self.model, self.data
         momenta = [
-            wheel_momentum(model, data, int(model.dof_jntid[dof]), data.qvel[dof])
-            for dof in (module.flywheel_dof for module in modules)
+            wheel_momentum(model, data, module.flywheel_dof, data.qvel[module.flywheel_dof]) for module in modules
         ]
         left = float(np.linalg.norm(np.sum(momenta, axis=0)))
         if left > 0.01 * sum(float(np.linalg.norm(momentum)) for momentum in momenta):

@@ -119,12 +119,25 @@ def missing_elements(spec: mujoco.MjSpec) -> list[str]:
                 type=getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"),
             )
     check("keyframe", EQUILIBRIUM_KEY)
-    return [_missing(kind, names, list(elements[kind])) for kind, names in missing.items() if names] + wrong
+    return [
+        f"the model has no {kind} {', '.join(map(repr, names))}; {nearest(names[0], elements[kind], f'its {kind}s')}"
+        for kind, names in missing.items()
+        if names
+    ] + wrong
 
 
 def element_id(model: mujoco.MjModel, kind: str, name: str) -> int:
     """Return the number of an element of a kind, such as `joint`; -1 if there is none of that name."""
     return int(mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
+
+
+def subtree(model: mujoco.MjModel, root: int) -> list[int]:
+    """List a body and all that it carries."""
+    bodies = [root]
+    for body in range(root + 1, model.nbody):  # a body comes after its parent
+        if int(model.body_parentid[body]) in bodies:
+            bodies.append(body)
+    return bodies
 
 
 def joint_sizes(kind: int) -> tuple[int, int]:
@@ -150,12 +163,3 @@ def axis_modules(model: mujoco.MjModel) -> dict[str, list[str]]:
     joints = [model.joint(i).name for i in range(model.njnt)]
     sites = [model.site(i).name for i in range(model.nsite)]
     return {axis: modules_in(joints, axis) for axis in axes_in([*joints, *sites])}
-
-
-def _missing(kind: str, names: list[str], known: list[str]) -> str:
-    """Write `the model has no joint 'tilt'; did you mean 'tlit'? its joints: tlit, yaw`."""
-    hints = [nearest(name, known, f"its {kind}s") for name in names]
-    meant = [hint.removeprefix("did you mean ").partition("? ")[0] for hint in hints if "? its " in hint]
-    listing = hints[0].rpartition("? ")[2]
-    guess = f"did you mean {', '.join(dict.fromkeys(meant))}? " if meant else ""
-    return f"the model has no {kind} {', '.join(map(repr, names))}; {guess}{listing}"

@@ -82,11 +82,11 @@ def free_motions(model: mujoco.MjModel, data: mujoco.MjData, dofs: Sequence[int]
     return np.eye(model.nv)[:, moving] @ _ways(model, data, moving)
 
 
-def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, joint: int, speed: float) -> np.ndarray:
+def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, dof: int, speed: float) -> np.ndarray:
     """Return the momentum of a wheel that turns at a speed [rad/s] in its joint, in the world (3,) [N m s]."""
-    body = int(model.jnt_bodyid[joint])
-    shares = data.ximat[body].reshape(3, 3).T @ data.xaxis[joint]  # of the principal inertias
-    return model.body_inertia[body] @ shares**2 * speed * data.xaxis[joint]
+    body, axis = int(model.dof_bodyid[dof]), data.xaxis[model.dof_jntid[dof]]
+    shares = data.ximat[body].reshape(3, 3).T @ axis  # of the principal inertias
+    return model.body_inertia[body] @ shares**2 * speed * axis
 
 
 def _free_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
@@ -104,14 +104,12 @@ def _free_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
 def _weld_jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """Return the Jacobian of the errors of welds and connects, (n, nv). A weld holds a ball joint."""
     kinds = int(mujoco.mjtEq.mjEQ_WELD), int(mujoco.mjtEq.mjEQ_CONNECT)
-    rows = np.zeros((data.nefc, model.nv))
-    if data.nefc and mujoco.mj_isSparse(model):
-        mujoco.mju_sparse2dense(rows, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
-    elif data.nefc:
-        rows[:] = np.asarray(data.efc_J).reshape(data.nefc, model.nv)
+    columns = np.zeros((model.nv, data.nefc))
+    for column, unit in zip(columns, np.eye(model.nv), strict=True):
+        mujoco.mj_mulJacVec(model, data, column, unit)
     of_equality = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
     wanted = [bool(of_equality[i]) and int(model.eq_type[data.efc_id[i]]) in kinds for i in range(data.nefc)]
-    return rows[wanted] if data.nefc else rows
+    return columns.T[np.array(wanted, dtype=bool)]
 
 
 def _contacts(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:

@@ -56,8 +56,8 @@ def lock_axes(spec: mujoco.MjSpec, rig: ResolvedModel, settings: PlantSettings) 
             raise InputError(f"{setting} tilts about {name!r} as a free body does; only a hinge can be locked")
         hinges.append(line)
     if len(hinges) == len(known):
-        leave = f"; leave one of {', '.join(map(repr, known))}" if len(known) > 1 else ""
-        raise InputError(f"{setting} would have no axis left to tilt about{leave}")
+        leave = ", ".join(map(repr, known))
+        raise InputError(f"{setting} would have no axis left to tilt about; leave one of {leave}")
     for line in hinges:
         name = model.joint(line.joint).name
         angle = line.zero - float(model.qpos0[line.angle])
@@ -103,7 +103,8 @@ def remove_hinge(spec: mujoco.MjSpec, name: str) -> None:
     of_joints = [sum(joint_sizes(int(joint.type))[i] for joint in before) for i in (0, 1)]
     drives = list(spec.actuators)
     gone = [i for i, drive in enumerate(drives) if drive.target == name and int(drive.trntype) in ON_A_JOINT]
-    starts = np.cumsum([0, *map(_states, drives)])
+    none = int(mujoco.mjtDyn.mjDYN_NONE)
+    starts = np.cumsum([0, *(max(1, int(drive.actdim)) if int(drive.dyntype) != none else 0 for drive in drives)])
     states = [state for i in gone for state in range(starts[i], starts[i + 1])]
     hinge = int(mujoco.mjtObj.mjOBJ_JOINT)
     reads = [sensor for sensor in spec.sensors if sensor.objname == name and int(sensor.objtype) == hinge]
@@ -116,10 +117,3 @@ def remove_hinge(spec: mujoco.MjSpec, name: str) -> None:
         key.qpos, key.qvel, key.act, key.ctrl = (
             np.delete(entries, at if len(entries) else []) for entries, at in values
         )
-
-
-def _states(drive: Any) -> int:
-    """Count an actuator's numbers in act."""
-    if int(drive.dyntype) == int(mujoco.mjtDyn.mjDYN_NONE):
-        return 0
-    return max(1, int(drive.actdim))

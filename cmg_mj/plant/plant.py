@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -31,15 +31,14 @@ from cmg_mj.plant.locking import lock_thrust_bearing
 from cmg_mj.plant.mjcf import compile_model, parse, quiet, set_control_callback
 from cmg_mj.plant.settings import apply, place_accelerometers
 from cmg_mj.plant.tilt_line import Addressed, HingeLine
+from cmg_mj.plant.turning import turning
 from cmg_mj.scenario.design import PlantNumbers
 from cmg_mj.scenario.plant_settings import MIN_STEP_S, PlantSettings
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.stages.backlash import ARCMIN_A_DEGREE, backlash
-
-if TYPE_CHECKING:
-    from cmg_mj.stages.turning import YawCoupling
+from cmg_mj.stages.turning import YawCoupling
 
 
 class Plant:
@@ -156,8 +155,6 @@ class Plant:
     @cached_property
     def turning(self) -> YawCoupling:
         """Coupling of the axes in a turn about the vertical."""
-        from cmg_mj.plant.turning import turning  # most rigs have one axis
-
         return turning(self.filed.model, self.key, self.axes)
 
     @property
@@ -314,10 +311,9 @@ def load_plant(
             wrong = complaints(PlantSettings, error.errors(), fields)
             raise InputError("; ".join(f"plant.{clause}" for clause in wrong)) from error
     for name, section in sections.items():
-        if name not in entries("edit"):
-            raise InputError(f"sections: {name!r}: no such section; {nearest(name, entries('edit'))}")
-        if not isinstance(section, entries("section")[name]):
-            raise InputError(f"sections: {name}: must be a {entries('section')[name].__name__}")
+        if name not in entries("edit") or not isinstance(section, entries("section")[name]):
+            known = {edit: entries("section")[edit].__name__ for edit in entries("edit")}
+            raise InputError(f"sections: {name!r}: no such section, or not of its class: {known}")
     path = find("models", settings.model, ".xml", "plant.model =", beside)
     with set_control_callback(None):  # compiling a model runs it
         return Plant(build(path, settings, sections), settings, sections, axis_settings, grid)
@@ -337,15 +333,13 @@ def load_scenario_plant(scenario: Scenario, grid: TimeGrid, like: Plant | None =
     """
     settings, axes = scenario.plant, scenario.axis_scenarios
     sections = {name: scenario.section(name) for name in entries("edit")}
-    same = like is not None and like.sections == sections and like.settings.compiled_alike(settings)
+    filed = None
+    if like is not None and like.sections == sections and like.settings.compiled_alike(settings):
+        filed = like.filed  # whose file may be gone
     with set_control_callback(None):  # compiling a model runs it
-        if like is not None and same:  # whose file may be gone
-            filed = like.filed
-        else:
-            path = find("models", settings.model, ".xml", "plant.model =")
-            filed = build(path, settings, sections)
-        plant = Plant(filed, settings, sections, {name: axis.plant for name, axis in axes.items()}, grid)
-    if not same and plant.path.resolve().parent != folder("models").resolve():
+        rig = filed or build(find("models", settings.model, ".xml", "plant.model ="), settings, sections)
+        plant = Plant(rig, settings, sections, {name: axis.plant for name, axis in axes.items()}, grid)
+    if filed is None and plant.path.resolve().parent != folder("models").resolve():
         _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
     return plant
 

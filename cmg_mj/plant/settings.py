@@ -7,8 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -34,26 +33,12 @@ _INTEGRATORS = {
 YAW_SERVO = "yaw_servo"
 
 
-class Varied(NamedTuple):
-    """A model with a scenario's settings.
-
-    Attributes:
-        model: The model, whose physics step is still that of its file, or the longest that a feature allows.
-        axes: Its axes.
-        largest_step: The largest physics step that is accurate enough [s].
-    """
-
-    model: mujoco.MjModel
-    axes: tuple[Axis, ...]
-    largest_step: float
-
-
 def apply(
     rig: ResolvedModel,
     settings: PlantSettings,
-    axis_settings: Mapping[str, PlantSettings] = MappingProxyType({}),
-    sections: Mapping[str, Any] = MappingProxyType({}),
-) -> Varied:
+    axis_settings: Mapping[str, PlantSettings],
+    sections: Mapping[str, Any],
+) -> tuple[mujoco.MjModel, tuple[Axis, ...], float]:
     """Change a copy of a compiled model as settings say.
 
     Args:
@@ -63,7 +48,8 @@ def apply(
         sections: Settings of the features that edit the model.
 
     Returns:
-        The changed model.
+        The changed model, whose physics step is still that of its file, or the longest that a feature allows; its axes;
+        the largest physics step that is accurate enough [s].
 
     Raises:
         InputError: The body that tilts has no mass of its own to move or no joint for friction; a servo lacks a
@@ -96,7 +82,7 @@ def apply(
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
     speeds = [abs(module.speed) for axis in axes for module in axis.modules]
     shake_rate = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
-    return Varied(model, tuple(axes), largest_step(model, key, float(model.opt.timestep), shake_rate))
+    return model, tuple(axes), largest_step(model, key, float(model.opt.timestep), shake_rate)
 
 
 def _vary_masses_and_friction(
@@ -106,22 +92,18 @@ def _vary_masses_and_friction(
     model.opt.integrator = _INTEGRATORS[settings.integrator]
     # A plant that diverges must say so, not start again from its reference pose.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    gimbals, hinges = [module.gimbal_dof for module in modules], [axis.line for axis in axes]
-    for field, value in (
-        (model.dof_armature, settings.gimbal_armature_kg_m2),
-        (model.dof_frictionloss, settings.gimbal_friction_n_m),
-        (model.dof_damping, settings.gimbal_damping_n_m_s),
+    gimbals, hinges = [module.gimbal_dof for module in modules], [axis.line.dof for axis in axes]
+    for field, dofs, value in (
+        (model.dof_armature, gimbals, settings.gimbal_armature_kg_m2),
+        (model.dof_frictionloss, gimbals, settings.gimbal_friction_n_m),
+        (model.dof_damping, gimbals, settings.gimbal_damping_n_m_s),
+        (model.dof_frictionloss, hinges, settings.tilt_friction_n_m),
+        (model.dof_damping, hinges, settings.tilt_damping_n_m_s),
     ):
         if value is not None:
-            field[gimbals] = value
-    for field, value in (
-        (model.dof_frictionloss, settings.tilt_friction_n_m),
-        (model.dof_damping, settings.tilt_damping_n_m_s),
-    ):
-        if value is not None:
-            if not all(isinstance(line, HingeLine) for line in hinges):
+            if dofs is hinges and not all(isinstance(axis.line, HingeLine) for axis in axes):
                 raise InputError(f"plant.tilt_friction_n_m, plant.tilt_damping_n_m_s: {path} tilts about no hinge")
-            field[[line.dof for line in hinges]] = value
+            field[dofs] = value
     _vary_servos(model, settings, path, modules)
     biased = [axis for axis in axes if axis.bias]
     shifts = [bias_shift(model, axis, axis.bias, path) for axis in biased]
@@ -179,36 +161,28 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
     Raises:
         InputError: The outer one is no farther out than the inner one.
     """
-    filed, height = axis.radial_tilt, _rest_height(settings, axis, path)
-    known, places = [], {}
-    for which, was in (("inner", filed.r_inner), ("outer", filed.r_outer)):
+    height = axis.reduced.pivot_arm if settings.pivot_slides else 0.0  # of the point that is taken to be at rest
+    if settings.pivot_slides and not height:
+        about = f" of axis {axis.name!r}" if axis.name else ""
+        raise InputError(f"plant.pivot_slides = true: {path}: the pivot{about} does not slide freely; leave it out")
+    known, places = [], []
+    for which, was in (("inner", axis.radial_tilt.r_inner), ("outer", axis.radial_tilt.r_outer)):
         set_to = getattr(settings, f"accelerometer_{which}_m")
         known.append(was if set_to is None else set_to)
-        places[which] = known[-1] + 1e-3 * getattr(settings, f"accelerometer_{which}_misplaced_mm")
-    if not (known[0] < known[1] and 0.0 < places["inner"] < places["outer"]):
+        places.append(known[-1] + 1e-3 * getattr(settings, f"accelerometer_{which}_misplaced_mm"))
+        if places[-1] != was:
+            site = int(model.sensor_objid[element_id(model, "sensor", f"{axis.prefix}accelerometer_{which}")])
+            arm = model.site_pos[site] - axis.point
+            model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (places[-1] / was - 1.0)
+            model.site_sameframe[site] = 0  # should it have stood where the body's frame does
+    if not (known[0] < known[1] and 0.0 < places[0] < places[1]):
         changes = {name: value for name, value in settings.changes().items() if name.startswith("accelerometer")}
         raise InputError(
             f"{', '.join(f'plant.{name} = {value:g}' for name, value in changes.items())}: the inner accelerometer "
-            f"must lie nearer to the tilt axis than the outer one, and they are {places['inner']:g} and "
-            f"{places['outer']:g} m away ({path})"
+            f"must lie nearer to the tilt axis than the outer one, and they are {places[0]:g} and "
+            f"{places[1]:g} m away ({path})"
         )
-    for which, was in (("inner", filed.r_inner), ("outer", filed.r_outer)):
-        if places[which] != was:
-            site = int(model.sensor_objid[element_id(model, "sensor", f"{axis.prefix}accelerometer_{which}")])
-            arm = model.site_pos[site] - axis.point
-            model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (places[which] / was - 1.0)
-            model.site_sameframe[site] = 0  # should it have stood where the body's frame does
     return RadialTilt(*known).about(height)
-
-
-def _rest_height(settings: PlantSettings, axis: Axis, path: Path) -> float:
-    """Height above the pivot of the point that the tilt estimate takes to be at rest [m]."""
-    if not settings.pivot_slides:
-        return 0.0
-    if not axis.reduced.pivot_arm:
-        about = f" of axis {axis.name!r}" if axis.name else ""
-        raise InputError(f"plant.pivot_slides = true: {path}: the pivot{about} does not slide freely; leave it out")
-    return axis.reduced.pivot_arm
 
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:

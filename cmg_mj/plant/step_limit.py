@@ -19,7 +19,7 @@ OTHERS_LIMIT_S = 0.001
 """Largest step of MuJoCo's other integrators; none is as accurate at any step that costs less [s]."""
 
 
-def largest_step(model: mujoco.MjModel, key: int, own_s: float, shake_rate: float = 0.0) -> float:
+def largest_step(model: mujoco.MjModel, key: int, own_s: float, shake_rate: float) -> float:
     """Return the largest physics step that is accurate enough for a rig [s].
 
     Args:
@@ -33,23 +33,10 @@ def largest_step(model: mujoco.MjModel, key: int, own_s: float, shake_rate: floa
     """
     if int(model.opt.integrator) != int(mujoco.mjtIntegrator.mjINT_RK4):
         return min(own_s, OTHERS_LIMIT_S)
-    return min(own_s, RK4_LIMIT / max(fastest_rate(model, key), shake_rate, RK4_LIMIT / own_s))
-
-
-def fastest_rate(model: mujoco.MjModel, key: int) -> float:
-    """Return the largest modulus of a pole of a rig without dry friction, linearised at a keyframe.
-
-    Args:
-        model: The compiled model.
-        key: The keyframe.
-
-    Returns:
-        The rate [1/s]; 0 where the model has no finite accelerations, which is found elsewhere.
-    """
     jacobian = state_matrix(model, key)
-    if not np.isfinite(jacobian).all():
-        return 0.0
-    return float(np.abs(np.linalg.eigvals(jacobian)).max())
+    # A model without finite accelerations is found elsewhere.
+    fastest = float(np.abs(np.linalg.eigvals(jacobian)).max()) if np.isfinite(jacobian).all() else 0.0
+    return min(own_s, RK4_LIMIT / max(fastest, shake_rate, RK4_LIMIT / own_s))
 
 
 def state_matrix(model: mujoco.MjModel, key: int) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -115,20 +115,25 @@ class SupportLine:
 
     def tilt(self, data: mujoco.MjData, angle: float) -> None:
         """Tilt data, which is at the keyframe, by an angle [rad]."""
-        position, quaternion = data.qpos[self.angle : self.angle + 3], data.qpos[self.angle + 3 : self.angle + 7]
-        turned, moved = np.empty(4), np.empty(3)
+        pose = data.qpos[self.angle : self.angle + 7]  # a view
         axis, pivot = np.empty(3), np.empty(3)
-        mujoco.mju_rotVecQuat(axis, self.axes[:, 1].copy(), quaternion)
-        mujoco.mju_rotVecQuat(pivot, self.point, quaternion)
-        pivot += position
-        mujoco.mju_axisAngle2Quat(turned, axis, angle)
-        mujoco.mju_rotVecQuat(moved, position - pivot, turned)
-        data.qpos[self.angle : self.angle + 3] = pivot + moved
-        mujoco.mju_mulQuat(turned, turned.copy(), quaternion.copy())
-        data.qpos[self.angle + 3 : self.angle + 7] = turned / math.sqrt(float(turned @ turned))
+        mujoco.mju_rotVecQuat(axis, self.axes[:, 1].copy(), pose[3:])
+        mujoco.mju_rotVecQuat(pivot, self.point, pose[3:])
+        turn_pose(pose, pivot + pose[:3], axis, angle)
+        pose[3:] /= math.sqrt(float(pose[3:] @ pose[3:]))
 
 
 Line = HingeLine | SupportLine
+
+
+def turn_pose(pose: np.ndarray, point: np.ndarray, axis: np.ndarray, angle: float) -> None:
+    """Turn the pose of a free joint, position and quaternion (7,), in place about an axis through a point [rad]."""
+    turn, moved, turned = np.empty(4), np.empty(3), np.empty(4)
+    mujoco.mju_axisAngle2Quat(turn, axis, angle)
+    mujoco.mju_rotVecQuat(moved, pose[:3] - point, turn)
+    mujoco.mju_mulQuat(turned, turn, pose[3:])
+    pose[:3], pose[3:] = point + moved, turned
+
 
 SAME_LINE_M = 1e-3
 """A hinge whose axis passes by a site at a larger distance is not the line that the site marks [m]."""
@@ -151,21 +156,6 @@ def apply_torques(applied: np.ndarray, lines: Sequence[Line], torques: Sequence[
             applied[dof] += share * torque
 
 
-def line_of_joint(model: mujoco.MjModel, joint: int, key: int) -> HingeLine:
-    """Return the axis of a hinge.
-
-    Args:
-        model: The compiled model.
-        joint: The hinge's number.
-        key: The keyframe at which the rig stands upright.
-
-    Returns:
-        The line.
-    """
-    angle = int(model.jnt_qposadr[joint])
-    return HingeLine(joint, angle, int(model.jnt_dofadr[joint]), float(model.key_qpos[key, angle]))
-
-
 def line_named(model: mujoco.MjModel, data: mujoco.MjData, name: str, key: int) -> Line:
     """Return the hinge of a name; or the line along the y axis of a site of that name, a hinge's or a free body's.
 
@@ -181,32 +171,33 @@ def line_named(model: mujoco.MjModel, data: mujoco.MjData, name: str, key: int) 
     Raises:
         InputError: The site's body has no hinge along its y axis and is not free.
     """
-    joint, site = element_id(model, "joint", name), element_id(model, "site", name)
-    if joint >= 0:
-        return line_of_joint(model, joint, key)
-    at, axes = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
-    body = int(model.site_bodyid[site])
-    while body:
-        first = int(model.body_jntadr[body])
-        for joint in range(first, first + int(model.body_jntnum[body])):
-            kind = int(model.jnt_type[joint])
-            if kind == int(mujoco.mjtJoint.mjJNT_FREE):
-                turn = data.xmat[body].reshape(3, 3).T
-                at_joint = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-                return SupportLine(joint, *at_joint, turn @ axes, turn @ (at - data.xpos[body]))
-            along = float(data.xaxis[joint] @ axes[:, 1])
-            past = np.cross(data.xanchor[joint] - at, axes[:, 1])
-            if (
-                kind == int(mujoco.mjtJoint.mjJNT_HINGE)
-                and abs(along) > SAME_DIRECTION
-                and float(np.linalg.norm(past)) < SAME_LINE_M
-            ):
-                return replace(line_of_joint(model, joint, key), sign=math.copysign(1.0, along))
-        body = int(model.body_parentid[body])
-    raise InputError(
-        f"site {name!r} lies on no hinge that its body hangs on, along its y axis, and that body is not free: about "
-        "what it tilts cannot be told"
-    )
+    joint, sign = element_id(model, "joint", name), 1.0
+    if joint < 0:
+        site = element_id(model, "site", name)
+        at, axes = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
+        body = int(model.site_bodyid[site])
+        while body and joint < 0:
+            first = int(model.body_jntadr[body])
+            for candidate in range(first, first + int(model.body_jntnum[body])):
+                kind = int(model.jnt_type[candidate])
+                if kind == int(mujoco.mjtJoint.mjJNT_FREE):
+                    turn = data.xmat[body].reshape(3, 3).T
+                    at_joint = int(model.jnt_qposadr[candidate]), int(model.jnt_dofadr[candidate])
+                    return SupportLine(candidate, *at_joint, turn @ axes, turn @ (at - data.xpos[body]))
+                along = float(data.xaxis[candidate] @ axes[:, 1])
+                past = float(np.linalg.norm(np.cross(data.xanchor[candidate] - at, axes[:, 1])))
+                is_hinge = kind == int(mujoco.mjtJoint.mjJNT_HINGE)
+                if is_hinge and abs(along) > SAME_DIRECTION and past < SAME_LINE_M:
+                    joint, sign = candidate, math.copysign(1.0, along)
+                    break
+            body = int(model.body_parentid[body])
+        if joint < 0:
+            raise InputError(
+                f"site {name!r} lies on no hinge that its body hangs on, along its y axis, and that body is not free: "
+                "about what it tilts cannot be told"
+            )
+    angle = int(model.jnt_qposadr[joint])
+    return HingeLine(joint, angle, int(model.jnt_dofadr[joint]), float(model.key_qpos[key, angle]), sign)
 
 
 def _dot(a: Addressed, b: Sequence[float]) -> Scalar:

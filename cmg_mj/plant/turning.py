@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.plant.axis import Axis
-from cmg_mj.plant.elements import Module
+from cmg_mj.plant.elements import Module, subtree
 from cmg_mj.plant.inertia import wheel_momentum
 from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import UP
@@ -42,19 +42,15 @@ def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCouplin
 
 def _turned(model: mujoco.MjModel, data: mujoco.MjData, module: Module) -> np.ndarray:
     """Return the derivative of a wheel's momentum by x3 at x3 = 0, in the world (3,) [N m s]."""
-    gimbal, wheel = int(model.dof_jntid[module.gimbal_dof]), int(model.dof_jntid[module.flywheel_dof])
-    return module.direction * np.cross(data.xaxis[gimbal], wheel_momentum(model, data, wheel, module.speed))
+    momentum = wheel_momentum(model, data, module.flywheel_dof, module.speed)
+    return module.direction * np.cross(data.xaxis[model.dof_jntid[module.gimbal_dof]], momentum)
 
 
 def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarray:
     """Return the inertia of all that tilts about a point of the line, in the world (3, 3) [kg m^2]."""
     pivot = data.xpos[axis.frame] + data.xmat[axis.frame].reshape(3, 3) @ axis.point
     inertia = np.zeros((3, 3))
-    tilting = {int(model.jnt_bodyid[axis.line.joint])}
-    for body in range(min(tilting), model.nbody):  # children come after their parents
-        if body not in tilting and int(model.body_parentid[body]) not in tilting:
-            continue
-        tilting.add(body)
+    for body in subtree(model, int(model.jnt_bodyid[axis.line.joint])):
         axes, arm = data.ximat[body].reshape(3, 3), data.xipos[body] - pivot
         inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
         inertia += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))

@@ -15,8 +15,9 @@ from cmg_mj.features.mounting.attach import place_modules
 from cmg_mj.features.mounting.hold import as_qpos, rest_controls
 from cmg_mj.features.mounting.request import MountRequest, Place
 from cmg_mj.plant.checks import TRUE_DEG
+from cmg_mj.plant.elements import subtree
 from cmg_mj.plant.mjcf import compile_model, posed
-from cmg_mj.plant.tilt_line import UP, Line
+from cmg_mj.plant.tilt_line import UP, Line, turn_pose
 
 MAX_SETTLE_S = 10.0
 """Longest time for a robot to come to rest [s]."""
@@ -82,12 +83,8 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
         if abs(math.degrees(lean)) < UPRIGHT_DEG:
             return Support(data.qpos.copy(), point, direction)
         # Turn the robot back about the line by this angle, and stop it.
-        pose = data.qpos[model.jnt_qposadr[joint] :]  # a view
-        quaternion, moved, turned = np.empty(4), np.empty(3), np.empty(4)
-        mujoco.mju_axisAngle2Quat(quaternion, direction, -lean)
-        mujoco.mju_rotVecQuat(moved, pose[:3] - point, quaternion)
-        mujoco.mju_mulQuat(turned, quaternion, pose[3:7])
-        pose[:3], pose[3:7] = point + moved, turned
+        address = model.jnt_qposadr[joint]
+        turn_pose(data.qpos[address : address + 7], point, direction, -lean)
         data.qvel[:] = 0.0
         mujoco.mj_forward(model, data)
     raise InputError("the robot does not come to stand upright; give a keyframe in which it stands")
@@ -267,15 +264,10 @@ def under_and_height(
     """Return the line's point under a robot's mass, in the world (3,) [m], and the robot's height above it [m]."""
     root = model.jnt_bodyid[joint]
     under = point + ((data.subtree_com[root] - point) @ direction) * direction
-    carried = {root}
-    for body in range(root + 1, model.nbody):  # a body comes after its parent
-        if model.body_parentid[body] in carried:
-            carried.add(body)
     tops = []
-    for geom in range(model.ngeom):
-        if model.geom_bodyid[geom] in carried:
-            turn, aabb = data.geom_xmat[geom].reshape(3, 3), model.geom_aabb[geom]
-            tops.append((data.geom_xpos[geom] + turn @ aabb[:3])[2] + np.abs(turn[2]) @ aabb[3:])
+    for geom in np.flatnonzero(np.isin(model.geom_bodyid, subtree(model, root))):
+        turn, aabb = data.geom_xmat[geom].reshape(3, 3), model.geom_aabb[geom]
+        tops.append((data.geom_xpos[geom] + turn @ aabb[:3])[2] + np.abs(turn[2]) @ aabb[3:])
     return under, float(max(tops) - point[2])
 
 

@@ -24,8 +24,6 @@ FIELDS_OF = {
     "noise": ("acceleration_m_s2", "corner_hz"),
 }
 """Fields of each kind, beside those of all."""
-OPTIONAL = ("phase_deg", "column", "scale")
-"""Fields that a kind which has them does without."""
 
 Acceleration = Annotated[float, Field(ge=-MAX_ACCELERATION_M_S2, le=MAX_ACCELERATION_M_S2)]
 Frequency = Annotated[float, Field(gt=0.0, le=MAX_FREQUENCY_HZ)]
@@ -74,7 +72,7 @@ class Pivot(Section):
         for name in dict.fromkeys(name for names in FIELDS_OF.values() for name in names):
             value = getattr(self, name)
             if name in FIELDS_OF[self.kind]:
-                if value is None and name not in OPTIONAL:
+                if value is None and name != "column":
                     raise ValueError(f"{noun} needs {name}")
             elif value != defaults[name]:
                 raise ValueError(f"{noun} has no {name}; it has {', '.join(FIELDS_OF[self.kind])}")

@@ -8,7 +8,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.pivot import Pivot
-from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
+from cmg_mj.features.pivot.pivot_signals import PivotSignals
 from cmg_mj.features.pivot.pivot_track import MAX_RECORDED_M_S2, read_track
 from cmg_mj.inputs.features import Judgement
 from cmg_mj.plant.mjcf import data_at_keyframe
@@ -49,12 +49,10 @@ def check_pivots(scenario: Scenario, plant: Plant) -> None:
 
 def moving_pivot(
     pivots: Sequence[Pivot], plants: Sequence[Plant], seed: int, worlds: int | Sequence[int]
-) -> MovingPivot:
+) -> PivotSignals:
     """Make the acceleration of the pivot as a disturbance; a size may be an array (n_worlds,)."""
-    for plant in dict.fromkeys(plants):
-        refuse_other_forces(plant)
-    signals = PivotSignals(pivots, pivot_directions(plants[0], pivots), seed, worlds)
-    return MovingPivot(signals, plants[0].timestep)
+    directions, *_ = [pivot_directions(plant, pivots) for plant in dict.fromkeys(plants)]
+    return PivotSignals(pivots, directions, seed, worlds, plants[0].timestep)
 
 
 def describe_pivots(design: Design, plant: Plant) -> Judgement:
@@ -90,8 +88,18 @@ def pivot_directions(plant: Plant, pivots: Sequence[Pivot]) -> list[list[float]]
     """
     if not pivots:
         return []
-    refuse_other_forces(plant)
-    data = data_at_keyframe(plant.model, plant.key)
+    model = plant.model
+    if compensated := np.flatnonzero(model.body_gravcomp).tolist():
+        raise InputError(
+            f"pivot: {plant.path}: the body {model.body(compensated[0]).name!r} has gravcomp, which holds against "
+            "gravity and not against the pivot's acceleration: such a rig's pivot cannot be moved"
+        )
+    if model.opt.density or model.opt.viscosity:
+        raise InputError(
+            f"pivot: {plant.path}: <option density, viscosity>: the air's drag depends on the pivot's velocity, which "
+            "is not simulated: such a rig's pivot cannot be moved"
+        )
+    data = data_at_keyframe(model, plant.key)
     along = {}
     for axis in plant.axes:
         line = data.xmat[axis.frame].reshape(3, 3) @ axis.direction
@@ -103,24 +111,3 @@ def pivot_directions(plant: Plant, pivots: Sequence[Pivot]) -> list[list[float]]
         vectors = {"along": line, "across": np.cross(line, UP), "vertical": UP}
         directions.append((vectors[pivot.direction] + 0.0).tolist())
     return directions
-
-
-def refuse_other_forces(plant: Plant) -> None:
-    """Refuse a model on which an acceleration of the pivot is not a shift of gravity alone.
-
-    Raises:
-        InputError: It has gravcomp, or drag in the air.
-    """
-    model = plant.model
-    compensated = np.flatnonzero(model.body_gravcomp)
-    if len(compensated):
-        name = model.body(int(compensated[0])).name
-        raise InputError(
-            f"pivot: {plant.path}: the body {name!r} has gravcomp, which holds against gravity and not against the "
-            "pivot's acceleration: such a rig's pivot cannot be moved"
-        )
-    if model.opt.density or model.opt.viscosity:
-        raise InputError(
-            f"pivot: {plant.path}: <option density, viscosity>: the air's drag depends on the pivot's velocity, which "
-            "is not simulated: such a rig's pivot cannot be moved"
-        )

@@ -111,7 +111,7 @@ def pivot_signal(pivot: Pivot, number: int, seed: int, worlds: int | Sequence[in
     if pivot.kind == "sine":
         unit = _sine(pivot.frequency_hz or 1.0, pivot.phase_deg)
     elif pivot.kind == "step":
-        unit = _constant
+        unit = _mean_of(lambda time: time)
     elif pivot.kind == "track":
         unit = _mean_of(read_track(pivot.file or "", pivot.column).velocity)
     else:
@@ -131,19 +131,19 @@ def pivot_signal(pivot: Pivot, number: int, seed: int, worlds: int | Sequence[in
     return mean
 
 
-def _constant(_start: float, _end: float) -> float:
-    return 1.0
-
-
 class PivotSignals:
-    """The acceleration of the pivot in time, the sum of all motions.
+    """The acceleration of the pivot in time, the sum of all motions; as a disturbance its mean until the next instant.
 
     Args:
         pivots: The motions; a size may be an array (n_worlds,).
         directions: Unit vector of each, in the world's axes.
         seed: The run's seed.
         worlds: The number of one world, or the numbers of many: noise depends on (seed, number) alone.
+        timestep: Physics step of the disturbance [s].
     """
+
+    edges: Collection[int] = ()
+    accelerates = True
 
     def __init__(
         self,
@@ -151,7 +151,9 @@ class PivotSignals:
         directions: Sequence[Sequence[float]],
         seed: int,
         worlds: int | Sequence[int],
+        timestep: float = 0.0,
     ) -> None:
+        self._timestep = timestep
         signals = [pivot_signal(pivot, i, seed, worlds) for i, pivot in enumerate(pivots)]
         self._parts = list(zip(signals, directions, strict=True))
 
@@ -163,22 +165,6 @@ class PivotSignals:
             total = [part + along * acceleration for part, along in zip(total, direction, strict=True)]
         return total
 
-
-class MovingPivot:
-    """The acceleration of the pivot as a disturbance: its mean until the next instant.
-
-    Args:
-        signals: The acceleration in time.
-        timestep: Physics step [s].
-    """
-
-    edges: Collection[int] = ()
-    accelerates = True
-
-    def __init__(self, signals: PivotSignals, timestep: float) -> None:
-        self._signals, self._timestep = signals, timestep
-
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
         """Set the acceleration: see `Disturbance`."""
-        mean = self._signals.mean(step * self._timestep, (step + steps) * self._timestep)
-        return Outside(outside.torques, mean)
+        return Outside(outside.torques, self.mean(step * self._timestep, (step + steps) * self._timestep))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import functools
 import math
 from pathlib import Path
@@ -11,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest, shown
-from cmg_mj.inputs.files import read_text, require_file
+from cmg_mj.inputs.files import require_file
 
-MAX_BYTES = 100_000_000
 MAX_RECORDED_M_S2 = 1000.0
 """A track with a larger acceleration is in another unit [m/s^2]."""
 
@@ -60,7 +58,7 @@ def read_track(file: str, column: str | None) -> Track:
         The track.
 
     Raises:
-        InputError: The file cannot be read or holds no track; the line is named.
+        InputError: The file cannot be read or holds no track.
     """
     path = Path(file)
     require_file(path)
@@ -71,65 +69,35 @@ def read_track(file: str, column: str | None) -> Track:
 @functools.lru_cache(maxsize=16)
 def _read_track(path: Path, column: str | None, _changed_ns: int, _size: int) -> Track:
     """See `read_track`; a file that changes is read anew."""
-    rows = csv.reader(read_text(path, str(path), MAX_BYTES).splitlines())
+    import pyarrow as pa
+    import pyarrow.csv as pacsv
+
     try:
-        heading = [name.strip() for name in next(rows, [])]
-        number = _column(path, heading, column)
-        lines = [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise InputError(f"{path}: no CSV: {error} (line {rows.line_num})") from error
-    if len(lines) < 2:
-        raise InputError(f"{path}: too few samples ({len(lines)}); a track has at least two")
-    numbers = np.array([_numbers(path, line, row, number, len(heading)) for line, row in lines])
-    times, accelerations = numbers.T
+        table = pacsv.read_csv(path)
+        names = [name.strip() for name in table.column_names]
+        if len(names) < 2 or names[0][:1] in "+-.0123456789":
+            raise InputError(f"{path}: line 1: must be a heading of at least two columns, as time_s,acceleration_m_s2")
+        if column is None and len(names) > 2:
+            known = shown(", ".join(names[1:]))
+            raise InputError(f"{path}: has the columns {known}; name that of the acceleration with column")
+        if column is not None and column not in names[1:]:
+            raise InputError(f"{path}: no column {shown(column)}; {nearest(column, names[1:])}")
+        number = 1 if column is None else names.index(column, 1)
+        times, accelerations = (table[i].cast(pa.float64()).to_numpy() for i in (0, number))
+    except (pa.ArrowException, OSError, UnicodeError) as error:
+        raise InputError(f"{path}: cannot be read as CSV: {' '.join(str(error).split())}") from error
+    if len(times) < 2:
+        raise InputError(f"{path}: too few samples ({len(times)}); a track has at least two")
+    wrong = np.flatnonzero(~(np.isfinite(times) & (np.abs(accelerations) <= MAX_RECORDED_M_S2)))
+    if len(wrong):
+        raise InputError(
+            f"{path}: sample {wrong[0] + 1}: {accelerations[wrong[0]]:g} m/s2 at {times[wrong[0]]:g} s: must be finite "
+            f"numbers, accelerations in m/s2 and at most {MAX_RECORDED_M_S2:g}"
+        )
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):
-        line = lines[int(back[0]) + 1][0]
-        raise InputError(f"{path}: line {line}: the time {times[back[0] + 1]:g} s does not follow {times[back[0]]:g} s")
-    largest = int(np.argmax(np.abs(accelerations)))
-    if abs(accelerations[largest]) > MAX_RECORDED_M_S2:
-        raise InputError(
-            f"{path}: line {lines[largest][0]}: {accelerations[largest]:g} m/s2: at most {MAX_RECORDED_M_S2:g}; "
-            "accelerations are in m/s2"
-        )
+        first, second = times[back[0] : back[0] + 2]
+        raise InputError(f"{path}: sample {back[0] + 2}: the time {second:g} s does not follow {first:g} s")
     times = times - times[0]
     steps = 0.5 * np.diff(times) * (accelerations[:-1] + accelerations[1:])
     return Track(times, accelerations, np.concatenate([[0.0], np.cumsum(steps)]))
-
-
-def _column(path: Path, heading: list[str], column: str | None) -> int:
-    """Find the number of the acceleration's column."""
-    if not heading or any(_is_number(name) for name in heading):
-        raise InputError(f"{path}: line 1: must be a heading, such as time_s,acceleration_m_s2")
-    if len(heading) < 2:
-        raise InputError(f"{path}: line 1: one column; a track has the time first, then an acceleration")
-    names = heading[1:]
-    if column is None:
-        if len(names) > 1:
-            raise InputError(
-                f"{path}: has the columns {shown(', '.join(names))}; name that of the acceleration with column"
-            )
-        return 1
-    if column not in names:
-        raise InputError(f"{path}: no column {shown(column)}; {nearest(column, names)}")
-    return 1 + names.index(column)
-
-
-def _numbers(path: Path, line: int, row: list[str], column: int, columns: int) -> tuple[float, float]:
-    """Read the time and the acceleration of a line."""
-    if len(row) != columns:
-        raise InputError(f"{path}: line {line}: {len(row)} values; the heading has {columns}")
-    values = []
-    for text in (row[0], row[column]):
-        if not _is_number(text) or not math.isfinite(float(text)):
-            raise InputError(f"{path}: line {line}: {shown(text.strip())} is not a finite number")
-        values.append(float(text))
-    return values[0], values[1]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

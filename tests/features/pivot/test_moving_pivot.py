@@ -14,7 +14,7 @@ from cmg_mj.core.loop import Outside, instants
 from cmg_mj.core.types import IdealReading
 from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.moving_pivot import pivot_directions
-from cmg_mj.features.pivot.pivot_signals import MovingPivot, PivotSignals
+from cmg_mj.features.pivot.pivot_signals import PivotSignals
 from cmg_mj.plant.physics import OneWorld
 from cmg_mj.results.summary_keys import section
 from cmg_mj.runs.callback import control
@@ -62,7 +62,7 @@ def test_equals_a_base_that_slide_joints_drive(scenario: str, settings: list[str
     shifted, driven = OneWorld(plant), DrivenBase(plant)
     steps, per_sample, h = round(0.5 / plant.timestep), round(0.005 / plant.timestep), plant.timestep
 
-    move = MovingPivot(signals(rig, pivots), h)
+    move = PivotSignals(pivots, pivot_directions(plant, pivots), 0, 0, h)
 
     joints, readings = [], []
     for step, held in instants(steps, per_sample):
