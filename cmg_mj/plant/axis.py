@@ -245,7 +245,7 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     gravity_torque = -(line.motion(model, data) @ data.qfrc_bias) / n
     across, about = pivot_rows(model, key, axis)
     arm = -float(across @ upright.rates)  # how far the pivot slides back for a tilt of 1 rad
-    if not (arm > MIN_ARM_M and abs(float(about @ upright.rates) - 1.0) <= TURNS_ALIKE):
+    if not (arm > MIN_ARM_M and abs(about @ upright.rates - 1.0) <= TURNS_ALIKE):
         arm = 0.0  # it is at rest, or the body that carries the hinge turns with the tilt
     return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n, arm)
 

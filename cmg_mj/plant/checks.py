@@ -37,7 +37,7 @@ def invalid_numbers(model: mujoco.MjModel) -> list[str]:
         Clauses for an error message.
     """
     wrong = []
-    step = float(model.opt.timestep)
+    step = model.opt.timestep
     if not STEPS_S[0] <= step <= STEPS_S[1]:
         wrong.append(f"<option timestep={shown(f'{step:g}')}>: must be from {STEPS_S[0]:g} to {STEPS_S[1]:g} s")
     x, y, z = model.opt.gravity
@@ -49,7 +49,7 @@ def invalid_numbers(model: mujoco.MjModel) -> list[str]:
         values = getattr(model, name) if "_" in name and not name.startswith("_") else None
         if not (isinstance(values, np.ndarray) and values.dtype.kind == "f") or np.all(np.abs(values) < LARGEST):
             continue
-        row = int(np.argwhere(~(np.abs(values) < LARGEST))[0][0])
+        row = np.argwhere(~(np.abs(values) < LARGEST))[0][0]
         prefix, _, quantity = name.partition("_")
         element = named[prefix](row).name if prefix in named else str(row)
         wrong.append(f"{quantity} of {prefix} {element!r} is no number of any size")
@@ -84,7 +84,7 @@ class RigChecker:
         else:
             centre = data.subtree_com[self.model.jnt_bodyid[axis.line.joint]] - pivot
             radial = centre - (centre @ along) * along
-            lean = math.atan2(float(centre @ np.cross(along, UP)), float(centre[2]))
+            lean = math.atan2(centre @ np.cross(along, UP), centre[2])
             if abs(math.degrees(lean)) > TRUE_DEG or not centre[2] > 0.0:
                 cure = ""
                 if isinstance(axis.line, HingeLine):
@@ -102,7 +102,7 @@ class RigChecker:
         """Check a module: its axes are at right angles, its flywheel turns, its servo holds where it stands."""
         model, data, name = self.model, self.data, module.name
         turns, spins = (data.xaxis[model.dof_jntid[dof]] for dof in (module.gimbal_dof, module.flywheel_dof))
-        angle, speed, start = module.gimbal_zero, module.speed, float(data.qvel[module.flywheel_dof])
+        angle, speed, start = module.gimbal_zero, module.speed, data.qvel[module.flywheel_dof]
         if not (_is_square(turns, along) and _is_square(spins, turns)):
             yield (
                 f"the axes of '{name}/gimbal' and the tilt, and of '{name}/flywheel' and its gimbal, must be at right "
@@ -110,7 +110,7 @@ class RigChecker:
             )
         else:
             # Both lie in the plane that the gimbal turns in: by how much it must turn to part them by a quarter turn.
-            apart = math.atan2(float(np.cross(spins, along) @ turns), float(spins @ along))
+            apart = math.atan2(np.cross(spins, along) @ turns, spins @ along)
             off = apart - math.copysign(math.pi / 2.0, apart)
             if abs(math.degrees(off)) > TRUE_DEG:
                 yield (
@@ -126,7 +126,7 @@ class RigChecker:
                 f"{start:g}, ctrl {speed:g}"
             )
         if model.actuator_dyntype[module.servo] == mujoco.mjtDyn.mjDYN_INTEGRATOR:
-            setpoint = float(data.act[model.actuator_actadr[module.servo]])
+            setpoint = data.act[model.actuator_actadr[module.servo]]
             if abs(math.degrees(setpoint - angle)) > TRUE_DEG:
                 yield (
                     f"keyframe {EQUILIBRIUM_KEY!r} must have the setpoint (act) of '{name}/gimbal_servo' where its "
@@ -135,8 +135,9 @@ class RigChecker:
 
     def _rest(self) -> Iterator[str]:
         """Nothing but the flywheels moves."""
-        model = self.model
-        joints = {model.joint(int(model.dof_jntid[dof])).name: float(self.data.qvel[dof]) for dof in range(model.nv)}
+        joints = {
+            self.model.joint(joint).name: rate for joint, rate in zip(self.model.dof_jntid, self.data.qvel, strict=True)
+        }
         moving = [
             f"{name!r} ({rate:g} rad/s)" for name, rate in joints.items() if rate and not name.endswith("/flywheel")
         ]
@@ -148,7 +149,7 @@ class RigChecker:
         model, data = self.model, self.data
         for sensor, kind in SENSORS.items():
             name, beside, away = axis.prefix + sensor, 0.0, ""
-            site = int(model.sensor_objid[element_id(model, "sensor", name)])
+            site = model.sensor_objid[element_id(model, "sensor", name)]
             if model.site_bodyid[site] != axis.frame:
                 yield f"sensor {name!r} must be at a site of the body with {axis.prefix + TILT_ELEMENT!r}"
                 continue
@@ -183,8 +184,8 @@ class RigChecker:
         momenta = [
             wheel_momentum(model, data, module.flywheel_dof, data.qvel[module.flywheel_dof]) for module in modules
         ]
-        left = float(np.linalg.norm(np.sum(momenta, axis=0)))
-        if left > 0.01 * sum(float(np.linalg.norm(momentum)) for momentum in momenta):
+        left = np.linalg.norm(np.sum(momenta, axis=0))
+        if left > 0.01 * sum(np.linalg.norm(momentum) for momentum in momenta):
             self.hints.append(
                 "the flywheels' momenta do not cancel while the thrust bearing is free, which the reduced model does "
                 "not know: see plant.lock_thrust_bearing"
@@ -206,7 +207,7 @@ def survives_first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
 
 
 def _degrees_between(a: np.ndarray, b: np.ndarray) -> float:
-    return math.degrees(math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b)))
+    return math.degrees(math.atan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
 
 def _is_square(a: np.ndarray, b: np.ndarray) -> bool:

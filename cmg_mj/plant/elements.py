@@ -22,7 +22,7 @@ REQUIRED_ELEMENTS = (
     f"{EQUILIBRIUM_KEY}, for one MODULE or more; of several axes each has its name before these, as roll/tilt and "
     "roll/MODULE/gimbal"
 )
-ON_A_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+ON_A_JOINT = mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT
 """Transmissions of an actuator that drives a joint."""
 _OF_A_MODULE = ("/gimbal", "/flywheel", "/gimbal_servo", "/flywheel_motor", "/gimbal_encoder")
 
@@ -135,7 +135,7 @@ def subtree(model: mujoco.MjModel, root: int) -> list[int]:
     """List a body and all that it carries."""
     bodies = [root]
     for body in range(root + 1, model.nbody):  # a body comes after its parent
-        if int(model.body_parentid[body]) in bodies:
+        if model.body_parentid[body] in bodies:
             bodies.append(body)
     return bodies
 

@@ -84,30 +84,31 @@ def free_motions(model: mujoco.MjModel, data: mujoco.MjData, dofs: Sequence[int]
 
 def wheel_momentum(model: mujoco.MjModel, data: mujoco.MjData, dof: int, speed: float) -> np.ndarray:
     """Return the momentum of a wheel that turns at a speed [rad/s] in its joint, in the world (3,) [N m s]."""
-    body, axis = int(model.dof_bodyid[dof]), data.xaxis[model.dof_jntid[dof]]
+    body, axis = model.dof_bodyid[dof], data.xaxis[model.dof_jntid[dof]]
     shares = data.ximat[body].reshape(3, 3).T @ axis  # of the principal inertias
     return model.body_inertia[body] @ shares**2 * speed * axis
 
 
 def _free_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
     """Degrees of freedom that neither a constraint, a servo nor the spring of a bend holds."""
-    held = {int(model.jnt_dofadr[joint]) for joint in [element_id(model, "joint", BEND_JOINT)] if joint >= 0}
-    for constraint in np.flatnonzero((model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (data.eq_active == 1)):
-        held.add(int(model.jnt_dofadr[model.eq_obj1id[constraint]]))
+    bend = element_id(model, "joint", BEND_JOINT)
+    held = {model.jnt_dofadr[bend]} if bend >= 0 else set()
+    for constraint in np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_JOINT) & (data.eq_active == 1)):
+        held.add(model.jnt_dofadr[model.eq_obj1id[constraint]])
     for actuator in range(model.nu):
         holds = model.actuator_biasprm[actuator, 1:3].any()  # a servo of position or rate
         if holds and int(model.actuator_trntype[actuator]) in ON_A_JOINT:
-            held.add(int(model.jnt_dofadr[model.actuator_trnid[actuator, 0]]))
+            held.add(model.jnt_dofadr[model.actuator_trnid[actuator, 0]])
     return [dof for dof in range(model.nv) if dof not in held]
 
 
 def _weld_jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """Return the Jacobian of the errors of welds and connects, (n, nv). A weld holds a ball joint."""
-    kinds = int(mujoco.mjtEq.mjEQ_WELD), int(mujoco.mjtEq.mjEQ_CONNECT)
+    kinds = mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT
     columns = np.zeros((model.nv, data.nefc))
     for column, unit in zip(columns, np.eye(model.nv), strict=True):
         mujoco.mj_mulJacVec(model, data, column, unit)
-    of_equality = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+    of_equality = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
     wanted = [bool(of_equality[i]) and int(model.eq_type[data.efc_id[i]]) in kinds for i in range(data.nefc)]
     return columns.T[np.array(wanted, dtype=bool)]
 
@@ -122,7 +123,7 @@ def _contacts(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         if contact.efc_address < 0:  # near, and not touching
             continue
         for jacobian, geom in ((one, contact.geom[0]), (other, contact.geom[1])):
-            mujoco.mj_jac(model, data, jacobian, None, contact.pos, int(model.geom_bodyid[geom]))
+            mujoco.mj_jac(model, data, jacobian, None, contact.pos, model.geom_bodyid[geom])
         directions = contact.frame.reshape(3, 3)[: 1 if contact.dim == 1 else 3]  # the normal is the first
         rows.append(directions @ (other - one))
     return np.concatenate(rows) if rows else np.zeros((0, model.nv))

@@ -60,9 +60,9 @@ def lock_axes(spec: mujoco.MjSpec, rig: ResolvedModel, settings: PlantSettings) 
         raise InputError(f"{setting} would have no axis left to tilt about; leave one of {leave}")
     for line in hinges:
         name = model.joint(line.joint).name
-        angle = line.zero - float(model.qpos0[line.angle])
+        angle = line.zero - model.qpos0[line.angle]
         if angle:
-            if line.joint != int(model.body_jntadr[model.jnt_bodyid[line.joint]]):
+            if line.joint != model.body_jntadr[model.jnt_bodyid[line.joint]]:
                 raise InputError(
                     f"{setting}: hinge {name!r} stands at {angle:g} rad at the keyframe, behind another joint of its "
                     "body; give it a body of its own"
@@ -83,13 +83,12 @@ def _turn(hinge: Any, angle: float) -> None:
         )
         body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     orientation /= np.linalg.norm(orientation)
-    turn, both, arm, moved = np.empty(4), np.empty(4), np.empty(3), np.empty(3)
-    axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
-    mujoco.mju_axisAngle2Quat(turn, axis, angle)
-    mujoco.mju_rotVecQuat(arm, np.array(hinge.pos), turn)
-    mujoco.mju_rotVecQuat(moved, np.array(hinge.pos) - arm, orientation)
-    mujoco.mju_mulQuat(both, orientation, turn)
-    body.pos, body.quat = np.array(body.pos) + moved, both
+    turn, arm, place, both = np.empty(4), np.empty(3), np.empty(3), np.empty(4)
+    point = np.array(hinge.pos)
+    mujoco.mju_axisAngle2Quat(turn, np.array(hinge.axis) / np.linalg.norm(hinge.axis), angle)
+    mujoco.mju_rotVecQuat(arm, point, turn)
+    mujoco.mju_mulPose(place, both, np.array(body.pos), orientation, point - arm, turn)
+    body.pos, body.quat = place, both
 
 
 def remove_hinge(spec: mujoco.MjSpec, name: str) -> None:
@@ -102,13 +101,13 @@ def remove_hinge(spec: mujoco.MjSpec, name: str) -> None:
     before = spec.joints[: [joint.name for joint in spec.joints].index(name)]
     of_joints = [sum(joint_sizes(int(joint.type))[i] for joint in before) for i in (0, 1)]
     drives = list(spec.actuators)
-    gone = [i for i, drive in enumerate(drives) if drive.target == name and int(drive.trntype) in ON_A_JOINT]
-    none = int(mujoco.mjtDyn.mjDYN_NONE)
-    starts = np.cumsum([0, *(max(1, int(drive.actdim)) if int(drive.dyntype) != none else 0 for drive in drives)])
+    gone = [i for i, drive in enumerate(drives) if drive.target == name and drive.trntype in ON_A_JOINT]
+    none = mujoco.mjtDyn.mjDYN_NONE
+    starts = np.cumsum([0, *(0 if drive.dyntype == none else max(1, drive.actdim) for drive in drives)])
     states = [state for i in gone for state in range(starts[i], starts[i + 1])]
-    hinge = int(mujoco.mjtObj.mjOBJ_JOINT)
-    reads = [sensor for sensor in spec.sensors if sensor.objname == name and int(sensor.objtype) == hinge]
-    holds = [one for one in spec.equalities if int(one.type) == int(mujoco.mjtEq.mjEQ_JOINT)]
+    hinge = mujoco.mjtObj.mjOBJ_JOINT
+    reads = [sensor for sensor in spec.sensors if sensor.objname == name and sensor.objtype == hinge]
+    holds = [one for one in spec.equalities if one.type == mujoco.mjtEq.mjEQ_JOINT]
     holds = [one for one in holds if name in (one.name1, one.name2)]
     for element in [*(drives[i] for i in gone), *reads, *holds, spec.joint(name)]:
         spec.delete(element)

@@ -22,14 +22,6 @@ from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 
-_INTEGRATORS = {
-    "RK4": int(mujoco.mjtIntegrator.mjINT_RK4),
-    "Euler": int(mujoco.mjtIntegrator.mjINT_EULER),
-    "implicit": int(mujoco.mjtIntegrator.mjINT_IMPLICIT),
-    "implicitfast": int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST),
-    "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
-}
-
 YAW_SERVO = "yaw_servo"
 
 
@@ -82,16 +74,16 @@ def apply(
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
     speeds = [abs(module.speed) for axis in axes for module in axis.modules]
     shake_rate = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
-    return model, tuple(axes), largest_step(model, key, float(model.opt.timestep), shake_rate)
+    return model, tuple(axes), largest_step(model, key, model.opt.timestep, shake_rate)
 
 
 def _vary_masses_and_friction(
     model: mujoco.MjModel, settings: PlantSettings, path: Path, axes: Sequence[Axis], modules: Sequence[Module]
 ) -> None:
     """Set integrator, friction, servos, equilibrium bias and imbalance."""
-    model.opt.integrator = _INTEGRATORS[settings.integrator]
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     # A plant that diverges must say so, not start again from its reference pose.
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     gimbals, hinges = [module.gimbal_dof for module in modules], [axis.line.dof for axis in axes]
     for field, dofs, value in (
         (model.dof_armature, gimbals, settings.gimbal_armature_kg_m2),
@@ -111,7 +103,7 @@ def _vary_masses_and_friction(
         model.body_ipos[frame_bodies(model, axis)] += shift
     if settings.flywheel_imbalance_kg_m:
         for module in modules:
-            body = int(model.dof_bodyid[module.flywheel_dof])
+            body = model.dof_bodyid[module.flywheel_dof]
             model.body_ipos[body, 0] += settings.flywheel_imbalance_kg_m / model.body_mass[body]
 
 
@@ -132,7 +124,7 @@ def _set_turn_rate(model: mujoco.MjModel, key: int, rate: float, path: Path) -> 
     """Let the rig turn about the vertical from the start, held by its drive [rad/s]."""
     prefix = f"plant.turn_rate_rad_s = {rate:g}: {path}"
     joint, servo = element_id(model, "joint", "yaw"), element_id(model, "actuator", YAW_SERVO)
-    if joint < 0 or servo < 0 or int(model.actuator_trnid[servo, 0]) != joint:
+    if joint < 0 or servo < 0 or model.actuator_trnid[servo, 0] != joint:
         raise InputError(f"{prefix} has no actuator {YAW_SERVO!r} that drives a joint 'yaw', which alone holds a rate")
     _check_range(model, servo, rate, prefix)
     model.key_qvel[key, model.jnt_dofadr[joint]] = model.key_ctrl[key, servo] = rate
@@ -171,7 +163,7 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
         known.append(was if set_to is None else set_to)
         places.append(known[-1] + 1e-3 * getattr(settings, f"accelerometer_{which}_misplaced_mm"))
         if places[-1] != was:
-            site = int(model.sensor_objid[element_id(model, "sensor", f"{axis.prefix}accelerometer_{which}")])
+            site = model.sensor_objid[element_id(model, "sensor", f"{axis.prefix}accelerometer_{which}")]
             arm = model.site_pos[site] - axis.point
             model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (places[-1] / was - 1.0)
             model.site_sameframe[site] = 0  # should it have stood where the body's frame does
@@ -206,7 +198,7 @@ def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, mod
                 f"plant.{field}: {path}: actuator '{module.name}/gimbal_servo' is no position loop whose setpoint "
                 "is the integral of its command (<intvelocity>), which alone has this stiffness and damping"
             )
-        per_gear = 1.0 / float(model.actuator_gear[servo, 0]) ** 2  # they are those at the joint
+        per_gear = 1.0 / model.actuator_gear[servo, 0] ** 2  # they are those at the joint
         if stiffness is not None:
             gain[0], bias[1] = stiffness * per_gear, -stiffness * per_gear
         if damping is not None:
@@ -230,7 +222,7 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
     Raises:
         InputError: The frame has no mass of its own.
     """
-    frame, all_that_tilts = axis.frame, int(model.jnt_bodyid[axis.line.joint])
+    frame, all_that_tilts = axis.frame, model.jnt_bodyid[axis.line.joint]
     if model.body_mass[frame] <= 0.0:
         raise InputError(
             f"plant.equilibrium_bias_deg: {path}: the body {model.body(frame).name!r}, which tilts, needs a mass of "
@@ -242,7 +234,7 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
     centre = to_frame @ (data.subtree_com[all_that_tilts] - data.xpos[frame]) - axis.point
     radial = centre - (centre @ axis.direction) * axis.direction
     turned = math.cos(bias) * radial + math.sin(bias) * np.cross(axis.direction, radial)
-    own = sum(float(model.body_mass[body]) for body in frame_bodies(model, axis))
+    own = sum(model.body_mass[frame_bodies(model, axis)])
     return model.body_subtreemass[all_that_tilts] / own * (turned - radial)
 
 

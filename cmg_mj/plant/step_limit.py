@@ -31,7 +31,7 @@ def largest_step(model: mujoco.MjModel, key: int, own_s: float, shake_rate: floa
     Returns:
         The step [s].
     """
-    if int(model.opt.integrator) != int(mujoco.mjtIntegrator.mjINT_RK4):
+    if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
         return min(own_s, OTHERS_LIMIT_S)
     jacobian = state_matrix(model, key)
     # A model without finite accelerations is found elsewhere.
@@ -53,7 +53,7 @@ def state_matrix(model: mujoco.MjModel, key: int) -> np.ndarray:
     sizes = np.ones(2 * nv + model.na)  # of what the state is turned from, for the length of a difference
     sizes[nv:] = np.maximum(1.0, np.abs([*model.key_qvel[key], *model.key_act[key]]))
     for joint in np.flatnonzero(model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)):
-        sizes[model.jnt_dofadr[joint]] = max(1.0, abs(float(model.key_qpos[key, model.jnt_qposadr[joint]])))
+        sizes[model.jnt_dofadr[joint]] = max(1.0, abs(model.key_qpos[key, model.jnt_qposadr[joint]]))
     h = 1e-5 * sizes
     columns = [(slope(move) - slope(-move)) / (2.0 * length) for move, length in zip(np.diag(h), h, strict=True)]
     return np.array(columns).T
@@ -78,7 +78,7 @@ def input_column(model: mujoco.MjModel, key: int, command: np.ndarray, forces: V
 def _slopes(model: mujoco.MjModel, key: int) -> Callable[..., np.ndarray]:
     """Return the derivative of the state as a function of moves from the keyframe; without dry friction."""
     smooth = copy.copy(model)
-    smooth.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+    smooth.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
     data, nv = mujoco.MjData(smooth), smooth.nv
 
     def slope(move: Vector, command: Vector = 0.0, forces: Vector = 0.0) -> np.ndarray:

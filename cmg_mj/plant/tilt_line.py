@@ -107,7 +107,7 @@ class SupportLine:
 
     def motion(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """Return the joints' rates of a tilt rate of 1 rad/s about the line, (nv,)."""
-        turn = data.xmat[int(model.jnt_bodyid[self.joint])].reshape(3, 3)
+        turn = data.xmat[model.jnt_bodyid[self.joint]].reshape(3, 3)
         rates = np.zeros(model.nv)
         rates[self.dof : self.dof + 3] = np.cross(turn @ self.axes[:, 1], turn @ -self.point)
         rates[self.dof + 3 : self.dof + 6] = self.axes[:, 1]
@@ -120,7 +120,7 @@ class SupportLine:
         mujoco.mju_rotVecQuat(axis, self.axes[:, 1].copy(), pose[3:])
         mujoco.mju_rotVecQuat(pivot, self.point, pose[3:])
         turn_pose(pose, pivot + pose[:3], axis, angle)
-        pose[3:] /= math.sqrt(float(pose[3:] @ pose[3:]))
+        pose[3:] /= math.sqrt(pose[3:] @ pose[3:])
 
 
 Line = HingeLine | SupportLine
@@ -175,22 +175,22 @@ def line_named(model: mujoco.MjModel, data: mujoco.MjData, name: str, key: int) 
     if joint < 0:
         site = element_id(model, "site", name)
         at, axes = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
-        body = int(model.site_bodyid[site])
+        body = model.site_bodyid[site]
         while body and joint < 0:
-            first = int(model.body_jntadr[body])
-            for candidate in range(first, first + int(model.body_jntnum[body])):
-                kind = int(model.jnt_type[candidate])
-                if kind == int(mujoco.mjtJoint.mjJNT_FREE):
+            first = model.body_jntadr[body]
+            for candidate in range(first, first + model.body_jntnum[body]):
+                kind = model.jnt_type[candidate]
+                if kind == mujoco.mjtJoint.mjJNT_FREE:
                     turn = data.xmat[body].reshape(3, 3).T
                     at_joint = int(model.jnt_qposadr[candidate]), int(model.jnt_dofadr[candidate])
                     return SupportLine(candidate, *at_joint, turn @ axes, turn @ (at - data.xpos[body]))
-                along = float(data.xaxis[candidate] @ axes[:, 1])
-                past = float(np.linalg.norm(np.cross(data.xanchor[candidate] - at, axes[:, 1])))
-                is_hinge = kind == int(mujoco.mjtJoint.mjJNT_HINGE)
+                along = data.xaxis[candidate] @ axes[:, 1]
+                past = np.linalg.norm(np.cross(data.xanchor[candidate] - at, axes[:, 1]))
+                is_hinge = kind == mujoco.mjtJoint.mjJNT_HINGE
                 if is_hinge and abs(along) > SAME_DIRECTION and past < SAME_LINE_M:
                     joint, sign = candidate, math.copysign(1.0, along)
                     break
-            body = int(model.body_parentid[body])
+            body = model.body_parentid[body]
         if joint < 0:
             raise InputError(
                 f"site {name!r} lies on no hinge that its body hangs on, along its y axis, and that body is not free: "

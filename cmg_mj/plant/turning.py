@@ -29,14 +29,14 @@ def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCouplin
     data = data_at_keyframe(model, key)
     along = [data.xmat[axis.frame].reshape(3, 3) @ axis.direction for axis in axes]
     swept = [sum((_turned(model, data, module) for module in axis.modules), np.zeros(3)) for axis in axes]
-    pushes = [float(n @ s) for n, s in zip(along, swept, strict=True)]
+    pushes = [n @ s for n, s in zip(along, swept, strict=True)]
     rows = [(n, push, _inertia(model, data, axis)) for n, push, axis in zip(along, pushes, axes, strict=True)]
-    wheels = [[-float(n @ np.cross(UP, s)) / push for s in swept] for n, push, _ in rows]
+    wheels = [[-(n @ np.cross(UP, s)) / push for s in swept] for n, push, _ in rows]
     body = [
-        [float((n @ about @ n + m @ about @ m - UP @ about @ UP) * (n @ np.cross(m, UP))) / push for m in along]
+        [(n @ about @ n + m @ about @ m - UP @ about @ UP) * (n @ np.cross(m, UP)) / push for m in along]
         for n, push, about in rows
     ]
-    coriolis = [[2.0 * float(n @ np.cross(UP, m)) for m in along] for n, _, _ in rows]
+    coriolis = [[2.0 * (n @ np.cross(UP, m)) for m in along] for n, _, _ in rows]
     return YawCoupling(np.array(wheels), np.array(body), np.array(coriolis))
 
 
@@ -50,7 +50,7 @@ def _inertia(model: mujoco.MjModel, data: mujoco.MjData, axis: Axis) -> np.ndarr
     """Return the inertia of all that tilts about a point of the line, in the world (3, 3) [kg m^2]."""
     pivot = data.xpos[axis.frame] + data.xmat[axis.frame].reshape(3, 3) @ axis.point
     inertia = np.zeros((3, 3))
-    for body in subtree(model, int(model.jnt_bodyid[axis.line.joint])):
+    for body in subtree(model, model.jnt_bodyid[axis.line.joint]):
         axes, arm = data.ximat[body].reshape(3, 3), data.xipos[body] - pivot
         inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
         inertia += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))

@@ -89,7 +89,7 @@ def place_modules(mounts: Sequence[mujoco.MjsFrame], middle: np.ndarray, axes: n
         Whether the modules had this orientation before.
     """
     quaternion = _quaternion(axes)
-    unchanged = all(abs(abs(float(np.asarray(mount.quat) @ quaternion)) - 1.0) < SAME_WAY for mount in mounts)
+    unchanged = all(abs(abs(np.asarray(mount.quat) @ quaternion) - 1.0) < SAME_WAY for mount in mounts)
     for i, mount in enumerate(mounts):
         place = (len(mounts) - 1) / 2.0 - i
         mount.pos, mount.quat = middle + axes[:, 1] * place * EDGE_M * scale, quaternion

@@ -92,7 +92,7 @@ def mount(
     from cmg_mj.features.mounting.write import mount_and_write
 
     with CtrlC() as ctrl_c, nullcontext() if quick else progress("no push", MAX_SEARCH_S, ctrl_c) as on_progress:
-        time_limit = None if quick else TimeLimit(on_progress=on_progress)
+        time_limit = TimeLimit(on_progress=on_progress) if on_progress else None
         result = mount_and_write(
             robot,
             MountRequest(**request),

@@ -13,8 +13,7 @@ from cmg_mj.features.mounting.request import MountRequest
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, ON_A_JOINT
 from cmg_mj.plant.mjcf import posed
 
-_INTEGRATOR = int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
-_FILTERS = int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
+_FILTERS = mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT
 
 
 def rest_controls(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
@@ -43,7 +42,7 @@ def rest_controls(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarra
         target, dynamics = -(bias[0] + bias[1] * length) / gain, int(model.actuator_dyntype[i])
         if state < 0 or dynamics in _FILTERS:
             ctrl[i] = target
-        if dynamics in (_INTEGRATOR, *_FILTERS):
+        if dynamics in (mujoco.mjtDyn.mjDYN_INTEGRATOR, *_FILTERS):
             act[state] = target
     return act, ctrl
 
@@ -109,7 +108,7 @@ def hold_joints(
     for name in request.release:
         if name not in names:
             raise InputError(f"--release {name}: no such joint; {nearest(name, names, 'its joints')}")
-    servos = [a for a in spec.actuators if int(a.trntype) in ON_A_JOINT and _pulls_back(a.biastype, a.biasprm)]
+    servos = [a for a in spec.actuators if a.trntype in ON_A_JOINT and _pulls_back(a.biastype, a.biasprm)]
     on_servos = [servo.target for servo in servos if request.hold == "servos"]
     ties = {joint: tie for tie in spec.equalities if (joint := joint_held(spec, tie))}
     free = {*moving, *request.release}
@@ -123,7 +122,7 @@ def hold_joints(
     data = posed(model, pose)
     for name in held:
         kind = model.joint(name).type[0]
-        if kind == int(mujoco.mjtJoint.mjJNT_FREE):
+        if kind == mujoco.mjtJoint.mjJNT_FREE:
             body = model.body(model.joint(name).bodyid[0]).name
             raise InputError(f"body {body!r} is free and carries no pair: give --release {name} if it is to move")
         if kind == mujoco.mjtJoint.mjJNT_BALL:

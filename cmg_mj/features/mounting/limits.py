@@ -134,7 +134,7 @@ def _largest_push(design: Design, impulses: np.ndarray) -> PushMargin | None:
     if np.median(count) < 0:
         return None
     largest = np.where(count < 0, 0.0, impulses[np.maximum(count, 0)])
-    return PushMargin(float(np.median(largest)), float(largest.min()))
+    return PushMargin(float(np.median(largest)), largest.min())
 
 
 def _stands(design: Design, impulses: np.ndarray) -> np.ndarray:
@@ -396,9 +396,9 @@ def pair_demands(plant: Plant, rate_limit: float, scale: float) -> PairDemands:
         The demands.
     """
     model, modules = plant.model, plant.axis.modules
-    mass = sum(float(model.body_subtreemass[model.body(f"{module.name}/half").id]) for module in modules)
-    robot = float(model.body_subtreemass[model.body_rootid[plant.axis.frame]]) - mass
-    torque = min(float(model.actuator_forcerange[module.servo, 1]) for module in modules)
+    mass = sum(model.body_subtreemass[model.body(f"{module.name}/half").id] for module in modules)
+    robot = model.body_subtreemass[model.body_rootid[plant.axis.frame]] - mass
+    torque = min(model.actuator_forcerange[module.servo, 1] for module in modules)
     energy = sum(0.5 * plant.axis.reduced.J_d * module.speed**2 for module in modules)
     moment = BEARINGS * 0.5 * FRICTION * 0.1 * RATING_N * BORE_M * scale**3
     power = sum(moment * abs(module.speed) for module in modules)

@@ -241,7 +241,7 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     # With sensors, and a keyframe to start from.
     check_unturned(model, poses, qpos, [*others, place.joint] if others else [])
     data = posed(model, qpos)
-    check_room(model, data, names, float(point[2]) if place.free else None)
+    check_room(model, data, names, point[2] if place.free else None)
     under, height = under_and_height(model, data, model.joint(place.joint).id, point, direction)
     frame = model.body(request.body).id
     turn, origin = data.xmat[frame].reshape(3, 3), data.xpos[frame]

@@ -209,6 +209,6 @@ def _attempt(
                 break
             loop.decide()
             loop.advance()
-            torque = max(torque, float(np.abs(forces[:, servos]).max()))
-            rate = max(rate, float(np.abs(np.asarray(tick.v)[gimbals]).max()))
+            torque = max(torque, np.abs(forces[:, servos]).max())
+            rate = max(rate, np.abs(np.asarray(tick.v)[gimbals]).max())
     return _Attempt(len(loop.endings), torque, rate)

@@ -119,7 +119,7 @@ def find_place(model: mujoco.MjModel, pose: np.ndarray, request: MountRequest) -
     if chain and chain[-1].type[0] == mujoco.mjtJoint.mjJNT_FREE:  # only a child of the world is free
         return Place(chain[-1].name, True, direction, middle)
     for name, joint in hinges.items():
-        along = float(data.xaxis[joint] @ direction)
+        along = data.xaxis[joint] @ direction
         if abs(along) > PARALLEL:
             return Place(name, False, _level(data.xaxis[joint] * np.sign(along), f"--axis {axis}"), middle)
     raise InputError(
@@ -130,7 +130,7 @@ def find_place(model: mujoco.MjModel, pose: np.ndarray, request: MountRequest) -
 
 def _level(direction: np.ndarray, what: str) -> np.ndarray:
     """Make a direction exactly horizontal, if it nearly is."""
-    steep = math.degrees(math.asin(min(1.0, abs(float(direction @ UP)))))
+    steep = math.degrees(math.asin(min(1.0, abs(direction @ UP))))
     if steep > LEVEL_DEG:
         word = "along gravity" if steep > 90.0 - LEVEL_DEG else f"{steep:.3g} deg steep"
         raise InputError(f"{what}: lies {word} where the robot stands; a robot tilts about a horizontal line")

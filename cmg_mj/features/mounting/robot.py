@@ -77,7 +77,7 @@ def _bake_masses(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
     for body in spec.bodies:
         if body.name != "world":
-            body.mass, body.inertia = float(model.body_mass[body.id]), model.body_inertia[body.id]
+            body.mass, body.inertia = model.body_mass[body.id], model.body_inertia[body.id]
             body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
             body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
             body.fullinertia = np.full(6, np.nan)
@@ -105,8 +105,8 @@ def set_physics_options(spec: mujoco.MjSpec) -> list[str]:
     notes = []
     option = spec.option
     gravity = np.asarray(option.gravity)
-    down = [0.0, 0.0, -float(np.linalg.norm(gravity))]
-    if gravity.tolist() != down and gravity[2] < 0.0 and np.linalg.norm(gravity[:2]) < 1e-3 * -gravity[2]:
+    down = [0.0, 0.0, -np.linalg.norm(gravity)]
+    if gravity.tolist() != down and np.linalg.norm(gravity[:2]) < 1e-3 * -gravity[2]:
         notes.append(f"its gravity of {' '.join(f'{part:g}' for part in gravity)} is now straight down")
         option.gravity = down
     if option.integrator != mujoco.mjtIntegrator.mjINT_RK4:

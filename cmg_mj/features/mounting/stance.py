@@ -71,9 +71,9 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
     for _ in range(MAX_ROUNDS):
         _rest(model, data, joint, direction)
         mass = data.subtree_com[model.jnt_bodyid[joint]]
-        point, direction = _support(model, data, tree, float(mass[2]), direction)
+        point, direction = _support(model, data, tree, mass[2], direction)
         arm = mass - point
-        lean = math.atan2(float(arm @ np.cross(direction, UP)), float(arm[2]))
+        lean = math.atan2(arm @ np.cross(direction, UP), arm[2])
         leaned += lean
         if abs(math.degrees(leaned)) > MAX_LEAN_DEG:
             raise InputError(
@@ -121,9 +121,9 @@ def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, he
 def _rest(model: mujoco.MjModel, data: mujoco.MjData, joint: int, direction: np.ndarray) -> None:
     """Let the robot come to rest, kept from tilting by a torque that vanishes where its mass is above the line."""
     body, dof = model.jnt_bodyid[joint], model.jnt_dofadr[joint]
-    mass = float(model.body_subtreemass[body])
-    height = max(float(data.subtree_com[body][2] - data.xipos[body][2] + 1.0), 0.1)
-    stiffness = 20.0 * mass * float(np.linalg.norm(model.opt.gravity)) * height
+    mass = model.body_subtreemass[body]
+    height = max(data.subtree_com[body][2] - data.xipos[body][2] + 1.0, 0.1)
+    stiffness = 20.0 * mass * np.linalg.norm(model.opt.gravity) * height
     damping = 2.0 * math.sqrt(stiffness * mass * height**2)
     drag = mass * 2.0
     start, off = data.xquat[body].copy(), np.empty(3)
@@ -140,7 +140,7 @@ def _rest(model: mujoco.MjModel, data: mujoco.MjData, joint: int, direction: np.
             break
     mujoco.mj_forward(model, data)
     mujoco.mju_subQuat(off, data.xquat[body], start)
-    turned = math.degrees(float(np.linalg.norm(off)))
+    turned = math.degrees(np.linalg.norm(off))
     if turned > MAX_LEAN_DEG:
         raise InputError(
             f"the robot falls over while it settles, by {turned:.3g} deg, about another line than the one that is "
@@ -167,10 +167,10 @@ def _support(
     # of flat tyres.
     level = (places - middle)[:, :2]
     along = np.append(np.linalg.eigh(level.T @ (np.array(loads)[:, None] * level))[1][:, 1], 0.0)
-    along *= math.copysign(1.0, float(along @ direction))
-    if float(np.ptp(places @ along)) > LONG_M and float(along @ direction) > math.cos(math.radians(MAX_LEAN_DEG)):
+    along *= math.copysign(1.0, along @ direction)
+    if np.ptp(places @ along) > LONG_M and along @ direction > math.cos(math.radians(MAX_LEAN_DEG)):
         direction = along
-    width = float(np.ptp(places @ np.cross(direction, UP)))
+    width = np.ptp(places @ np.cross(direction, UP))
     if math.degrees(math.atan2(0.5 * width, max(mass_height - middle[2], 1e-9))) > STANDS_DEG:
         raise InputError(
             f"the robot stands by itself: its support is {width:.3g} m wide across the axis; a pair balances a robot "
@@ -268,7 +268,7 @@ def under_and_height(
     for geom in np.flatnonzero(np.isin(model.geom_bodyid, subtree(model, root))):
         turn, aabb = data.geom_xmat[geom].reshape(3, 3), model.geom_aabb[geom]
         tops.append((data.geom_xpos[geom] + turn @ aabb[:3])[2] + np.abs(turn[2]) @ aabb[3:])
-    return under, float(max(tops) - point[2])
+    return under, max(tops) - point[2]
 
 
 def axes_along(direction: np.ndarray) -> np.ndarray:
@@ -282,12 +282,12 @@ def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np
     point = data.xanchor[joint].copy()
     arm = data.subtree_com[model.jnt_bodyid[joint]] - point
     radial = arm - (arm @ direction) * direction
-    if float(np.linalg.norm(radial)) < MIN_HEIGHT_M:
+    if np.linalg.norm(radial) < MIN_HEIGHT_M:
         raise InputError(f"the mass on the hinge {name!r} lies on its axis: there is nothing to balance")
-    lean = math.atan2(float(radial @ np.cross(direction, UP)), float(radial @ UP))
-    sign = math.copysign(1.0, float(data.xaxis[joint] @ direction))
+    lean = math.atan2(radial @ np.cross(direction, UP), radial @ UP)
+    sign = math.copysign(1.0, data.xaxis[joint] @ direction)
     address = model.jnt_qposadr[joint]
-    upright = float(qpos[address]) - sign * lean
+    upright = qpos[address] - sign * lean
     low, high = model.jnt_range[joint]
     if model.jnt_limited[joint] and not low <= upright <= high:
         raise InputError(
@@ -333,8 +333,8 @@ def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.
     growth = 1.0
     while growth < UNTIL and data.time < MAX_FALL_S:
         mujoco.mj_step(model, data)
-        growth = (float(line.lean(data.qpos)) + bias) / start
-    return math.acosh(growth) / float(data.time) if growth > 1.0 else 0.0
+        growth = (line.lean(data.qpos) + bias) / start
+    return math.acosh(growth) / data.time if growth > 1.0 else 0.0
 
 
 def check_falls(model: mujoco.MjModel, key: int, line: Line) -> None:

@@ -38,7 +38,7 @@ def check_pivots(scenario: Scenario, plant: Plant) -> None:
                 track = read_track(pivot.file, pivot.column)
             except InputError as error:
                 raise InputError(f"pivot.{i}.file: {error}") from error
-            largest = abs(pivot.scale) * float(abs(track.accelerations).max())
+            largest = abs(pivot.scale) * abs(track.accelerations).max()
             if largest > MAX_RECORDED_M_S2:
                 raise InputError(
                     f"pivot.{i}.scale = {pivot.scale:g}: {pivot.file} times this reaches {largest:.3g} m/s2; at most "

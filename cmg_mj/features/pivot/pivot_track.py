@@ -32,19 +32,19 @@ class Track(NamedTuple):
     @property
     def words(self) -> str:
         """Samples, length and size, for one line."""
-        rms = math.sqrt(float(np.mean(np.square(self.accelerations))))
+        rms = math.sqrt(np.mean(np.square(self.accelerations)))
         return f"{len(self.times)} samples over {self.times[-1]:g} s, {rms:.3g} m/s2 rms before its scale"
 
     def velocity(self, time: float) -> float:
         """Integral of the acceleration from the first sample to a time [m/s]; before and after it rests."""
         if time <= 0.0:
             return 0.0
-        i = int(np.searchsorted(self.times, time, side="right")) - 1
+        i = np.searchsorted(self.times, time, side="right") - 1
         if i + 1 >= len(self.times):
-            return float(self.velocities[-1])
-        since, length = time - float(self.times[i]), float(self.times[i + 1] - self.times[i])
-        a, b = float(self.accelerations[i]), float(self.accelerations[i + 1])
-        return float(self.velocities[i]) + since * (a + 0.5 * (b - a) * since / length)
+            return self.velocities[-1]
+        since, length = time - self.times[i], self.times[i + 1] - self.times[i]
+        a, b = self.accelerations[i : i + 2]
+        return self.velocities[i] + since * (a + 0.5 * (b - a) * since / length)
 
 
 def read_track(file: str, column: str | None) -> Track:
