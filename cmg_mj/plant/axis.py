@@ -13,13 +13,14 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.loop import Joints
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.inertia import inertia_about
 from cmg_mj.plant.mjcf import data_at_keyframe
-from cmg_mj.plant.tilt_line import UP, Addressed, Line, line_named
+from cmg_mj.plant.tilt_line import UP, Line, line_named
 
 _new = tuple.__new__  # a named tuple's own takes twice as long
 
@@ -91,7 +92,7 @@ class Axis:
         n = len(self.modules)
         return [(module.gimbal, module.direction / n, module.gimbal_zero) for module in self.modules]
 
-    def ideal(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> IdealReading:
+    def ideal(self, sensordata: Joints, qvel: Joints) -> IdealReading:
         """Return the readings of perfect sensors.
 
         Args:
@@ -108,7 +109,7 @@ class Axis:
         wheels = [qvel[dof] for dof in self._spins]
         return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel), wheels))
 
-    def gimbal_angle(self, qpos: Addressed) -> Scalar:
+    def gimbal_angle(self, qpos: Joints) -> Scalar:
         """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""
         angle = 0.0
         for gimbal, share, zero in self._gimbals:

@@ -80,19 +80,3 @@ def edit(
             rig = resolve(rig.path, compile_model(spec, rig.path), rig.modules, settings.locked_axes)
             finish(rig.model)
     return rig
-
-
-def check_rig(path: Path, name: Path) -> None:
-    """See that a file is a rig.
-
-    Args:
-        path: The file.
-        name: Name of the file in messages.
-
-    Raises:
-        InputError: The file is not a rig.
-    """
-    try:
-        build(path, PlantSettings(), {})
-    except InputError as error:
-        raise InputError(str(error).replace(str(path), str(name))) from error

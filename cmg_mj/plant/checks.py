@@ -20,9 +20,6 @@ TRUE_DEG = 0.05
 """A keyframe that is off by more is no equilibrium: a tenth of the bias that observers are tried with [deg]."""
 MOUNTED_DEG = 5.0
 """A sensor or axis farther off is mounted otherwise, not inaccurately: no observer stands so much [deg]."""
-FIRST_S = 0.02
-"""Simulated time of the trial of the physics, in 4 to 100 steps [s]."""
-HUGE = 1e10  # MuJoCo's mjMAXVAL
 STEPS_S = 1e-6, 0.1
 """Physics steps that a model may ask for [s]."""
 
@@ -190,20 +187,6 @@ class RigChecker:
                 "the flywheels' momenta do not cancel while the thrust bearing is free, which the reduced model does "
                 "not know: see plant.lock_thrust_bearing"
             )
-
-
-def survives_first_steps(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-    """Check that the physics gets through its first steps.
-
-    Args:
-        model: The rig as it is run.
-        data: Its initial state, which is changed.
-
-    Returns:
-        Whether all joints still have angles and rates that MuJoCo takes for sane.
-    """
-    mujoco.mj_step(model, data, int(np.clip(FIRST_S / model.opt.timestep, 4, 100)))
-    return bool(np.all(np.abs(data.qpos) < HUGE) and np.all(np.abs(data.qvel) < HUGE))
 
 
 def _degrees_between(a: np.ndarray, b: np.ndarray) -> float:

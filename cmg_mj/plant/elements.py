@@ -55,11 +55,6 @@ class Module:
     gimbal_zero: float
     speed: float
 
-    @property
-    def short_name(self) -> str:
-        """The module's name without that of its axis: `cube1` of `roll/cube1`."""
-        return self.name.rpartition("/")[2]
-
 
 def missing_elements(spec: mujoco.MjSpec) -> list[str]:
     """List the joints, actuators, sensors and the keyframe that a rig needs and a parsed model lacks.

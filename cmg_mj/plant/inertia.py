@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,8 +16,7 @@ SMALL = 1e-9
 """Below this share of the largest singular value a matrix takes a direction to zero."""
 
 
-@dataclass(frozen=True)
-class Inertia:
+class Inertia(NamedTuple):
     """The effective inertia about a line.
 
     Attributes:
@@ -108,9 +107,8 @@ def _weld_jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     columns = np.zeros((model.nv, data.nefc))
     for column, unit in zip(columns, np.eye(model.nv), strict=True):
         mujoco.mj_mulJacVec(model, data, column, unit)
-    of_equality = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-    wanted = [bool(of_equality[i]) and int(model.eq_type[data.efc_id[i]]) in kinds for i in range(data.nefc)]
-    return columns.T[np.array(wanted, dtype=bool)]
+    equalities = np.flatnonzero(data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+    return columns.T[[i for i in equalities if int(model.eq_type[data.efc_id[i]]) in kinds]]
 
 
 def _contacts(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:

@@ -16,8 +16,6 @@ from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine, line_named
 from cmg_mj.scenario.plant_settings import PlantSettings
 
-YAW = "yaw"
-
 
 def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:
     """Remove the yaw joint.
@@ -25,9 +23,9 @@ def lock_thrust_bearing(spec: mujoco.MjSpec, path: Path) -> None:
     Raises:
         InputError: There is no yaw joint.
     """
-    if YAW not in [joint.name for joint in spec.joints]:
+    if "yaw" not in [joint.name for joint in spec.joints]:
         raise InputError(f"plant.lock_thrust_bearing = true: {path} has no joint 'yaw' to lock")
-    remove_hinge(spec, YAW)
+    remove_hinge(spec, "yaw")
 
 
 def lock_axes(spec: mujoco.MjSpec, rig: ResolvedModel, settings: PlantSettings) -> Callable[[mujoco.MjModel], None]:

@@ -103,7 +103,7 @@ class ManyWorlds:
             self._ctrl[places], act[places] = data.ctrl, data.act
         self._servos = [axis.servos for axis in first.axes]
         self._directions = [np.array(axis.directions) for axis in first.axes]
-        self._pushes = [axis.line.push for axis in first.axes]
+        self._lines = [axis.line for axis in first.axes]
         self.tilt, self._ideal = first.largest_tilt, first.ideal_readings
         self.running: np.ndarray = np.ones(len(plants), dtype=bool)
         self.any_running = self._all_running = True
@@ -126,16 +126,17 @@ class ManyWorlds:
 
     def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
         """Set the torques about the axes, one for all or (n_worlds,) each; return arrays (n_worlds,) [N m]."""
-        for dofs, _ in self._pushes:
-            self._applied[:, dofs] = 0.0
-        for (dofs, shares), torque in zip(self._pushes, torques, strict=True):
-            self._applied[:, dofs] += np.multiply.outer(torque, shares)
+        apply_torques(self._applied.T, self._lines, torques)
         return [np.broadcast_to(torque, len(self.running)) for torque in torques]
 
     def accelerate(self, acceleration: Acceleration) -> None:
         """Set the pivot's acceleration, x, y, z, one for all or (n_worlds,) each [m/s^2]."""
         if not len(self._still):
-            self._gravity = self._own_gravity()
+            if self.batch.models is None:
+                self._gravity = self.batch.expand("opt.gravity")
+            else:
+                self._own_models = [copy.copy(plant.model) for plant in self._plants]
+                self._gravity = np.array([model.opt.gravity for model in self._own_models])
             self._still = self._gravity.copy()
         for i, part in enumerate(acceleration):
             self._gravity[:, i] = self._still[:, i] - part
@@ -143,13 +144,6 @@ class ManyWorlds:
             for model, gravity in zip(self._own_models, self._gravity, strict=True):
                 model.opt.gravity[:] = gravity
             self.batch.set_models(self._own_models)
-
-    def _own_gravity(self) -> np.ndarray:
-        """Give every world gravity of its own, (n_worlds, 3)."""
-        if self.batch.models is None:
-            return self.batch.expand("opt.gravity")
-        self._own_models = [copy.copy(plant.model) for plant in self._plants]
-        return np.array([model.opt.gravity for model in self._own_models])
 
     def advance(self, steps: int) -> None:
         """Take physics steps. A world in which MuJoCo raises is given joints that are NaN: it has diverged."""

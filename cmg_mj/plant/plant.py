@@ -17,6 +17,7 @@ from pydantic import ValidationError
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.controller import KnownPlant
 from cmg_mj.core.errors import InputError, TomlValue, nearest
+from cmg_mj.core.loop import Joints
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import MultiAxisReading
@@ -25,12 +26,11 @@ from cmg_mj.inputs.files import find, folder
 from cmg_mj.inputs.messages import complaints
 from cmg_mj.plant.axis import Axis, ResolvedModel, resolve
 from cmg_mj.plant.build import build, edit
-from cmg_mj.plant.checks import survives_first_steps
 from cmg_mj.plant.elements import BEND_JOINT, element_id
 from cmg_mj.plant.locking import lock_thrust_bearing
 from cmg_mj.plant.mjcf import compile_model, parse, quiet, set_control_callback
 from cmg_mj.plant.settings import apply, place_accelerometers
-from cmg_mj.plant.tilt_line import Addressed, HingeLine
+from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.plant.turning import turning
 from cmg_mj.scenario.design import PlantNumbers
 from cmg_mj.scenario.plant_settings import MIN_STEP_S, PlantSettings
@@ -39,6 +39,10 @@ from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.stages.backlash import ARCMIN_A_DEGREE, backlash
 from cmg_mj.stages.turning import YawCoupling
+
+FIRST_S = 0.02
+"""Simulated time of the trial of the physics, in 4 to 100 steps [s]."""
+HUGE = 1e10  # MuJoCo's mjMAXVAL
 
 
 class Plant:
@@ -84,7 +88,9 @@ class Plant:
             )
         step = grid.physics_step(self.largest_step) if grid else settings.timestep_s
         self.model.opt.timestep = step or self.largest_step
-        if not survives_first_steps(self.model, self.new_data()):
+        data = self.new_data()
+        mujoco.mj_step(self.model, data, int(np.clip(FIRST_S / self.timestep, 4, 100)))
+        if not np.all(np.abs([*data.qpos, *data.qvel]) < HUGE):
             raise InputError(
                 f"{self._error_source}: the physics fails in its first steps of {self.timestep:g} s; masses, friction, "
                 "damping and servos must be of sizes that go together"
@@ -158,11 +164,11 @@ class Plant:
         return turning(self.filed.model, self.key, self.axes)
 
     @property
-    def largest_tilt(self) -> Callable[[Addressed], Scalar]:
+    def largest_tilt(self) -> Callable[[Joints], Scalar]:
         """Function of qpos: the tilt from the keyframe of the axis that is farthest from it [rad]."""
         return self.axis.line.lean if len(self.axes) == 1 else self._farthest_lean
 
-    def _farthest_lean(self, qpos: Addressed) -> Scalar:
+    def _farthest_lean(self, qpos: Joints) -> Scalar:
         leans = np.array([axis.line.lean(qpos) for axis in self.axes])
         farthest = np.argmax(np.where(np.isnan(leans), np.inf, np.abs(leans)), axis=0)
         lean = np.take_along_axis(leans, farthest[None], axis=0)[0]
@@ -206,11 +212,11 @@ class Plant:
         return line
 
     @property
-    def ideal_readings(self) -> Callable[[list[float] | np.ndarray, Addressed], Any]:
+    def ideal_readings(self) -> Callable[[Joints, Joints], Any]:
         """Function of sensordata and qvel: readings of perfect sensors (see `Axis.ideal`), or `MultiAxisReading`."""
         return self.axis.ideal if len(self.axes) == 1 else self._readings_of_axes
 
-    def _readings_of_axes(self, sensordata: list[float] | np.ndarray, qvel: Addressed) -> MultiAxisReading:
+    def _readings_of_axes(self, sensordata: Joints, qvel: Joints) -> MultiAxisReading:
         upward = sensordata[self.axis.gyro + 1]
         return MultiAxisReading([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
 

@@ -98,7 +98,7 @@ def _vary_masses_and_friction(
             field[dofs] = value
     _vary_servos(model, settings, path, modules)
     biased = [axis for axis in axes if axis.bias]
-    shifts = [bias_shift(model, axis, axis.bias, path) for axis in biased]
+    shifts = [bias_shift(model, axis, path) for axis in biased]
     for axis, shift in zip(biased, shifts, strict=True):
         model.body_ipos[frame_bodies(model, axis)] += shift
     if settings.flywheel_imbalance_kg_m:
@@ -187,13 +187,12 @@ def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, mod
         servo = module.servo
         gain, bias = model.actuator_gainprm[servo], model.actuator_biasprm[servo]
         # A position loop whose setpoint is the integral of its command: what <intvelocity> makes.
-        is_loop = (
+        if not (
             model.actuator_dyntype[servo] == mujoco.mjtDyn.mjDYN_INTEGRATOR
             and model.actuator_gaintype[servo] == mujoco.mjtGain.mjGAIN_FIXED
             and model.actuator_biastype[servo] == mujoco.mjtBias.mjBIAS_AFFINE
             and gain[0] == -bias[1]
-        )
-        if not is_loop:
+        ):
             raise InputError(
                 f"plant.{field}: {path}: actuator '{module.name}/gimbal_servo' is no position loop whose setpoint "
                 "is the integral of its command (<intvelocity>), which alone has this stiffness and damping"
@@ -205,7 +204,7 @@ def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, mod
             bias[2] = -damping * per_gear
 
 
-def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np.ndarray:
+def bias_shift(model: mujoco.MjModel, axis: Axis, path: Path) -> np.ndarray:
     """Compute the shift of the frame's centre of mass that turns the whole plant's about the line by e.
 
     The first moment of all that tilts is turned, not lengthened: gravity's torque keeps its amplitude.
@@ -213,7 +212,6 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
     Args:
         model: The model, as its file has it.
         axis: The axis, on whose frame all of the shift is.
-        bias: e [rad].
         path: The model's file, for messages.
 
     Returns:
@@ -233,7 +231,7 @@ def bias_shift(model: mujoco.MjModel, axis: Axis, bias: float, path: Path) -> np
     to_frame = data.xmat[frame].reshape(3, 3).T
     centre = to_frame @ (data.subtree_com[all_that_tilts] - data.xpos[frame]) - axis.point
     radial = centre - (centre @ axis.direction) * axis.direction
-    turned = math.cos(bias) * radial + math.sin(bias) * np.cross(axis.direction, radial)
+    turned = math.cos(axis.bias) * radial + math.sin(axis.bias) * np.cross(axis.direction, radial)
     own = sum(model.body_mass[frame_bodies(model, axis)])
     return model.body_subtreemass[all_that_tilts] / own * (turned - radial)
 

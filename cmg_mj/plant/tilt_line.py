@@ -6,22 +6,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar, atan2
 from cmg_mj.core.errors import InputError
+from cmg_mj.core.loop import Joints
 from cmg_mj.plant.elements import element_id
 
 UP = np.array([0.0, 0.0, 1.0])
-
-
-class Addressed(Protocol):
-    """Numbers of MuJoCo's, by address: of one world floats, of many arrays (n_worlds,)."""
-
-    def __getitem__(self, address: int, /) -> Scalar: ...
 
 
 @dataclass(frozen=True)
@@ -42,11 +36,11 @@ class HingeLine:
     zero: float
     sign: float = 1.0
 
-    def lean(self, qpos: Addressed) -> Scalar:
+    def lean(self, qpos: Joints) -> Scalar:
         """Tilt from the keyframe [rad]."""
         return self.sign * (qpos[self.angle] - self.zero)
 
-    def rate(self, qvel: Addressed) -> Scalar:
+    def rate(self, qvel: Joints) -> Scalar:
         """Tilt rate [rad/s]."""
         return self.sign * qvel[self.dof]
 
@@ -89,14 +83,14 @@ class SupportLine:
         """The axes as floats, which every tick looks up."""
         return self.axes.T.tolist()
 
-    def lean(self, qpos: Addressed) -> Scalar:
+    def lean(self, qpos: Joints) -> Scalar:
         """Tilt of the line's z axis from the vertical about the line, as accelerometers see it [rad]."""
         w, x, y, z = (qpos[self.angle + 3 + i] for i in range(4))
         up = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)  # in the body's axes
         across, _, upward = self._xyz
         return atan2(-_dot(up, across), _dot(up, upward))
 
-    def rate(self, qvel: Addressed) -> Scalar:
+    def rate(self, qvel: Joints) -> Scalar:
         """Angular velocity about the line [rad/s]."""
         return _dot([qvel[self.dof + 3 + i] for i in range(3)], self._xyz[1])
 
@@ -144,7 +138,7 @@ def apply_torques(applied: np.ndarray, lines: Sequence[Line], torques: Sequence[
     """Set the generalised forces of torques about tilt lines; lines of one free body share its joint.
 
     Args:
-        applied: MuJoCo's qfrc_applied, changed in place [N m].
+        applied: MuJoCo's qfrc_applied, changed in place, (nv,) or (nv, n_worlds) [N m].
         lines: The lines.
         torques: About each line [N m].
     """
@@ -200,5 +194,5 @@ def line_named(model: mujoco.MjModel, data: mujoco.MjData, name: str, key: int) 
     return HingeLine(joint, angle, int(model.jnt_dofadr[joint]), float(model.key_qpos[key, angle]), sign)
 
 
-def _dot(a: Addressed, b: Sequence[float]) -> Scalar:
+def _dot(a: Joints, b: Sequence[float]) -> Scalar:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import mujoco
@@ -18,7 +18,7 @@ from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.types import IdealReading
-from cmg_mj.plant.mjcf import quiet
+from cmg_mj.plant.mjcf import posed, quiet
 from cmg_mj.plant.physics import OneWorld
 from cmg_mj.results.baselines import MEMS_GYRO
 from cmg_mj.runs.disturbances import disturbances, outsides
@@ -133,17 +133,11 @@ class ScissoredPairEnv(gymnasium.Env):
             if not isinstance(world, int) or world < 0:
                 raise InputError(f"reset: world = {world!r}: must be a whole number, 0 or more")
             self._world = world
-        self._start(self._changed(changed), self._seed)
-        return self._observed()
-
-    def _changed(self, settings: Mapping[str, Any]) -> Experiment:
-        if not settings:
-            return self._base
-        changed = self._base.with_settings(settings)
-        law, base_law = changed.law, self._base.law
-        if (law.dt, law.rate_limit) != (base_law.dt, base_law.rate_limit):
+        experiment, law = self._base.with_settings(changed) if changed else self._base, self._base.law
+        if (experiment.law.dt, experiment.law.rate_limit) != (law.dt, law.rate_limit):
             raise InputError("reset: settings: the control rate and the gimbals' limit stay those of the environment")
-        return changed
+        self._start(experiment, self._seed)
+        return self._observed()
 
     def _start(self, experiment: Experiment, seed: int) -> None:
         self.experiment, part = experiment, experiment.require_single_axis("an environment")
@@ -249,16 +243,14 @@ class ScissoredPairEnv(gymnasium.Env):
         if self.render_mode is None:
             return None
         model = self.experiment.plant.drawn_model
-        if self._renderer is not None and self._renderer.model is not model:
+        renderer = self._renderer
+        if renderer is None or renderer.model is not model:
             self.close()
-        renderer = self._renderer = self._renderer or mujoco.Renderer(model, *SIZE)
-        data = mujoco.MjData(model)
-        data.qpos[:] = self._physics.data.qpos
-        mujoco.mj_forward(model, data)
+            renderer = self._renderer = mujoco.Renderer(model, *SIZE)
         camera = mujoco.MjvCamera()
         mujoco.mjv_defaultFreeCamera(model, camera)
         camera.azimuth, camera.elevation = VIEW
-        renderer.update_scene(data, camera)
+        renderer.update_scene(posed(model, self._physics.data.qpos), camera)
         return renderer.render()
 
     def close(self) -> None:

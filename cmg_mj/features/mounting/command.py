@@ -88,25 +88,24 @@ def mount(
     """
     from cmg_mj.features.mounting.push import MAX_SEARCH_S, TimeLimit
     from cmg_mj.features.mounting.report import mount_report_lines
-    from cmg_mj.features.mounting.request import MountRequest
     from cmg_mj.features.mounting.write import mount_and_write
 
     with CtrlC() as ctrl_c, nullcontext() if quick else progress("no push", MAX_SEARCH_S, ctrl_c) as on_progress:
         time_limit = TimeLimit(on_progress=on_progress) if on_progress else None
         result = mount_and_write(
             robot,
-            MountRequest(**request),
             out,
             observer,
             overwrite=overwrite,
             time_limit=time_limit,
             with_plugin=with_plugin,
+            **request,
         )
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:
         note_hints(result.prospects.hints)
-        run_it = shell_command("cmg-mj", "run", result.scenario_path)
-        note(f"wrote {result.path} and {result.scenario_path}; try: {run_it}")
+        scenario = result.path.with_suffix(".toml")
+        note(f"wrote {result.path} and {scenario}; try: {shell_command('cmg-mj', 'run', scenario)}")
         if result.plugin:
             example = result.plugin.model.with_name(f"{result.plugin.model.stem}_example.py")
             note(f"wrote {result.plugin.model.parent}; try: {shell_command('python', example)}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.features.mounting.request import MountRequest
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, ON_A_JOINT
+from cmg_mj.plant.elements import ON_A_JOINT
 from cmg_mj.plant.mjcf import posed
 
 _FILTERS = mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT
@@ -104,21 +104,25 @@ def hold_joints(
         InputError: A joint to release does not exist, or the file holds a joint elsewhere.
     """
     poses = poses_of(model, pose)
-    names = list(poses)
     for name in request.release:
-        if name not in names:
-            raise InputError(f"--release {name}: no such joint; {nearest(name, names, 'its joints')}")
+        if name not in poses:
+            raise InputError(f"--release {name}: no such joint; {nearest(name, poses, 'its joints')}")
     servos = [a for a in spec.actuators if a.trntype in ON_A_JOINT and _pulls_back(a.biastype, a.biasprm)]
     on_servos = [servo.target for servo in servos if request.hold == "servos"]
     ties = {joint: tie for tie in spec.equalities if (joint := joint_held(spec, tie))}
     free = {*moving, *request.release}
     for name, tie in ties.items():
         if name not in free:
-            _check_stands(model.joint(name).qpos0[0], poses[name][0], name, tie)
+            target, stands = model.joint(name).qpos0[0] + tie.data[0], poses[name][0]
+            if tie.type == mujoco.mjtEq.mjEQ_JOINT and abs(target - stands) > SAME_PLACE:
+                raise InputError(
+                    f"equality {tie.name!r} holds the joint {name!r} at {target:.4g}, and the robot is to stand with "
+                    f"it at {stands:.4g}: give a --keyframe that has it there, or take the equality out of the file"
+                )
         elif tie.name.startswith(f"{name}_held"):  # the user's own is the user's
             spec.delete(tie)
     tie_names = {tie.name for tie in spec.equalities}
-    held = [name for name in names if name not in {*free, *on_servos, *ties}]
+    held = [name for name in poses if name not in {*free, *on_servos, *ties}]
     data = posed(model, pose)
     for name in held:
         kind = model.joint(name).type[0]
@@ -134,16 +138,6 @@ def hold_joints(
         tie.name, tie.active = unused_name(f"{name}_held", tie_names), True
         tie.solimp[:2] = IMPEDANCE
     return held
-
-
-def _check_stands(reference: float, stands: float, name: str, tie: mujoco.MjsEquality) -> None:
-    """Check that a constraint of the file holds a joint where the robot is to stand."""
-    target = reference + tie.data[0]
-    if tie.type == mujoco.mjtEq.mjEQ_JOINT and abs(target - stands) > SAME_PLACE:
-        raise InputError(
-            f"equality {tie.name!r} holds the joint {name!r} at {target:.4g}, and the robot is to stand with it at "
-            f"{stands:.4g}: give a --keyframe that has it there, or take the equality out of the file"
-        )
 
 
 def _weld_ball(spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, joint: str) -> mujoco.MjsEquality:
@@ -200,12 +194,3 @@ def write_keyframe(
     for joint, speed in speeds.items():
         qvel[model.joint(joint).dofadr[0]] = controls[model.actuator(f"{joint}_motor").id] = speed
     spec.add_key(name=name, qpos=qpos, qvel=qvel, act=act, ctrl=controls)
-
-
-def pop_keyframes(spec: mujoco.MjSpec, model: mujoco.MjModel) -> list[tuple[str, dict[str, np.ndarray]]]:
-    """Remove a robot's own keyframes before it gets more joints, and return their names and poses."""
-    keyframes = [(model.key(i).name, poses_of(model, model.key_qpos[i])) for i in range(model.nkey)]
-    for key in list(spec.keys):
-        spec.delete(key)
-    # The equilibrium of an axis mounted earlier is written anew.
-    return [(name, poses) for name, poses in keyframes if name != EQUILIBRIUM_KEY]

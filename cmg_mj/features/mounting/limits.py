@@ -311,7 +311,7 @@ class Prospects:
         """Return the figures by name, as `cmg-mj mount --json` prints them."""
         model = self.reduced
         n, poles = model.gimbals, self.sliding_poles
-        return {
+        figures = {
             "inertia_kg_m2": n * model.J1,
             "gravity_torque_n_m": n * model.gravity_torque,
             "momentum_n_m_s": n * model.J_d * model.omega_d,
@@ -324,9 +324,11 @@ class Prospects:
             "push_margin_impulse_n_m_s": self.push_margin.median_impulse,
             "push_margin_worst_impulse_n_m_s": self.push_margin.worst_impulse,
             "push_margin_torque_n_m": self.push_margin.median_impulse / PUSH_S,
-            **({"pivot_arm_m": model.pivot_arm} if model.pivot_arm else {}),
-            **({f"pole_tilt_{name}_1_s": pole for name, pole in poles._asdict().items()} if poles else {}),
         }
+        if poles:
+            figures |= {"pivot_arm_m": model.pivot_arm}
+            figures |= {f"pole_tilt_{name}_1_s": pole for name, pole in poles._asdict().items()}
+        return figures
 
 
 def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = True) -> Prospects:

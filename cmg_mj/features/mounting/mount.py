@@ -14,31 +14,24 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting.attach import add_sensors, attach_modules, check_room
-from cmg_mj.features.mounting.hold import as_qpos, hold_joints, pop_keyframes, poses_of, write_keyframe
+from cmg_mj.features.mounting.hold import as_qpos, hold_joints, poses_of, write_keyframe
 from cmg_mj.features.mounting.request import AxisLike, Base, Hold, MountRequest, find_place
 from cmg_mj.features.mounting.robot import (
     body_of,
-    check_chains,
-    check_names,
     find_existing_axes,
     free_base,
     pose_of,
     read_robot,
     set_physics_options,
 )
-from cmg_mj.features.mounting.stance import (
-    axes_along,
-    check_falls,
-    check_unturned,
-    stand_upright,
-    under_and_height,
-)
+from cmg_mj.features.mounting.stance import axes_along, check_falls, stand_upright, under_and_height
 from cmg_mj.inputs.files import expanded, folder, model_files
 from cmg_mj.plant.axis import find_axis
-from cmg_mj.plant.build import check_rig
+from cmg_mj.plant.build import build
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, axis_modules
 from cmg_mj.plant.mjcf import as_mjcf, compile_model, parse, posed, quiet, set_control_callback
 from cmg_mj.results.folder import is_own, is_signed, signed, whole_file
+from cmg_mj.scenario.plant_settings import PlantSettings
 
 PLUGIN = "_plugin"
 """Ending of a plugin's folder, behind the stem of the model's file."""
@@ -85,7 +78,10 @@ class MountedRobot:
         try:
             with whole_file(target, ".xml") as temporary:
                 temporary.write_bytes(signed(as_mjcf(spec, self.path), ".xml"))
-                check_rig(temporary, target)
+                try:
+                    build(temporary, PlantSettings(), {})
+                except InputError as error:
+                    raise InputError(str(error).replace(temporary.name, target.name)) from error
         except OSError as error:
             raise InputError(f"-o {path}: cannot be written: {error.strerror}") from error
         return target
@@ -213,21 +209,25 @@ def mount(
 def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> MountedRobot:
     """Mount a pair on a model, which is changed."""
     body = body_of(spec, request.body)
-    check_chains(spec)
     if request.base == "free":
         free_base(spec, body, path)
     names = [f"{request.prefix}cube{i + 1}" for i in range(request.modules)]
     model = compile_model(spec, path)
     existing = find_existing_axes(spec, model, request.name)
     sites = [request.prefix + name for name in (TILT_ELEMENT, *SENSORS)]
-    check_names(spec, [*sites, *(f"{name}{end}" for name in names for end in ("/half", "_mount"))])
+    taken = {element.name for kind in (spec.bodies, spec.frames, spec.sites, spec.sensors) for element in kind}
+    for name in [*sites, *(f"{name}{end}" for name in names for end in ("/half", "_mount"))]:
+        if name in taken:
+            raise InputError(f"has an element {name!r} already, which a mounted pair brings: rename it")
 
     # The robot as it is to stand.
     pose = pose_of(model, request.keyframe or (EQUILIBRIUM_KEY if existing.drives else None))
     place = find_place(model, pose, request)
     if place.joint in existing.lines:
         raise InputError(f"the hinge {place.joint!r} has an axis already: another one needs another hinge")
-    keyframes = pop_keyframes(spec, model)
+    keyframes = [(model.key(i).name, poses_of(model, model.key_qpos[i])) for i in range(model.nkey)]
+    for key in list(spec.keys):  # the robot gets more joints
+        spec.delete(key)
     held = hold_joints(spec, model, pose, request, {place.joint, *existing.lines, *existing.drives})
 
     # With the modules on it.
@@ -239,7 +239,6 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     model, (qpos, point, direction) = stand_upright(spec, poses, place, mounts, others, request, path)
 
     # With sensors, and a keyframe to start from.
-    check_unturned(model, poses, qpos, [*others, place.joint] if others else [])
     data = posed(model, qpos)
     check_room(model, data, names, point[2] if place.free else None)
     under, height = under_and_height(model, data, model.joint(place.joint).id, point, direction)
@@ -247,20 +246,15 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     turn, origin = data.xmat[frame].reshape(3, 3), data.xpos[frame]
     add_sensors(spec, body, request.prefix, turn.T @ (under - origin), turn.T @ axes_along(direction), height)
     model = compile_model(spec, path)
-    speed = nominal_speed()
+    papers_rig = parse(folder("models") / "scissored_pair.xml")  # whose flywheels' speed theirs is
+    speed = max(papers_rig.key(EQUILIBRIUM_KEY).ctrl)
     speeds = {f"{module}/flywheel": speed * (-1.0) ** i for i, module in enumerate(names)}
     speeds |= existing.speeds
     write_keyframe(spec, model, EQUILIBRIUM_KEY, qpos, speeds)
     for name, own in keyframes:
-        write_keyframe(spec, model, name, as_qpos(model, own | gimbals), speeds)
+        if name != EQUILIBRIUM_KEY:  # of an axis mounted earlier
+            write_keyframe(spec, model, name, as_qpos(model, own | gimbals), speeds)
     model = compile_model(spec, path)
     key = model.key(EQUILIBRIUM_KEY).id
     check_falls(model, key, find_axis(model, key, request.name, axis_modules(model)[request.name]).line)
     return MountedRobot(spec, path, tuple(held), tuple(notes))
-
-
-def nominal_speed() -> float:
-    """Return the speed of the papers' flywheels [rad/s]."""
-    rig = parse(folder("models") / "scissored_pair.xml")
-    names = [actuator.name for actuator in rig.actuators]
-    return abs(float(rig.key(EQUILIBRIUM_KEY).ctrl[names.index("cube1/flywheel_motor")]))

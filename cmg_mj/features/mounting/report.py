@@ -64,15 +64,13 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
 
 def _pivot(result: MountResult) -> Iterator[str]:
     """Say what a pivot that slides freely does to the tilt, and what the loop would be if the tilt did not know it."""
-    rig = result.plant
-    if rig.reduced.pivot_arm:
+    rig, poles = result.plant, result.prospects.sliding_poles
+    if poles:
         yield f"  its pivot {sliding_words(rig)}"
-        poles = result.prospects.sliding_poles
-        if poles:
-            yield (
-                f"    so the loop with the true rate is {loop_words(poles.about_centre)}; about the pivot, where "
-                f"{measured_words(rig)}, it is {loop_words(poles.about_pivot)}"
-            )
+        yield (
+            f"    so the loop with the true rate is {loop_words(poles.about_centre)}; about the pivot, where "
+            f"{measured_words(rig)}, it is {loop_words(poles.about_pivot)}"
+        )
         if result.observer != "free_pivot":
             yield "    if what it slides on rubs, --observer free_pivot stands more of that"
         yield f"    in the reduced model: {IN_THE_MODEL}; not: {NOT_IN_THE_MODEL}"

@@ -39,7 +39,7 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
         The model, all joints named, and the path to call it by in messages.
 
     Raises:
-        InputError: The file is no MJCF, does not compile, or disables a feature that mounting needs.
+        InputError: The file is no MJCF, does not compile, disables what mounting needs, or has a closed chain.
     """
     if isinstance(robot, (str, Path)):
         path = expanded(robot, "ROBOT")
@@ -62,6 +62,13 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
         raise InputError(f'{path}: <option gravity="{gravity}"/> does not pull down: there is nothing to balance')
     _bake_masses(spec, model)
     _name_all(spec)
+    for equality in spec.equalities:
+        kind = BAD_CONNECTIONS.get(equality.type)
+        if kind and not joint_held(spec, equality):
+            raise InputError(
+                f"<{kind}> ties {equality.name1!r} and {equality.name2 or 'the world'!r} together: a closed "
+                "chain, whose joints cannot be held one by one"
+            )
     return spec, path
 
 
@@ -133,37 +140,6 @@ def body_of(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody:
         names = [body.name for body in spec.bodies if body.name != "world"]
         raise InputError(f"--body {name}: no such body; {nearest(name, names, 'its bodies')}")
     return body
-
-
-def check_names(spec: mujoco.MjSpec, names: Sequence[str]) -> None:
-    """Check that no new element has a name that is taken.
-
-    Raises:
-        InputError: A name is taken.
-    """
-    existing_names = {
-        element.name
-        for kind in (spec.bodies, spec.frames, spec.joints, spec.sites, spec.sensors, spec.actuators)
-        for element in kind
-    }
-    for name in names:
-        if name in existing_names:
-            raise InputError(f"has an element {name!r} already, which a mounted pair brings: rename it")
-
-
-def check_chains(spec: mujoco.MjSpec) -> None:
-    """Check that the robot is a tree: the joints of a closed chain cannot be held one by one.
-
-    Raises:
-        InputError: Two bodies are tied together by a constraint.
-    """
-    for equality in spec.equalities:
-        kind = BAD_CONNECTIONS.get(equality.type)
-        if kind and not joint_held(spec, equality):
-            raise InputError(
-                f"<{kind}> ties {equality.name1!r} and {equality.name2 or 'the world'!r} together: a closed "
-                "chain, whose joints cannot be held one by one"
-            )
 
 
 def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> None:
@@ -263,8 +239,7 @@ def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str) ->
     if missing:
         raise InputError(f"the robot has an axis already, and yet {missing[0]}")
     if not name:
-        known = f" {', '.join(filter(None, names))}" if any(names) else ""
-        raise InputError(f"the robot has an axis{known} already: give the new one a name, such as --name pitch")
+        raise InputError("the robot has an axis already: give the new one a name, such as --name pitch")
     key, names_of = model.key(EQUILIBRIUM_KEY).id, axis_modules(model)
     axes = [find_axis(model, key, axis, names_of[axis]) for axis in names]
     modules = [module for axis in axes for module in axis.modules]

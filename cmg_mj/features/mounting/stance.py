@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -231,31 +231,25 @@ def stand_upright(
 
 
 def _all_balanced(model: mujoco.MjModel, start: Support, hinge: str, others: Sequence[str]) -> Support:
-    """Turn the hinges of all axes so that the mass on each hinge is above it."""
-    line = model.joint(hinge).id
-    pose = start.pose
-    for joint in [*(model.joint(other).id for other in others), line] * (2 if others else 0):
+    """Turn the hinges of all axes so that the mass on each hinge is above it.
+
+    Of several hinges none may turn: the modules of one axis are square to its hinge only while the other hinges rest.
+    """
+    line, pose = model.joint(hinge).id, start.pose
+    several = [*(model.joint(other).id for other in others), line] if others else []
+    for joint in several * 2:
         direction = start.direction if joint == line else posed(model, pose).xaxis[joint].copy()
         pose = _balanced(model, pose, joint, direction).pose  # which moves what another carries
-    return _balanced(model, pose, line, start.direction)
-
-
-def check_unturned(
-    model: mujoco.MjModel, poses: Mapping[str, np.ndarray], qpos: np.ndarray, hinges: Sequence[str]
-) -> None:
-    """Check that no hinge turned: the modules of one axis are square to its hinge only while the other hinges rest.
-
-    Raises:
-        InputError: A hinge has to turn for the robot to stand upright.
-    """
-    for name in hinges:
-        turned = math.degrees(qpos[model.joint(name).qposadr[0]] - poses[name][0])
+    support = _balanced(model, pose, line, start.direction)
+    for joint in several:
+        turned = math.degrees((support.pose - start.pose)[model.jnt_qposadr[joint]])
         if abs(turned) > TRUE_DEG:
             raise InputError(
-                f"to stand upright on all axes the hinge {name!r} has to turn by {turned:.3g} deg, and the "
-                "modules of another axis would stand crooked: place the modules above both hinges (--position), or "
-                "mount the first axis in a keyframe in which its mass is above both"
+                f"to stand upright on all axes the hinge {model.joint(joint).name!r} has to turn by {turned:.3g} deg, "
+                "and the modules of another axis would stand crooked: place the modules above both hinges "
+                "(--position), or mount the first axis in a keyframe in which its mass is above both"
             )
+    return support
 
 
 def under_and_height(

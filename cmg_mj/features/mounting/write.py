@@ -13,7 +13,6 @@ from cmg_mj.features.export.names import LONGEST, RESERVED
 from cmg_mj.features.mounting.limits import PUSH_S, PairDemands, Prospects, pair_demands, prospects
 from cmg_mj.features.mounting.mount import PLUGIN, MountedRobot, check_target, mount, with_scenario
 from cmg_mj.features.mounting.push import SimulatedPush, TimeLimit, simulated_push
-from cmg_mj.features.mounting.request import MountRequest
 from cmg_mj.features.plugin.make import Plugin, make_plugin, require_tools, write_plugin
 from cmg_mj.features.plugin.tables import NAMES_IN_USE
 from cmg_mj.inputs.files import expanded
@@ -60,11 +59,6 @@ class MountResult:
     demands: PairDemands
     plugin: Plugin | None = None
 
-    @property
-    def scenario_path(self) -> Path:
-        """The scenario's file."""
-        return self.path.with_suffix(".toml")
-
     def figures(self) -> dict[str, Any]:
         """Return the figures that `cmg-mj mount --json` prints."""
         simulated = self.simulated
@@ -87,24 +81,24 @@ class MountResult:
 
 def mount_and_write(
     robot: str | Path,
-    request: MountRequest,
     target: str | Path,
     observer: str,
     *,
     overwrite: bool = False,
     time_limit: TimeLimit | None = None,
     with_plugin: bool = False,
+    **request: Any,
 ) -> MountResult:
     """Mount a pair on a robot, find its limits, and write the model with a scenario beside it.
 
     Args:
         robot: The robot's MJCF file.
-        request: The body, the axis and the modules.
         target: The model's file, `.xml`; the scenario gets the same name with `.toml`.
         observer: Observer in the scenario's loop.
         overwrite: Whether the files of an earlier mount are replaced. Others never are.
         time_limit: The time to try in MuJoCo what the robot stands; None to leave that out.
         with_plugin: Whether a plugin of MuJoCo is written too, into a folder beside the model.
+        **request: Arguments of `mount`, all of them.
 
     Returns:
         The robot, its files and its limits.
@@ -112,13 +106,13 @@ def mount_and_write(
     Raises:
         InputError: The robot or the request does not allow it, or a file cannot be written.
     """
-    file, axis = expanded(target, "-o"), request.name
+    file, axis = expanded(target, "-o"), request["name"]
     OBSERVER_CLASSES.find(observer)
     endings = [".xml", ".toml", *([PLUGIN] if with_plugin else [])]
     check_target(file, expanded(robot, "ROBOT"), endings, overwrite=overwrite)
     if with_plugin:
         require_tools()
-    mounted = mount(robot, **vars(request))
+    mounted = mount(robot, **request)
     simulated = plugin = None
     with with_scenario(file) as model:
         experiment = write_scenario(mounted.save(model), mounted.path, observer, axis=axis)
@@ -133,7 +127,7 @@ def mount_and_write(
             with RunFolder(file.with_name(file.stem + PLUGIN), overwrite=True) as folder:
                 plugin = write_plugin(made, folder)
     plant = experiment.plant.single_axis(axis)
-    demands = pair_demands(plant, experiment.law.rate_limit, request.scale)
+    demands = pair_demands(plant, experiment.law.rate_limit, request["scale"])
     return MountResult(mounted, file, plant, observer, limits, simulated, demands, plugin)
 
 

@@ -152,7 +152,7 @@ def _series(run: Run, plant: Plant, observers: Sequence[LegendEntry], header: Re
     yield _bounds("command/limit", "rate limit", time, header.rate_limit_rad_s)
     for i, module in enumerate(plant.axis.modules):
         color = MODULES[i % len(MODULES)]
-        part = rr.escape_entity_path_part(module.short_name)
+        part = rr.escape_entity_path_part(module.name.rpartition("/")[2])
         angle = t[f"angle/{module.name}/gimbal_rad"] - module.gimbal_zero
         speed = t[f"rate/{module.name}/flywheel_rad_s"] * np.sign(module.speed)
         # the modules' speeds agree: the first one's line is wider, and shines through
