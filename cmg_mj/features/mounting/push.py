@@ -40,12 +40,6 @@ MAX_CEILINGS = 8.0
 """Largest push that is tried, in shares of the ceiling, which springs and damping let a robot exceed."""
 MARGIN = 0.1
 """The largest push found is reduced by this share, and again until the other worlds stand it."""
-SearchProgress = Callable[[float, str], None]
-"""Called with the time that the search has taken [s], and what it tries."""
-
-
-class OutOfTimeError(Exception):
-    """The search has taken as long as it may."""
 
 
 @dataclass
@@ -54,12 +48,12 @@ class TimeLimit:
 
     Args:
         longest_s: So long [s].
-        on_progress: Called at every check.
+        on_progress: Called at every check, with the time that the search has taken [s], and what it tries.
         clock: Returns the time [s].
     """
 
     longest_s: float = MAX_SEARCH_S
-    on_progress: SearchProgress = lambda *_: None
+    on_progress: Callable[[float, str], None] = lambda *_: None
     clock: Callable[[], float] = time.monotonic
 
     def __post_init__(self) -> None:
@@ -69,12 +63,12 @@ class TimeLimit:
         """Show the progress.
 
         Raises:
-            OutOfTimeError: The time is over.
+            TimeoutError: The time is over.
         """
         passed = self.clock() - self._start
         self.on_progress(min(passed, self.longest_s), now)
         if passed > self.longest_s:
-            raise OutOfTimeError
+            raise TimeoutError
 
 
 class SimulatedPush(NamedTuple):
@@ -129,7 +123,7 @@ def simulated_push(
         if standing == WORLDS and limits.noisy:
             worlds += OTHER_WORLDS
             standing += unpushed(range(WORLDS, worlds))
-    except OutOfTimeError:
+    except TimeoutError:
         return SimulatedPush(None, complete=False)
     if standing < worlds:
         return SimulatedPush(standing, worlds=worlds)
@@ -159,7 +153,7 @@ def simulated_push(
             result = attempt(found, range(WORLDS, WORLDS + OTHER_WORLDS), longer)
             if not result.fallen:
                 return SimulatedPush(standing, found, True, result.servo_torque, result.servo_rate, worlds=worlds)
-    except OutOfTimeError:
+    except TimeoutError:
         return SimulatedPush(standing, found or (1.0 - MARGIN) * low, complete=False, worlds=worlds)
     return SimulatedPush(standing, worlds=worlds)
 
