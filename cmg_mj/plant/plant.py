@@ -317,9 +317,10 @@ def load_plant(
             wrong = complaints(PlantSettings, error.errors(), fields)
             raise InputError("; ".join(f"plant.{clause}" for clause in wrong)) from error
     for name, section in sections.items():
-        if name not in entries("edit") or not isinstance(section, entries("section")[name]):
-            known = {edit: entries("section")[edit].__name__ for edit in entries("edit")}
-            raise InputError(f"sections: {name!r}: no such section, or not of its class: {known}")
+        if name not in entries("edit"):
+            raise InputError(f"sections: {name!r}: no such section; {nearest(name, entries('edit'))}")
+        if not isinstance(section, entries("section")[name]):
+            raise InputError(f"sections: {name}: must be a {entries('section')[name].__name__}")
     path = find("models", settings.model, ".xml", "plant.model =", beside)
     with set_control_callback(None):  # compiling a model runs it
         return Plant(build(path, settings, sections), settings, sections, axis_settings, grid)
