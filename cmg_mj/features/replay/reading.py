@@ -126,7 +126,7 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         notes=tuple(notes),
         options=replace(options, units={role: column.unit or "s" for role, column in columns.items()}),
         row_period_s=period,
-        white_noise=white_noise_of(segments, period),
+        white_noise=white_noise_of(segments, period, dt),
     )
 
 
