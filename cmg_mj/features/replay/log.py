@@ -71,6 +71,9 @@ class LogNoise(NamedTuple):
     """Correlation of both; 0 where it cannot be told from 0."""
 
 
+KNOWN_SENSORS = LogNoise("the sensors are known", None, 0.0)
+
+
 @dataclass(frozen=True)
 class ReadOptions:
     """Options with which a log is read; the command line has one option for each.
@@ -143,7 +146,7 @@ class Log:
     options: ReadOptions = ReadOptions()
     scenario: Mapping[str, Any] | None = None
     row_period_s: float | None = None
-    white_noise: LogNoise = LogNoise("the sensors are known", None, 0.0)
+    white_noise: LogNoise = KNOWN_SENSORS
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]

@@ -20,7 +20,6 @@ from cmg_mj.features.replay.log import (
     EVEN,
     ONE_ACCELEROMETER,
     REFERENCE,
-    UNITS,
     Column,
     Log,
     ReadOptions,
@@ -106,21 +105,17 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
             raise InputError(f"{path}: the reference has no number where the tilt has one")
         if np.ptp(known) == 0.0:
             raise InputError(f"{path}: the reference is {known[0]:g} rad/s in every row: leave it out")
-    notes += _gravity_remarks(columns, signals, options.scale)
+    notes += _gravity_remarks(signals, options.scale)
     if "ax" in signals:
         notes.append("the tilt is atan2(-ax, az): an acceleration of the sensor by 0.1 g puts it off by 5.7 deg")
-    present = {
-        "gimbals": {"y2_rad", HELD} <= measured.keys(),
-        "acceleration": "acceleration_rad_s2" in measured,
-        "reference": "rate" in signals,
-    }
+    needed = {"gimbals": {"y2_rad", HELD}, "acceleration": {"acceleration_rad_s2"}, "reference": {"rate"}}
     ends = np.cumsum([0, *(len(segment.time) for segment in segments)]).tolist()
     return Log(
         path.stem,
         dt,
         joined,
         [slice(start, end) for start, end in pairwise(ends)],
-        frozenset(name for name, known in present.items() if known),
+        frozenset(name for name, columns in needed.items() if columns <= {*measured, *signals}),
         tilt=geometry,
         windows=_windows_inside(path, options.windows_s, joined["time_s"]),
         notes=tuple(notes),
@@ -430,40 +425,36 @@ def _reference(segments: Sequence[Segment], time: np.ndarray, reference: np.ndar
         gap = GAP_PERIODS * float(np.median(np.diff(stamps)))
         slack = 1e-6 * gap
         after = np.clip(np.searchsorted(stamps, grid, side="right"), 1, len(stamps) - 1)
-        near = np.minimum(np.abs(grid - stamps[after - 1]), np.abs(stamps[after] - grid)) <= slack
-        known = (grid >= stamps[0] - slack) & (grid <= stamps[-1] + slack)
-        known &= (stamps[after] - stamps[after - 1] <= gap) | near
+        before, later = grid - stamps[after - 1], stamps[after] - grid
+        known = (before >= 0.0) & (later >= 0.0) & (before + later <= gap)
+        known |= np.minimum(np.abs(before), np.abs(later)) <= slack
         values = _resample(np.clip(grid, stamps[0], stamps[-1]), stamps, reference, gap)
         sampled.append(np.where(known, values, np.nan))
     return np.concatenate(sampled)
 
 
-def _gravity_remarks(columns: Mapping[str, Column], signals: Values, scale: Mapping[str, float]) -> list[str]:
+def _gravity_remarks(signals: Values, scale: Mapping[str, float]) -> list[str]:
     """Compare the size and the sign of each accelerometer's specific force with gravity's, by their medians.
 
     Returns:
         A line for each that is wrong, with the options that cure it.
     """
     remarks = []
-    units = UNITS["acceleration"]
     for x, z in (ACCELEROMETERS[:2], ACCELEROMETERS[2:], ONE_ACCELEROMETER):
         if x not in signals:
             continue
         size = float(np.nanmedian(np.hypot(signals[x], signals[z]))) / STANDARD_GRAVITY
-        upward = float(np.nanmedian(signals[z]))
-        scales = {role: scale.get(role, 1.0) for role in (x, z)}
+        upward = float(np.nanmedian(signals[z])) / STANDARD_GRAVITY
+        now = {role: scale.get(role, 1.0) for role in (x, z)}
         if size > 0.0 and not NEAR[0] <= size <= NEAR[1]:
-            now = units[columns[z].unit or ""]
-            fits = {unit: abs(math.log(now / units[unit] / size)) for unit in units}
-            unit = min(units, key=lambda unit: fits[unit])
-            cure = f"--units {x}={unit},{z}={unit}"
-            if not fits[unit] < math.log(NEAR[1]):
-                cure = "--scale " + ",".join(f"{role}={factor / size:.4g}" for role, factor in scales.items())
-            remarks.append(f"the specific force of {x} and {z} is {size:.4g} times gravity's 9.81 m/s^2: {cure}")
-        elif upward < 0.0:
-            turned = ",".join(f"{role}={-factor:g}" for role, factor in scales.items())
+            cure = ",".join(f"{role}={factor / size:.4g}" for role, factor in now.items())
             remarks.append(
-                f"the median of {z} is {upward / STANDARD_GRAVITY:.2g} g, so the tilt is beyond 90 deg: --scale "
-                f"{turned} if the sensor shows gravity itself, --scale {z}={-scales[z]:g} if it is upside down"
+                f"the specific force of {x} and {z} is {size:.4g} times gravity's 9.81 m/s^2: --scale {cure}"
+            )
+        elif upward < 0.0:
+            turned = ",".join(f"{role}={-factor:g}" for role, factor in now.items())
+            remarks.append(
+                f"the median of {z} is {upward:.2g} g, so the tilt is beyond 90 deg: --scale {turned} if the sensor "
+                f"shows gravity itself, --scale {z}={-now[z]:g} if it is upside down"
             )
     return remarks

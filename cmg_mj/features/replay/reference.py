@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.features.replay.log import REFERENCE, UNITS, Log
 from cmg_mj.features.replay.noise import noise_remarks
-from cmg_mj.features.replay.scores import jackknife_error, jackknife_stretches, lag_with_error
+from cmg_mj.features.replay.scores import STRETCHES, jackknife_error, jackknife_stretches, lag_with_error
 
 SPAN_S = 0.2
 """Time over which increments of the tilt and of the integrated reference are compared [s]; slopes are mostly noise."""
@@ -64,50 +65,63 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
     span = max(2, round(SPAN_S / dt))
     pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
     rises = [y[span:] - y[:-span] for y, _ in pieces]
-    lag_s, lag_error = lag_with_error([_travelled(rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
-    travels = [_travelled(rate, span, dt, lag_s or 0.0) for _, rate in pieces]
-    pairs = np.stack([np.concatenate([*parts, []]) for parts in (travels, rises)])
-    line = _line(pairs, span * dt)
+    lag_s, lag_error = lag_with_error([partial(_travelled, rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
+    sums, middle = np.zeros((STRETCHES, 3, 3)), np.zeros(3)
+    for number, piece, rows in jackknife_stretches([len(rise) for rise in rises], 0):
+        travel = _travelled(pieces[piece][1], span, dt, lag_s or 0.0, rows)
+        pairs = np.stack([np.ones(len(travel)), travel, rises[piece][rows]])[:, np.isfinite(travel)]
+        if not pairs.size:
+            continue
+        if not sums.any():
+            middle[1:] = pairs[1:].mean(axis=1)  # sums of numbers near zero lose nothing
+        pairs -= middle[:, None]
+        sums[number] += pairs @ pairs.T
+    whole = sums.sum(axis=0)
+    line = _line(whole, middle, span * dt)
     if line is None:
         return Alignment(lag_s, None, None, None)
-    stretches = [rows for *_, rows in jackknife_stretches([pairs.shape[1]], 0)]
-    others = [_line(np.delete(pairs, rows, axis=1), span * dt) for rows in stretches if np.isfinite(pairs[0, rows]).any()]
-    errors = jackknife_error(others)
+    errors = jackknife_error([_line(whole - stretch, middle, span * dt) for stretch in sums if stretch[0, 0]])
     return Alignment(lag_s, *line, lag_error, *(() if errors is None else errors[:2].tolist()))
 
 
-def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float) -> np.ndarray:
-    """Integrate a rate, shifted by its lag, over each span of samples; NaN where it is unknown, (n - span,)."""
+def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float, rows: slice) -> np.ndarray:
+    """Integrate a rate, shifted by its lag, over each span of samples; NaN where it is unknown, (n - span,)[rows]."""
+    start, stop, _ = rows.indices(len(rate) - span)
+    margin = math.ceil(abs(lag_s) / dt) + 2
+    first = max(0, start - margin)
+    rate = rate[first : stop + span + margin]
     clock = np.arange(len(rate)) * dt
     steps = (rate[1:] + rate[:-1]) * dt / 2.0
     travelled, unknown = (
         np.interp(clock + lag_s, clock, np.concatenate([[0.0], np.cumsum(values)]), left=np.nan, right=np.nan)
         for values in (np.nan_to_num(steps), np.isnan(steps))
     )
-    return np.where(unknown[span:] == unknown[:-span], travelled[span:] - travelled[:-span], np.nan)
+    known = unknown[span:] == unknown[:-span]
+    return np.where(known, travelled[span:] - travelled[:-span], np.nan)[start - first : stop - first]
 
 
-def _line(pairs: np.ndarray, length: float) -> tuple[float, float, float] | None:
-    """Fit a line, rise = start + slope travel, to the pairs of both that are known, (2, n).
+def _line(sums: np.ndarray, middle: np.ndarray, length: float) -> tuple[float, float, float] | None:
+    """Fit a line, rise = start + slope travel, to sums of products of 1, travel and rise.
 
     Args:
-        pairs: Travels, NaN where they are unknown, and rises.
+        sums: Sums, (3, 3).
+        middle: Numbers that were subtracted, (3,).
         length: Time over which the tilt rises [s].
 
     Returns:
         Slope, start by the length, and correlation; None if there is too little motion.
     """
-    pairs = pairs[:, np.isfinite(pairs[0])]
-    n = pairs.shape[1]
+    n = sums[0, 0]
     if n < 3:
         return None
-    (xx, xy), (_, yy) = np.cov(pairs, bias=True)
-    x, y = pairs.mean(axis=1)
-    rounding = (n * np.finfo(float).eps * np.array([x, y])) ** 2
-    if not (xx > rounding[0] and yy > rounding[1]):
+    means = sums[0, 1:] / n
+    (xx, xy), (_, yy) = sums[1:, 1:] - n * np.outer(means, means)
+    rounding = n * (n * np.finfo(float).eps * (means + middle[1:])) ** 2
+    if not xx > rounding[0] or not yy > rounding[1]:
         return None
     slope = xy / xx
-    return float(slope), float(y - slope * x) / length, float(xy / math.sqrt(xx * yy))
+    start = (means[1] + middle[2]) - slope * (means[0] + middle[1])
+    return float(slope), float(start) / length, float(xy / math.sqrt(xx * yy))
 
 
 def alignment_of(log: Log) -> Alignment | None:
@@ -143,7 +157,7 @@ def judge(log: Log, aligned: Alignment) -> str:
     comes, cures = "", []
     if lag is not None and abs(lag) > max(LATE * max(log.dt, log.row_period_s or 0.0), CLEAR * lag_error):
         comes = f"the reference comes {abs(lag) * 1e3:.4g} ms {'behind' if lag > 0.0 else 'before'}; "
-        cures.append(f"--delay {options.delay_s + lag:.6g}")
+        cures.append(f"--delay {options.delay_s + lag:.4g}")
     factor = 1.0
     if abs(scale - 1.0) > max(OFF, CLEAR * scale_error):
         factor = scale

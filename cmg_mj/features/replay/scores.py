@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -25,6 +25,8 @@ TAPS = 15
 RECONSTRUCTED_S = 1.0
 """Length of the stretches over which the estimated rate is integrated [s]."""
 
+Piece = Callable[[slice], np.ndarray]
+"""A signal that is computed a stretch at a time: successive samples, (n,)."""
 
 
 def scores(log: Log, rate: np.ndarray, scored: np.ndarray, noise_gain: float | None) -> Figures:
@@ -41,8 +43,8 @@ def scores(log: Log, rate: np.ndarray, scored: np.ndarray, noise_gain: float | N
     """
     counted = [part.start + np.flatnonzero(scored[part]) for part in log.parts]
     pieces = [slice(rows[0], rows[-1] + 1) for rows in counted if len(rows)]
-    against = _against if "reference" in log.has else _against_tilt
-    return {**against(log, rate, scored, pieces), "noise_gain_1_s": noise_gain}
+    figures = _against(log, rate, scored, pieces) if "reference" in log.has else _against_tilt(log, rate, pieces)
+    return {**figures, "noise_gain_1_s": noise_gain}
 
 
 def _against(log: Log, rate: np.ndarray, scored: np.ndarray, pieces: Sequence[slice]) -> Figures:
@@ -63,7 +65,7 @@ def _against(log: Log, rate: np.ndarray, scored: np.ndarray, pieces: Sequence[sl
     return figures
 
 
-def _against_tilt(log: Log, rate: np.ndarray, scored: np.ndarray, pieces: Sequence[slice]) -> Figures:
+def _against_tilt(log: Log, rate: np.ndarray, pieces: Sequence[slice]) -> Figures:
     """Compute the reconstruction error and the roughness of an estimate.
 
     For the first, the rate is integrated by the trapezoidal rule over `RECONSTRUCTED_S` at a time, each with the
@@ -112,11 +114,11 @@ def lag(behind: Sequence[np.ndarray], ahead: Sequence[np.ndarray], dt: float) ->
         The lag [s], negative if the signal comes before the other. None for no motion, a low correlation (`ALIKE`), a
         peak at the end, or a standard error (jackknife over `STRETCHES`) above a sample and above half of the lag.
     """
-    return lag_with_error(behind, ahead, dt)[0]
+    return lag_with_error([piece.__getitem__ for piece in behind], ahead, dt)[0]
 
 
 def lag_with_error(
-    behind: Sequence[np.ndarray], ahead: Sequence[np.ndarray], dt: float
+    behind: Sequence[Piece], ahead: Sequence[np.ndarray], dt: float
 ) -> tuple[float, float] | tuple[None, None]:
     """Find a lag as `lag` does, with its standard error [s]."""
     size = max((len(piece) for piece in ahead), default=0)
@@ -126,34 +128,30 @@ def lag_with_error(
     stretches = _sums(behind, ahead, reach)
     whole = stretches.sum(axis=0)
     peak = _peak_of(whole)
-    if peak is None:
-        return None, None
     error = jackknife_error([_peak_of(whole - stretch) for stretch in stretches if stretch[0].any()])
-    if error is None or error > max(1.0, abs(peak) / 2.0):
+    if peak is None or error is None or error > max(1.0, abs(peak) / 2.0):
         return None, None
     return peak * dt, float(error) * dt
 
 
-def _sums(behind: Sequence[np.ndarray], ahead: Sequence[np.ndarray], reach: int) -> np.ndarray:
+def _sums(behind: Sequence[Piece], ahead: Sequence[np.ndarray], reach: int) -> np.ndarray:
     """Sum counts, values, squares and products of the known pairs, (stretches, 6, lags)."""
     from scipy.signal import correlate
 
     # Numbers of like size: of the products of transforms, what is far smaller than the largest is lost.
-    middle_x, middle_y = map(_mean, (behind, ahead))
+    middle_x, middle_y = map(_mean, ([piece(slice(None)) for piece in behind], ahead))
     sums = np.zeros((STRETCHES, 6, 2 * reach + 1))
     for stretch, piece, rows in jackknife_stretches([len(piece) for piece in ahead], 2 * reach):
         around = slice(max(0, rows.start - reach), rows.stop + reach)
-        x, y = behind[piece][around] - middle_x, ahead[piece][rows] - middle_y
+        x, y = behind[piece](around) - middle_x, ahead[piece][rows] - middle_y
         known_x, known_y = np.isfinite(x), np.isfinite(y)
         x, y = np.where(known_x, x, 0.0), np.where(known_y, y, 0.0)
         ones_x, ones_y = known_x.astype(float), known_y.astype(float)
         # x's row i is y's row i + around.start - rows.start.
         middle = len(y) - 1 + rows.start - around.start
-        first, last = max(0, middle - reach), min(len(x) + len(y) - 1, middle + reach + 1)
-        into = slice(first - middle + reach, last - middle + reach)
         pairs = ((ones_x, ones_y), (x, ones_y), (ones_x, y), (x * x, ones_y), (ones_x, y * y), (x, y))
         for i, (a, b) in enumerate(pairs):
-            sums[stretch, i, into] += correlate(a, b, mode="full", method="fft")[first:last]
+            sums[stretch, i] += np.pad(correlate(a, b, method="fft"), reach)[middle : middle + 2 * reach + 1]
     sums[:, 0] = np.rint(sums[:, 0])
     return sums
 

@@ -45,7 +45,6 @@ class Reasons:
         self._field = field
         self.counts: Counter[tuple[str, str]] = Counter()
         self._first: dict[tuple[str, str], str] = {}
-        self._differ: set[tuple[str, str]] = set()
 
     def add(self, outcome: str, reason: str | None) -> None:
         """Count a trial that neither stood nor fell."""
@@ -54,14 +53,13 @@ class Reasons:
             text = text.partition(f"{self._field}=")[2].partition(": ")[2] or text
         text = shortened(text, MAX_REASON)
         kind = (outcome, NUMBER.sub("#", text))
-        if self._first.setdefault(kind, text) != text:
-            self._differ.add(kind)
+        self._first.setdefault(kind, text)
         self.counts[kind] += 1
 
     def most(self, n: int) -> list[str]:
         """List the most frequent kinds of reasons, with counts."""
         return [
-            f"{count} {kind[0]}{', such as' if kind in self._differ else ''}: {self._first[kind]}"
+            f"{count} {kind[0]}{', such as' if count > 1 else ''}: {self._first[kind]}"
             for kind, count in self.counts.most_common(n)
         ]
 
@@ -214,7 +212,6 @@ class LeadRow(NamedTuple):
         leads: Points at which it leads; of a baseline, at which its error is less than the leader's.
         surely: Points at which it does so beyond 95 % intervals.
         close: Points at which it stood in every world, with at most `CLOSE` times the leader's error.
-        points: Points in all.
     """
 
     name: str
@@ -222,7 +219,6 @@ class LeadRow(NamedTuple):
     leads: int
     surely: int
     close: int
-    points: int
 
 
 def least_error(figure: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -290,5 +286,5 @@ def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
             surely = [leads_here and (i < 0 or _is_less(own, all_[i])) for leads_here, own, all_, i in against]
         close = errors.mean(axis=-1) <= CLOSE * error
         counts = (int(np.sum(mask)) for mask in (leads, surely, close))
-        rows.append(LeadRow(name, name in ahead, *counts, points=len(figure)))
+        rows.append(LeadRow(name, name in ahead, *counts))
     return sorted(rows, key=lambda row: row.is_baseline)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -124,33 +125,26 @@ def _study(
     sample: int | None,
 ) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
-    from cmg_mj.features.sweeps.study import (
-        SweepSection,
-        SweepStudy,
-        locate_tracks,
-        parse_axis,
-        read_study,
-        scenario_of,
-    )
+    from cmg_mj.features.sweeps.study import SweepStudy, locate_tracks, parse_axis, read_study
     from cmg_mj.inputs.files import find
+    from cmg_mj.scenario.loading import load_scenario
 
     settings = [setting.partition("=") for setting in varied]
     axes = [parse_axis(field, values, f"--vary {field}{equals}{values}") for field, equals, values in settings]
     file = read_study(arguments.name)
-    section = SweepSection() if file is None else file.sweep
-    if file is None:
-        scenario = arguments.scenario()
+    where = f"{arguments.name}: vary."
+    axes = axes or [parse_axis(field, values, where + field) for field, values in file.vary.items()]
+    if isinstance(file.scenario, str):
+        scenario = replace(arguments, name=file.scenario).scenario()
     else:
-        scenario = scenario_of(arguments.name, file, arguments.settings)
+        scenario = load_scenario(arguments.name, arguments.settings, fields=file.scenario)
         if arguments.seed is not None:
             scenario = scenario.model_copy(update={"seed": arguments.seed})
-        where = f"{arguments.name}: vary."
-        axes = axes or [parse_axis(field, values, where + field) for field, values in file.vary.items()]
     beside = find("scenarios", arguments.name, ".toml", "scenario").parent
     return SweepStudy(
         scenario,
         tuple(locate_tracks(axis, beside) for axis in axes),
-        tuple(observers or section.observers or [scenario.observer.kind]),
-        worlds or section.worlds,
-        *((section.design, section.n) if sample is None else ("sample", sample)),
+        tuple(observers or file.sweep.observers or [scenario.observer.kind]),
+        worlds or file.sweep.worlds,
+        *((file.sweep.design, file.sweep.n) if sample is None else ("sample", sample)),
     )

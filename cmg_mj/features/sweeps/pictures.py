@@ -69,18 +69,13 @@ class Map:
     falls: Mapping[str, np.ndarray]
 
 
-def is_number(value: object) -> bool:
-    """Return whether a field's value is a number, not true or false."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
 def pictures_of(trials: Trials) -> list[Picture]:
     """Draw curves over one varied numeric field, a map a figure over two in a grid; else nothing."""
     study = trials.study
     axes = [axis for axis in study.axes if not axis.values or len(axis.values) > 1]  # a range has no values
     worlds = f"{counted(study.worlds, 'world')} a cell"
     title = f"{study.scenario.title or 'Sweep'}: "
-    if not all(is_number(value) for axis in axes for value in axis.values):
+    if not all(type(value) in (int, float) for axis in axes for value in axis.values):
         return []
     if len(axes) == 1 and (trials.stood | trials.fell).any():
         return [Picture(CURVES, title + worlds, partial(curves, trials, axes[0].field))]

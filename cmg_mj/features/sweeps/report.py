@@ -209,9 +209,9 @@ def _leads(trials: Trials) -> list[str]:
     is_grid = study.design == "grid"
     table = []
     for row in lead_rows(trials, ERROR):
-        _, low, high = fell_interval(row.leads, row.points)
+        _, low, high = fell_interval(row.leads, study.n_points)
         interval = [] if is_grid else [f"{100.0 * low:.1f} % to {100.0 * high:.1f} %"]
-        leads, *counts = (f"{count} of {row.points}" for count in (row.leads, row.surely, row.close))
+        leads, *counts = (f"{count} of {study.n_points}" for count in (row.leads, row.surely, row.close))
         table.append([f"{row.name} (baseline)" if row.is_baseline else row.name, leads, *interval, *counts])
     head = ["observer", "leads", *([] if is_grid else ["95 % interval"]), "surely", "close"]
     return ["## Who leads", ABOUT_LEADS, markdown_table(head, table)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 import re
 import tomllib
@@ -28,7 +27,6 @@ from cmg_mj.plant.plant import Plant, load_scenario_plant
 from cmg_mj.results.baselines import RATES
 from cmg_mj.runs.batch import UNUSED, can_vary_in_batch
 from cmg_mj.runs.experiment import prepare
-from cmg_mj.scenario.loading import find_files, find_model, load_scenario
 from cmg_mj.scenario.schema import ObserverSettings, Scenario, parse_scenario
 from cmg_mj.scenario.time_grid import time_grid
 
@@ -229,7 +227,7 @@ class SweepStudy:
         """
         if not self.axes:
             raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")
-        for field, times in Counter(self._fields).items():
+        for field, times in Counter(self.fields).items():
             unused = "no trial depends on it" if field.partition(".")[0] in UNUSED else None
             if why := NOT_VARIED.get(field, unused):
                 raise InputError(f"--vary {field}: is not varied: {why}")
@@ -240,13 +238,12 @@ class SweepStudy:
                 raise InputError(
                     f"--vary {axis.field}: a range without a count is for --sample; write first:last:count"
                 )
-        if not _is_count(self.worlds):
-            raise InputError(f"worlds = {shown(self.worlds)}: must be a whole number, 1 or more")
-        n = shown(self.n)
         if self.design == "grid" and self.n != 0:
-            raise InputError(f"n = {n}: is for the design sample; a grid is every combination")
-        if self.design == "sample" and not _is_count(self.n):
-            raise InputError(f"--sample, n = {n}: must be a whole number of points, 1 or more")
+            raise InputError(f"n = {self.n}: is for the design sample; a grid is every combination")
+        counts = {"worlds": self.worlds, **({} if self.design == "grid" else {"--sample, n": self.n})}
+        for name, count in counts.items():
+            if not isinstance(count, (int, np.integer)) or count < 1:
+                raise InputError(f"{name} = {shown(count)}: must be a whole number, 1 or more")
         for name, times in Counter(self.observers).items():
             if not isinstance(name, str) or (":" not in name and name not in (*OBSERVERS, *RATES)):
                 known = nearest(str(name), [*OBSERVERS, *RATES])
@@ -257,7 +254,8 @@ class SweepStudy:
             raise InputError("observers: there must be one at least")
 
     @property
-    def _fields(self) -> list[str]:
+    def fields(self) -> list[str]:
+        """All varied fields."""
         return [field for axis in self.axes for field in axis.fields]
 
     @property
@@ -295,7 +293,7 @@ class SweepStudy:
     @property
     def apart(self) -> list[str]:
         """Varied fields whose values cannot run in one batch."""
-        return [field for field in self._fields if not can_vary_in_batch(field, self.scenario.controller.kind)]
+        return [field for field in self.fields if not can_vary_in_batch(field, self.scenario.controller.kind)]
 
     @cached_property
     def _order(self) -> np.ndarray:
@@ -378,10 +376,6 @@ class SweepStudy:
         }
 
 
-def _is_count(number: float | str | None) -> bool:
-    return isinstance(number, (int, np.integer)) and not isinstance(number, bool) and number >= 1
-
-
 def counted(n: int, noun: str) -> str:
     """Put a number before a noun: `1 world`, `2 worlds`."""
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
@@ -461,37 +455,23 @@ class StudyFile(BaseModel):
     scenario: str | dict[str, Any]
 
 
-def read_study(name: str) -> StudyFile | None:
-    """Read a study file; None of a scenario.
+def read_study(name: str) -> StudyFile:
+    """Read a study file; a scenario's is one without a section [sweep].
 
     Raises:
-        InputError: The file is neither.
+        InputError: Its sections are not written so.
     """
     path = find("scenarios", name, ".toml", "scenario")
     try:
         fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
-        return None  # as a scenario it is refused with what is wrong
+        fields = {}  # as a scenario it is refused with what is wrong
     if "vary" not in fields and "sweep" not in fields:
-        return None
+        fields = {"scenario": name}
     try:
         return StudyFile.model_validate(fields)
     except ValidationError as error:
         raise InputError(f"{name}: {'; '.join(complaints(StudyFile, error.errors(), fields))}") from error
-
-
-def scenario_of(name: str, file: StudyFile, settings: Sequence[str] = ()) -> Scenario:
-    """Load a study file's scenario, a table or a name, with settings `section.field=value` that replace its own."""
-    if isinstance(file.scenario, str):
-        return load_scenario(file.scenario, settings)
-    fields = {key: value for key, value in copy.deepcopy(file.scenario).items() if key != "versions"}
-    for setting in settings:
-        override(fields, setting)
-    scenario = parse_scenario(fields, f"{name} with --set {' --set '.join(settings)}" if settings else name)
-    beside = find("scenarios", name, ".toml", "scenario").parent
-    if not any(setting.partition("=")[0].strip() == "plant.model" for setting in settings):
-        scenario = find_model(scenario, beside)
-    return find_files(scenario, beside)
 
 
 MAY_NAME_TRACKS = re.compile(r"pivot(\.\d+(\.file)?)?")
