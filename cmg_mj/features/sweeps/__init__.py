@@ -78,7 +78,7 @@ def sweep(
     if isinstance(observers, str):
         raise InputError(f"observers = {observers!r}: must be a list of names, such as ['linear', 'ltv']")
     names = (base.observer.kind,) if observers is None else tuple(observers)
-    study = SweepStudy(base, axes, names, worlds, *(("grid", 0) if sample is None else ("sample", sample)))
+    study = SweepStudy(base, axes, names, worlds, sample)
     check_values(study)
     rows = (compute(study, *study.chunk(number)) for number in range(study.n_chunks))
     table = pa.concat_tables(table_of(chunk_rows, trials_schema(study)) for chunk_rows in rows)

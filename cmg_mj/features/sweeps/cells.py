@@ -32,38 +32,6 @@ CLOSE = 1.2
 """Factor on the leader's error up to which another observer is close to it."""
 
 
-class Reasons:
-    """Counts of the reasons why trials never ran to an end.
-
-    Reasons that differ in their numbers alone are of one kind, which the first of them stands for.
-
-    Args:
-        field: The last varied field: a refusal begins with the values of all, which are discarded.
-    """
-
-    def __init__(self, field: str) -> None:
-        self._field = field
-        self.counts: Counter[tuple[str, str]] = Counter()
-        self._first: dict[tuple[str, str], str] = {}
-
-    def add(self, outcome: str, reason: str | None) -> None:
-        """Count a trial that neither stood nor fell."""
-        text = " ".join((reason or "no reason is given").split())
-        if outcome == "refused" and f"{self._field}=" in text:
-            text = text.partition(f"{self._field}=")[2].partition(": ")[2] or text
-        text = shortened(text, MAX_REASON)
-        kind = (outcome, NUMBER.sub("#", text))
-        self._first.setdefault(kind, text)
-        self.counts[kind] += 1
-
-    def most(self, n: int) -> list[str]:
-        """List the most frequent kinds of reasons, with counts."""
-        return [
-            f"{count} {kind[0]}{', such as' if count > 1 else ''}: {self._first[kind]}"
-            for kind, count in self.counts.most_common(n)
-        ]
-
-
 class Trials:
     """The outcomes and figures of a sweep's trials, by cell: 8 bytes a figure.
 
@@ -74,7 +42,8 @@ class Trials:
     Attributes:
         study: The sweep.
         outcome: How each trial ended, (n_points, n_observers, n_worlds).
-        reasons: Counts of the reasons why trials were refused or stopped.
+        reasons: Outcome and kind of reason -> number of trials that were refused or stopped. Reasons that differ in
+            their numbers alone are of one kind, which the first of them stands for.
     """
 
     def __init__(self, study: SweepStudy, tables: Iterable[pa.Table]) -> None:
@@ -82,7 +51,8 @@ class Trials:
         shape = (study.n_points, len(study.observers), study.worlds)
         self.outcome = np.full(shape, "", dtype="U7")
         self._figures = {key: np.full(shape, math.nan) for key in COMPARED}
-        self.reasons = Reasons(study.axes[-1].fields[-1])
+        self.reasons: Counter[tuple[str, str]] = Counter()
+        self._first: dict[str, str] = {}
         for table in tables:
             observers = np.array([study.observers.index(name) for name in table["observer"].to_pylist()])
             at = (table["point"].to_numpy(), observers, table["world"].to_numpy())
@@ -90,9 +60,17 @@ class Trials:
             self.outcome[at] = outcomes
             for outcome, reason in zip(outcomes, table["reason"].to_pylist(), strict=True):
                 if outcome not in ("done", "fell"):
-                    self.reasons.add(outcome, reason)
+                    self.add_reason(outcome, reason)
             for key, values in self._figures.items():
                 values[at] = table[key].to_numpy(zero_copy_only=False)
+
+    def add_reason(self, outcome: str, reason: str | None) -> None:
+        """Count a trial that neither stood nor fell."""
+        text, field = " ".join((reason or "no reason is given").split()), f"{self.study.fields[-1]}="
+        if outcome == "refused" and field in text:  # it begins with the values of all fields
+            text = text.partition(field)[2].partition(": ")[2] or text
+        text = shortened(text, MAX_REASON)
+        self.reasons[outcome, self._first.setdefault(NUMBER.sub("#", text), text)] += 1
 
     @property
     def stood(self) -> np.ndarray:

@@ -170,7 +170,7 @@ def estimate_cost(study: SweepStudy) -> dict[str, float]:
     """
     thinned = study
     if study.trials > MAX_TRIALS and study.n_points > POINTS:  # points that lie alike, and are soon drawn
-        thinned = replace(study, design="sample", n=POINTS)
+        thinned = replace(study, sample=POINTS)
     trials_an_observer = study.n_points * study.worlds
     trials_a_chunk = min(CHUNK, trials_an_observer)
     plants = min(study.n_points, -(-trials_a_chunk // study.worlds))
@@ -337,7 +337,7 @@ def run(store: Store, left: Sequence[int], on_progress: OnProgress = no_progress
             what is finished is kept.
     """
     study = store.study
-    done = study.trials - sum(map(study.chunk_size, left))
+    done = study.trials_without(left)
     for number in left:
         size = study.chunk_size(number)
         store.keep(number, compute(study, *study.chunk(number), part_of(on_progress, done, size)))

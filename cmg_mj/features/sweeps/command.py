@@ -73,13 +73,11 @@ def sweep(
     from cmg_mj.features.sweeps.cells import COLUMNS, Trials, cells_of
     from cmg_mj.features.sweeps.chunks import Store, estimate_cost
     from cmg_mj.features.sweeps.chunks import run as run_here
-    from cmg_mj.features.sweeps.cluster import local_workers, on_cluster
+    from cmg_mj.features.sweeps.cluster import on_cluster
     from cmg_mj.features.sweeps.report import save, summary
-    from cmg_mj.features.sweeps.study import MAX_TRIALS, check_values, counted
+    from cmg_mj.features.sweeps.study import MAX_TRIALS, check_values
     from cmg_mj.scenario.resolve import safe_name
 
-    if cluster is not None:
-        local_workers(cluster)
     study = _study(arguments, varied, observers, worlds, sample)
     check_values(study)
     if dry_run:
@@ -92,15 +90,13 @@ def sweep(
         return
     if study.trials > MAX_TRIALS and not yes:
         raise InputError(
-            f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; for more than "
-            f"{MAX_TRIALS} give --yes (--dry-run prints the time and memory)"
+            f"--vary: {study.trials} trials; for more than {MAX_TRIALS} give --yes (--dry-run prints time and memory)"
         )
     path = output_path(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
     with nullcontext(run_here) if cluster is None else on_cluster(cluster) as run:
         store = Store.open(path, study, overwrite=overwrites())
         left = store.left()
-        before = study.trials - sum(map(study.chunk_size, left))
-        if before:
+        if before := study.trials_without(left):
             note(f"resuming: {before} of {study.trials} trials are done")
         with CtrlC() as ctrl_c:
             try:
@@ -146,5 +142,5 @@ def _study(
         tuple(locate_tracks(axis, beside) for axis in axes),
         tuple(observers or file.sweep.observers or [scenario.observer.kind]),
         worlds or file.sweep.worlds,
-        *((file.sweep.design, file.sweep.n) if sample is None else ("sample", sample)),
+        sample or file.sweep.points,
     )

@@ -79,7 +79,7 @@ def pictures_of(trials: Trials) -> list[Picture]:
         return []
     if len(axes) == 1 and (trials.stood | trials.fell).any():
         return [Picture(CURVES, title + worlds, partial(curves, trials, axes[0].field))]
-    if len(axes) == 2 and study.design == "grid":
+    if len(axes) == 2 and study.sample is None:
         across, up = axes
         return [
             Picture(name, f"{title}{a_map.label}, {worlds}", partial(draw_map, a_map, study.observers, across, up))
@@ -149,12 +149,10 @@ def maps(trials: Trials, across: VariedField, up: VariedField) -> dict[str, Map]
             found[name] = Map(heading(key), best, sure, each, baselines_ahead(study, figure, value), falls)
     if trials.fell.any():
         best, value = least(shares, places)
-        best[(shares[:, :, places] == value[:, :, None]).sum(axis=2) > 1] = -1  # several alike
-        sure = np.zeros(best.shape, dtype=bool)
-        for at in zip(*np.nonzero(best >= 0), strict=True):
-            others = [place for place in places if place != best[at]]
-            sure[at] = not (intervals[at][others, 1] <= intervals[at][best[at], 2]).any()
-        found[FALLS] = Map("share of falls", best, sure, falls, {}, falls)
+        best[(shares[:, :, places] == value[..., None]).sum(axis=2) > 1] = -1  # several alike
+        high = np.take_along_axis(intervals[..., 2], best[..., None], axis=2)
+        only = (intervals[:, :, places, 1] <= high).sum(axis=2) == 1  # the best itself
+        found[FALLS] = Map("share of falls", best, (best >= 0) & only, falls, {}, falls)
     return found
 
 

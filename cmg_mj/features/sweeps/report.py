@@ -92,7 +92,7 @@ def report(trials: Trials, pictures: Sequence[Picture]) -> str:
     study = trials.study
     sizes = ((study.n_points, "point"), (len(study.observers), "observer"), (study.worlds, "world"))
     counts = ", ".join(counted(n, noun) for n, noun in sizes)
-    is_grid = study.design == "grid"
+    is_grid = study.sample is None
     return "\n\n".join(
         [
             f"# {study.scenario.title or 'Sweep'}",
@@ -110,16 +110,16 @@ def report(trials: Trials, pictures: Sequence[Picture]) -> str:
 def summary(trials: Trials) -> str:
     """Write for the terminal: cells, reasons of unfinished trials."""
     parts = _cells(trials)
-    more = len(trials.reasons.counts) - 1
-    if more >= 0:
+    if trials.reasons:
+        more = len(trials.reasons) - 1
         others = f" (and {counted(more, 'other reason')}: see the report)" if more else ""
-        parts.append(f"{_count_unfinished(trials)}. {trials.reasons.most(1)[0]}{others}")
+        parts.append(f"{_count_unfinished(trials)}. {_reasons(trials, 1)[0]}{others}")
     return "\n\n".join(parts)
 
 
 def _varied(study: SweepStudy) -> list[str]:
     """Say what a table of the cells does not: a design's values of every field, a grid's fields that vary together."""
-    if study.design != "grid":
+    if study.sample is not None:
         return ["Varied:", "\n".join(f"- {axis.option}: {_values(axis)}" for axis in study.axes)]
     together = [axis.fields for axis in study.axes if len(axis.fields) > 1]
     return [f"With {first} go, alike: {', '.join(others)}." for first, *others in together]
@@ -141,7 +141,7 @@ def _format_value(value: SummaryValue) -> str:
 def _cells(trials: Trials) -> list[str]:
     """Show a grid's cells, a row a point, or how each observer does over the points of a design."""
     study = trials.study
-    if study.design != "grid":
+    if study.sample is not None:
         return _over_points(trials)
     fields = [axis.field for axis in study.axes]
     rows, every_cell = [], cells_of(trials)
@@ -181,14 +181,19 @@ def _over_points(trials: Trials) -> list[str]:
 
 def _unfinished(trials: Trials) -> list[str]:
     """List the most frequent reasons why trials were refused or stopped; nothing if there are no such trials."""
-    if not trials.reasons.counts:
+    if not trials.reasons:
         return []
     about = f"{_count_unfinished(trials)}; no mean counts them. Every one's reason is in {TRIALS}, the most frequent:"
-    return ["## Refused and stopped", about, "\n".join(f"- {reason}" for reason in trials.reasons.most(MAX_REASONS))]
+    return ["## Refused and stopped", about, "\n".join(f"- {reason}" for reason in _reasons(trials, MAX_REASONS))]
+
+
+def _reasons(trials: Trials, n: int) -> list[str]:
+    kinds = trials.reasons.most_common(n)
+    return [f"{count} {outcome}{', such as' if count > 1 else ''}: {text}" for (outcome, text), count in kinds]
 
 
 def _count_unfinished(trials: Trials) -> str:
-    return f"{trials.reasons.counts.total()} of {trials.study.trials} trials were refused or stopped"
+    return f"{trials.reasons.total()} of {trials.study.trials} trials were refused or stopped"
 
 
 def _pictures(trials: Trials, pictures: Sequence[Picture]) -> list[str]:
@@ -206,7 +211,7 @@ def _leads(trials: Trials) -> list[str]:
     study = trials.study
     if not study.references:
         return []
-    is_grid = study.design == "grid"
+    is_grid = study.sample is None
     table = []
     for row in lead_rows(trials, ERROR):
         _, low, high = fell_interval(row.leads, study.n_points)

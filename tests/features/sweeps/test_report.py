@@ -35,7 +35,7 @@ def test_of_a_design_an_observer_has_a_row_and_the_report_says_what_is_varied() 
         return None if name == "ltv" and world == 1 and point[BIAS] > 0.5 else point[BIAS] + 0.1 * world
 
     axes = {BIAS: "0:1", NOISE: "log:100:800", RATES: "100,200"}
-    trials = make_trials(axes, ("linear", "ltv", "kalman"), 2, error, design="sample", n=24)
+    trials = make_trials(axes, ("linear", "ltv", "kalman"), 2, error, sample=24)
     bias = np.array([trials.study.point(number)[BIAS] for number in range(24)])
     falls = bias > 0.5
     errors = bias + 0.05 * ~falls
@@ -60,8 +60,8 @@ def test_reasons_are_in_the_report_and_on_the_terminal() -> None:
     trials = make_trials({BIAS: "0,1"}, ("linear",), 4, lambda *_: 1.0)
     assert "refused" not in report(trials, []) + summary(trials)
     for reason in ("gone at t = 0.5 s", "gone at t = 1e-3 s", None):
-        trials.reasons.add("stopped", reason)
-    trials.reasons.add("refused", f"it with --set x=1 with a=1, {BIAS}=2: b.c = 2: must be\n  less: than 1")
+        trials.add_reason("stopped", reason)
+    trials.add_reason("refused", f"it with --set x=1 with a=1, {BIAS}=2: b.c = 2: must be\n  less: than 1")
     lines = report(trials, []).splitlines()
     assert "- 2 stopped, such as: gone at t = 0.5 s" in lines
     assert "- 1 refused: b.c = 2: must be less: than 1" in lines
