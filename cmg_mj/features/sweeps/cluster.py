@@ -28,7 +28,7 @@ from cmg_mj.scenario.resolve import versions
 if TYPE_CHECKING:
     from distributed import Client, Future, Worker
 
-ADDRESS = re.compile(r"local:(?P<workers>[1-9]\d?)|(?!local:)((tcp|tls)://)?[^/\s]+:\d{1,5}")
+ADDRESS = re.compile(r"local:(?P<workers>[1-9]\d{0,2})|(?!local:)((tcp|tls)://)?[^/\s]+:\d{1,5}")
 PATIENCE_S = 10.0
 """Time for which a cluster may fail to answer."""
 LOOK_S = 0.25
@@ -62,7 +62,7 @@ def on_cluster(address: str) -> Iterator[Callable[..., None]]:
     if written is None:
         raise InputError(
             f"--cluster {address}: write tcp://HOST:PORT of a scheduler that is running, or local:2 for 2 workers on "
-            "this machine, at most 99"
+            "this machine"
         )
     if find_spec("distributed") is None:
         raise InputError('--cluster: distributed is not installed: python -m pip install "cmg_mj[cluster]"')

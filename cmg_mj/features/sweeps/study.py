@@ -128,12 +128,8 @@ def _parse_range(fields: tuple[str, ...], text: str, where: str) -> VariedField:
             f"{where}: {text!r} is no range; write first:last:count, or low:high for --sample, "
             "with log: before it for a logarithmic one"
         ) from None
-    if (
-        not math.isfinite(high - low)
-        or low == high
-        or (count is None and low > high)
-        or (log and min(low, high) <= 0.0)
-    ):
+    wrong = low == high or (count is None and low > high) or (log and min(low, high) <= 0.0)
+    if wrong or not math.isfinite(high - low):
         raise InputError(f"{where}: its ends must be two different numbers, the lower one first, after log: above 0")
     axis = VariedField(fields, (), low, high, log)
     if count is None:
@@ -232,10 +228,12 @@ class SweepStudy:
                 raise InputError(f"--vary {field}: {why}")
         for axis in self.axes:
             if not axis.values and self.sample is None:
-                raise InputError(f"--vary {axis.field}: a range without a count, which is for --sample")
+                raise InputError(
+                    f"--vary {axis.field}: a range without a count is for --sample; write first:last:count"
+                )
         for name, count in {"worlds": self.worlds, "--sample, n": self.sample}.items():
             if count is not None and not (isinstance(count, (int, np.integer)) and count >= 1):
-                raise InputError(f"{name} = {shown(count)}: must be a whole number, 1 or more")
+                raise InputError(f"{name} = {count}: must be a whole number, 1 or more")
         for name, times in Counter(map(str, self.observers)).items():
             if ":" not in name and name not in (*OBSERVERS, *RATES):
                 known = nearest(name, [*OBSERVERS, *RATES])
@@ -428,7 +426,11 @@ class SweepSection(BaseModel):
     @property
     def points(self) -> int | None:
         """Points of a quasi-random design; None for a grid."""
-        return (self.n or 0) if self.design == "sample" else None
+        if self.design == "sample":
+            return self.n or 0
+        if self.n:
+            raise InputError(f"n = {self.n}: is for the design sample; a grid is every combination")
+        return None
 
 
 class StudyFile(BaseModel):
