@@ -53,8 +53,6 @@ HELD = "u_rad_s"
 """The signal that holds until the next row."""
 UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
-MAX_DELAY_S = 1e6
-"""Longest delay of a reference [s]."""
 MAX_RADIUS_M = 10.0
 """Largest distance of an accelerometer from the pivot; millimetres taken as metres are larger [m]."""
 NEAR = (0.7, 1.4)
@@ -83,17 +81,18 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         return _read_run(path, options)
     columns = columns_of(options)
     geometry = _geometry(columns, options.radii_m)
-    if not abs(options.delay_s) <= MAX_DELAY_S:
-        raise InputError(f"--delay {options.delay_s:g}: must be from -{MAX_DELAY_S:g} to {MAX_DELAY_S:g} s")
+    if not math.isfinite(options.delay_s):
+        raise InputError(f"--delay {options.delay_s:g}: must be a number of seconds")
     if "rate" not in columns and (options.delay_s or options.windows_s):
         raise InputError("--delay, --window: there is no reference; name it, --columns rate=...")
     time, signals = _times(path, read_table(path, columns, options), options)
     notes: list[str] = []
-    unit_known = "time" not in columns or columns["time"].unit is not None
-    if not unit_known:
+    slowest = MIN_RATE_HZ
+    if "time" in columns and columns["time"].unit is None:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
+        slowest = BALANCED_HZ
     measured = _measured(signals, geometry, notes)
-    period, dt, segments = _sample(path, time, measured, options, unit_known, notes)
+    period, dt, segments = _sample(path, time, measured, options, slowest, notes)
     joined = _join(segments)
     tilt = joined["y1_rad"]
     if np.ptp(tilt) == 0.0:
@@ -137,8 +136,6 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
             f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; save one of them "
             f"from Python: Trajectory.load(path).along({trajectory.axes[0]!r}).save(...)"
         )
-    if len(trajectory) < 2:
-        raise InputError(f"{path}: a run that ended before its second tick")
     given = [field for field in options.as_toml() if field != "windows_s"]
     if given:
         raise InputError(f"{path}: {given[0]} is for other logs than a run's own recording; read it with --columns")
@@ -241,7 +238,7 @@ def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
 
 
 def _sample(
-    path: Path, time: np.ndarray, measured: Values, options: ReadOptions, unit_known: bool, notes: list[str]
+    path: Path, time: np.ndarray, measured: Values, options: ReadOptions, slowest: float, notes: list[str]
 ) -> tuple[float, float, list[Segment]]:
     """Divide the complete rows at long gaps, and resample them if they are uneven.
 
@@ -250,7 +247,7 @@ def _sample(
         time: Stamps, (n_rows,) [s].
         measured: Name -> values, (n_rows,).
         options: The rate to resample to, and the longest gap.
-        unit_known: Whether the unit of the times is known; else milliseconds taken as seconds are refused.
+        slowest: Lowest rate of rows; without a unit of the times milliseconds are not taken as seconds [Hz].
         notes: Takes what was changed.
 
     Returns:
@@ -259,7 +256,7 @@ def _sample(
     time, values = _complete(path, time, measured, notes)
     steps = np.diff(time)
     period = float(steps[steps <= GAP_PERIODS * float(np.median(steps))].mean())
-    if not 1.0 / MAX_RATE_HZ <= period <= 1.0 / (MIN_RATE_HZ if unit_known else BALANCED_HZ):
+    if not 1.0 / MAX_RATE_HZ <= period <= 1.0 / slowest:
         raise InputError(
             f"{path}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz: is the time's unit right? "
             "Say it, --units time=ms or time=s"

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from cmg_mj.core.errors import InputError
+from cmg_mj.core.errors import InputError, listed
 from cmg_mj.features.sweeps.cells import (
     CLOSE,
     Trials,
@@ -32,7 +32,7 @@ from cmg_mj.view.plots.figure import save_figure
 
 MAX_ROWS = 60
 """Rows of a table on the terminal or in the report; the files have all."""
-MAX_REASONS, MAX_VALUES = 5, 10
+MAX_REASONS = 5
 QUANTILES = {0.1: "10 % quantile", 0.5: "median", 0.9: "90 % quantile"}
 """Quantiles of a figure over the points of a design."""
 ERROR = ERRORS[0]
@@ -109,12 +109,7 @@ def report(trials: Trials, pictures: Sequence[Picture]) -> str:
 
 def summary(trials: Trials) -> str:
     """Write for the terminal: cells, reasons of unfinished trials."""
-    parts = _cells(trials)
-    if trials.reasons:
-        more = len(trials.reasons) - 1
-        others = f" (and {counted(more, 'other reason')}: see the report)" if more else ""
-        parts.append(f"{_count_unfinished(trials)}. {_reasons(trials, 1)[0]}{others}")
-    return "\n\n".join(parts)
+    return "\n\n".join([*_cells(trials), *_unfinished(trials)])
 
 
 def _varied(study: SweepStudy) -> list[str]:
@@ -128,10 +123,7 @@ def _varied(study: SweepStudy) -> list[str]:
 def _values(axis: VariedField) -> str:
     if not axis.values:
         return f"{axis.low:g} to {axis.high:g}{', evenly in the logarithm' if axis.log else ''}"
-    values = [_format_value(value) for value in axis.values]
-    if len(values) > MAX_VALUES:
-        values[MAX_VALUES - 1 :] = ["...", f"{values[-1]} ({len(values)} values)"]
-    return ", ".join(values)
+    return listed([_format_value(value) for value in axis.values])
 
 
 def _format_value(value: SummaryValue) -> str:
@@ -183,17 +175,11 @@ def _unfinished(trials: Trials) -> list[str]:
     """List the most frequent reasons why trials were refused or stopped; nothing if there are no such trials."""
     if not trials.reasons:
         return []
-    about = f"{_count_unfinished(trials)}; no mean counts them. Every one's reason is in {TRIALS}, the most frequent:"
-    return ["## Refused and stopped", about, "\n".join(f"- {reason}" for reason in _reasons(trials, MAX_REASONS))]
-
-
-def _reasons(trials: Trials, n: int) -> list[str]:
-    kinds = trials.reasons.most_common(n)
-    return [f"{count} {outcome}{', such as' if count > 1 else ''}: {text}" for (outcome, text), count in kinds]
-
-
-def _count_unfinished(trials: Trials) -> str:
-    return f"{trials.reasons.total()} of {trials.study.trials} trials were refused or stopped"
+    about = f"{trials.reasons.total()} of {trials.study.trials} trials were refused or stopped; no mean counts them. "
+    about += f"Every one's reason is in {TRIALS}, the most frequent:"
+    kinds = trials.reasons.most_common(MAX_REASONS)
+    lines = (f"- {n} {outcome}{', such as' if n > 1 else ''}: {text}" for (outcome, text), n in kinds)
+    return ["## Refused and stopped", about, "\n".join(lines)]
 
 
 def _pictures(trials: Trials, pictures: Sequence[Picture]) -> list[str]:

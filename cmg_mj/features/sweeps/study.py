@@ -369,8 +369,7 @@ def sampled(dimensions: int, n: int, seed: int) -> np.ndarray:
 
     # The argument is called `rng` since 1.15; all versions take this name.
     generator: Any = {"seed": np.random.default_rng(seed)}
-    with warnings.catch_warnings():  # that n is no power of two
-        warnings.simplefilter("ignore", UserWarning)
+    with warnings.catch_warnings(action="ignore"):  # that n is no power of two
         return qmc.Sobol(dimensions, **generator).random(n)
 
 
