@@ -301,9 +301,8 @@ def columns_of(options: ReadOptions) -> dict[str, Column]:
         InputError: A role is unknown, roles do not go together, or a column has no known unit.
     """
     names = options.columns
-    given = {"columns": names, "units": options.units, "scale": options.scale, "offset": options.offset}
-    for option, roles in given.items():
-        for role in roles:
+    for option in ("columns", "units", "scale", "offset"):
+        for role in getattr(options, option):
             if role not in ROLES:
                 raise InputError(f"--{option} {role}: no such role; {nearest(role, ROLES)}")
             if role not in names:
@@ -327,8 +326,8 @@ def _column(role: str, name: str, options: ReadOptions) -> Column:
             wrong = f"--units {role}={told}: no unit of this quantity"
         raise InputError(f"{wrong}; {nearest(unit or '', units)}")
     scale = options.scale.get(role, 1.0)
-    if not math.isfinite(scale) or not scale:
-        raise InputError(f"--scale {role}={scale:g}: must be a finite number other than 0")
+    if not scale:
+        raise InputError(f"--scale {role}={scale:g}: must be a number other than 0")
     size = units[unit or "s"]
     return Column(name, unit, size * scale, size * options.offset.get(role, 0.0))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -77,7 +77,7 @@ class ReplayResult(NamedColumns):
     alignment: Alignment | None
     settle_s: float
     noise: MeasurementNoise
-    parameters: Parameters = field(default_factory=dict)
+    parameters: Parameters
 
     @cached_property
     def trajectory(self) -> Trajectory:

@@ -20,7 +20,6 @@ from cmg_mj.features.replay.log import (
     EVEN,
     ONE_ACCELEROMETER,
     REFERENCE,
-    Column,
     Log,
     ReadOptions,
     Segment,
@@ -80,7 +79,15 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if not options.columns:
         return _read_run(path, options)
     columns = columns_of(options)
-    geometry = _geometry(columns, options.radii_m)
+    if ("inner_x" in columns) != (options.radii_m is not None):
+        raise InputError("--radii INNER,OUTER [m] and --columns inner_x, inner_z, outer_x, outer_z go together")
+    inner, outer = options.radii_m or (0.0, MAX_RADIUS_M)
+    if not 0.0 <= inner < outer <= MAX_RADIUS_M:
+        raise InputError(
+            f"--radii {inner:g},{outer:g}: must be two distances from the pivot, the smaller first, at most "
+            f"{MAX_RADIUS_M:g} m"
+        )
+    geometry = RadialTilt(inner, outer) if options.radii_m else None
     if not math.isfinite(options.delay_s):
         raise InputError(f"--delay {options.delay_s:g}: must be a number of seconds")
     if "rate" not in columns and (options.delay_s or options.windows_s):
@@ -159,21 +166,6 @@ def read_logs(paths: Sequence[str], options: ReadOptions) -> list[Log]:
         if files[i] in files[:i]:
             raise InputError(f"{path}: this log is given twice")
     return [read_log(path, options) for path in paths]
-
-
-def _geometry(columns: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:
-    """Return the geometry of two accelerometers; None if there are none."""
-    if ("inner_x" in columns) != (radii is not None):
-        raise InputError("--radii INNER,OUTER [m] and --columns inner_x, inner_z, outer_x, outer_z go together")
-    if radii is None:
-        return None
-    inner, outer = radii
-    if not 0.0 <= inner < outer <= MAX_RADIUS_M:
-        raise InputError(
-            f"--radii {inner:g},{outer:g}: must be two distances from the pivot, the smaller first, at most "
-            f"{MAX_RADIUS_M:g} m"
-        )
-    return RadialTilt(inner, outer)
 
 
 def _windows_inside(path: Path, windows: Sequence[Window], time: np.ndarray) -> tuple[Window, ...]:

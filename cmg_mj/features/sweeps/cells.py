@@ -41,7 +41,9 @@ class Trials:
 
     Attributes:
         study: The sweep.
-        outcome: How each trial ended, (n_points, n_observers, n_worlds).
+        stood: Mask of the trials that stood to the end, (n_points, n_observers, n_worlds).
+        fell: Mask of the trials that fell, likewise. A refused or stopped one did not.
+        figures: Figure -> its values, likewise; NaN where a trial did not stand.
         reasons: Outcome and kind of reason -> number of trials that were refused or stopped. Reasons that differ in
             their numbers alone are of one kind, which the first of them stands for.
     """
@@ -49,20 +51,20 @@ class Trials:
     def __init__(self, study: SweepStudy, tables: Iterable[pa.Table]) -> None:
         self.study = study
         shape = (study.n_points, len(study.observers), study.worlds)
-        self.outcome = np.full(shape, "", dtype="U7")
-        self._figures = {key: np.full(shape, math.nan) for key in COMPARED}
+        self.stood, self.fell = np.zeros((2, *shape), dtype=bool)
+        self.figures = {key: np.full(shape, math.nan) for key in COMPARED}
         self.reasons: Counter[tuple[str, str]] = Counter()
         self._first: dict[str, str] = {}
         for table in tables:
             observers = np.array([study.observers.index(name) for name in table["observer"].to_pylist()])
             at = (table["point"].to_numpy(), observers, table["world"].to_numpy())
-            outcomes = table["outcome"].to_pylist()
-            self.outcome[at] = outcomes
-            for outcome, reason in zip(outcomes, table["reason"].to_pylist(), strict=True):
+            outcomes = np.array(table["outcome"].to_pylist())
+            self.stood[at], self.fell[at] = outcomes == "done", outcomes == "fell"
+            for outcome, reason in zip(outcomes.tolist(), table["reason"].to_pylist(), strict=True):
                 if outcome not in ("done", "fell"):
                     self.add_reason(outcome, reason)
-            for key, values in self._figures.items():
-                values[at] = table[key].to_numpy(zero_copy_only=False)
+            for key, values in self.figures.items():
+                values[at] = np.where(outcomes == "done", table[key].to_numpy(zero_copy_only=False), math.nan)
 
     def add_reason(self, outcome: str, reason: str | None) -> None:
         """Count a trial that neither stood nor fell."""
@@ -71,20 +73,6 @@ class Trials:
             text = text.partition(field)[2].partition(": ")[2] or text
         text = shortened(text, MAX_REASON)
         self.reasons[outcome, self._first.setdefault(NUMBER.sub("#", text), text)] += 1
-
-    @property
-    def stood(self) -> np.ndarray:
-        """Mask of the trials that stood to the end, (n_points, n_observers, n_worlds)."""
-        return self.outcome == "done"
-
-    @property
-    def fell(self) -> np.ndarray:
-        """Mask of the trials that fell, (n_points, n_observers, n_worlds). A refused or stopped one did not."""
-        return self.outcome == "fell"
-
-    def figure(self, key: str) -> np.ndarray:
-        """Return a figure of every trial, (n_points, n_observers, n_worlds); NaN where it did not stand."""
-        return np.where(self.stood, self._figures[key], math.nan)
 
 
 @cache  # of few different counts, at 0.3 ms each
@@ -134,9 +122,8 @@ def cells_of(trials: Trials) -> Iterator[Summary]:
     """
     study, n = trials.study, trials.study.worlds
     n_fell, n_stood = trials.fell.sum(axis=2), trials.stood.sum(axis=2)
-    figures = {key: trials.figure(key) for key in COMPARED}
     best = {}
-    for key, values in figures.items():
+    for key, values in trials.figures.items():
         means = values.mean(axis=-1)
         best[key], _ = least(means if KEYS[key].better == "less" else -means, study.contenders)
     for number, (place, observer) in itertools.product(range(study.n_points), enumerate(study.observers)):
@@ -144,7 +131,7 @@ def cells_of(trials: Trials) -> Iterator[Summary]:
         share, low, high = fell_interval(fell, fell + stood) if fell + stood else (None, None, None)
         row: Summary = {"point": number, **study.point(number), "observer": observer, "trials": n, "stood": stood}
         row |= {"fell": fell, "stopped": n - stood - fell, "fell_share": share, "fell_low": low, "fell_high": high}
-        for key, values in figures.items():
+        for key, values in trials.figures.items():
             leader = int(best[key][number])
             behind = values[number, place] - (math.nan if leader < 0 else values[number, leader])
             row |= with_ends(key, values[number, place], KEYS[key].positive)
@@ -251,7 +238,7 @@ def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
         A row an observer, then a row a baseline.
     """
     study = trials.study
-    figure = trials.figure(key)
+    figure = trials.figures[key]
     best, sure, error = least_error(figure, study.contenders)
     ahead = baselines_ahead(study, figure, error)
     rows = []

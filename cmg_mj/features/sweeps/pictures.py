@@ -93,19 +93,19 @@ def curves(trials: Trials, field: str) -> Any:
     study = trials.study
     x = np.array([study.point(number)[field] for number in range(study.n_points)], dtype=float)
     order = np.argsort(x, kind="stable")
-    keys = [key for key in ERRORS if np.isfinite(trials.figure(key)).any()]
+    keys = [key for key in ERRORS if np.isfinite(trials.figures[key]).any()]
     n = len(keys) + bool(trials.fell.any())
     figure, grid = pyplot().subplots(n, sharex=True, squeeze=False, layout="constrained", figsize=(9.0, 0.8 + 2.9 * n))
     palette, falls = colours(study.observers), np.insert(fall_shares(trials), 3, 0.0, axis=2)
     for axes, key in zip(grid[:, 0], [*keys, FALLS], strict=False):
         for place, name in enumerate(study.observers):
-            curve = falls[:, place] if key == FALLS else error_curve(trials.figure(key)[:, place])
+            curve = falls[:, place] if key == FALLS else error_curve(trials.figures[key][:, place])
             mean, low, high, is_part = curve[order].T
             color = hexadecimal(palette[name])
             axes.errorbar(x[order], mean, [mean - low, high - mean], fmt=".-", color=color, label=name)
             axes.plot(x[order][is_part == 1], mean[is_part == 1], "x", color=color, markersize=9)
         axes.set_ylabel("share of falls" if key == FALLS else heading(key))
-        if key != FALLS and scale_of(trials.figure(key)) == "log":
+        if key != FALLS and scale_of(trials.figures[key]) == "log":
             axes.set_yscale("log")
     grid[-1, 0].set(xlabel=field, xscale=scale_of(x))
     grid[0, 0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False)
@@ -142,7 +142,7 @@ def maps(trials: Trials, across: VariedField, up: VariedField) -> dict[str, Map]
         falls[TRUE_RATE] = shares[:, :, study.observers.index(study.references[0])]
     found = {}
     for key, name in MAPS.items():
-        figure = gridded(trials.figure(key))
+        figure = gridded(trials.figures[key])
         if np.isfinite(figure).any():
             best, sure, value = least_error(figure, places)
             each = dict(zip(study.observers, np.moveaxis(figure.mean(axis=-1), -1, 0), strict=True))

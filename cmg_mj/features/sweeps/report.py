@@ -154,7 +154,7 @@ def _format_cell(row: Summary) -> str:
 def _over_points(trials: Trials) -> list[str]:
     """Make a table with a row an observer: its error's mean and quantiles over the points, and its falls."""
     study = trials.study
-    error, (fell, known) = trials.figure(ERROR), fall_counts(trials)
+    error, (fell, known) = trials.figures[ERROR], fall_counts(trials)
     table = []
     for place, name in enumerate(study.observers):
         means = [mean for mean in map(finite_mean, error[:, place]) if mean is not None]

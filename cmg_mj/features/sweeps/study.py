@@ -106,9 +106,16 @@ def parse_axis(option: str, variation: Variation, where: str) -> VariedField:
     fields = tuple(field.strip() for field in option.split(TOGETHER))
     if "" in fields:
         raise InputError(f"{where}: write FIELD=VALUES, for example plant.equilibrium_bias_deg=-1.5:1.5:13")
-    if isinstance(variation, str) and ":" in variation and not variation.lstrip().startswith(("[", '"')):
-        return _parse_range(fields, variation.strip(), where)
-    values = _parse_list(variation, where) if isinstance(variation, str) else _as_list(variation, where)
+    values = _plain(variation)
+    if isinstance(values, str) and ":" in values and not values.lstrip().startswith(("[", '"')):
+        return _parse_range(fields, values.strip(), where)
+    if isinstance(values, str):
+        values = _parse_list(values, where)
+    if isinstance(values, (int, float)):
+        values = [values]
+    if isinstance(values, Mapping) or not isinstance(values, Iterable):
+        raise InputError(f"{where}: {shown(values)}: must be a list of values, or text such as '-1:1:5'")
+    values = [_plain(value) for value in values]
     if not values:
         raise InputError(f"{where}: no values; write FIELD=VALUES, such as plant.equilibrium_bias_deg=0,0.5")
     twice = next((value for i, value in enumerate(values) if value in values[:i]), None)
@@ -139,17 +146,8 @@ def _parse_range(fields: tuple[str, ...], text: str, where: str) -> VariedField:
     return VariedField(fields, tuple(axis.at(np.linspace(0.0, 1.0, count))))
 
 
-def _as_list(variation: Variation, where: str) -> list[Any]:
-    """Make values that are no text into a list, with numpy's numbers as Python's."""
-    values = _plain(variation)
-    if isinstance(values, (int, float)):
-        return [values]
-    if isinstance(values, Mapping) or not isinstance(values, Iterable):
-        raise InputError(f"{where}: {shown(values)}: must be a list of values, or text such as '-1:1:5'")
-    return [_plain(value) for value in values]
-
-
 def _plain(value: Any) -> Any:
+    """Make numpy's numbers and arrays Python's."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 

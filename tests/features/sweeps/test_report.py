@@ -123,12 +123,12 @@ def test_a_map_shows_where_baselines_are_ahead() -> None:
 
 def test_curves_have_intervals_and_say_where_some_worlds_fell() -> None:
     trials = make_trials({NOISE: "100,200,400"}, OBSERVERS, 4, lambda p, name, w: error({BIAS: 1, **p}, name, w))
-    mean, low, _, is_part = error_curve(trials.figure(VELOCITY)[:, 0]).T
+    mean, low, _, is_part = error_curve(trials.figures[VELOCITY][:, 0]).T
     assert mean == pytest.approx([0.1, 0.2, 0.2])
     half_width = 3.1824 * np.std([1, -1, 1, -1], ddof=1) * 0.01 / 2.0
     assert low == pytest.approx([0.1, 0.2, 0.2 * math.exp(-half_width / 0.2)], rel=1e-4)
     assert not is_part.any()
-    assert error_curve(trials.figure(VELOCITY)[:, 1])[:, 3].all()
+    assert error_curve(trials.figures[VELOCITY][:, 1])[:, 3].all()
     assert fall_shares(trials)[0, 1] == pytest.approx((0.75, 0.3006, 0.9544), abs=1e-4)
 
 
