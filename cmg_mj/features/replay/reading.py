@@ -52,6 +52,8 @@ HELD = "u_rad_s"
 """The signal that holds until the next row."""
 UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
+MAX_DELAY_S = 1e6
+"""Longest delay of a reference [s]."""
 MAX_RADIUS_M = 10.0
 """Largest distance of an accelerometer from the pivot; millimetres taken as metres are larger [m]."""
 NEAR = (0.7, 1.4)
@@ -88,8 +90,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
             f"{MAX_RADIUS_M:g} m"
         )
     geometry = RadialTilt(inner, outer) if options.radii_m else None
-    if not math.isfinite(options.delay_s):
-        raise InputError(f"--delay {options.delay_s:g}: must be a number of seconds")
+    if not abs(options.delay_s) <= MAX_DELAY_S:
+        raise InputError(f"--delay {options.delay_s:g}: must be from -{MAX_DELAY_S:g} to {MAX_DELAY_S:g} s")
     if "rate" not in columns and (options.delay_s or options.windows_s):
         raise InputError("--delay, --window: there is no reference; name it, --columns rate=...")
     time, signals = _times(path, read_table(path, columns, options), options)
