@@ -17,13 +17,16 @@ MAX_BYTES = 1_000_000
 """A scenario file is smaller; the longest that a run writes has three thousand bytes."""
 
 
-def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None = None) -> Scenario:
+def load_scenario(
+    name: str, overrides: Iterable[str] = (), observer: str | None = None, fields: dict[str, Any] | None = None
+) -> Scenario:
     """Read a scenario.
 
     Args:
         name: A bundled scenario's name, or the path of a TOML file.
         overrides: Settings `section.field=value` that replace those of the file.
         observer: An observer instead of the file's, whose parameters then do not count; `overrides` come after it.
+        fields: The scenario instead of the whole file, as in a study's; the overrides change it.
 
     Returns:
         The scenario, its fields checked.
@@ -32,7 +35,7 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
         InputError: The file does not exist, is no TOML, or has a field that is unknown or not allowed.
     """
     path = find("scenarios", name, ".toml", "scenario")
-    fields = _read(path, name)
+    fields = fields or _read(path, name)
     if path.stem in bundled("scenarios"):
         fields.setdefault("based_on", path.stem)
     changes = []

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,6 @@ EVEN = 0.02
 
 Values = Mapping[str, np.ndarray]
 """Name -> (n_rows,)."""
-Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -53,13 +52,8 @@ class Segment:
         return np.where(stamps < self.stamps[0], stamps - before, inside)
 
 
-def evenly(items: Sequence[Item], most: int) -> list[Item]:
-    """Select items, evenly spread from the first to the last, if there are more than the most."""
-    return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, min(len(items), most)).round().astype(int))]
-
-
 class WhiteNoise(NamedTuple):
-    """Standard deviation of the white noise of one row, with its 95 % interval."""
+    """Standard deviation of the white noise of one sample, with its 95 % interval."""
 
     sigma: float
     low: float
@@ -67,7 +61,7 @@ class WhiteNoise(NamedTuple):
 
 
 class LogNoise(NamedTuple):
-    """White noise of one row of a file, or why it cannot be told."""
+    """White noise of one sample of a log, or why it cannot be told."""
 
     tilt: WhiteNoise | str
     """Noise of the tilt [rad]."""
@@ -75,6 +69,9 @@ class LogNoise(NamedTuple):
     """Noise of the angular acceleration [rad/s^2]; None without one."""
     correlation: float
     """Correlation of both; 0 where it cannot be told from 0."""
+
+
+KNOWN_SENSORS = LogNoise("the sensors are known", None, 0.0)
 
 
 @dataclass(frozen=True)
@@ -135,7 +132,7 @@ class Log:
         options: Options with which it was read, the units of all columns among them.
         scenario: The resolved scenario of a run's recording.
         row_period_s: Period of the file's own rows, whatever the sample period [s]; None for a run's recording.
-        white_noise: White noise of one of these rows; None for a run's recording.
+        white_noise: White noise of one sample, as the rows show it, or why it cannot be told.
     """
 
     name: str
@@ -149,7 +146,7 @@ class Log:
     options: ReadOptions = ReadOptions()
     scenario: Mapping[str, Any] | None = None
     row_period_s: float | None = None
-    white_noise: LogNoise | None = None
+    white_noise: LogNoise = KNOWN_SENSORS
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]
@@ -304,9 +301,8 @@ def columns_of(options: ReadOptions) -> dict[str, Column]:
         InputError: A role is unknown, roles do not go together, or a column has no known unit.
     """
     names = options.columns
-    given = {"columns": names, "units": options.units, "scale": options.scale, "offset": options.offset}
-    for option, roles in given.items():
-        for role in roles:
+    for option in ("columns", "units", "scale", "offset"):
+        for role in getattr(options, option):
             if role not in ROLES:
                 raise InputError(f"--{option} {role}: no such role; {nearest(role, ROLES)}")
             if role not in names:
@@ -330,8 +326,8 @@ def _column(role: str, name: str, options: ReadOptions) -> Column:
             wrong = f"--units {role}={told}: no unit of this quantity"
         raise InputError(f"{wrong}; {nearest(unit or '', units)}")
     scale = options.scale.get(role, 1.0)
-    if not math.isfinite(scale) or not scale:
-        raise InputError(f"--scale {role}={scale:g}: must be a finite number other than 0")
+    if not scale:
+        raise InputError(f"--scale {role}={scale:g}: must be a number other than 0")
     size = units[unit or "s"]
     return Column(name, unit, size * scale, size * options.offset.get(role, 0.0))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,11 +17,12 @@ from cmg_mj.core.types import extra_signals, needs
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reference import Alignment, alignment_of
-from cmg_mj.features.replay.scores import Figures, ZeroPhase, rms, scores, zero_phase
+from cmg_mj.features.replay.scores import rms, scores
 from cmg_mj.inputs.users_line import users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
 from cmg_mj.observers.parameter_options import Parameters, numbers
 from cmg_mj.results.baselines import ZERO
+from cmg_mj.results.summary_keys import Figures
 from cmg_mj.results.trajectory import ESTIMATES, Layout, NamedColumns, Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay_all
@@ -67,7 +68,6 @@ class ReplayResult(NamedColumns):
         settle_s: Time at the start of each part that is not scored [s].
         noise: The sensors' noise that observers assumed; also the noise of the noise gain.
         parameters: Parameters that were set.
-        zero_phase: Figures of a smoother that sees the future, which is no observer; None without a reference.
     """
 
     log: Log
@@ -77,8 +77,7 @@ class ReplayResult(NamedColumns):
     alignment: Alignment | None
     settle_s: float
     noise: MeasurementNoise
-    parameters: Parameters = field(default_factory=dict)
-    zero_phase: ZeroPhase | None = None
+    parameters: Parameters
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -155,17 +154,7 @@ def replay_log(
         gain = None if response is None or not noise.tilt > 0.0 else response / noise.tilt
         summaries[name] = scores(log, rate, scored, gain)
     summaries[ZERO] = scores(log, np.zeros(len(log)), scored, 0.0)
-    return ReplayResult(
-        log,
-        estimates,
-        summaries,
-        left_out,
-        alignment_of(log),
-        settle_s,
-        noise,
-        parameters,
-        zero_phase(log, scored) if "reference" in log.has else None,
-    )
+    return ReplayResult(log, estimates, summaries, left_out, alignment_of(log), settle_s, noise, parameters)
 
 
 def _ready(

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import STANDARD_GRAVITY
-from cmg_mj.features.replay.log import EVEN, Log, LogNoise, Segment, Values, WhiteNoise, evenly
+from cmg_mj.features.replay.log import EVEN, Log, LogNoise, Segment, Values, WhiteNoise
 from cmg_mj.observers.parameter_options import numbers
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
@@ -67,21 +68,26 @@ APART = 1.5
 """Ratio of the noise that is used and the noise that the log shows, from which it is reported."""
 
 
-def white_noise_of(segments: Sequence[Segment], period: float) -> LogNoise:
+def white_noise_of(segments: Sequence[Segment], period: float, dt: float) -> LogNoise:
     """Estimate the white noise of a log's tilt and angular acceleration.
+
+    Resampling to a quicker rate keeps the density at low frequencies: white noise of that density is larger, sample for
+    sample, than that of the rows. A spline at a slower rate lets all of a row's noise through.
 
     Args:
         segments: The log's segments, with the file's own rows.
         period: Period of these rows [s].
+        dt: Sample period [s].
 
     Returns:
-        The noise of one row.
+        The noise of one sample.
     """
     names = [name for name in ("y1_rad", "acceleration_rad_s2") if name in segments[0].rows]
     residuals: list[np.ndarray] = []
     steps, sizes = [], []
     blocks = [(one, start) for one in segments for start in range(0, len(one.placed), BLOCK)]
-    for segment, start in evenly(blocks, MAX_BLOCKS):
+    for i in np.unique(np.linspace(0, len(blocks) - 1, min(len(blocks), MAX_BLOCKS)).round().astype(int)):
+        segment, start = blocks[i]
         rows = slice(start, start + BLOCK)
         places = (segment.placed[rows] - segment.placed[start]) / period
         values = {name: column[rows] for name, column in segment.rows.items()}
@@ -96,8 +102,9 @@ def white_noise_of(segments: Sequence[Segment], period: float) -> LogNoise:
         short = f"it takes {MIN_ROWS:,} rows, without the first and the last {TAPS} of each part; there are {n_rows:,}"
         return LogNoise(short, short if len(names) > 1 else None, 0.0)
     spectra = np.concatenate([_spectra(residual) for residual in residuals], axis=1)
-    tilt, *others = map(_floor, np.abs(spectra) ** 2, np.min(steps, axis=0), np.max(sizes, axis=0))
-    acceleration = others[0] if others else None
+    factor = math.sqrt(max(1.0, period / dt))
+    ends = (np.abs(spectra) ** 2, np.min(steps, axis=0), np.max(sizes, axis=0))
+    tilt, acceleration, *_ = [*map(partial(_floor, factor), *ends), None]
     known = isinstance(tilt, WhiteNoise) and isinstance(acceleration, WhiteNoise)
     return LogNoise(tilt, acceleration, _correlation(spectra) if known else 0.0)
 
@@ -163,10 +170,11 @@ def _steady(power: np.ndarray) -> np.ndarray:
     return sizes <= OUTLIER * np.median(sizes)
 
 
-def _floor(power: np.ndarray, step: float, size: float) -> WhiteNoise | str:
+def _floor(factor: float, power: np.ndarray, step: float, size: float) -> WhiteNoise | str:
     """Return the white floor of a spectrum, or why there is none.
 
     Args:
+        factor: Noise of a sample by that of a row.
         power: Squares of the transforms, (n_segments, n_frequencies).
         step: Smallest step between two values of the signal.
         size: Standard deviation of the signal.
@@ -199,7 +207,7 @@ def _floor(power: np.ndarray, step: float, size: float) -> WhiteNoise | str:
             low, high = sigma * math.exp(-1.96 * error), sigma * math.exp(1.96 * error)
             if np.sum((floor - floor.mean()) ** 2) > (len(order) - 1 + 3.3 * math.sqrt(2 * len(order) - 2)) * each**2:
                 low, high = min(low, math.exp(floor.min())), max(high, math.exp(floor.max()))
-            return WhiteNoise(sigma, low, high)
+            return WhiteNoise(factor * sigma, factor * low, factor * high)
     return "there is no white floor below half the row rate, as of a filtered or fused signal"
 
 
@@ -237,7 +245,7 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> Measurement
     Raises:
         InputError: A noise belongs to another sensor than the log's.
     """
-    noises, shown, gimbal = noises or {}, noise_in(log), Encoder().sample_sigma
+    noises, shown, gimbal = noises or {}, log.white_noise, Encoder().sample_sigma
     own = {name: noise.sigma for name, noise in shown._asdict().items() if isinstance(noise, WhiteNoise)}
     if log.tilt is None:
         if "accelerometer" in noises:
@@ -255,26 +263,6 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> Measurement
     else:
         return MeasurementNoise(**own, correlation=shown.correlation, gimbal=gimbal)
     return replace(log.tilt.noise(sigma, STANDARD_GRAVITY), gimbal=gimbal)
-
-
-def noise_in(log: Log) -> LogNoise:
-    """Return the white noise of one sample of a log, as its rows show it.
-
-    Resampling to a quicker rate keeps the density at low frequencies: white noise of that density is larger, sample for
-    sample, than that of the rows. A spline at a slower rate lets all of a row's noise through.
-
-    Args:
-        log: The log. The recording of a run is not looked at: its sensors' noise is known.
-
-    Returns:
-        The noise, or why it cannot be told.
-    """
-    noise = log.white_noise
-    if noise is None:
-        return LogNoise("the sensors are known", None, 0.0)
-    factor = math.sqrt(max(1.0, (log.row_period_s or log.dt) / log.dt))
-    parts = {name: part for name, part in noise._asdict().items() if isinstance(part, WhiteNoise)}
-    return noise._replace(**{name: WhiteNoise(*(factor * size for size in part)) for name, part in parts.items()})
 
 
 def noise_numbers(text: str) -> dict[str, float]:
@@ -302,9 +290,9 @@ def noise_remarks(log: Log, noise: MeasurementNoise) -> list[str]:
     Returns:
         A line for each noise; none for a run's recording, whose sensors are known.
     """
-    if log.white_noise is None:
+    if log.scenario is not None:
         return []
-    shown = noise_in(log)
+    shown = log.white_noise
     if log.tilt is not None:
         density = 1e-6 * STANDARD_GRAVITY * math.sqrt(_sampling_rate(log) / 2.0)
         of_tilt = 1.0 / (log.tilt.noise(1.0, STANDARD_GRAVITY).tilt * density)
@@ -329,9 +317,9 @@ def _remark(name: str, used: float, shown: WhiteNoise | str, factor: float, unit
 
 def noise_figures(log: Log, noise: MeasurementNoise) -> dict[str, SummaryValue]:
     """Return the noise that a log shows as `--json` prints it; nothing for a run's recording."""
-    if log.white_noise is None:
+    if log.scenario is not None:
         return {}
-    shown = noise_in(log)
+    shown = log.white_noise
     figures: dict[str, SummaryValue] = {"tilt_rad": _figures(shown.tilt, noise.tilt)}
     if shown.acceleration is not None:
         figures["acceleration_rad_s2"] = _figures(shown.acceleration, noise.acceleration)

@@ -20,8 +20,6 @@ from cmg_mj.features.replay.log import (
     EVEN,
     ONE_ACCELEROMETER,
     REFERENCE,
-    UNITS,
-    Column,
     Log,
     ReadOptions,
     Segment,
@@ -83,18 +81,27 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if not options.columns:
         return _read_run(path, options)
     columns = columns_of(options)
-    geometry = _geometry(columns, options.radii_m)
+    if ("inner_x" in columns) != (options.radii_m is not None):
+        raise InputError("--radii INNER,OUTER [m] and --columns inner_x, inner_z, outer_x, outer_z go together")
+    inner, outer = options.radii_m or (0.0, MAX_RADIUS_M)
+    if not 0.0 <= inner < outer <= MAX_RADIUS_M:
+        raise InputError(
+            f"--radii {inner:g},{outer:g}: must be two distances from the pivot, the smaller first, at most "
+            f"{MAX_RADIUS_M:g} m"
+        )
+    geometry = RadialTilt(inner, outer) if options.radii_m else None
     if not abs(options.delay_s) <= MAX_DELAY_S:
         raise InputError(f"--delay {options.delay_s:g}: must be from -{MAX_DELAY_S:g} to {MAX_DELAY_S:g} s")
     if "rate" not in columns and (options.delay_s or options.windows_s):
         raise InputError("--delay, --window: there is no reference; name it, --columns rate=...")
     time, signals = _times(path, read_table(path, columns, options), options)
     notes: list[str] = []
-    unit_known = "time" not in columns or columns["time"].unit is not None
-    if not unit_known:
+    slowest = MIN_RATE_HZ
+    if "time" in columns and columns["time"].unit is None:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
+        slowest = BALANCED_HZ
     measured = _measured(signals, geometry, notes)
-    period, dt, segments = _sample(path, time, measured, options, unit_known, notes)
+    period, dt, segments = _sample(path, time, measured, options, slowest, notes)
     joined = _join(segments)
     tilt = joined["y1_rad"]
     if np.ptp(tilt) == 0.0:
@@ -106,27 +113,23 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
             raise InputError(f"{path}: the reference has no number where the tilt has one")
         if np.ptp(known) == 0.0:
             raise InputError(f"{path}: the reference is {known[0]:g} rad/s in every row: leave it out")
-    notes += _gravity_remarks(columns, signals, options.scale)
+    notes += _gravity_remarks(signals, options.scale)
     if "ax" in signals:
         notes.append("the tilt is atan2(-ax, az): an acceleration of the sensor by 0.1 g puts it off by 5.7 deg")
-    present = {
-        "gimbals": {"y2_rad", HELD} <= measured.keys(),
-        "acceleration": "acceleration_rad_s2" in measured,
-        "reference": "rate" in signals,
-    }
+    needed = {"gimbals": {"y2_rad", HELD}, "acceleration": {"acceleration_rad_s2"}, "reference": {"rate"}}
     ends = np.cumsum([0, *(len(segment.time) for segment in segments)]).tolist()
     return Log(
         path.stem,
         dt,
         joined,
         [slice(start, end) for start, end in pairwise(ends)],
-        frozenset(name for name, known in present.items() if known),
+        frozenset(name for name, columns in needed.items() if columns <= {*measured, *signals}),
         tilt=geometry,
         windows=_windows_inside(path, options.windows_s, joined["time_s"]),
         notes=tuple(notes),
         options=replace(options, units={role: column.unit or "s" for role, column in columns.items()}),
         row_period_s=period,
-        white_noise=white_noise_of(segments, period),
+        white_noise=white_noise_of(segments, period, dt),
     )
 
 
@@ -142,8 +145,6 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
             f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; save one of them "
             f"from Python: Trajectory.load(path).along({trajectory.axes[0]!r}).save(...)"
         )
-    if len(trajectory) < 2:
-        raise InputError(f"{path}: a run that ended before its second tick")
     given = [field for field in options.as_toml() if field != "windows_s"]
     if given:
         raise InputError(f"{path}: {given[0]} is for other logs than a run's own recording; read it with --columns")
@@ -167,21 +168,6 @@ def read_logs(paths: Sequence[str], options: ReadOptions) -> list[Log]:
         if files[i] in files[:i]:
             raise InputError(f"{path}: this log is given twice")
     return [read_log(path, options) for path in paths]
-
-
-def _geometry(columns: Mapping[str, Column], radii: tuple[float, float] | None) -> RadialTilt | None:
-    """Return the geometry of two accelerometers; None if there are none."""
-    if ("inner_x" in columns) != (radii is not None):
-        raise InputError("--radii INNER,OUTER [m] and --columns inner_x, inner_z, outer_x, outer_z go together")
-    if radii is None:
-        return None
-    inner, outer = radii
-    if not 0.0 <= inner < outer <= MAX_RADIUS_M:
-        raise InputError(
-            f"--radii {inner:g},{outer:g}: must be two distances from the pivot, the smaller first, at most "
-            f"{MAX_RADIUS_M:g} m"
-        )
-    return RadialTilt(inner, outer)
 
 
 def _windows_inside(path: Path, windows: Sequence[Window], time: np.ndarray) -> tuple[Window, ...]:
@@ -246,7 +232,7 @@ def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
 
 
 def _sample(
-    path: Path, time: np.ndarray, measured: Values, options: ReadOptions, unit_known: bool, notes: list[str]
+    path: Path, time: np.ndarray, measured: Values, options: ReadOptions, slowest: float, notes: list[str]
 ) -> tuple[float, float, list[Segment]]:
     """Divide the complete rows at long gaps, and resample them if they are uneven.
 
@@ -255,7 +241,7 @@ def _sample(
         time: Stamps, (n_rows,) [s].
         measured: Name -> values, (n_rows,).
         options: The rate to resample to, and the longest gap.
-        unit_known: Whether the unit of the times is known; else milliseconds taken as seconds are refused.
+        slowest: Lowest rate of rows; without a unit of the times milliseconds are not taken as seconds [Hz].
         notes: Takes what was changed.
 
     Returns:
@@ -264,7 +250,7 @@ def _sample(
     time, values = _complete(path, time, measured, notes)
     steps = np.diff(time)
     period = float(steps[steps <= GAP_PERIODS * float(np.median(steps))].mean())
-    if not 1.0 / MAX_RATE_HZ <= period <= 1.0 / (MIN_RATE_HZ if unit_known else BALANCED_HZ):
+    if not 1.0 / MAX_RATE_HZ <= period <= 1.0 / slowest:
         raise InputError(
             f"{path}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz: is the time's unit right? "
             "Say it, --units time=ms or time=s"
@@ -430,40 +416,36 @@ def _reference(segments: Sequence[Segment], time: np.ndarray, reference: np.ndar
         gap = GAP_PERIODS * float(np.median(np.diff(stamps)))
         slack = 1e-6 * gap
         after = np.clip(np.searchsorted(stamps, grid, side="right"), 1, len(stamps) - 1)
-        near = np.minimum(np.abs(grid - stamps[after - 1]), np.abs(stamps[after] - grid)) <= slack
-        known = (grid >= stamps[0] - slack) & (grid <= stamps[-1] + slack)
-        known &= (stamps[after] - stamps[after - 1] <= gap) | near
+        before, later = grid - stamps[after - 1], stamps[after] - grid
+        known = (before >= 0.0) & (later >= 0.0) & (before + later <= gap)
+        known |= np.minimum(np.abs(before), np.abs(later)) <= slack
         values = _resample(np.clip(grid, stamps[0], stamps[-1]), stamps, reference, gap)
         sampled.append(np.where(known, values, np.nan))
     return np.concatenate(sampled)
 
 
-def _gravity_remarks(columns: Mapping[str, Column], signals: Values, scale: Mapping[str, float]) -> list[str]:
+def _gravity_remarks(signals: Values, scale: Mapping[str, float]) -> list[str]:
     """Compare the size and the sign of each accelerometer's specific force with gravity's, by their medians.
 
     Returns:
         A line for each that is wrong, with the options that cure it.
     """
     remarks = []
-    units = UNITS["acceleration"]
     for x, z in (ACCELEROMETERS[:2], ACCELEROMETERS[2:], ONE_ACCELEROMETER):
         if x not in signals:
             continue
         size = float(np.nanmedian(np.hypot(signals[x], signals[z]))) / STANDARD_GRAVITY
-        upward = float(np.nanmedian(signals[z]))
-        scales = {role: scale.get(role, 1.0) for role in (x, z)}
+        upward = float(np.nanmedian(signals[z])) / STANDARD_GRAVITY
+        now = {role: scale.get(role, 1.0) for role in (x, z)}
         if size > 0.0 and not NEAR[0] <= size <= NEAR[1]:
-            now = units[columns[z].unit or ""]
-            fits = {unit: abs(math.log(now / units[unit] / size)) for unit in units}
-            unit = min(units, key=lambda unit: fits[unit])
-            cure = f"--units {x}={unit},{z}={unit}"
-            if not fits[unit] < math.log(NEAR[1]):
-                cure = "--scale " + ",".join(f"{role}={factor / size:.4g}" for role, factor in scales.items())
-            remarks.append(f"the specific force of {x} and {z} is {size:.4g} times gravity's 9.81 m/s^2: {cure}")
-        elif upward < 0.0:
-            turned = ",".join(f"{role}={-factor:g}" for role, factor in scales.items())
+            cure = ",".join(f"{role}={factor / size:.4g}" for role, factor in now.items())
             remarks.append(
-                f"the median of {z} is {upward / STANDARD_GRAVITY:.2g} g, so the tilt is beyond 90 deg: --scale "
-                f"{turned} if the sensor shows gravity itself, --scale {z}={-scales[z]:g} if it is upside down"
+                f"the specific force of {x} and {z} is {size:.4g} times gravity's 9.81 m/s^2: --scale {cure}"
+            )
+        elif upward < 0.0:
+            turned = ",".join(f"{role}={-factor:g}" for role, factor in now.items())
+            remarks.append(
+                f"the median of {z} is {upward:.2g} g, so the tilt is beyond 90 deg: --scale {turned} if the sensor "
+                f"shows gravity itself, --scale {z}={-now[z]:g} if it is upside down"
             )
     return remarks

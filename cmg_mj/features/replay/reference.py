@@ -10,27 +10,21 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.tilt import MeasurementNoise
-from cmg_mj.features.replay.log import REFERENCE, UNITS, Log, WhiteNoise
-from cmg_mj.features.replay.noise import noise_in, noise_remarks
-from cmg_mj.features.replay.scores import STRETCHES, Piece, jackknife_error, jackknife_stretches, lag_with_error
+from cmg_mj.features.replay.log import REFERENCE, UNITS, Log
+from cmg_mj.features.replay.noise import noise_remarks
+from cmg_mj.features.replay.scores import STRETCHES, jackknife_error, jackknife_stretches, lag_with_error
 
 SPAN_S = 0.2
 """Time over which increments of the tilt and of the integrated reference are compared [s]; slopes are mostly noise."""
 OFF = 0.005
 """Deviation of the reference's scale from 1, or its offset by its RMS, from which it matters, if it is significant."""
-NEAR = 0.05
-"""Largest such deviation at which a reference that correlates less than `AGREES` still agrees."""
 SURE = 2.365
 """Standard errors of a 95 % interval: Student's, of the seven degrees of freedom of eight stretches."""
 CLEAR = 4.03
 """Standard errors of a 99.5 % interval, which a deviation leaves that is reported: one of 20 faultless logs would leave
 the other."""
-NOISE = 1.2
-"""Ratio up to which the rest of the tilt is its white noise."""
 LATE = 0.1
 """Lag from which it is reported, in periods of the log's rows or its samples, the longer of the two."""
-FINE = 0.01
-"""Step in which a delay is offered, at most, in the same periods."""
 AGREES = 0.95
 """Correlation at the best lag, of either sign, from which a cure is offered. If the tilt freezes half-way, neither lag
 nor scale is meaningful."""
@@ -48,13 +42,11 @@ class Alignment(NamedTuple):
     correlation: float | None
     """Correlation of the increments, near -1 for a reference of the other sign."""
     lag_error_s: float | None = None
-    """Standard error of the lag [s]; these errors are jackknives over `STRETCHES` of the log."""
+    """Standard error of the lag [s]; these errors are jackknives over eighths of the log."""
     scale_error: float | None = None
     """Standard error of the scale."""
     offset_error_rad_s: float | None = None
     """Standard error of the offset [rad/s]."""
-    residual_rad: float | None = None
-    """RMS of the tilt's increments less those of the fit [rad]."""
 
 
 def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: float) -> Alignment:
@@ -74,15 +66,22 @@ def alignment(tilt: Sequence[np.ndarray], reference: Sequence[np.ndarray], dt: f
     pieces = [(y, rate) for y, rate in zip(tilt, reference, strict=True) if len(y) > 2 * span]
     rises = [y[span:] - y[:-span] for y, _ in pieces]
     lag_s, lag_error = lag_with_error([partial(_travelled, rate, span, dt, 0.0) for _, rate in pieces], rises, dt)
-    sums, middle = _pair_sums([partial(_travelled, rate, span, dt, lag_s or 0.0) for _, rate in pieces], rises)
+    sums, middle = np.zeros((STRETCHES, 3, 3)), np.zeros(3)
+    for number, piece, rows in jackknife_stretches([len(rise) for rise in rises], 0):
+        travel = _travelled(pieces[piece][1], span, dt, lag_s or 0.0, rows)
+        pairs = np.stack([np.ones(len(travel)), travel, rises[piece][rows]])[:, np.isfinite(travel)]
+        if not pairs.size:
+            continue
+        if not sums.any():
+            middle[1:] = pairs[1:].mean(axis=1)  # sums of numbers near zero lose nothing
+        pairs -= middle[:, None]
+        sums[number] += pairs @ pairs.T
     whole = sums.sum(axis=0)
     line = _line(whole, middle, span * dt)
     if line is None:
         return Alignment(lag_s, None, None, None)
     errors = jackknife_error([_line(whole - stretch, middle, span * dt) for stretch in sums if stretch[0, 0]])
-    scale_error, offset_error = (None, None) if errors is None else errors[:2].tolist()
-    scale, offset, correlation, residual = line
-    return Alignment(lag_s, scale, offset, correlation, lag_error, scale_error, offset_error, residual)
+    return Alignment(lag_s, *line, lag_error, *(() if errors is None else errors[:2].tolist()))
 
 
 def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float, rows: slice) -> np.ndarray:
@@ -101,28 +100,8 @@ def _travelled(rate: np.ndarray, span: int, dt: float, lag_s: float, rows: slice
     return np.where(known, travelled[span:] - travelled[:-span], np.nan)[start - first : stop - first]
 
 
-def _pair_sums(travels: Sequence[Piece], rises: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Sum the known pairs of each stretch of a log.
-
-    Returns:
-        Products of 1, travel and rise, less the following, (`STRETCHES`, 3, 3); numbers that are subtracted from the
-        three, since sums of numbers near zero lose nothing, (3,).
-    """
-    sums, middle = np.zeros((STRETCHES, 3, 3)), np.zeros(3)
-    for number, piece, rows in jackknife_stretches([len(rise) for rise in rises], 0):
-        pairs = np.stack([np.ones(rows.stop - rows.start), travels[piece](rows), rises[piece][rows]])
-        pairs = pairs[:, np.isfinite(pairs[1])]
-        if not pairs.shape[1]:
-            continue
-        if not sums.any():
-            middle = np.array([0.0, *pairs[1:].mean(axis=1)])
-        pairs -= middle[:, None]
-        sums[number] += pairs @ pairs.T
-    return sums, middle
-
-
-def _line(sums: np.ndarray, middle: np.ndarray, length: float) -> tuple[float, float, float, float] | None:
-    """Fit a line, rise = start + slope travel, to sums of pairs.
+def _line(sums: np.ndarray, middle: np.ndarray, length: float) -> tuple[float, float, float] | None:
+    """Fit a line, rise = start + slope travel, to sums of products of 1, travel and rise.
 
     Args:
         sums: Sums, (3, 3).
@@ -130,7 +109,7 @@ def _line(sums: np.ndarray, middle: np.ndarray, length: float) -> tuple[float, f
         length: Time over which the tilt rises [s].
 
     Returns:
-        Slope, start by the length, correlation, and RMS of the rises less the line; None if there is too little motion.
+        Slope, start by the length, and correlation; None if there is too little motion.
     """
     n = sums[0, 0]
     if n < 3:
@@ -142,8 +121,7 @@ def _line(sums: np.ndarray, middle: np.ndarray, length: float) -> tuple[float, f
         return None
     slope = xy / xx
     start = (means[1] + middle[2]) - slope * (means[0] + middle[1])
-    residual = math.sqrt(max(0.0, yy - slope * xy) / n)
-    return float(slope), float(start) / length, float(xy / math.sqrt(xx * yy)), residual
+    return float(slope), float(start) / length, float(xy / math.sqrt(xx * yy))
 
 
 def alignment_of(log: Log) -> Alignment | None:
@@ -161,43 +139,37 @@ def judge(log: Log, aligned: Alignment) -> str:
         log: The log.
         aligned: Alignment from `alignment_of`.
     """
-    lag, scale, offset, correlation = aligned[:4]
+    lag, scale, offset, correlation, *errors = aligned
     if scale is None or offset is None or correlation is None:
         return "The reference cannot be compared with the tilt: too little motion, or too short."
-    *errors, residual = aligned[4:]
-    lag_error, scale_error, offset_error = (math.inf if error is None else CLEAR * error for error in errors)
-    noise, options = noise_in(log).tilt, log.options
-    noisy = residual is not None and isinstance(noise, WhiteNoise) and residual <= NOISE * math.sqrt(2.0) * noise.high
+    lag_error, scale_error, offset_error = (math.inf if error is None else error for error in errors)
+    options = log.options
     scale_set, offset_set = options.scale.get("rate", 1.0), options.offset.get("rate", 0.0)
-    period = max(log.dt, log.row_period_s or 0.0)
-    motion = math.sqrt(float(np.nanmean(log[REFERENCE] ** 2)))
-    near = lag is not None and abs(lag) <= LATE * period and abs(scale - 1.0) <= NEAR and abs(offset) <= NEAR * motion
-    not_alike = f"The reference does not go with the tilt (correlation {correlation:.2f})"
-    if correlation <= -AGREES or (noisy and scale < -scale_error):
-        return f"{not_alike}: it counts the other way: --scale rate={-scale_set:g}."
-    if correlation < AGREES and not (noisy and scale > scale_error) and not near:
-        return f"{not_alike}: is it the rate of this tilt, and do both move and not leap? No delay or scale is offered."
-    late = lag is not None and abs(lag) > max(LATE * period, lag_error)
-    resized = abs(scale - 1.0) > max(OFF, scale_error)
-    shifted = abs(offset) > max(OFF * motion, offset_error)
-    share = SURE / CLEAR
-    fits = f"{_with_interval(scale, share * scale_error)} times the reference plus "
-    fits += f"{_with_interval(offset, share * offset_error)} rad/s fits"
-    if not (late or resized or shifted):
-        return f"Tilt and reference agree: {fits}."
-    decimals = max(0, math.ceil(-math.log10(FINE * period)))
+    if correlation <= -AGREES:
+        return f"The reference counts the other way (correlation {correlation:.2f}): --scale rate={-scale_set:g}."
+    if correlation < AGREES:
+        return (
+            f"Tilt and reference correlate by {correlation:.2f}: one is noisy, or is not of this motion. No delay or "
+            "scale is offered."
+        )
+    fits = f"{_with_interval(scale, scale_error)} times the reference plus "
+    fits += f"{_with_interval(offset, offset_error)} rad/s fits"
     comes, cures = "", []
-    if late and lag is not None:
-        where = "behind" if lag > 0.0 else "before"
-        comes = f"the reference comes {abs(lag) * 1e3:.{max(2, decimals - 3)}f} ms {where}; "
-        cures.append(f"--delay {options.delay_s + lag:.{decimals}f}")
-    factor = scale if resized else 1.0
-    if resized:
-        cures.append(f"--scale rate={factor * scale_set:.4g}")
-    if shifted or (resized and offset_set):
+    if lag is not None and abs(lag) > max(LATE * max(log.dt, log.row_period_s or 0.0), CLEAR * lag_error):
+        comes = f"the reference comes {abs(lag) * 1e3:.4g} ms {'behind' if lag > 0.0 else 'before'}; "
+        cures.append(f"--delay {options.delay_s + lag:.4g}")
+    factor = 1.0
+    if abs(scale - 1.0) > max(OFF, CLEAR * scale_error):
+        factor = scale
+        cures.append(f"--scale rate={scale * scale_set:.4g}")
+    motion = math.sqrt(float(np.nanmean(log[REFERENCE] ** 2)))
+    shift = offset if abs(offset) > max(OFF * motion, CLEAR * offset_error) else 0.0
+    if shift or (factor != 1.0 and offset_set):
         unit_size = UNITS["rate"][options.units.get("rate", "rad_s")]
-        cures.append(f"--offset rate={factor * offset_set + (offset / unit_size if shifted else 0.0):.3g}")
-    return f"Beside the tilt {comes}{fits} (to take it out: {' '.join(cures)})."
+        cures.append(f"--offset rate={factor * offset_set + shift / unit_size:.3g}")
+    if cures:
+        return f"Beside the tilt {comes}{fits} (to take it out: {' '.join(cures)})."
+    return f"Tilt and reference agree: {fits}."
 
 
 def remarks_on(log: Log, aligned: Alignment | None, noise: MeasurementNoise) -> list[str]:
@@ -207,5 +179,6 @@ def remarks_on(log: Log, aligned: Alignment | None, noise: MeasurementNoise) -> 
 
 
 def _with_interval(value: float, error: float) -> str:
-    value, low, high = (round(number, 4) + 0.0 for number in (value, value - error, value + error))  # no -0.0000
+    ends = (value, value - SURE * error, value + SURE * error)
+    value, low, high = (round(number, 4) + 0.0 for number in ends)  # no -0.0000
     return f"{value:.4f} ({low:.4f} to {high:.4f})" if math.isfinite(error) else f"{value:.4f}"

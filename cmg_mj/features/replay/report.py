@@ -11,7 +11,7 @@ from rich.text import Text
 from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.noise import noise_figures
 from cmg_mj.features.replay.reference import remarks_on
-from cmg_mj.features.replay.scores import RECONSTRUCTED_S, ZERO_PHASE, Figures
+from cmg_mj.features.replay.scores import RECONSTRUCTED_S
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.intervals import Interval, format_interval, known_interval
 from cmg_mj.results.summary_keys import Key, SummaryValue
@@ -46,7 +46,7 @@ def replay_figures(replays: Sequence[ReplayResult]) -> dict[str, SummaryValue]:
 
 def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
     """Return the figures of one log."""
-    log, noise, smoother = replayed.log, replayed.noise, replayed.zero_phase
+    log, noise = replayed.log, replayed.noise
     figures: dict[str, SummaryValue] = {
         "log": log.name,
         "samples": len(log),
@@ -65,29 +65,15 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
     figures |= noise_figures(log, noise)
     if replayed.alignment:
         figures["reference"] = replayed.alignment._asdict()
-    figures["observers"] = dict(replayed.summaries)
-    if smoother is not None:
-        more = {"best_cutoff_hz": smoother.best_cutoff_hz, "best_rms_error_rad_s": smoother.best_rms_error_rad_s}
-        figures[ZERO_PHASE] = {**smoother.figures, "cutoff_hz": smoother.cutoff_hz, **more}
-    return {**figures, "left_out": dict(replayed.left_out)}
-
-
-def _rows(replayed: ReplayResult) -> dict[str, Figures]:
-    """Return the figures of a table's rows: the observers, the smoother that is none, and the baseline."""
-    rows = dict(replayed.summaries)
-    if replayed.zero_phase is not None:
-        rows[ZERO_PHASE] = replayed.zero_phase.figures
-        rows[ZERO] = rows.pop(ZERO)
-    return rows
+    return {**figures, "observers": dict(replayed.summaries), "left_out": dict(replayed.left_out)}
 
 
 def _means(replays: Sequence[ReplayResult]) -> dict[str, dict[str, SummaryValue]]:
     """Return every row's number of logs, and its figures' means over the logs that have them, the baseline's last."""
-    rows = [_rows(replayed) for replayed in replays]
-    names = dict.fromkeys(name for row in rows for name in row)
+    names = dict.fromkeys(name for replayed in replays for name in replayed.summaries)
     means = {}
-    for name in sorted(names, key=lambda name: (name == ZERO, name == ZERO_PHASE)):
-        summaries = [row[name] for row in rows if name in row]
+    for name in sorted(names, key=lambda name: name == ZERO):
+        summaries = [replayed.summaries[name] for replayed in replays if name in replayed.summaries]
         means[name] = {"logs": len(summaries)}
         for key in _keys(replays):
             values = [value for summary in summaries if (value := summary.get(key)) is not None]
@@ -106,7 +92,7 @@ def _keys(replays: Sequence[ReplayResult]) -> list[str]:
 
 def _tables(replays: Sequence[ReplayResult]) -> list[tuple[Table, list[str]]]:
     """Tabulate each log, with its remarks, and of several the means."""
-    tables = [(_table(replayed.log.title, _rows(replayed), [replayed]), remarks(replayed)) for replayed in replays]
+    tables = [(_table(replayed.log.title, replayed.summaries, [replayed]), remarks(replayed)) for replayed in replays]
     if len(replays) > 1:
         tables.append((_table(f"Means over {len(replays)} logs, with 95 % intervals", _means(replays), replays), []))
     return tables
@@ -153,13 +139,6 @@ def replay_markdown(replays: Sequence[ReplayResult]) -> str:
 def remarks(replayed: ReplayResult) -> list[str]:
     """Return the remarks on a log and its reference, and the observers left out."""
     lines = remarks_on(replayed.log, replayed.alignment, replayed.noise)
-    if (smoother := replayed.zero_phase) is not None:
-        best = "-" if smoother.best_rms_error_rad_s is None else f"{smoother.best_rms_error_rad_s:.4f}"
-        lines.append(
-            f"{ZERO_PHASE} is no observer: it sees the future. It smooths the tilt to both sides of each sample, below "
-            f"{smoother.cutoff_hz:.3g} Hz, chosen by the tilt alone; with {smoother.best_cutoff_hz:.3g} Hz, the best "
-            f"for the reference, its error is {best} rad/s."
-        )
     reasons: dict[str, list[str]] = {}
     for name, reason in replayed.left_out.items():
         reasons.setdefault(reason, []).append(name)

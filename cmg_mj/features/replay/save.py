@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from operator import itemgetter
+from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from cmg_mj.results.summary_keys import finite
 from cmg_mj.scenario.resolve import safe_name
 from cmg_mj.view.plots.figure import Line, Panel, Picture, Span, draw
 from cmg_mj.view.plots.run_plot import INK, MEASURED, SMALL_COLUMNS
-from cmg_mj.view.plots.style import BASELINE_COLOURS, Colour, colours, short_names, thinned
+from cmg_mj.view.plots.style import BASELINE_COLOURS, colours, short_names, thinned
 
 if TYPE_CHECKING:
     from cmg_mj.view.recording.signals import Series
@@ -43,7 +43,7 @@ def liveliest_span(log: Log) -> tuple[float, float]:
         bends = sums[n:] - sums[:-n]
         start = int(np.argmax(bends))
         spans.append((float(bends[start]), (float(time[start]), float(time[start + n - 1]))))
-    return max(spans, key=itemgetter(0))[1]
+    return max(spans)[1]
 
 
 def plot_replay(path: Path, replayed: ReplayResult) -> None:
@@ -57,10 +57,9 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     rates = {name: estimates["x2_rad_s"] for name, estimates in replayed.estimates.items()}
     labels = {name: label.lstrip("_") for name, label in short_names(list(rates)).items()}
     reference = [log[REFERENCE]] if "reference" in log.has else []
-    if reference:
-        titles = {n: f"{label} {figure_text(key, replayed.summaries[n].get(key))}" for n, label in labels.items()}
-    else:
-        titles = labels
+    titles = dict(labels)
+    for name in labels if reference else ():
+        titles[name] += f" {figure_text(key, replayed.summaries[name].get(key))}"
     span, time = liveliest_span(log), log.broken_time()
     whole, detail = slice(None), slice(*np.searchsorted(time, span).tolist())
 
@@ -94,37 +93,31 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     draw(path, page)
 
 
-def series(replayed: ReplayResult) -> Iterator[Series]:
-    """Make all time series of one log, one by one: angles in degrees, rates in rad/s."""
+def series(replayed: ReplayResult) -> list[Series]:
+    """Make all time series of one log: angles in degrees, rates in rad/s."""
     from cmg_mj.view.recording.run import numbered_parts
     from cmg_mj.view.recording.signals import CONTROLLER, MODULES, Series
 
-    log = replayed.log
-    time = log.broken_time()
-
-    def row(path: str, name: str, values: np.ndarray, color: Colour, width: float = 1.5, by: str = "") -> Series:
-        return Series(path, name, time, log.broken(values), color, width, by)
-
-    yield row("tilt/measured", "measured", np.degrees(log["y1_rad"]), BASELINE_COLOURS["gyro"])
+    log, gyro = replayed.log, BASELINE_COLOURS["gyro"]
+    rows: list[tuple[Any, ...]] = [("tilt/measured", "measured", np.degrees(log["y1_rad"]), gyro)]
     if "reference" in log.has:
-        yield row("rate/true", "reference", log[REFERENCE], BASELINE_COLOURS["true"], 3.0)
+        rows.append(("rate/true", "reference", log[REFERENCE], BASELINE_COLOURS["true"], 3.0))
     labels, names = short_names(list(replayed.estimates)), list(replayed.estimates)
     for part, (name, color) in zip(numbered_parts(names), colours(names).items(), strict=True):
         estimates = replayed.estimates[name]
-        rate = estimates["x2_rad_s"]
-        signals = {"rate_estimate": rate}
+        signals = {"rate_estimate": estimates["x2_rad_s"]}
         if "reference" in log.has:
-            signals["rate_error"] = rate - log[REFERENCE]
+            signals["rate_error"] = estimates["x2_rad_s"] - log[REFERENCE]
         if BIAS in estimates:
             signals["bias"] = np.degrees(estimates[BIAS])
-        for folder, values in signals.items():
-            yield row(f"{folder}/{part}", labels[name], values, color, by=name)
+        rows += [(f"{folder}/{part}", labels[name], values, color, 1.5, name) for folder, values in signals.items()]
     if "acceleration" in log.has:
-        measured = log["acceleration_rad_s2"]
-        yield row("acceleration/measured", "measured", measured, BASELINE_COLOURS["gyro"], 1.0)
+        rows.append(("acceleration/measured", "measured", log["acceleration_rad_s2"], gyro, 1.0))
     if "gimbals" in log.has:
-        yield row("command/u", "command", log["u_rad_s"], CONTROLLER)
-        yield row("gimbal/y2", "measured", np.degrees(log["y2_rad"]), MODULES[0])
+        rows.append(("command/u", "command", log["u_rad_s"], CONTROLLER))
+        rows.append(("gimbal/y2", "measured", np.degrees(log["y2_rad"]), MODULES[0]))
+    time = log.broken_time()
+    return [Series(path, name, time, log.broken(values), *style) for path, name, values, *style in rows]
 
 
 def save_replays(
@@ -146,7 +139,7 @@ def save_replays(
 
     named = dict(zip(names, replays, strict=False))
     title = f"Replay: {', '.join(named)}"
-    logs = [LogSeries(name, list(series(replayed)), shown_first(replayed)) for name, replayed in named.items()]
+    logs = [LogSeries(name, series(replayed), shown_first(replayed)) for name, replayed in named.items()]
     texts = {
         "Summary": f"# {title}\n\n{replay_markdown(replays)}\n",
         "Settings": f"# Settings\n\n```toml\n{settings_toml.strip()}\n```\n",
@@ -166,11 +159,9 @@ def save_replays(
 
 def distinct_names(names: Iterable[str]) -> list[str]:
     """Return logs' names as parts of file names, the repeated ones numbered."""
-    distinct: list[str] = []
+    distinct: dict[str, str] = {}
     for name in map(safe_name, names):
-        number, candidate = 1, name
-        while candidate.casefold() in [other.casefold() for other in distinct]:
-            number += 1
-            candidate = f"{name}-{number}"
-        distinct.append(candidate)
-    return distinct
+        numbered = (name if number == 1 else f"{name}-{number}" for number in count(1))
+        candidate = next(candidate for candidate in numbered if candidate.casefold() not in distinct)
+        distinct[candidate.casefold()] = candidate
+    return list(distinct.values())

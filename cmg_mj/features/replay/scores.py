@@ -1,18 +1,15 @@
-"""Scores of an estimated rate on a log: against the reference, or, without one, against the tilt.
-
-The zero-phase smoother sees the future: no observer, but what an observer of the tilt could come near.
-"""
+"""Scores of an estimated rate on a log: against the reference, or, without one, against the tilt."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from cmg_mj.features.replay.log import REFERENCE, Log, evenly
+from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.results.metrics import finite_or_none, fit
+from cmg_mj.results.summary_keys import Figures
 from cmg_mj.stages.push import inside
 
 MAX_LAG_S = 0.5
@@ -27,17 +24,7 @@ TAPS = 15
 """The correlation is smoothed over so many lags either way, if there are as many."""
 RECONSTRUCTED_S = 1.0
 """Length of the stretches over which the estimated rate is integrated [s]."""
-ZERO_PHASE = "zero_phase"
-"""Name of the smoother's row among the figures."""
-CUTOFFS = 80
-"""Number of cut-offs that are tried, in equal ratios from the lowest to half the sampling rate."""
-MIN_PERIODS = 2.0
-"""The lowest cut-off has so many periods in the longest part."""
-BLOCK, BLOCKS = 32768, 4
-"""The cut-off of a long log is chosen on so many blocks of so many samples, evenly spread."""
 
-Figures = dict[str, float | None]
-"""Name -> figure; None where it does not exist."""
 Piece = Callable[[slice], np.ndarray]
 """A signal that is computed a stretch at a time: successive samples, (n,)."""
 
@@ -56,8 +43,8 @@ def scores(log: Log, rate: np.ndarray, scored: np.ndarray, noise_gain: float | N
     """
     counted = [part.start + np.flatnonzero(scored[part]) for part in log.parts]
     pieces = [slice(rows[0], rows[-1] + 1) for rows in counted if len(rows)]
-    against = _against if "reference" in log.has else _against_tilt
-    return {**against(log, rate, scored, pieces), "noise_gain_1_s": noise_gain}
+    figures = _against(log, rate, scored, pieces) if "reference" in log.has else _against_tilt(log, rate, pieces)
+    return {**figures, "noise_gain_1_s": noise_gain}
 
 
 def _against(log: Log, rate: np.ndarray, scored: np.ndarray, pieces: Sequence[slice]) -> Figures:
@@ -78,7 +65,7 @@ def _against(log: Log, rate: np.ndarray, scored: np.ndarray, pieces: Sequence[sl
     return figures
 
 
-def _against_tilt(log: Log, rate: np.ndarray, scored: np.ndarray, pieces: Sequence[slice]) -> Figures:
+def _against_tilt(log: Log, rate: np.ndarray, pieces: Sequence[slice]) -> Figures:
     """Compute the reconstruction error and the roughness of an estimate.
 
     For the first, the rate is integrated by the trapezoidal rule over `RECONSTRUCTED_S` at a time, each with the
@@ -141,10 +128,8 @@ def lag_with_error(
     stretches = _sums(behind, ahead, reach)
     whole = stretches.sum(axis=0)
     peak = _peak_of(whole)
-    if peak is None:
-        return None, None
     error = jackknife_error([_peak_of(whole - stretch) for stretch in stretches if stretch[0].any()])
-    if error is None or error > max(1.0, abs(peak) / 2.0):
+    if peak is None or error is None or error > max(1.0, abs(peak) / 2.0):
         return None, None
     return peak * dt, float(error) * dt
 
@@ -154,7 +139,7 @@ def _sums(behind: Sequence[Piece], ahead: Sequence[np.ndarray], reach: int) -> n
     from scipy.signal import correlate
 
     # Numbers of like size: of the products of transforms, what is far smaller than the largest is lost.
-    middle_x, middle_y = (_mean(pieces) for pieces in ([piece(slice(None)) for piece in behind], ahead))
+    middle_x, middle_y = map(_mean, ([piece(slice(None)) for piece in behind], ahead))
     sums = np.zeros((STRETCHES, 6, 2 * reach + 1))
     for stretch, piece, rows in jackknife_stretches([len(piece) for piece in ahead], 2 * reach):
         around = slice(max(0, rows.start - reach), rows.stop + reach)
@@ -164,11 +149,9 @@ def _sums(behind: Sequence[Piece], ahead: Sequence[np.ndarray], reach: int) -> n
         ones_x, ones_y = known_x.astype(float), known_y.astype(float)
         # x's row i is y's row i + around.start - rows.start.
         middle = len(y) - 1 + rows.start - around.start
-        first, last = max(0, middle - reach), min(len(x) + len(y) - 1, middle + reach + 1)
-        into = slice(first - middle + reach, last - middle + reach)
         pairs = ((ones_x, ones_y), (x, ones_y), (ones_x, y), (x * x, ones_y), (ones_x, y * y), (x, y))
         for i, (a, b) in enumerate(pairs):
-            sums[stretch, i, into] += correlate(a, b, mode="full", method="fft")[first:last]
+            sums[stretch, i] += np.pad(correlate(a, b, method="fft"), reach)[middle : middle + 2 * reach + 1]
     sums[:, 0] = np.rint(sums[:, 0])
     return sums
 
@@ -226,109 +209,3 @@ def _between(lags: np.ndarray, r: np.ndarray, at: int) -> float:
     ends = (lags[at] - 1, lags[at] + 1)
     result = minimize_scalar(lambda m: -curve(m), bounds=ends, method="bounded", options={"xatol": 1e-7})
     return float(result.x)  # pyright: ignore[reportAttributeAccessIssue]
-
-
-@dataclass(frozen=True)
-class ZeroPhase:
-    """Figures of the smoother on a log.
-
-    Attributes:
-        cutoff_hz: Its cut-off, chosen on the tilt alone [Hz].
-        figures: Its figures, as those of an observer.
-        best_cutoff_hz: The cut-off that fits the reference best [Hz].
-        best_rms_error_rad_s: RMS error with that cut-off [rad/s].
-    """
-
-    cutoff_hz: float
-    figures: Figures
-    best_cutoff_hz: float
-    best_rms_error_rad_s: float | None
-
-
-def zero_phase(log: Log, scored: np.ndarray) -> ZeroPhase | None:
-    """Choose the smoother's cut-off on a log with a reference, and score it.
-
-    Generalised cross-validation chooses it on the tilt alone: with the share R(f) = 1 - response that the smoother
-    takes away, mean(R^2 |y|^2)/mean(R)^2 estimates the error at samples that the smoother is not shown, if the tilt's
-    noise is white.
-
-    Args:
-        log: The log.
-        scored: Which samples count, (n,).
-
-    Returns:
-        Its figures; None if all parts are shorter than four samples.
-    """
-    blocks = [
-        slice(start, min(start + BLOCK, part.stop))
-        for part in log.parts
-        for start in range(part.start, part.stop - 3, BLOCK)
-    ]
-    if not blocks:
-        return None
-    if sum(block.stop - block.start for block in blocks) > BLOCK * BLOCKS:
-        blocks = evenly(blocks, BLOCKS)
-    longest = max(min(part.stop - part.start, BLOCK) for part in log.parts) * log.dt
-    cutoffs = np.geomspace(min(MIN_PERIODS / longest, 0.25 / log.dt), 0.5 / log.dt, CUTOFFS)
-    frequencies, powers, squares = [], [], np.zeros(len(cutoffs))
-    for block in blocks:
-        tilt, reference, n = log["y1_rad"][block], log[REFERENCE][block], block.stop - block.start
-        frequencies.append(np.fft.rfftfreq(2 * (n - 1), log.dt)[1:-1])
-        powers.append(np.abs(np.fft.rfft(_continued(tilt))[1:-1]) ** 2 / n)
-        counted = scored[block] & np.isfinite(reference)
-        for i, candidate in enumerate(cutoffs):
-            error = (smoothed_rate(tilt, log.dt, float(candidate)) - reference)[counted]
-            squares[i] += float(np.sum(error**2))
-    frequency, power = np.concatenate(frequencies), np.concatenate(powers)
-    taken = [1.0 / (1.0 + (candidate / frequency) ** 6) for candidate in cutoffs]
-    risks = [float(np.mean(share**2 * power) / np.mean(share) ** 2) for share in taken]
-    cutoff, best = (float(cutoffs[int(np.argmin(losses))]) for losses in (risks, squares))
-    own, best_figures = (
-        scores(log, _smoothed_log(log, chosen), scored, noise_gain_of(chosen, log.dt)) for chosen in (cutoff, best)
-    )
-    return ZeroPhase(cutoff, own, best, best_figures["velocity_rms_error_rad_s"])
-
-
-def smoothed_rate(tilt: np.ndarray, dt: float, cutoff_hz: float) -> np.ndarray:
-    """Return the rate of the smoothed tilt.
-
-    The smoothed tilt x minimises, but for the ends, the sum of (x - y)^2 plus the integral of x'''^2 by
-    (2 pi cutoff)^6: a smoothing spline, or the Rauch-Tung-Striebel smoother of an acceleration that is a random walk.
-    Its response is 1/(1 + (f/cutoff)^6), as that of `scipy.signal.filtfilt` with a Butterworth filter of third order.
-    It is applied in the frequency domain, the tilt less the line through its ends being continued oddly.
-
-    Args:
-        tilt: Successive samples, (n,) [rad].
-        dt: Sample period [s].
-        cutoff_hz: Where half of the amplitude is left [Hz].
-
-    Returns:
-        (n,) [rad/s].
-    """
-    n = len(tilt)
-    spectrum = np.fft.rfft(_continued(tilt))
-    frequency = np.fft.rfftfreq(2 * (n - 1), dt)
-    spectrum *= 2j * math.pi * frequency / (1.0 + (frequency / cutoff_hz) ** 6)
-    slope = (tilt[-1] - tilt[0]) / ((n - 1) * dt)
-    return np.fft.irfft(spectrum, 2 * (n - 1))[:n] + slope
-
-
-def _continued(tilt: np.ndarray) -> np.ndarray:
-    """Continue the tilt less the line through its ends oddly to one period, (2 n - 2,)."""
-    bent = tilt - np.linspace(tilt[0], tilt[-1], len(tilt))
-    return np.concatenate([bent, -bent[-2:0:-1]])
-
-
-def noise_gain_of(cutoff_hz: float, dt: float) -> float:
-    """Return the size of the rate that white noise of the tilt leaves, by its size [1/s]."""
-    frequency = (np.arange(4096) + 0.5) / 4096 * 0.5 / dt
-    response = 2.0 * math.pi * frequency / (1.0 + (frequency / cutoff_hz) ** 6)
-    return math.sqrt(float(np.mean(response**2)))
-
-
-def _smoothed_log(log: Log, cutoff_hz: float) -> np.ndarray:
-    """Return the smoothed rate of a log, part by part, (n,) [rad/s]; NaN outside the parts."""
-    rate = np.full(len(log), np.nan)
-    for part in log.parts:
-        rate[part] = smoothed_rate(log["y1_rad"][part], log.dt, cutoff_hz)
-    return rate

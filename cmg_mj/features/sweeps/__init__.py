@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -20,8 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True)
-class SweepResult:
+class SweepResult(dict[str, pa.Table]):
     """The tables of a sweep, by name: `result["cells"]`, `dict(result)`.
 
     Attributes:
@@ -31,24 +29,9 @@ class SweepResult:
             paired difference to the best observer of the point.
     """
 
-    study: SweepStudy
-    trials: pa.Table
-    cells: pa.Table
-
-    def keys(self) -> list[str]:
-        """List the names of the tables: `trials`, `cells`."""
-        return ["trials", "cells"]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.keys())
-
-    def __len__(self) -> int:
-        return len(self.keys())
-
-    def __getitem__(self, name: str) -> pa.Table:
-        if name not in self.keys():
-            raise KeyError(name)
-        return getattr(self, name)
+    def __init__(self, study: SweepStudy, trials: pa.Table, cells: pa.Table) -> None:
+        super().__init__(trials=trials, cells=cells)
+        self.study, self.trials, self.cells = study, trials, cells
 
     def to_pandas(self, table: str = "cells") -> pd.DataFrame:
         """Make a pandas frame of one table.
@@ -62,8 +45,8 @@ class SweepResult:
         Raises:
             InputError: pandas is not installed, or the sweep has no such table.
         """
-        if table not in self.keys():
-            raise InputError(f"to_pandas: {table!r} is no table of this sweep; {nearest(table, self.keys())}")
+        if table not in self:
+            raise InputError(f"to_pandas: {table!r} is no table of this sweep; {nearest(table, self)}")
         return frame_of(self[table])
 
 
@@ -95,7 +78,7 @@ def sweep(
     if isinstance(observers, str):
         raise InputError(f"observers = {observers!r}: must be a list of names, such as ['linear', 'ltv']")
     names = (base.observer.kind,) if observers is None else tuple(observers)
-    study = SweepStudy(base, axes, names, worlds, *(("grid", 0) if sample is None else ("sample", sample)))
+    study = SweepStudy(base, axes, names, worlds, sample)
     check_values(study)
     rows = (compute(study, *study.chunk(number)) for number in range(study.n_chunks))
     table = pa.concat_tables(table_of(chunk_rows, trials_schema(study)) for chunk_rows in rows)

@@ -32,40 +32,6 @@ CLOSE = 1.2
 """Factor on the leader's error up to which another observer is close to it."""
 
 
-class Reasons:
-    """Counts of the reasons why trials never ran to an end.
-
-    Reasons that differ in their numbers alone are of one kind, which the first of them stands for.
-
-    Args:
-        field: The last varied field: a refusal begins with the values of all, which are discarded.
-    """
-
-    def __init__(self, field: str) -> None:
-        self._field = field
-        self.counts: Counter[tuple[str, str]] = Counter()
-        self._first: dict[tuple[str, str], str] = {}
-        self._differ: set[tuple[str, str]] = set()
-
-    def add(self, outcome: str, reason: str | None) -> None:
-        """Count a trial that neither stood nor fell."""
-        text = " ".join((reason or "no reason is given").split())
-        if outcome == "refused" and f"{self._field}=" in text:
-            text = text.partition(f"{self._field}=")[2].partition(": ")[2] or text
-        text = shortened(text, MAX_REASON)
-        kind = (outcome, NUMBER.sub("#", text))
-        if self._first.setdefault(kind, text) != text:
-            self._differ.add(kind)
-        self.counts[kind] += 1
-
-    def most(self, n: int) -> list[str]:
-        """List the most frequent kinds of reasons, with counts."""
-        return [
-            f"{count} {kind[0]}{', such as' if kind in self._differ else ''}: {self._first[kind]}"
-            for kind, count in self.counts.most_common(n)
-        ]
-
-
 class Trials:
     """The outcomes and figures of a sweep's trials, by cell: 8 bytes a figure.
 
@@ -75,40 +41,38 @@ class Trials:
 
     Attributes:
         study: The sweep.
-        outcome: How each trial ended, (n_points, n_observers, n_worlds).
-        reasons: Counts of the reasons why trials were refused or stopped.
+        stood: Mask of the trials that stood to the end, (n_points, n_observers, n_worlds).
+        fell: Mask of the trials that fell, likewise. A refused or stopped one did not.
+        figures: Figure -> its values, likewise; NaN where a trial did not stand.
+        reasons: Outcome and kind of reason -> number of trials that were refused or stopped. Reasons that differ in
+            their numbers alone are of one kind, which the first of them stands for.
     """
 
     def __init__(self, study: SweepStudy, tables: Iterable[pa.Table]) -> None:
         self.study = study
         shape = (study.n_points, len(study.observers), study.worlds)
-        self.outcome = np.full(shape, "", dtype="U7")
-        self._figures = {key: np.full(shape, math.nan) for key in COMPARED}
-        self.reasons = Reasons(study.axes[-1].fields[-1])
+        self.stood, self.fell = np.zeros((2, *shape), dtype=bool)
+        self.figures = {key: np.full(shape, math.nan) for key in COMPARED}
+        self.reasons: Counter[tuple[str, str]] = Counter()
+        self._first: dict[str, str] = {}
         for table in tables:
             observers = np.array([study.observers.index(name) for name in table["observer"].to_pylist()])
             at = (table["point"].to_numpy(), observers, table["world"].to_numpy())
-            outcomes = table["outcome"].to_pylist()
-            self.outcome[at] = outcomes
-            for outcome, reason in zip(outcomes, table["reason"].to_pylist(), strict=True):
+            outcomes = np.array(table["outcome"].to_pylist())
+            self.stood[at], self.fell[at] = outcomes == "done", outcomes == "fell"
+            for outcome, reason in zip(outcomes.tolist(), table["reason"].to_pylist(), strict=True):
                 if outcome not in ("done", "fell"):
-                    self.reasons.add(outcome, reason)
-            for key, values in self._figures.items():
-                values[at] = table[key].to_numpy(zero_copy_only=False)
+                    self.add_reason(outcome, reason)
+            for key, values in self.figures.items():
+                values[at] = np.where(outcomes == "done", table[key].to_numpy(zero_copy_only=False), math.nan)
 
-    @property
-    def stood(self) -> np.ndarray:
-        """Mask of the trials that stood to the end, (n_points, n_observers, n_worlds)."""
-        return self.outcome == "done"
-
-    @property
-    def fell(self) -> np.ndarray:
-        """Mask of the trials that fell, (n_points, n_observers, n_worlds). A refused or stopped one did not."""
-        return self.outcome == "fell"
-
-    def figure(self, key: str) -> np.ndarray:
-        """Return a figure of every trial, (n_points, n_observers, n_worlds); NaN where it did not stand."""
-        return np.where(self.stood, self._figures[key], math.nan)
+    def add_reason(self, outcome: str, reason: str | None) -> None:
+        """Count a trial that neither stood nor fell."""
+        text, field = " ".join((reason or "no reason is given").split()), f"{self.study.fields[-1]}="
+        if outcome == "refused" and field in text:  # it begins with the values of all fields
+            text = text.partition(field)[2].partition(": ")[2] or text
+        text = shortened(text, MAX_REASON)
+        self.reasons[outcome, self._first.setdefault(NUMBER.sub("#", text), text)] += 1
 
 
 @cache  # of few different counts, at 0.3 ms each
@@ -158,9 +122,8 @@ def cells_of(trials: Trials) -> Iterator[Summary]:
     """
     study, n = trials.study, trials.study.worlds
     n_fell, n_stood = trials.fell.sum(axis=2), trials.stood.sum(axis=2)
-    figures = {key: trials.figure(key) for key in COMPARED}
     best = {}
-    for key, values in figures.items():
+    for key, values in trials.figures.items():
         means = values.mean(axis=-1)
         best[key], _ = least(means if KEYS[key].better == "less" else -means, study.contenders)
     for number, (place, observer) in itertools.product(range(study.n_points), enumerate(study.observers)):
@@ -168,7 +131,7 @@ def cells_of(trials: Trials) -> Iterator[Summary]:
         share, low, high = fell_interval(fell, fell + stood) if fell + stood else (None, None, None)
         row: Summary = {"point": number, **study.point(number), "observer": observer, "trials": n, "stood": stood}
         row |= {"fell": fell, "stopped": n - stood - fell, "fell_share": share, "fell_low": low, "fell_high": high}
-        for key, values in figures.items():
+        for key, values in trials.figures.items():
             leader = int(best[key][number])
             behind = values[number, place] - (math.nan if leader < 0 else values[number, leader])
             row |= with_ends(key, values[number, place], KEYS[key].positive)
@@ -214,7 +177,6 @@ class LeadRow(NamedTuple):
         leads: Points at which it leads; of a baseline, at which its error is less than the leader's.
         surely: Points at which it does so beyond 95 % intervals.
         close: Points at which it stood in every world, with at most `CLOSE` times the leader's error.
-        points: Points in all.
     """
 
     name: str
@@ -222,7 +184,6 @@ class LeadRow(NamedTuple):
     leads: int
     surely: int
     close: int
-    points: int
 
 
 def least_error(figure: np.ndarray, places: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -277,7 +238,7 @@ def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
         A row an observer, then a row a baseline.
     """
     study = trials.study
-    figure = trials.figure(key)
+    figure = trials.figures[key]
     best, sure, error = least_error(figure, study.contenders)
     ahead = baselines_ahead(study, figure, error)
     rows = []
@@ -290,5 +251,5 @@ def lead_rows(trials: Trials, key: str) -> list[LeadRow]:
             surely = [leads_here and (i < 0 or _is_less(own, all_[i])) for leads_here, own, all_, i in against]
         close = errors.mean(axis=-1) <= CLOSE * error
         counts = (int(np.sum(mask)) for mask in (leads, surely, close))
-        rows.append(LeadRow(name, name in ahead, *counts, points=len(figure)))
+        rows.append(LeadRow(name, name in ahead, *counts))
     return sorted(rows, key=lambda row: row.is_baseline)

@@ -170,7 +170,7 @@ def estimate_cost(study: SweepStudy) -> dict[str, float]:
     """
     thinned = study
     if study.trials > MAX_TRIALS and study.n_points > POINTS:  # points that lie alike, and are soon drawn
-        thinned = replace(study, design="sample", n=POINTS)
+        thinned = replace(study, sample=POINTS)
     trials_an_observer = study.n_points * study.worlds
     trials_a_chunk = min(CHUNK, trials_an_observer)
     plants = min(study.n_points, -(-trials_a_chunk // study.worlds))
@@ -337,7 +337,7 @@ def run(store: Store, left: Sequence[int], on_progress: OnProgress = no_progress
             what is finished is kept.
     """
     study = store.study
-    done = study.trials - sum(map(study.chunk_size, left))
+    done = study.trials_without(left)
     for number in left:
         size = study.chunk_size(number)
         store.keep(number, compute(study, *study.chunk(number), part_of(on_progress, done, size)))
@@ -387,8 +387,7 @@ def hash_of(study: SweepStudy, fields: StudyFields) -> str:
 def resolved(study: SweepStudy) -> StudyFields:
     """Write every default of a study's scenario out, as read back from a study file: the study reruns from that."""
     fields = prepare(study.scenario).resolved()
-    varied = [field for axis in study.axes for field in axis.fields]
-    for field in varied:
+    for field in study.fields:
         section, _, name = field.rpartition(".")
         if section == "plant" and field != "plant.timestep_s":
             fields["plant"].pop(name, None)
@@ -397,8 +396,8 @@ def resolved(study: SweepStudy) -> StudyFields:
     weights = study.scenario.controller.lqr
     if weights is not None:  # solved for anew on every plant
         fields["controller"]["lqr"] = weights.model_dump(mode="json")
-    if weights is not None or any(f"{field}.".startswith("controller.lqr.") for field in varied):
+    if weights is not None or any(f"{field}.".startswith("controller.lqr.") for field in study.fields):
         fields["controller"].pop("gains", None)
-    if "controller.kind" in varied:  # each law has parameters of its own
+    if "controller.kind" in study.fields:  # each law has parameters of its own
         fields["controller"] = study.scenario.as_fields()["controller"]
     return tomllib.loads(tomli_w.dumps(study.as_fields(fields)))

@@ -28,9 +28,7 @@ from cmg_mj.scenario.resolve import versions
 if TYPE_CHECKING:
     from distributed import Client, Future, Worker
 
-MAX_LOCAL = 256
-"""Workers on this machine."""
-ADDRESS = re.compile(r"((tcp|tls)://)?[^/\s]+:\d{1,5}")
+ADDRESS = re.compile(r"local:(?P<workers>[1-9]\d{0,2})|(?!local:)((tcp|tls)://)?[^/\s]+:\d{1,5}")
 PATIENCE_S = 10.0
 """Time for which a cluster may fail to answer."""
 LOOK_S = 0.25
@@ -46,23 +44,6 @@ def dask_setup(worker: Worker) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def local_workers(address: str) -> int | None:
-    """Read how many workers to start here; None for the address of a scheduler.
-
-    Raises:
-        InputError: The address is written as neither.
-    """
-    local = re.fullmatch(r"local:([0-9]{1,9})", address)
-    if local and 1 <= int(local[1]) <= MAX_LOCAL:
-        return int(local[1])
-    if address.startswith("local:") or not ADDRESS.fullmatch(address):
-        raise InputError(
-            f"--cluster {address}: write tcp://HOST:PORT of a scheduler that is running, or local:2 for 2 workers on "
-            f"this machine, at most {MAX_LOCAL}"
-        )
-    return None
-
-
 @contextmanager
 def on_cluster(address: str) -> Iterator[Callable[..., None]]:
     """Connect to a cluster to run sweeps on.
@@ -75,17 +56,23 @@ def on_cluster(address: str) -> Iterator[Callable[..., None]]:
         The function that runs the chunks, as `chunks.run` does.
 
     Raises:
-        InputError: The cluster cannot be reached, or `distributed` is not installed.
+        InputError: The address is not written so, the cluster cannot be reached, or `distributed` is not installed.
     """
+    written = ADDRESS.fullmatch(address)
+    if written is None:
+        raise InputError(
+            f"--cluster {address}: write tcp://HOST:PORT of a scheduler that is running, or local:2 for 2 workers on "
+            "this machine"
+        )
     if find_spec("distributed") is None:
         raise InputError('--cluster: distributed is not installed: python -m pip install "cmg_mj[cluster]"')
     import distributed
 
-    workers = local_workers(address)
+    workers = written["workers"]
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said here, in a line
     with ExitStack() as stack:
         try:
-            scheduler: Any = address if workers is None else stack.enter_context(_started(workers))
+            scheduler: Any = address if workers is None else stack.enter_context(_started(int(workers)))
             client = distributed.Client(scheduler, timeout=PATIENCE_S, set_as_default=False)
         except Exception as error:  # among others OSError, and RuntimeError where a worker does not start
             verb = "reached" if workers is None else "started"
@@ -134,7 +121,7 @@ def _run(
 
     study = store.study
     task = partial(client.submit, compute_there, packed(study), wanted=versions(), pure=False)
-    done = study.trials - sum(map(study.chunk_size, left))
+    done = study.trials_without(left)
     killed: Counter[int] = Counter()
     suspects: list[int] = []
     running: dict[Future, int] = {task(number): number for number in left}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -72,13 +73,11 @@ def sweep(
     from cmg_mj.features.sweeps.cells import COLUMNS, Trials, cells_of
     from cmg_mj.features.sweeps.chunks import Store, estimate_cost
     from cmg_mj.features.sweeps.chunks import run as run_here
-    from cmg_mj.features.sweeps.cluster import local_workers, on_cluster
+    from cmg_mj.features.sweeps.cluster import on_cluster
     from cmg_mj.features.sweeps.report import save, summary
-    from cmg_mj.features.sweeps.study import MAX_TRIALS, check_values, counted
+    from cmg_mj.features.sweeps.study import MAX_TRIALS, check_values
     from cmg_mj.scenario.resolve import safe_name
 
-    if cluster is not None:
-        local_workers(cluster)
     study = _study(arguments, varied, observers, worlds, sample)
     check_values(study)
     if dry_run:
@@ -91,15 +90,13 @@ def sweep(
         return
     if study.trials > MAX_TRIALS and not yes:
         raise InputError(
-            f"{study.cells} cells of {counted(study.worlds, 'world')}: {study.trials} trials; for more than "
-            f"{MAX_TRIALS} give --yes (--dry-run prints the time and memory)"
+            f"--vary: {study.trials} trials; for more than {MAX_TRIALS} give --yes (--dry-run prints time and memory)"
         )
     path = output_path(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
     with nullcontext(run_here) if cluster is None else on_cluster(cluster) as run:
         store = Store.open(path, study, overwrite=overwrites())
         left = store.left()
-        before = study.trials - sum(map(study.chunk_size, left))
-        if before:
+        if before := study.trials_without(left):
             note(f"resuming: {before} of {study.trials} trials are done")
         with CtrlC() as ctrl_c:
             try:
@@ -124,33 +121,26 @@ def _study(
     sample: int | None,
 ) -> SweepStudy:
     """Make the study of the command's options, which precede those of a study file."""
-    from cmg_mj.features.sweeps.study import (
-        SweepSection,
-        SweepStudy,
-        locate_tracks,
-        parse_axis,
-        read_study,
-        scenario_of,
-    )
+    from cmg_mj.features.sweeps.study import SweepStudy, locate_tracks, parse_axis, read_study
     from cmg_mj.inputs.files import find
+    from cmg_mj.scenario.loading import load_scenario
 
     settings = [setting.partition("=") for setting in varied]
     axes = [parse_axis(field, values, f"--vary {field}{equals}{values}") for field, equals, values in settings]
     file = read_study(arguments.name)
-    section = SweepSection() if file is None else file.sweep
-    if file is None:
-        scenario = arguments.scenario()
+    where = f"{arguments.name}: vary."
+    axes = axes or [parse_axis(field, values, where + field) for field, values in file.vary.items()]
+    if isinstance(file.scenario, str):
+        scenario = replace(arguments, name=file.scenario).scenario()
     else:
-        scenario = scenario_of(arguments.name, file, arguments.settings)
+        scenario = load_scenario(arguments.name, arguments.settings, fields=file.scenario)
         if arguments.seed is not None:
             scenario = scenario.model_copy(update={"seed": arguments.seed})
-        where = f"{arguments.name}: vary."
-        axes = axes or [parse_axis(field, values, where + field) for field, values in file.vary.items()]
     beside = find("scenarios", arguments.name, ".toml", "scenario").parent
     return SweepStudy(
         scenario,
         tuple(locate_tracks(axis, beside) for axis in axes),
-        tuple(observers or section.observers or [scenario.observer.kind]),
-        worlds or section.worlds,
-        *((section.design, section.n) if sample is None else ("sample", sample)),
+        tuple(observers or file.sweep.observers or [scenario.observer.kind]),
+        worlds or file.sweep.worlds,
+        sample or file.sweep.points,
     )

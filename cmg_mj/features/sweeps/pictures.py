@@ -69,22 +69,17 @@ class Map:
     falls: Mapping[str, np.ndarray]
 
 
-def is_number(value: object) -> bool:
-    """Return whether a field's value is a number, not true or false."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
 def pictures_of(trials: Trials) -> list[Picture]:
     """Draw curves over one varied numeric field, a map a figure over two in a grid; else nothing."""
     study = trials.study
     axes = [axis for axis in study.axes if not axis.values or len(axis.values) > 1]  # a range has no values
     worlds = f"{counted(study.worlds, 'world')} a cell"
     title = f"{study.scenario.title or 'Sweep'}: "
-    if not all(is_number(value) for axis in axes for value in axis.values):
+    if not all(type(value) in (int, float) for axis in axes for value in axis.values):
         return []
     if len(axes) == 1 and (trials.stood | trials.fell).any():
         return [Picture(CURVES, title + worlds, partial(curves, trials, axes[0].field))]
-    if len(axes) == 2 and study.design == "grid":
+    if len(axes) == 2 and study.sample is None:
         across, up = axes
         return [
             Picture(name, f"{title}{a_map.label}, {worlds}", partial(draw_map, a_map, study.observers, across, up))
@@ -98,19 +93,19 @@ def curves(trials: Trials, field: str) -> Any:
     study = trials.study
     x = np.array([study.point(number)[field] for number in range(study.n_points)], dtype=float)
     order = np.argsort(x, kind="stable")
-    keys = [key for key in ERRORS if np.isfinite(trials.figure(key)).any()]
+    keys = [key for key in ERRORS if np.isfinite(trials.figures[key]).any()]
     n = len(keys) + bool(trials.fell.any())
     figure, grid = pyplot().subplots(n, sharex=True, squeeze=False, layout="constrained", figsize=(9.0, 0.8 + 2.9 * n))
     palette, falls = colours(study.observers), np.insert(fall_shares(trials), 3, 0.0, axis=2)
     for axes, key in zip(grid[:, 0], [*keys, FALLS], strict=False):
         for place, name in enumerate(study.observers):
-            curve = falls[:, place] if key == FALLS else error_curve(trials.figure(key)[:, place])
+            curve = falls[:, place] if key == FALLS else error_curve(trials.figures[key][:, place])
             mean, low, high, is_part = curve[order].T
             color = hexadecimal(palette[name])
             axes.errorbar(x[order], mean, [mean - low, high - mean], fmt=".-", color=color, label=name)
             axes.plot(x[order][is_part == 1], mean[is_part == 1], "x", color=color, markersize=9)
         axes.set_ylabel("share of falls" if key == FALLS else heading(key))
-        if key != FALLS and scale_of(trials.figure(key)) == "log":
+        if key != FALLS and scale_of(trials.figures[key]) == "log":
             axes.set_yscale("log")
     grid[-1, 0].set(xlabel=field, xscale=scale_of(x))
     grid[0, 0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False)
@@ -147,19 +142,17 @@ def maps(trials: Trials, across: VariedField, up: VariedField) -> dict[str, Map]
         falls[TRUE_RATE] = shares[:, :, study.observers.index(study.references[0])]
     found = {}
     for key, name in MAPS.items():
-        figure = gridded(trials.figure(key))
+        figure = gridded(trials.figures[key])
         if np.isfinite(figure).any():
             best, sure, value = least_error(figure, places)
             each = dict(zip(study.observers, np.moveaxis(figure.mean(axis=-1), -1, 0), strict=True))
             found[name] = Map(heading(key), best, sure, each, baselines_ahead(study, figure, value), falls)
     if trials.fell.any():
         best, value = least(shares, places)
-        best[(shares[:, :, places] == value[:, :, None]).sum(axis=2) > 1] = -1  # several alike
-        sure = np.zeros(best.shape, dtype=bool)
-        for at in zip(*np.nonzero(best >= 0), strict=True):
-            others = [place for place in places if place != best[at]]
-            sure[at] = not (intervals[at][others, 1] <= intervals[at][best[at], 2]).any()
-        found[FALLS] = Map("share of falls", best, sure, falls, {}, falls)
+        best[(shares[:, :, places] == value[..., None]).sum(axis=2) > 1] = -1  # several alike
+        high = np.take_along_axis(intervals[..., 2], best[..., None], axis=2)
+        only = (intervals[:, :, places, 1] <= high).sum(axis=2) == 1  # the best itself
+        found[FALLS] = Map("share of falls", best, (best >= 0) & only, falls, {}, falls)
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from cmg_mj.core.errors import InputError
+from cmg_mj.core.errors import InputError, listed
 from cmg_mj.features.sweeps.cells import (
     CLOSE,
     Trials,
@@ -32,7 +32,7 @@ from cmg_mj.view.plots.figure import save_figure
 
 MAX_ROWS = 60
 """Rows of a table on the terminal or in the report; the files have all."""
-MAX_REASONS, MAX_VALUES = 5, 10
+MAX_REASONS = 5
 QUANTILES = {0.1: "10 % quantile", 0.5: "median", 0.9: "90 % quantile"}
 """Quantiles of a figure over the points of a design."""
 ERROR = ERRORS[0]
@@ -92,7 +92,7 @@ def report(trials: Trials, pictures: Sequence[Picture]) -> str:
     study = trials.study
     sizes = ((study.n_points, "point"), (len(study.observers), "observer"), (study.worlds, "world"))
     counts = ", ".join(counted(n, noun) for n, noun in sizes)
-    is_grid = study.design == "grid"
+    is_grid = study.sample is None
     return "\n\n".join(
         [
             f"# {study.scenario.title or 'Sweep'}",
@@ -109,17 +109,12 @@ def report(trials: Trials, pictures: Sequence[Picture]) -> str:
 
 def summary(trials: Trials) -> str:
     """Write for the terminal: cells, reasons of unfinished trials."""
-    parts = _cells(trials)
-    more = len(trials.reasons.counts) - 1
-    if more >= 0:
-        others = f" (and {counted(more, 'other reason')}: see the report)" if more else ""
-        parts.append(f"{_count_unfinished(trials)}. {trials.reasons.most(1)[0]}{others}")
-    return "\n\n".join(parts)
+    return "\n\n".join([*_cells(trials), *_unfinished(trials)])
 
 
 def _varied(study: SweepStudy) -> list[str]:
     """Say what a table of the cells does not: a design's values of every field, a grid's fields that vary together."""
-    if study.design != "grid":
+    if study.sample is not None:
         return ["Varied:", "\n".join(f"- {axis.option}: {_values(axis)}" for axis in study.axes)]
     together = [axis.fields for axis in study.axes if len(axis.fields) > 1]
     return [f"With {first} go, alike: {', '.join(others)}." for first, *others in together]
@@ -128,10 +123,7 @@ def _varied(study: SweepStudy) -> list[str]:
 def _values(axis: VariedField) -> str:
     if not axis.values:
         return f"{axis.low:g} to {axis.high:g}{', evenly in the logarithm' if axis.log else ''}"
-    values = [_format_value(value) for value in axis.values]
-    if len(values) > MAX_VALUES:
-        values[MAX_VALUES - 1 :] = ["...", f"{values[-1]} ({len(values)} values)"]
-    return ", ".join(values)
+    return listed([_format_value(value) for value in axis.values])
 
 
 def _format_value(value: SummaryValue) -> str:
@@ -141,7 +133,7 @@ def _format_value(value: SummaryValue) -> str:
 def _cells(trials: Trials) -> list[str]:
     """Show a grid's cells, a row a point, or how each observer does over the points of a design."""
     study = trials.study
-    if study.design != "grid":
+    if study.sample is not None:
         return _over_points(trials)
     fields = [axis.field for axis in study.axes]
     rows, every_cell = [], cells_of(trials)
@@ -162,7 +154,7 @@ def _format_cell(row: Summary) -> str:
 def _over_points(trials: Trials) -> list[str]:
     """Make a table with a row an observer: its error's mean and quantiles over the points, and its falls."""
     study = trials.study
-    error, (fell, known) = trials.figure(ERROR), fall_counts(trials)
+    error, (fell, known) = trials.figures[ERROR], fall_counts(trials)
     table = []
     for place, name in enumerate(study.observers):
         means = [mean for mean in map(finite_mean, error[:, place]) if mean is not None]
@@ -181,14 +173,13 @@ def _over_points(trials: Trials) -> list[str]:
 
 def _unfinished(trials: Trials) -> list[str]:
     """List the most frequent reasons why trials were refused or stopped; nothing if there are no such trials."""
-    if not trials.reasons.counts:
+    if not trials.reasons:
         return []
-    about = f"{_count_unfinished(trials)}; no mean counts them. Every one's reason is in {TRIALS}, the most frequent:"
-    return ["## Refused and stopped", about, "\n".join(f"- {reason}" for reason in trials.reasons.most(MAX_REASONS))]
-
-
-def _count_unfinished(trials: Trials) -> str:
-    return f"{trials.reasons.counts.total()} of {trials.study.trials} trials were refused or stopped"
+    about = f"{trials.reasons.total()} of {trials.study.trials} trials were refused or stopped; no mean counts them. "
+    about += f"Every one's reason is in {TRIALS}, the most frequent:"
+    kinds = trials.reasons.most_common(MAX_REASONS)
+    lines = (f"- {n} {outcome}{', such as' if n > 1 else ''}: {text}" for (outcome, text), n in kinds)
+    return ["## Refused and stopped", about, "\n".join(lines)]
 
 
 def _pictures(trials: Trials, pictures: Sequence[Picture]) -> list[str]:
@@ -206,12 +197,12 @@ def _leads(trials: Trials) -> list[str]:
     study = trials.study
     if not study.references:
         return []
-    is_grid = study.design == "grid"
+    is_grid = study.sample is None
     table = []
     for row in lead_rows(trials, ERROR):
-        _, low, high = fell_interval(row.leads, row.points)
+        _, low, high = fell_interval(row.leads, study.n_points)
         interval = [] if is_grid else [f"{100.0 * low:.1f} % to {100.0 * high:.1f} %"]
-        leads, *counts = (f"{count} of {row.points}" for count in (row.leads, row.surely, row.close))
+        leads, *counts = (f"{count} of {study.n_points}" for count in (row.leads, row.surely, row.close))
         table.append([f"{row.name} (baseline)" if row.is_baseline else row.name, leads, *interval, *counts])
     head = ["observer", "leads", *([] if is_grid else ["95 % interval"]), "surely", "close"]
     return ["## Who leads", ABOUT_LEADS, markdown_table(head, table)]

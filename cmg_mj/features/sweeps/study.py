@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 import re
 import tomllib
@@ -11,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -28,8 +28,7 @@ from cmg_mj.plant.plant import Plant, load_scenario_plant
 from cmg_mj.results.baselines import RATES
 from cmg_mj.runs.batch import UNUSED, can_vary_in_batch
 from cmg_mj.runs.experiment import prepare
-from cmg_mj.scenario.loading import find_files, find_model, load_scenario
-from cmg_mj.scenario.schema import ObserverSettings, Scenario, parse_scenario
+from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.time_grid import time_grid
 
 # --- varied fields
@@ -38,7 +37,7 @@ Variation: TypeAlias = Any
 """Values of a field: a list or array of them, a single one, or text as `--vary` takes it."""
 
 MAX_VALUES = 10_000
-"""Values of one field."""
+"""Values of one range."""
 LOG = "log:"
 TOGETHER = "+"
 """Between fields that take the same values."""
@@ -107,13 +106,18 @@ def parse_axis(option: str, variation: Variation, where: str) -> VariedField:
     fields = tuple(field.strip() for field in option.split(TOGETHER))
     if "" in fields:
         raise InputError(f"{where}: write FIELD=VALUES, for example plant.equilibrium_bias_deg=-1.5:1.5:13")
-    if isinstance(variation, str) and ":" in variation and not variation.lstrip().startswith(("[", '"')):
-        return _parse_range(fields, variation.strip(), where)
-    values = _parse_list(variation, where) if isinstance(variation, str) else _as_list(variation, where)
+    values = _plain(variation)
+    if isinstance(values, str) and ":" in values and not values.lstrip().startswith(("[", '"')):
+        return _parse_range(fields, values.strip(), where)
+    if isinstance(values, str):
+        values = _parse_list(values, where)
+    if isinstance(values, (int, float)):
+        values = [values]
+    if isinstance(values, Mapping) or not isinstance(values, Iterable):
+        raise InputError(f"{where}: {shown(values)}: must be a list of values, or text such as '-1:1:5'")
+    values = [_plain(value) for value in values]
     if not values:
         raise InputError(f"{where}: no values; write FIELD=VALUES, such as plant.equilibrium_bias_deg=0,0.5")
-    if len(values) > MAX_VALUES:
-        raise InputError(f"{where}: {len(values)} values; at most {MAX_VALUES}")
     twice = next((value for i, value in enumerate(values) if value in values[:i]), None)
     if twice is not None:
         raise InputError(f"{where}: {twice} is there twice")
@@ -131,10 +135,9 @@ def _parse_range(fields: tuple[str, ...], text: str, where: str) -> VariedField:
             f"{where}: {text!r} is no range; write first:last:count, or low:high for --sample, "
             "with log: before it for a logarithmic one"
         ) from None
-    if not math.isfinite(high - low) or low == high or (count is None and low > high):
-        raise InputError(f"{where}: an empty range; its ends must be two different numbers, the lower one first")
-    if log and min(low, high) <= 0.0:
-        raise InputError(f"{where}: a logarithmic range needs ends above 0")
+    wrong = low == high or (count is None and low > high) or (log and min(low, high) <= 0.0)
+    if wrong or not math.isfinite(high - low):
+        raise InputError(f"{where}: its ends must be two different numbers, the lower one first, after log: above 0")
     axis = VariedField(fields, (), low, high, log)
     if count is None:
         return axis
@@ -143,17 +146,8 @@ def _parse_range(fields: tuple[str, ...], text: str, where: str) -> VariedField:
     return VariedField(fields, tuple(axis.at(np.linspace(0.0, 1.0, count))))
 
 
-def _as_list(variation: Variation, where: str) -> list[Any]:
-    """Make values that are no text into a list, with numpy's numbers as Python's."""
-    values = _plain(variation)
-    if isinstance(values, (bool, int, float)):
-        return [values]
-    if isinstance(values, Mapping) or not isinstance(values, Iterable):
-        raise InputError(f"{where}: {shown(values)}: must be a list of values, or text such as '-1:1:5'")
-    return [_plain(value) for value in values]
-
-
 def _plain(value: Any) -> Any:
+    """Make numpy's numbers and arrays Python's."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 
@@ -173,7 +167,6 @@ def _parse_list(text: str, where: str) -> list[Any]:
 
 # --- the study
 
-SamplingDesign = Literal["grid", "sample"]
 Point = dict[str, Any]
 """Varied field -> its value."""
 Trial = tuple[int, int]
@@ -209,17 +202,15 @@ class SweepStudy:
         observers: The observers in the loop, and baselines: `zero`, `mems_gyro` and the like close no loop, so that
             their trials are those of a loop with the true rate.
         worlds: Trials a point and observer: world i has the same noise at every point, for every observer.
-        design: `grid`: every combination of values, of which the last field's change first. `sample`: a quasi-random
-            design of the ranges and lists.
-        n: Points of the quasi-random design.
+        sample: Points of a quasi-random design of the ranges and lists; None for every combination of values, of which
+            the last field's change first.
     """
 
     scenario: Scenario
     axes: tuple[VariedField, ...]
     observers: tuple[str, ...]
     worlds: int
-    design: SamplingDesign = "grid"
-    n: int = 0
+    sample: int | None = None
 
     def __post_init__(self) -> None:
         """Check the study, as far as is known without importing a user's observer.
@@ -229,27 +220,21 @@ class SweepStudy:
         """
         if not self.axes:
             raise InputError("--vary: nothing is varied; give a field, such as --vary plant.equilibrium_bias_deg=0,0.5")
-        for field, times in Counter(self._fields).items():
-            unused = "no trial depends on it" if field.partition(".")[0] in UNUSED else None
-            if why := NOT_VARIED.get(field, unused):
-                raise InputError(f"--vary {field}: is not varied: {why}")
-            if times > 1:
-                raise InputError(f"--vary {field}: given twice")
+        for field, times in Counter(self.fields).items():
+            why = "no trial depends on it" if field.partition(".")[0] in UNUSED else "given twice" if times > 1 else ""
+            if why := NOT_VARIED.get(field, why):
+                raise InputError(f"--vary {field}: {why}")
         for axis in self.axes:
-            if not axis.values and self.design == "grid":
+            if not axis.values and self.sample is None:
                 raise InputError(
                     f"--vary {axis.field}: a range without a count is for --sample; write first:last:count"
                 )
-        if not _is_count(self.worlds):
-            raise InputError(f"worlds = {shown(self.worlds)}: must be a whole number, 1 or more")
-        n = shown(self.n)
-        if self.design == "grid" and self.n != 0:
-            raise InputError(f"n = {n}: is for the design sample; a grid is every combination")
-        if self.design == "sample" and not _is_count(self.n):
-            raise InputError(f"--sample, n = {n}: must be a whole number of points, 1 or more")
-        for name, times in Counter(self.observers).items():
-            if not isinstance(name, str) or (":" not in name and name not in (*OBSERVERS, *RATES)):
-                known = nearest(str(name), [*OBSERVERS, *RATES])
+        for name, count in {"worlds": self.worlds, "--sample, n": self.sample}.items():
+            if count is not None and not (isinstance(count, (int, np.integer)) and count >= 1):
+                raise InputError(f"{name} = {count}: must be a whole number, 1 or more")
+        for name, times in Counter(map(str, self.observers)).items():
+            if ":" not in name and name not in (*OBSERVERS, *RATES):
+                known = nearest(name, [*OBSERVERS, *RATES])
                 raise InputError(f"observers: {name!r}: no such observer; {known}, or your own as package.module:Class")
             if times > 1:
                 raise InputError(f"observers: {name!r} is there twice")
@@ -257,35 +242,33 @@ class SweepStudy:
             raise InputError("observers: there must be one at least")
 
     @property
-    def _fields(self) -> list[str]:
+    def fields(self) -> list[str]:
+        """All varied fields."""
         return [field for axis in self.axes for field in axis.fields]
 
     @property
     def n_points(self) -> int:
         """Number of points, without drawing them."""
-        if self.design == "grid":
-            return math.prod(len(axis.values) for axis in self.axes)
-        return self.n
-
-    @property
-    def cells(self) -> int:
-        """Points times observers."""
-        return self.n_points * len(self.observers)
+        return self.sample or math.prod(len(axis.values) for axis in self.axes)
 
     @property
     def trials(self) -> int:
         """Number of runs."""
-        return self.cells * self.worlds
+        return self.n_points * len(self.observers) * self.worlds
+
+    def trials_without(self, chunks: Sequence[int]) -> int:
+        """Number of runs in all chunks but some."""
+        return self.trials - sum(map(self.chunk_size, chunks))
 
     @cached_property
     def _drawn(self) -> list[list[Any]]:
         """The values of each axis at a design's points, (n_axes, n_points)."""
-        shares = sampled(len(self.axes), self.n, self.scenario.seed)
+        shares = sampled(len(self.axes), self.n_points, self.scenario.seed)
         return [axis.at(share) for axis, share in zip(self.axes, shares.T, strict=True)]
 
     def point(self, number: int) -> Point:
         """Return the values of the varied fields at a point."""
-        if self.design == "grid":
+        if self.sample is None:
             places = np.unravel_index(number, [len(axis.values) for axis in self.axes])
             row = [axis.values[place] for axis, place in zip(self.axes, places, strict=True)]
         else:
@@ -295,20 +278,15 @@ class SweepStudy:
     @property
     def apart(self) -> list[str]:
         """Varied fields whose values cannot run in one batch."""
-        return [field for field in self._fields if not can_vary_in_batch(field, self.scenario.controller.kind)]
+        return [field for field in self.fields if not can_vary_in_batch(field, self.scenario.controller.kind)]
 
     @cached_property
     def _order(self) -> np.ndarray:
         """Numbers of the points, those that can run in one batch next to each other, (n_points,)."""
-        apart = self.apart
-        if not apart:
+        if not self.apart:
             return np.arange(self.n_points)
-
-        def unpooled(number: int) -> list[str]:
-            point = self.point(number)
-            return [repr(point[field]) for field in apart]
-
-        return np.array(sorted(range(self.n_points), key=unpooled))
+        values = itemgetter(*self.apart)
+        return np.array(sorted(range(self.n_points), key=lambda number: repr(values(self.point(number)))))
 
     @property
     def _chunks_an_observer(self) -> int:
@@ -370,16 +348,12 @@ class SweepStudy:
 
     def as_fields(self, scenario: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         """Make the sections of a study file, with the scenario as given."""
-        design: dict[str, Any] = {} if self.design == "grid" else {"n": self.n}
+        design = {"design": "grid"} if self.sample is None else {"design": "sample", "n": self.sample}
         return {
-            "sweep": {"observers": list(self.observers), "worlds": self.worlds, "design": self.design, **design},
+            "sweep": {"observers": list(self.observers), "worlds": self.worlds, **design},
             "vary": {axis.option: axis.as_field() for axis in self.axes},
             "scenario": dict(scenario),
         }
-
-
-def _is_count(number: float | str | None) -> bool:
-    return isinstance(number, (int, np.integer)) and not isinstance(number, bool) and number >= 1
 
 
 def counted(n: int, noun: str) -> str:
@@ -393,8 +367,7 @@ def sampled(dimensions: int, n: int, seed: int) -> np.ndarray:
 
     # The argument is called `rng` since 1.15; all versions take this name.
     generator: Any = {"seed": np.random.default_rng(seed)}
-    with warnings.catch_warnings():  # that n is no power of two
-        warnings.simplefilter("ignore", UserWarning)
+    with warnings.catch_warnings(action="ignore"):  # that n is no power of two
         return qmc.Sobol(dimensions, **generator).random(n)
 
 
@@ -408,29 +381,25 @@ def check_values(study: SweepStudy) -> None:
         InputError: An observer cannot run, or a field or value does not fit.
     """
     plant = _plant(study.scenario)
-    base = study.scenario.model_copy(update={"open_loop_observers": []})
-    for observer in study.observers:
-        prepare(study.scenario_with(observer), plant)
+    bases = [study.scenario_with(observer) for observer in study.observers]
+    for base in bases:
+        prepare(base, plant)
     for axis in study.axes:
-        parameters = {field.partition(".")[2] for field in axis.fields if field.startswith("observer.")}
-        if parameters and study.baselines:
+        of_observer = any(field.startswith("observer.") for field in axis.fields)
+        if of_observer and study.baselines:
             raise InputError(f"--vary {axis.option}: a baseline has no parameters; leave {study.baselines[0]} out")
         values = axis.values or (axis.low, axis.high)
         for i, value in enumerate(values):
-            fields = base.as_fields()
-            for field in axis.fields:
-                assign(fields, field, value, f"--vary {field}")
-            scenario = parse_scenario(fields, f"--vary {axis.option}={value}")
             if "plant.model" in axis.fields:
                 find("models", str(value), ".xml", f"--vary {axis.option}: plant.model =")
             alone = len(study.axes) == 1 and (i < MAX_ALONE or i == len(values) - 1)
-            changed_plant = _plant(scenario, plant) if alone else plant
-            for observer in study.observers if parameters else study.observers[: int(alone)]:
-                settings = scenario.observer
-                kind = BASELINE_LOOP if observer in RATES else observer
-                if kind != base.observer.kind:
-                    settings = ObserverSettings.model_validate({"kind": kind, **dict.fromkeys(parameters, value)})
-                prepare(scenario.model_copy(update={"observer": settings}), changed_plant)
+            for base in bases if of_observer else bases[:1]:
+                fields = base.as_fields()
+                for field in axis.fields:
+                    assign(fields, field, value, f"--vary {field}")
+                scenario = parse_scenario(fields, f"--vary {axis.option}={value}")
+                if alone or of_observer:
+                    prepare(scenario, _plant(scenario, plant) if alone else plant)
 
 
 def _plant(scenario: Scenario, like: Plant | None = None) -> Plant:
@@ -448,8 +417,17 @@ class SweepSection(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
     observers: list[str] | None = None
     worlds: int = WORLDS
-    design: SamplingDesign = "grid"
-    n: int = 0
+    design: Literal["grid", "sample"] | None = None
+    n: int | None = None
+
+    @property
+    def points(self) -> int | None:
+        """Points of a quasi-random design; None for a grid."""
+        if self.design == "sample":
+            return self.n or 0
+        if self.n:
+            raise InputError(f"n = {self.n}: is for the design sample; a grid is every combination")
+        return None
 
 
 class StudyFile(BaseModel):
@@ -461,37 +439,23 @@ class StudyFile(BaseModel):
     scenario: str | dict[str, Any]
 
 
-def read_study(name: str) -> StudyFile | None:
-    """Read a study file; None of a scenario.
+def read_study(name: str) -> StudyFile:
+    """Read a study file; a scenario's is one without a section [sweep].
 
     Raises:
-        InputError: The file is neither.
+        InputError: Its sections are not written so.
     """
     path = find("scenarios", name, ".toml", "scenario")
     try:
         fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
-        return None  # as a scenario it is refused with what is wrong
+        fields = {}  # as a scenario it is refused with what is wrong
     if "vary" not in fields and "sweep" not in fields:
-        return None
+        fields = {"scenario": name}
     try:
         return StudyFile.model_validate(fields)
     except ValidationError as error:
         raise InputError(f"{name}: {'; '.join(complaints(StudyFile, error.errors(), fields))}") from error
-
-
-def scenario_of(name: str, file: StudyFile, settings: Sequence[str] = ()) -> Scenario:
-    """Load a study file's scenario, a table or a name, with settings `section.field=value` that replace its own."""
-    if isinstance(file.scenario, str):
-        return load_scenario(file.scenario, settings)
-    fields = {key: value for key, value in copy.deepcopy(file.scenario).items() if key != "versions"}
-    for setting in settings:
-        override(fields, setting)
-    scenario = parse_scenario(fields, f"{name} with --set {' --set '.join(settings)}" if settings else name)
-    beside = find("scenarios", name, ".toml", "scenario").parent
-    if not any(setting.partition("=")[0].strip() == "plant.model" for setting in settings):
-        scenario = find_model(scenario, beside)
-    return find_files(scenario, beside)
 
 
 MAY_NAME_TRACKS = re.compile(r"pivot(\.\d+(\.file)?)?")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.features.replay.log import Log, LogNoise, ReadOptions, WhiteNoise
+from cmg_mj.features.replay.log import Log, ReadOptions
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.features.replay.reference import AGREES, SURE, alignment, alignment_of, judge
 from tests.command import ROOT
@@ -42,37 +42,25 @@ def real_remark(**options) -> str:
 def test_a_tilt_that_freezes_is_offered_no_cure(tmp_path: Path) -> None:
     for sign in (1.0, -1.0):
         said = remark(tmp_path, sign * FREEZES)
-        assert f"(correlation {0.71 * sign:.2f})" in said
+        assert f"correlate by {0.71 * sign:.2f}:" in said
         assert "--" not in said
 
 
-@pytest.mark.daily_cases("True-0.0", "True-0.02", "False-0.02", "False-0.1")
-@pytest.mark.parametrize("size", [0.0, 0.02, 0.1])
-@pytest.mark.parametrize("is_white", [True, False])
-def test_a_cure_is_offered_from_the_criterion_on(size: float, is_white: bool, tmp_path: Path) -> None:
-    """Half of the rate is missing. White noise of the tilt is no disagreement; a smooth error of that size is one."""
-    error = noise()
-    if not is_white:
-        error = 5.0 * np.convolve(error, np.hanning(41) / np.hanning(41).sum(), "same")
-    log = read(tmp_path, {**sine(), "tilt_rad": TILT + size * error, "gyro_rad_s": 0.5 * RATE})
-    fit = alignment_of(log)
-    assert fit is not None
-    assert fit.correlation is not None
-    assert (fit.correlation >= AGREES) == (size < 0.05)
-    assert ("--scale rate=" in last_remark(log)) == (is_white or fit.correlation >= AGREES)
+def test_a_cure_is_offered_from_the_criterion_on(tmp_path: Path) -> None:
+    """Half of the rate is missing."""
+    for size in (0.0, 0.02, 0.1):
+        log = read(tmp_path, {**sine(), "tilt_rad": TILT + size * noise(), "gyro_rad_s": 0.5 * RATE})
+        fit = alignment_of(log)
+        assert fit is not None
+        assert fit.correlation is not None
+        assert ("--scale rate=" in last_remark(log)) == (fit.correlation >= AGREES) == (size < 0.05)
 
 
-@pytest.mark.daily_cases("0.05")
-@pytest.mark.parametrize("size", [0.05, 0.1])
-def test_a_faultless_log_is_not_blamed_for_its_noise(size: float, tmp_path: Path) -> None:
+def test_a_faultless_log_is_not_blamed_for_its_noise(tmp_path: Path) -> None:
     """By chance one of a hundred is: here at most one of ten."""
-    log, agree = read(tmp_path, sine()), 0
-    for seed in range(10):
-        known = LogNoise(WhiteNoise(size, size, size), None, 0.0)
-        noisy = replace(log, columns={**log.columns, "y1_rad": TILT + size * noise(seed)}, white_noise=known)
-        assert "does not go with" not in last_remark(noisy)
-        agree += last_remark(noisy).startswith(AGREE)
-    assert agree >= 9
+    log = read(tmp_path, sine())
+    logs = (replace(log, columns={**log.columns, "y1_rad": TILT + 0.02 * noise(seed)}) for seed in range(10))
+    assert sum(last_remark(noisy).startswith(AGREE) for noisy in logs) >= 9
 
 
 def test_a_small_bias_and_a_small_scale_error_are_told(tmp_path: Path) -> None:
@@ -114,7 +102,7 @@ def test_intervals_of_scale_and_offset(sigma: float, seeds: int, share: float) -
 
 
 def test_a_delay_below_its_error_is_none(tmp_path: Path) -> None:
-    log = read(tmp_path, {**sine(), "tilt_rad": TILT + 0.1 * noise(), "gyro_rad_s": 2.0 * RATE})
+    log = read(tmp_path, {**sine(), "tilt_rad": TILT + 0.03 * noise(), "gyro_rad_s": 2.0 * RATE})
     fit = alignment_of(log)
     assert fit is not None
     assert fit.lag_s is not None
@@ -124,8 +112,8 @@ def test_a_delay_below_its_error_is_none(tmp_path: Path) -> None:
 
 
 def test_the_other_way_round(tmp_path: Path) -> None:
-    assert remark(tmp_path, rate=-RATE).endswith("it counts the other way: --scale rate=-1.")
-    assert real_remark(scale={"rate": -1.0}).endswith("it counts the other way: --scale rate=1.")
+    assert remark(tmp_path, rate=-RATE).startswith("The reference counts the other way")
+    assert real_remark(scale={"rate": -1.0}).endswith(": --scale rate=1.")
 
 
 def test_late_is_late_by_the_logs_own_rows() -> None:
@@ -147,7 +135,7 @@ def test_the_delay_of_a_fast_log_is_offered_so_that_it_cures(tmp_path: Path) -> 
     t = 2e-4 * np.arange(N)
     columns = {"t_s": t, "tilt_rad": 0.2 * np.sin(30.0 * t), "gyro_rad_s": 6.0 * np.cos(30.0 * (t - 1.6e-4))}
     first = last_remark(read(tmp_path, columns))
-    assert "comes 0.160 ms behind" in first
+    assert "comes 0.16 ms behind" in first
     again = last_remark(read(tmp_path, columns, delay_s=1e-4))
     for said in (first, again):
         assert offered(said)["delay"] == pytest.approx(1.6e-4, abs=4e-6)

@@ -27,7 +27,7 @@ def noise_of_rows(t: np.ndarray, *parts: slice, **signals: np.ndarray) -> LogNoi
     for part in parts or [slice(None)]:
         rows = {name: values[part] for name, values in signals.items()}
         segments.append(Segment(t[part], {}, t[part], t[part], rows))
-    return white_noise_of(segments, DT)
+    return white_noise_of(segments, DT, DT)
 
 
 def tilt_noise(signal: MakeSignal, seed: int = 0) -> WhiteNoise | str:

@@ -60,8 +60,8 @@ def error(point: dict[str, Any], name: str, world: int) -> float | None:
 def test_leaders_are_counted_and_baselines_stand_apart() -> None:
     trials = make_trials(GRID, OBSERVERS, 4, error)
     linear, ltv, zero = lead_rows(trials, VELOCITY)
-    assert linear == ("linear", False, 3, 2, 3, 6)
-    assert ltv == ("ltv", False, 2, 2, 5, 6)
+    assert linear == ("linear", False, 3, 2, 3)
+    assert ltv == ("ltv", False, 2, 2, 5)
     assert zero[:4] == ("zero", True, 4, 3)  # at 200 and 400, and where nobody stood; the leader's pull apart at 400
     rows = {(row["point"], row["observer"]): row for row in cells_of(trials)}
     assert rows[1, "zero"][f"{VELOCITY}_best"] == "linear"

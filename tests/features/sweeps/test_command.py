@@ -118,7 +118,7 @@ def test_the_tables_of_a_sweep_as_frames() -> None:
     pytest.importorskip("pandas")
     scenario = package.load_scenario("push_recovery", ["duration_s=0.4", "push=[]"])
     swept = package.sweep(scenario, {BIAS: [0.0, 0.5]}, ["linear", "gyro_free"], worlds=2)
-    assert swept.keys() == ["trials", "cells"]
+    assert list(swept) == ["trials", "cells"]
     assert len(swept.to_pandas("trials")) == 2 * 2 * 2
     assert swept.to_pandas()["observer"].tolist() == swept.cells["observer"].to_pylist()
     with pytest.raises(InputError, match="to_pandas: 'order'"):

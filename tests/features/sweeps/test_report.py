@@ -35,7 +35,7 @@ def test_of_a_design_an_observer_has_a_row_and_the_report_says_what_is_varied() 
         return None if name == "ltv" and world == 1 and point[BIAS] > 0.5 else point[BIAS] + 0.1 * world
 
     axes = {BIAS: "0:1", NOISE: "log:100:800", RATES: "100,200"}
-    trials = make_trials(axes, ("linear", "ltv", "kalman"), 2, error, design="sample", n=24)
+    trials = make_trials(axes, ("linear", "ltv", "kalman"), 2, error, sample=24)
     bias = np.array([trials.study.point(number)[BIAS] for number in range(24)])
     falls = bias > 0.5
     errors = bias + 0.05 * ~falls
@@ -60,8 +60,8 @@ def test_reasons_are_in_the_report_and_on_the_terminal() -> None:
     trials = make_trials({BIAS: "0,1"}, ("linear",), 4, lambda *_: 1.0)
     assert "refused" not in report(trials, []) + summary(trials)
     for reason in ("gone at t = 0.5 s", "gone at t = 1e-3 s", None):
-        trials.reasons.add("stopped", reason)
-    trials.reasons.add("refused", f"it with --set x=1 with a=1, {BIAS}=2: b.c = 2: must be\n  less: than 1")
+        trials.add_reason("stopped", reason)
+    trials.add_reason("refused", f"it with --set x=1 with a=1, {BIAS}=2: b.c = 2: must be\n  less: than 1")
     lines = report(trials, []).splitlines()
     assert "- 2 stopped, such as: gone at t = 0.5 s" in lines
     assert "- 1 refused: b.c = 2: must be less: than 1" in lines
@@ -123,12 +123,12 @@ def test_a_map_shows_where_baselines_are_ahead() -> None:
 
 def test_curves_have_intervals_and_say_where_some_worlds_fell() -> None:
     trials = make_trials({NOISE: "100,200,400"}, OBSERVERS, 4, lambda p, name, w: error({BIAS: 1, **p}, name, w))
-    mean, low, _, is_part = error_curve(trials.figure(VELOCITY)[:, 0]).T
+    mean, low, _, is_part = error_curve(trials.figures[VELOCITY][:, 0]).T
     assert mean == pytest.approx([0.1, 0.2, 0.2])
     half_width = 3.1824 * np.std([1, -1, 1, -1], ddof=1) * 0.01 / 2.0
     assert low == pytest.approx([0.1, 0.2, 0.2 * math.exp(-half_width / 0.2)], rel=1e-4)
     assert not is_part.any()
-    assert error_curve(trials.figure(VELOCITY)[:, 1])[:, 3].all()
+    assert error_curve(trials.figures[VELOCITY][:, 1])[:, 3].all()
     assert fall_shares(trials)[0, 1] == pytest.approx((0.75, 0.3006, 0.9544), abs=1e-4)
 
 
