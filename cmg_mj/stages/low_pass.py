@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, clip
-from cmg_mj.core.sensor import SensorStage, Site, Timing
+from cmg_mj.core.sensor import Site, Timing
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
 from cmg_mj.inputs.types import STRICT
 from cmg_mj.stages.pair import PairSettings
@@ -133,8 +133,3 @@ def low_pass(bandwidth_hz: float, rate_hz: float, start: Scalar) -> Callable[[Sc
         return y
 
     return passed
-
-
-def low_pass_stage(part: LowPassSettings, site: Site) -> SensorStage | None:
-    """Make the stage of accelerometers with a low-pass."""
-    return LowPass(part, site) if part.bandwidth_hz else None

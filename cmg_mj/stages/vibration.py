@@ -57,8 +57,8 @@ class VibrationSettings(PairSettings):
 
     @property
     def vibrates(self) -> bool:
-        """True if the accelerometers of one world vibrate."""
-        return bool(self.vibration_mg) or any(self.wheel_harmonics_mg)
+        """True if the accelerometers of any world vibrate."""
+        return bool(np.any(self.vibration_mg)) or any(self.wheel_harmonics_mg)
 
 
 class BroadbandVibration:
@@ -141,37 +141,21 @@ class WheelTones:
         return total
 
 
-class Vibration:
-    """Vibration of the accelerometers, added to the true specific forces.
+def vibration(part: VibrationSettings, site: Site) -> SensorStage:
+    """Make the stage that adds the vibration to the true specific forces."""
+    dt, milli_g = 1.0 / part.raw_rate_hz, 1e-3 * STANDARD_GRAVITY
+    rms, is_broad = milli_g * part.vibration_mg, np.any(part.vibration_mg)
+    numbers = site.noise(NoiseStream.VIBRATION, BroadbandVibration.channels)
+    broadband = BroadbandVibration(part.vibration_band_hz, dt, numbers)
+    amplitudes = [milli_g * amplitude for amplitude in part.wheel_harmonics_mg]
+    tones = WheelTones(amplitudes, dt, site.noise(NoiseStream.WHEEL_TONES, 2))
 
-    Args:
-        part: The accelerometers.
-        site: Their place in the run.
-    """
-
-    def __init__(self, part: VibrationSettings, site: Site) -> None:
-        dt, milli_g = 1.0 / part.raw_rate_hz, 1e-3 * STANDARD_GRAVITY
-        self._rms = milli_g * part.vibration_mg
-        self._broadband = self._tones = None
-        if np.any(part.vibration_mg):
-            numbers = site.noise(NoiseStream.VIBRATION, BroadbandVibration.channels)
-            self._broadband = BroadbandVibration(part.vibration_band_hz, dt, numbers)
-        if any(part.wheel_harmonics_mg):
-            amplitudes = [milli_g * amplitude for amplitude in part.wheel_harmonics_mg]
-            self._tones = WheelTones(amplitudes, dt, site.noise(NoiseStream.WHEEL_TONES, 2))
-
-    def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
-        """Return the forces with the next sample of the vibration."""
-        added: list[Scalar] = [0.0] * AXES
-        if self._broadband is not None:
-            added = [self._rms * part for part in self._broadband.advance()]
-        if self._tones is not None and ideal.wheels:
-            added = [part + tone for part, tone in zip(added, self._tones.advance(ideal.wheels), strict=True)]
+    def add(forces: Forces, ideal: IdealReading) -> Forces:
+        added = [rms * part for part in broadband.advance()] if is_broad else [0.0] * AXES
+        if amplitudes and ideal.wheels:
+            added = [part + tone for part, tone in zip(added, tones.advance(ideal.wheels), strict=True)]
         if isinstance(forces, np.ndarray):
             return forces + np.array(added)
         return [force + part for force, part in zip(forces, added, strict=True)]
 
-
-def vibration(part: VibrationSettings, site: Site) -> SensorStage | None:
-    """Make the stage of accelerometers that vibrate in any world."""
-    return Vibration(part, site) if np.any(part.vibration_mg) or any(part.wheel_harmonics_mg) else None
+    return add
