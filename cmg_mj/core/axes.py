@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import MultiAxisReading
 
-
-class AxesStage(Protocol):
-    """An effect between the axes: it turns the gimbals of all of them after their decisions."""
-
-    def __call__(self, parts: Sequence[Controller], ideals: MultiAxisReading, /) -> None:
-        """Turn the gimbals of all axes, once a control tick."""
-        ...
+AxesStage = Callable[[Sequence[Controller], MultiAxisReading], None]
+"""An effect between the axes: it turns the gimbals of all of them after their decisions, once a control tick."""
 
 
 class MultiAxisController:

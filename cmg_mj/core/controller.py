@@ -45,18 +45,6 @@ It outlives a reset, and so has no memory of its own.
 """
 
 
-class ControllerSite(NamedTuple):
-    """The controller that a stage is made for."""
-
-    law: Law
-    timestep: float
-    """Physics step [s]."""
-    extra_signals: Sequence[str]
-    """Names of what the observer in the loop estimates beyond x."""
-    settings: Mapping[str, Any]
-    """The settings of stages, by the name of the scenario's field."""
-
-
 class KnownPlant(NamedTuple):
     """The plant's properties that its controller knows."""
 
@@ -79,8 +67,6 @@ class ControllerOptions(TypedDict, total=False):
     angle_source: AngleSource
     open_loop_observers: Mapping[str, Observer] | None
     axis: int
-    commands: Sequence[Callable[[], CommandStage]]
-    memories: Sequence[MemoryStage]
 
 
 class Controller:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, get_args, get_origin
 
@@ -65,8 +66,7 @@ def complaints(root: Any, errors: Iterable[Mapping[str, Any]], fields: Mapping[s
             value: Any = fields
             for part in location:
                 value = value[part]
-            choices = [str(choice) for choice in _types_in(_type_at(root, location)) if isinstance(choice, str)]
-            guess, is_close, _ = nearest(str(value), choices).partition("? ")
+            guess, is_close, _ = nearest(str(value), re.findall(r"'(.+?)'", message)).partition("? ")
             clause = f"{message}; {guess}?" if kind == "literal_error" and is_close else message
             where += f" = {shown(value)}"
         clauses[where] = f"{clauses[where]}, or {clause.removeprefix('must be ')}" if where in clauses else clause
@@ -132,7 +132,7 @@ def fields_of(place: Any) -> dict[str, Any]:
 
 
 def _types_in(annotation: Any) -> list[Any]:
-    """List the parts of a type: classes, and the choices of a Literal."""
+    """List the parts of a type."""
     if get_origin(annotation) is Annotated:
         return _types_in(get_args(annotation)[0])
     arguments = get_args(annotation)

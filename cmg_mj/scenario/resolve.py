@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import platform
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import PurePath
 from typing import Any, TypeGuard
@@ -164,16 +164,12 @@ SHOWN = 3
 
 def describe_differences(differing: Mapping[str, TomlValue | None]) -> str:
     """Write the first few after a comma, as `--set` takes them; nothing if nothing differs."""
-    assignments = [f"{name}={_value(value)}" for name, value in zip(_short(differing), differing.values(), strict=True)]
-    return "".join(f", {text}" for text in _first(assignments, SHOWN, " and {} more"))
+    return "".join(f", {text}" for text in _first(_assignments(differing), SHOWN, "and {} more"))
 
 
 def folder_suffix(differing: Mapping[str, TomlValue | None]) -> str:
     """Make the end of a folder's name: letters that every system takes, and not too many."""
-    assignments = [
-        re.sub(r"[^\w.=+-]+", "_", f"{name}={_value(value)}", flags=re.ASCII).strip("_")
-        for name, value in zip(_short(differing), differing.values(), strict=True)
-    ]
+    assignments = [re.sub(r"[^\w.=+-]+", "_", text, flags=re.ASCII).strip("_") for text in _assignments(differing)]
     count = len(assignments)
     while count and sum(len(text) + 1 for text in assignments[:count]) > MAX_NAME:
         count -= 1
@@ -188,12 +184,12 @@ def safe_name(text: str) -> str:
 def _first(texts: list[str], count: int, rest: str) -> list[str]:
     """Return the first ones, and how many more there are."""
     more = len(texts) - count
-    return texts if more <= 0 else [*texts[:count], rest.format(more).strip()]
+    return texts if more <= 0 else [*texts[:count], rest.format(more)]
 
 
-def _short(names: Iterable[str]) -> list[str]:
-    """Fields by their last name, or by as many as tell them apart from the other differences."""
-    full = [name.split(".") for name in names]
+def _assignments(differing: Mapping[str, TomlValue | None]) -> list[str]:
+    """`field=value`, the field by its last name, or by as many as tell it apart from the other differences."""
+    full = [name.split(".") for name in differing]
 
     def short(parts: list[str]) -> str:
         for start in range(len(parts) - 1, 0, -1):
@@ -202,7 +198,7 @@ def _short(names: Iterable[str]) -> list[str]:
                 return ".".join(end)
         return ".".join(parts)
 
-    return [short(parts) for parts in full]
+    return [f"{short(parts)}={_value(value)}" for parts, value in zip(full, differing.values(), strict=True)]
 
 
 def _value(value: TomlValue | None) -> str:

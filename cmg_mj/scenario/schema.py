@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, Self
 
@@ -90,12 +90,6 @@ class ControllerSettings(BaseModel):
             raise ValueError("give either gains or lqr, not both")
         return self
 
-    @model_validator(mode="after")
-    def _notch_below_half_the_rate(self) -> ControllerSettings:
-        if self.notch_hz >= 0.5 * self.rate_hz:
-            raise ValueError(f"notch_hz = {self.notch_hz:g}: must be below {0.5 * self.rate_hz:g} Hz, half of rate_hz")
-        return self
-
     @property
     def parameters(self) -> dict[str, Any]:
         """The section's fields that belong to the law alone."""
@@ -112,9 +106,9 @@ class ControllerSettings(BaseModel):
         return make_law(self.kind, 1.0 / self.rate_hz, self.rate_limit_rad_s, model, noise, **parameters)
 
 
-ONE_LAW_FIELDS = tuple(marked_fields(ControllerSettings, OfOneLaw))
-"""Fields of [controller] that another law does not take over."""
-COMMON_LAW_FIELDS = tuple(name for name in ControllerSettings.model_fields if name not in ONE_LAW_FIELDS)
+COMMON_LAW_FIELDS = [
+    name for name in ControllerSettings.model_fields if name not in marked_fields(ControllerSettings, OfOneLaw)
+]
 """Fields of [controller] that every law has."""
 ALL_AXES_LAW_FIELDS = tuple(marked_fields(ControllerSettings, OnAllAxes))
 """Fields of [controller] that are the same on all axes."""
@@ -311,30 +305,20 @@ class Scenario(create_model("Scenario", __base__=Sections, **_OF_FEATURES)):
 
         On a rig of several axes it is that of all: what an axis has of another's own goes.
         """
-        common, axes = self.observer.kind, self._axes_with_kind("observer", kind)
-        observer = self.observer if kind == common else ObserverSettings(kind=kind)
-        return self.model_copy(update={"observer": observer, "axes": axes})
+        return self.with_kind("observer", kind)
 
-    def with_law(self, kind: str) -> Scenario:
-        """The same experiment with another control law, with its default parameters, on all axes."""
-        common, axes = self.controller.kind, self._axes_with_kind("controller", kind, COMMON_LAW_FIELDS)
-        if kind == common:
-            return self.model_copy(update={"axes": axes})
-        fields: dict[str, Any] = {name: getattr(self.controller, name) for name in COMMON_LAW_FIELDS}
-        return self.model_copy(update={"controller": ControllerSettings(**fields, kind=kind), "axes": axes})
-
-    def _axes_with_kind(
-        self, section: Literal["observer", "controller"], kind: str, shared: Collection[str] = ()
-    ) -> dict[str, AxisSettings]:
-        """The settings of the axes; of a section of another kind the fields that all kinds share are left."""
-        is_observer, axes = section == "observer", dict(self.axes)
-        common = self.observer.kind if is_observer else self.controller.kind
+    def with_kind(self, section: Literal["controller", "observer"], kind: str) -> Scenario:
+        """The same experiment with another law or observer, with its default parameters, on all axes."""
+        own, axes = getattr(self, section), dict(self.axes)
+        shared = COMMON_LAW_FIELDS if section == "controller" else ()
         for name, settings in self.axes.items():
-            fields = settings.observer if is_observer else settings.controller
-            if fields.get("kind", common) != kind:
+            fields = getattr(settings, section)
+            if fields.get("kind", own.kind) != kind:
                 fields = {field: value for field, value in fields.items() if field in shared}
                 axes[name] = settings.model_copy(update={section: fields})
-        return axes
+        if own.kind != kind:
+            own = type(own)(**{name: getattr(own, name) for name in shared}, kind=kind)
+        return self.model_copy(update={section: own, "axes": axes})
 
     def open_loop_names(self) -> list[str]:
         """The open-loop observers, spelled out, without the observer itself."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -131,8 +130,10 @@ def common_period(scenario: Scenario) -> float:
         InputError: It is shorter than `MIN_PERIOD_S`; the first field that makes it so is named.
     """
     common = Fraction(0)
-    for time in sorted(_grid_times(scenario), key=lambda time: time.unit == "s"):
-        common = _common_divisor(common, time.exact)
+    for time in _grid_times(scenario):
+        a, b = common, time.exact
+        divisor = math.gcd(a.numerator * b.denominator, b.numerator * a.denominator)
+        common = Fraction(divisor, a.denominator * b.denominator)
         if common and common < _fraction(MIN_PERIOD_S):
             raise InputError(
                 f"{time.field} = {time.text}: does not fit the other rates and times: no physics step of "
@@ -141,29 +142,21 @@ def common_period(scenario: Scenario) -> float:
     return float(common)
 
 
-def _grid_times(scenario: Scenario) -> Iterator[_GridTime]:
+def _grid_times(scenario: Scenario) -> list[_GridTime]:
     """Return all periods and times of a scenario and of its axes: rates first, then times."""
-    for prefix, part in {
-        "": scenario,
-        **{f"axes.{name}.": part for name, part in scenario.axis_scenarios.items()},
-    }.items():
-        numbers = [(prefix + field, number, mark.unit) for field, number, mark in marked_values(part, OnGrid)]
-        for field, rate, unit in numbers:
-            if unit == "Hz":
-                yield _GridTime(field, f"{rate:g} Hz", 1.0 / rate, 1 / _fraction(rate), unit)
-        accelerometer = part.sensors.accelerometer
-        if accelerometer.bandwidth_hz:
-            rate = accelerometer.raw_rate_hz
-            text = f"{accelerometer.bandwidth_hz:g} Hz, sampled at {rate:g} Hz inside the part"
-            yield _GridTime(f"{prefix}sensors.accelerometer.bandwidth_hz", text, 1.0 / rate, _fraction(1.0 / rate))
-        for field, time, unit in numbers:
-            if unit == "s":
-                yield _GridTime(field, f"{time:g} s", time, _fraction(time), unit)
+    times = []
+    parts = {"": scenario, **{f"axes.{name}.": part for name, part in scenario.axis_scenarios.items()}}
+    for prefix, part in parts.items():
+        for field, number, mark in marked_values(part, OnGrid):
+            exact, text = _fraction(number), f"{number:g} {mark.unit}"
+            seconds, exact = (1.0 / number, 1 / exact) if mark.unit == "Hz" else (number, exact)
+            times.append(_GridTime(prefix + field, text, seconds, exact, mark.unit))
+        pair = part.sensors.accelerometer
+        if pair.bandwidth_hz:
+            field, period = f"{prefix}sensors.accelerometer.bandwidth_hz", 1.0 / pair.raw_rate_hz
+            times.append(_GridTime(field, pair.inside_text, period, _fraction(period)))
+    return sorted(times, key=lambda time: time.unit == "s")
 
 
 def _fraction(number: float) -> Fraction:
     return Fraction(number).limit_denominator(_MAX_DENOMINATOR)
-
-
-def _common_divisor(a: Fraction, b: Fraction) -> Fraction:
-    return Fraction(math.gcd(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator)

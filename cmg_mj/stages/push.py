@@ -70,12 +70,11 @@ class Pushes:
 
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
         """Add the torques: see `Disturbance`."""
-        change = self._changes.get(step)
-        if change is None and outside is self._before:
+        if change := self._changes.get(step):
+            self._torques = [torque + more for torque, more in zip(self._torques, change, strict=True)]
+        elif outside is self._before:
             return self._sum
         others, acceleration = outside
-        if change is not None:
-            self._torques = [torque + more for torque, more in zip(self._torques, change, strict=True)]
         held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in self._torques]  # no remainders
         self._before = outside
         self._sum = Outside([a + b for a, b in zip(others, held, strict=True)], acceleration)
