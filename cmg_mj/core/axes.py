@@ -30,7 +30,6 @@ class MultiAxisController:
         if any(part.period != first.period for part in self.parts):
             raise InputError("controller.rate_hz: must be the same on all axes")
         self.period, self.timestep = first.period, first.timestep
-        self.law, self.sensors = first.law, first.sensors
         self.seed, self.worlds = first.seed, first.worlds
         self.steps_per_sample = math.gcd(*(part.steps_per_sample for part in self.parts))
         """Physics steps between the instants at which anything may be due."""

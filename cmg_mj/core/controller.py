@@ -131,9 +131,9 @@ class Controller:
         self._single = isinstance(worlds, int)
         timestep = plant.timestep
         self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
-        self._law = LawRunner(law, self._single, timestep)
+        self._law = LawRunner(law, self._single)
         observers = [observer, *self.open_loop_observers.values()]
-        self._observers = ObserverRunner(observers, self._single, timestep)
+        self._observers = ObserverRunner(observers, self._single)
         self.extra_signals = self._observers.extra_signals
         self.reset()
 
@@ -224,19 +224,20 @@ class Controller:
             acceleration = acceleration - self.coriolis
         y = _new(Measurement, (y1, y2))
         y.acceleration = acceleration
+        time = step * self.timestep
         if self.tick is None:
-            estimates, held = self._observers.start(y, step), 0.0 * y1
-            self._law.start(y, step)
+            estimates, held = self._observers.start(y, time), 0.0 * y1
+            self._law.start(y, time)
         else:
             held = self.tick.u
-            estimates = self._observers.advance(y, held, step)
+            estimates = self._observers.advance(y, held, time)
         estimate = estimates[0]
         for remember in self.memories:
             self._law.state = remember(step, estimate, self._law.state)
         x1, x2, x3 = (y1, estimate[1], y2) if self.angle_source == "measured" else estimate[:3]
         if self.feedback != "observer":
             x2 = fog if self.feedback == "fog" else rate
-        u, x_e = self._law.decide(y, feedback_state(x1, x2, x3, estimate[3:]), held, step)
+        u, x_e = self._law.decide(y, feedback_state(x1, x2, x3, estimate[3:]), held, time)
         for stage in self.command_stages:
             u = stage(u)
         self.tick = _new(Tick, (y1, y2, acceleration, fog, u, x_e, estimates))

@@ -139,8 +139,6 @@ def _check(scenario: Scenario) -> None:
     kind, parameters = controller.kind, controller.parameters
     law = LAW_CLASSES.find(kind)
     LAW_CLASSES.check_types(kind, parameters)
-    for clause in LAW_CLASSES.unknown(kind, parameters, ControllerSettings.model_fields):
-        raise InputError(clause)
     for name in ("gains", "lqr"):
         if getattr(controller, name) is not None and not LAW_CLASSES.may_take(kind, "gains"):
             raise InputError(f"controller.{name}: {kind} takes no gains; leave it out")

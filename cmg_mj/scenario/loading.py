@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.inputs.features import FEATURES
 from cmg_mj.inputs.files import bundled, find, folder, read_text
 from cmg_mj.inputs.overrides import override
 from cmg_mj.scenario.schema import ControllerSettings, Scenario, parse_scenario
@@ -94,9 +95,7 @@ def find_model(scenario: Scenario, beside: Path) -> Scenario:
 def find_files(scenario: Scenario, beside: Path) -> Scenario:
     """Return the scenario with the whole paths of its features' files, which it names relative to itself."""
     found = {}
-    for name in scenario.feature_sections:
-        section = scenario.section(name)
-        found[name] = (
-            [part.located(beside) for part in section] if isinstance(section, list) else section.located(beside)
-        )
+    for name, parts in scenario.feature_sections.items():
+        located = [part.located(beside) for part in parts]
+        found[name] = located if FEATURES[name].is_list else located[0]
     return scenario.model_copy(update=found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, Self
 
@@ -56,10 +56,20 @@ class LqrSettings(BaseModel):
     """Weight of u."""
 
 
-class ControllerSettings(BaseModel):
-    """The control law by name or dotted path, and its parameters, which the law itself checks."""
+class _OfUserClass(BaseModel):
+    """A section whose `kind` names a class; the class checks its parameters."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The section's fields that belong to the class alone."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class ControllerSettings(_OfUserClass):
+    """The control law by name or dotted path, and its parameters, which the law itself checks."""
+
     kind: Annotated[str, OfOneLaw()] = "state_feedback"
     """A name that `cmg-mj list laws` shows, or package.module:Class."""
     rate_hz: Annotated[Rate, OnAllAxes()] = 200.0
@@ -90,11 +100,6 @@ class ControllerSettings(BaseModel):
             raise ValueError("give either gains or lqr, not both")
         return self
 
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """The section's fields that belong to the law alone."""
-        return dict(self.__pydantic_extra__ or {})
-
     def law(self, model: ReducedModel, noise: MeasurementNoise) -> Law:
         """The law for a reduced model and the sensors' noise."""
         parameters = self.parameters
@@ -114,17 +119,11 @@ ALL_AXES_LAW_FIELDS = tuple(marked_fields(ControllerSettings, OnAllAxes))
 """Fields of [controller] that are the same on all axes."""
 
 
-class ObserverSettings(BaseModel):
+class ObserverSettings(_OfUserClass):
     """An observer by name or dotted path, and its parameters, which the observer itself checks."""
 
-    model_config = ConfigDict(extra="allow", frozen=True)
     kind: str = "homogeneous"
     """A name that `cmg-mj list observers` shows, or package.module:Class."""
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """The section's fields besides the kind."""
-        return dict(self.__pydantic_extra__ or {})
 
     def make(self, dt: float, model: ReducedModel, noise: MeasurementNoise) -> Observer:
         """Construct the observer."""
@@ -234,7 +233,7 @@ class Scenario(create_model("Scenario", __base__=Sections, **_OF_FEATURES)):
     def feature_sections(self) -> dict[str, list[Section]]:
         """The settings of all features, by name."""
         sections = {name: getattr(self, name) for name in _OF_FEATURES}
-        return {name: section if isinstance(section, list) else [section] for name, section in sections.items()}
+        return {name: section if FEATURES[name].is_list else [section] for name, section in sections.items()}
 
     @property
     def source(self) -> str:
@@ -343,12 +342,14 @@ def parse_scenario(fields: Mapping[str, Any], source: str = "") -> Scenario:
     try:
         # By way of JSON, pydantic takes a list for a tuple and still no text or true for a number.
         scenario = Scenario.model_validate_json(json.dumps(fields, default=as_json), strict=True).with_source(source)
+        wrong = out_of_size(fields)
     except ValidationError as error:
-        wrong = [*complaints(Scenario, error.errors(), fields), *_unknown_to_bench_law(fields)]
-        raise InputError(located(source, _clauses(wrong))) from error
-    wrong = [*_unknown_to_bench_law(fields), *out_of_size(fields)]
-    if wrong:
-        raise InputError(located(source, _clauses(wrong)))
+        scenario, wrong = Scenario(), complaints(Scenario, error.errors(), fields)
+    clauses = list(dict.fromkeys([*wrong, *_unknown_to_bench_law(fields)]))
+    if len(clauses) > MAX_CLAUSES:
+        clauses[MAX_CLAUSES:] = [f"and {len(clauses) - MAX_CLAUSES} more"]
+    if clauses:
+        raise InputError(located(source, "; ".join(clauses)))
     _ = scenario.axis_scenarios  # their fields are checked, too
     return scenario
 
@@ -384,13 +385,6 @@ def _moved(fields: Mapping[str, Any]) -> Mapping[str, Any]:
             moved[section] = found
             plant = {name: value for name, value in plant.items() if name not in old}
     return {**moved, "plant": plant}
-
-
-def _clauses(wrong: Iterable[str]) -> str:
-    """All that is wrong, or the first of very much."""
-    clauses = list(dict.fromkeys(wrong))
-    more = [f"and {len(clauses) - MAX_CLAUSES} more"] if len(clauses) > MAX_CLAUSES else []
-    return "; ".join(clauses[:MAX_CLAUSES] + more)
 
 
 def located(source: str, wrong: str) -> str:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.sensor import whole_steps
@@ -22,8 +22,7 @@ MAX_STEPS = 1_000_000_000
 _MAX_DENOMINATOR = 10**9  # 1/3 s as a float is the fraction 1/3
 
 
-@dataclass(frozen=True)
-class TimeGrid:
+class TimeGrid(NamedTuple):
     """The times that whole physics steps of a run must fill.
 
     Attributes:
@@ -58,8 +57,7 @@ class TimeGrid:
         return step
 
 
-@dataclass(frozen=True)
-class _GridTime:
+class _GridTime(NamedTuple):
     """A period or time of a scenario that whole physics steps must fill.
 
     Attributes:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, where
-from cmg_mj.core.loop import Outside
+from cmg_mj.core.loop import Disturbance, Outside
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.inputs.types import STRICT, Batched, GridDuration, GridInstant, Section, Start
 
@@ -43,7 +43,7 @@ class Push(Section):
         return self.start_s + self.duration_s
 
 
-class Pushes:
+class Pushes(Disturbance):
     """The torques of pushes. A push about an axis that the rig does not have, since it is locked, moves nothing.
 
     Args:
@@ -51,8 +51,6 @@ class Pushes:
         timestep: Physics step [s].
         axes: The axes' names.
     """
-
-    accelerates = False
 
     def __init__(self, pushes: Sequence[Push], timestep: float, axes: Sequence[str]) -> None:
         self._changes: dict[int, list[Scalar]] = {}

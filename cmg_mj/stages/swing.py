@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.loop import Outside
+from cmg_mj.core.loop import Disturbance, Outside
 from cmg_mj.inputs.types import STRICT, Duration, Held, Instant, Section, Start
 
 
@@ -41,7 +41,7 @@ class Swing(Section):
         return self.amplitude_n_m * math.sin(2.0 * math.pi * self.frequency_hz * since + math.radians(self.phase_deg))
 
 
-class Swings:
+class Swings(Disturbance):
     """The torques of swings, at their value in the middle between two instants.
 
     Args:
@@ -49,9 +49,6 @@ class Swings:
         timestep: Physics step [s].
         axes: The axes' names.
     """
-
-    edges: Collection[int] = ()
-    accelerates = False
 
     def __init__(self, swings: Sequence[Swing], timestep: float, axes: Sequence[str]) -> None:
         self._swings, self._timestep, self._axes = swings, timestep, axes

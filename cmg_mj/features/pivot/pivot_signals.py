@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.loop import Outside
+from cmg_mj.core.loop import Disturbance, Outside
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.pivot_track import read_track
@@ -164,7 +164,7 @@ class PivotSignals:
         return total
 
 
-class MovingPivot:
+class MovingPivot(Disturbance):
     """The acceleration of the pivot as a disturbance: its mean until the next instant.
 
     Args:
@@ -172,7 +172,6 @@ class MovingPivot:
         timestep: Physics step [s].
     """
 
-    edges: Collection[int] = ()
     accelerates = True
 
     def __init__(self, signals: PivotSignals, timestep: float) -> None:
