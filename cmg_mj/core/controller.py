@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, NamedTuple, TypedDict
+from typing import Any, Literal, NamedTuple
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.runners import LawRunner, ObserverRunner
@@ -56,17 +56,6 @@ class KnownPlant(NamedTuple):
     """Physics step [s]."""
     servos: Sequence[Callable[[float], CommandStage]] = ()
     """Make the stages between the commanded rate and the gimbals' own, from the control period [s]."""
-
-
-class ControllerOptions(TypedDict, total=False):
-    """Keyword arguments of `Controller` that are a user's choice; the others are the plant's."""
-
-    seed: int
-    worlds: int | Sequence[int]
-    feedback: Feedback
-    angle_source: AngleSource
-    open_loop_observers: Mapping[str, Observer] | None
-    axis: int
 
 
 class Controller:

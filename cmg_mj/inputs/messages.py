@@ -47,7 +47,10 @@ def complaints(root: Any, errors: Iterable[Mapping[str, Any]], fields: Mapping[s
     """
     clauses: dict[str, str] = {}
     for detail in errors:
-        kind, message = detail["type"], _allowed(detail)
+        kind = detail["type"]
+        message = _WORDS_OF_TYPE.get(kind, str(detail["msg"]))
+        for word, ours in _WORDS.items():
+            message = message.replace(word, ours)
         # A union's members are parts of the location, with their type's name.
         location = [part for part in detail["loc"] if not (isinstance(part, str) and "[" in part)]
         while location and isinstance(location[-1], int) and not fields_of(_type_at(root, location)):
@@ -92,14 +95,6 @@ _WORDS = {
     "a valid ": "a ",
 }
 """Pydantic's words -> words for the user of a TOML file."""
-
-
-def _allowed(detail: Mapping[str, Any]) -> str:
-    """Return pydantic's sentence as a clause: `must be greater than 0`."""
-    text = _WORDS_OF_TYPE.get(detail["type"], str(detail["msg"]))
-    for word, ours in _WORDS.items():
-        text = text.replace(word, ours)
-    return text
 
 
 def _type_at(place: Any, location: Sequence[str | int]) -> Any:

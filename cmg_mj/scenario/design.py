@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple, Unpack
+from typing import NamedTuple, TypedDict, Unpack
 
-from cmg_mj.core.controller import Controller, ControllerOptions, KnownPlant
+from cmg_mj.core.controller import AngleSource, Controller, Feedback, KnownPlant
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise, RadialTilt
@@ -180,9 +180,15 @@ class PlantNumbers(NamedTuple):
         return replace(self.tilt.noise(sensors.accelerometer.sample_sigma, self.gravity), gimbal=gimbal)
 
 
-class StageOptions(ControllerOptions, total=False):
-    """Options of a controller and of its stages."""
+class StageOptions(TypedDict, total=False):
+    """Keyword arguments of `Controller` that are a user's choice, and settings of its stages."""
 
+    seed: int
+    worlds: int | Sequence[int]
+    feedback: Feedback
+    angle_source: AngleSource
+    open_loop_observers: Mapping[str, Observer] | None
+    axis: int
     bias_trim_s: float
     """For so long from the start, the integrator is held where the observer's bias estimate asks for it [s]."""
     notch_hz: float

@@ -45,20 +45,16 @@ def load_scenario(name: str, overrides: Iterable[str] = (), observer: str | None
         changes.append(f"--set {setting}")
         names.append(setting.partition("=")[0].strip())
         override(fields, setting)
-    _drop_gains(fields, names, _law(fields) != law)
+    # Of gains and lqr, the one that --set does not give goes; with another law both.
+    set_sections = {".".join(f"{field}.".split(".")[:2]) for field in names}
+    unset = [field for field in ("gains", "lqr") if f"controller.{field}" not in set_sections]
+    if len(unset) == 1 or _law(fields) != law:
+        for field in unset:
+            fields["controller"].pop(field, None)
     scenario = parse_scenario(fields, " ".join([name, *(["with"] if changes else []), *changes]))
     if "plant.model" not in names:
         scenario = find_model(scenario, path.parent)
     return find_files(scenario, path.parent)
-
-
-def _drop_gains(fields: dict[str, Any], names: Iterable[str], has_law_changed: bool) -> None:
-    """Take the file's gains out where --set names another law; of gains and lqr, the one that --set does not give."""
-    set_sections = {".".join(f"{name}.".split(".")[:2]) for name in names}
-    unset = [name for name in ("gains", "lqr") if f"controller.{name}" not in set_sections]
-    if has_law_changed or len(unset) == 1:
-        for name in unset:
-            fields["controller"].pop(name, None)
 
 
 def _law(fields: Mapping[str, Any]) -> Any:

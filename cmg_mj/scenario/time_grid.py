@@ -74,17 +74,6 @@ class _GridTime(NamedTuple):
     exact: Fraction
     unit: str = ""
 
-    def check(self, timestep: float) -> None:
-        """Refuse what is no whole number of physics steps [s], and name the nearest that are."""
-        try:
-            whole_steps(self.seconds, timestep, self.field, self.text)
-        except InputError as error:
-            if not self.unit:
-                raise
-            around = {max(1, math.floor(self.seconds / timestep)), max(1, math.ceil(self.seconds / timestep))}
-            times = [1.0 / (steps * timestep) if self.unit == "Hz" else steps * timestep for steps in sorted(around)]
-            raise InputError(f"{error} (nearest: {' or '.join(f'{t:g} {self.unit}' for t in times)})") from error
-
 
 def time_grid(scenario: Scenario) -> TimeGrid:
     """Find the grid of a scenario: rates and times that fit each other, and a run that is not too long.
@@ -108,7 +97,15 @@ def time_grid(scenario: Scenario) -> TimeGrid:
     if timestep is not None:
         grid.physics_step(timestep)
         for time in _grid_times(scenario):
-            time.check(timestep)
+            try:
+                whole_steps(time.seconds, timestep, time.field, time.text)
+            except InputError as error:
+                if not time.unit:
+                    raise
+                ratio = time.seconds / timestep
+                steps = sorted({max(1, math.floor(ratio)), max(1, math.ceil(ratio))})
+                times = [1.0 / (n * timestep) if time.unit == "Hz" else n * timestep for n in steps]
+                raise InputError(f"{error} (nearest: {' or '.join(f'{t:g} {time.unit}' for t in times)})") from error
     for field, frequency, mark in marked_values(scenario, Held):
         if frequency and frequency > control / SWING_SHARE:
             raise InputError(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.noise import normals
 from cmg_mj.core.sensor import SampledSensor, Site
 from cmg_mj.inputs.types import STRICT
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
@@ -51,9 +50,13 @@ class Sensors:
         Raises:
             InputError: A rate or a time does not fit the physics step.
         """
-
-        def noise(stream: NoiseStream, channels: int) -> Iterator[Sequence[Scalar]]:
-            return normals(seed, worlds, stream.on_axis(axis), channels)
-
-        names = ("accelerometer", "encoder", "fog")
-        return [getattr(self, name).at_work(Site(f"sensors.{name}", timestep, noise)) for name in names]
+        return [
+            getattr(self, name).at_work(
+                Site(
+                    f"sensors.{name}",
+                    timestep,
+                    lambda stream, channels: normals(seed, worlds, stream.on_axis(axis), channels),
+                )
+            )
+            for name in ("accelerometer", "encoder", "fog")
+        ]

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, NamedTuple, Protocol, Unpack
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import Controller, ControllerOptions, KnownPlant, Tick
+from cmg_mj.core.controller import Controller, KnownPlant, Tick
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.runners import as_estimate
 from cmg_mj.core.types import Forces, Law, Measurement, Observer
@@ -88,7 +88,7 @@ class ProcessorController(Controller):
         law: Law,
         sensors: Any,
         plant: KnownPlant,
-        **options: Unpack[ControllerOptions],
+        **options: Any,
     ) -> None:
         self.processor = processor
         self._remote = _RemoteObserver(observer)
