@@ -118,8 +118,7 @@ class Controller:
         self.angle_source: AngleSource = angle_source
         self.open_loop_observers = dict(open_loop_observers or {})
         self._single = isinstance(worlds, int)
-        timestep = plant.timestep
-        self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
+        self.period = whole_steps(law.dt, self.timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
         self._law = LawRunner(law, self._single)
         observers = [observer, *self.open_loop_observers.values()]
         self._observers = ObserverRunner(observers, self._single)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import json
 import platform
 import re
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import PurePath
-from typing import Any, TypeGuard
+from typing import Any
 
 import tomli_w
 
@@ -86,11 +88,14 @@ def _resolved(scenario: Scenario, design: Design) -> dict[str, Any]:
 
 def _parameters(parameters: dict[str, Any], part: Any, by_bench: Collection[str]) -> dict[str, Any]:
     """Return the given parameters, and the defaults of the rest as far as they are known and TOML can hold them."""
-    if not dataclasses.is_dataclass(part):
-        return parameters
-    names = [f.name for f in dataclasses.fields(part) if f.init and f.name not in by_bench]
-    defaults = {name: _plain(getattr(part, name, None)) for name in names if name not in parameters}
-    return {name: value for name, value in defaults.items() if _is_toml(value)} | parameters
+    defaults = {}
+    for field in dataclasses.fields(part) if dataclasses.is_dataclass(part) else ():
+        if field.init and field.name not in {*by_bench, *parameters}:
+            with suppress(AttributeError, TypeError, ValueError):
+                value = _plain(getattr(part, field.name))
+                tomli_w.dumps({"value": value})
+                defaults[field.name] = value
+    return defaults | parameters
 
 
 @functools.cache
@@ -102,21 +107,7 @@ def versions() -> dict[str, str]:
 
 def _plain(value: Any) -> Any:
     """Tuples and arrays to lists, as TOML wants them."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    return value
-
-
-def _is_toml(value: Any) -> bool:
-    try:
-        tomli_w.dumps({"value": value})
-    except TypeError:
-        return False
-    return True
+    return json.loads(json.dumps(value, default=lambda array: array.tolist()))
 
 
 def differences(base: Mapping[str, Any], scenario: Mapping[str, Any]) -> dict[str, Any]:
@@ -145,15 +136,16 @@ def _differing(
     if isinstance(base, Mapping) and isinstance(other, Mapping):
         for key in dict.fromkeys([*other, *base]):
             yield from _differing(base.get(key), other.get(key), f"{below}{key}")
-    elif _are_sections(base) and _are_sections(other) and len(base) == len(other):
-        for i, (one, two) in enumerate(zip(base, other, strict=True)):
-            yield from _differing(one, two, f"{below}{i}")
+    elif (
+        isinstance(base, list)
+        and isinstance(other, list)
+        and len(base) == len(other)
+        and all(isinstance(item, Mapping) for item in [*base, *other])
+    ):
+        for i, one in enumerate(base):
+            yield from _differing(one, other[i], f"{below}{i}")
     elif base != other:
         yield name, other
-
-
-def _are_sections(value: TomlValue | None) -> TypeGuard[list[TomlValue]]:
-    return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
 
 
 MAX_NAME = 60

@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.sensor import SampledSensor, SensorStage, Site, shown
+from cmg_mj.core.sensor import SampledSensor, Site, shown
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces
 from cmg_mj.inputs.types import STRICT, Instant, NonNegative, Rate
 from cmg_mj.stages.flicker import FlickerSettings, flicker
@@ -54,16 +53,16 @@ class Accelerometer(VibrationSettings, LowPassSettings, FlickerSettings, SkewSet
 
     def at_work(self, site: Site) -> SampledSensor:
         """Start the accelerometers."""
-        effects: list[tuple[Any, Callable[[Any, Site], SensorStage]]] = [
+        effects = (
             (self.skew_s, Skew),
             (self.vibrates, vibration),
             (self.mounting_weights() != PERFECT, mounting_errors),
             (True, white),
             (self.bias_instability_ug, flicker),
             (self.bandwidth_hz, LowPass),
-        ]
-        stages = [make(self, site) for is_on, make in effects if is_on]
-        stages.append(shown(self.range_g * STANDARD_GRAVITY, self.resolution))
+        )
+        digital = shown(self.range_g * STANDARD_GRAVITY, self.resolution)
+        stages = [*(make(self, site) for is_on, make in effects if is_on), digital]
         return SampledSensor(self.rate_hz, self.latency_s, site, "accelerations", stages)
 
 
