@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import MultiAxisReading
 
-
-class AxesStage(Protocol):
-    """An effect between the axes: it turns the gimbals of all of them after their decisions."""
-
-    def __call__(self, parts: Sequence[Controller], ideals: MultiAxisReading, /) -> None:
-        """Turn the gimbals of all axes, once a control tick."""
-        ...
+AxesStage = Callable[[Sequence[Controller], MultiAxisReading], None]
+"""An effect between the axes: it turns the gimbals of all of them after their decisions, once a control tick."""
 
 
 class MultiAxisController:
@@ -36,7 +30,6 @@ class MultiAxisController:
         if any(part.period != first.period for part in self.parts):
             raise InputError("controller.rate_hz: must be the same on all axes")
         self.period, self.timestep = first.period, first.timestep
-        self.law, self.sensors = first.law, first.sensors
         self.seed, self.worlds = first.seed, first.worlds
         self.steps_per_sample = math.gcd(*(part.steps_per_sample for part in self.parts))
         """Physics steps between the instants at which anything may be due."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, NamedTuple, Protocol, TypedDict
+from typing import Any, Literal, NamedTuple
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.runners import LawRunner, ObserverRunner
-from cmg_mj.core.sensor import SampledSensor, whole_steps
+from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
 from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, State, feedback_state
 
@@ -32,51 +32,17 @@ class Tick(NamedTuple):
     """The observer's estimate (x1, x2, x3, its extra signals), then those of the open-loop observers."""
 
 
-class Sensors(Protocol):
-    """The sensors between the ideal readings and a controller."""
+CommandStage = Callable[[Scalar], Scalar]
+"""An effect on the gimbal rate [rad/s]: on the law's command, which observers are told, or behind it in the servo.
 
-    def at_work(
-        self, timestep: float, seed: int, worlds: int | Sequence[int], axis: int
-    ) -> tuple[SampledSensor[Forces], SampledSensor[Sequence[Scalar]], SampledSensor[Scalar]]:
-        """Start the accelerometers, the encoders and the gyro of an axis."""
-        ...
+It is called once a control tick. The law's limit lies before it: a stage on the command keeps to that limit itself.
+"""
 
+MemoryStage = Callable[[int, Sequence[Scalar], State], State]
+"""An effect on the law's memory before its step: (physics step, the estimate in the loop, memory) -> memory.
 
-class CommandStage(Protocol):
-    """An effect on the gimbal rate: on the law's command, which observers are told, or behind it in the servo.
-
-    The law's limit lies before it: a stage on the command keeps to that limit itself.
-    """
-
-    def __call__(self, u: Scalar, /) -> Scalar:
-        """Return the rate with the effect, once a control tick [rad/s]."""
-        ...
-
-
-class MemoryStage(Protocol):
-    """An effect on the law's memory before its step. It outlives a reset, and so has no memory of its own."""
-
-    def __call__(self, step: int, estimate: Sequence[Scalar], memory: State, /) -> State:
-        """Return the memory with the effect, once a control tick.
-
-        Args:
-            step: Number of the physics step.
-            estimate: The estimate of the observer in the loop.
-            memory: The law's memory.
-        """
-        ...
-
-
-class ControllerSite(NamedTuple):
-    """The controller that a stage is made for."""
-
-    law: Law
-    timestep: float
-    """Physics step [s]."""
-    extra_signals: Sequence[str]
-    """Names of what the observer in the loop estimates beyond x."""
-    settings: Mapping[str, Any]
-    """The settings of stages, by the name of the scenario's field."""
+It outlives a reset, and so has no memory of its own.
+"""
 
 
 class KnownPlant(NamedTuple):
@@ -92,19 +58,6 @@ class KnownPlant(NamedTuple):
     """Make the stages between the commanded rate and the gimbals' own, from the control period [s]."""
 
 
-class ControllerOptions(TypedDict, total=False):
-    """Keyword arguments of `Controller` that are a user's choice; the others are the plant's."""
-
-    seed: int
-    worlds: int | Sequence[int]
-    feedback: Feedback
-    angle_source: AngleSource
-    open_loop_observers: Mapping[str, Observer] | None
-    axis: int
-    commands: Sequence[Callable[[], CommandStage]]
-    memories: Sequence[MemoryStage]
-
-
 class Controller:
     """Runs the sensors, the observer and the law, tick after tick.
 
@@ -114,7 +67,7 @@ class Controller:
     Args:
         observer: The observer whose estimate the law uses.
         law: The control law; its `dt` is the control period, and what it decides is limited to its `rate_limit`.
-        sensors: The sensors between the ideal readings and the controller.
+        sensors: The sensors between the ideal readings and the controller, such as `Sensors`.
         plant: The controller's knowledge of the plant.
         seed: Seed of the sensors' noise.
         worlds: The number of one world, on floats, or the numbers of many, on arrays.
@@ -138,7 +91,7 @@ class Controller:
         self,
         observer: Observer,
         law: Law,
-        sensors: Sensors,
+        sensors: Any,
         plant: KnownPlant,
         *,
         seed: int = 0,
@@ -152,7 +105,7 @@ class Controller:
     ) -> None:
         self.observer = observer
         self.law = law
-        self.sensors: Any = sensors
+        self.sensors = sensors
         self.plant = plant
         self.tilt, self.gimbal_angle, self.timestep, self.servos = plant
         self.commands, self.memories = commands, memories
@@ -165,11 +118,10 @@ class Controller:
         self.angle_source: AngleSource = angle_source
         self.open_loop_observers = dict(open_loop_observers or {})
         self._single = isinstance(worlds, int)
-        timestep = plant.timestep
-        self.period = whole_steps(law.dt, timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
-        self._law = LawRunner(law, self._single, timestep)
+        self.period = whole_steps(law.dt, self.timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
+        self._law = LawRunner(law, self._single)
         observers = [observer, *self.open_loop_observers.values()]
-        self._observers = ObserverRunner(observers, self._single, timestep)
+        self._observers = ObserverRunner(observers, self._single)
         self.extra_signals = self._observers.extra_signals
         self.reset()
 
@@ -217,12 +169,9 @@ class Controller:
 
     def sample(self, step: int, ideal: IdealReading) -> None:
         """Take the samples that are due at a physics step: see `update`."""
-        first, self.step = self.step is None, step
-        self._true_rate = ideal.rate
-        self.body_rate = ideal.gyro
+        self.step, self._true_rate, self.body_rate = step, ideal.rate, ideal.gyro
         for sensor in self._sampled:
-            if step % sensor.steps_per_sample == 0 or first:  # a start between two samples still has something to show
-                sensor.sample(step, ideal)
+            sensor.sample(step, ideal)
 
     def readings(self, step: int) -> tuple[Forces, Sequence[Scalar], Scalar]:
         """Return the samples that have been delivered by a physics step, as `decide` takes them."""
@@ -231,8 +180,7 @@ class Controller:
 
     def control(self, step: int) -> None:
         """Take the control decision of a tick, a multiple of `period`: see `update`."""
-        accelerometers, encoders, fog = self._sampled
-        u = self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), self._true_rate).u
+        u = self.decide(step, *self.readings(step), self._true_rate).u
         if self.turns_gimbals:
             self.command_rate(u)
 
@@ -258,31 +206,26 @@ class Controller:
         Raises:
             RunStopped: The observer or the law failed, or returned a number that is not finite.
         """
-        y1, y2, acceleration = (
-            self.tilt(*forces),
-            self.gimbal_angle(encoders),
-            self.tilt.acceleration(forces[0], forces[2]),
-        )
+        y1, y2 = self.tilt(*forces), self.gimbal_angle(encoders)
+        acceleration = self.tilt.acceleration(forces[0], forces[2])
         if self.coriolis is not None:
             acceleration = acceleration - self.coriolis
         y = _new(Measurement, (y1, y2))
         y.acceleration = acceleration
+        time = step * self.timestep
         if self.tick is None:
-            estimates, held = self._observers.start(y, step), 0.0 * y1
-            self._law.start(y, step)
+            estimates, held = self._observers.start(y, time), 0.0 * y1
+            self._law.start(y, time)
         else:
             held = self.tick.u
-            estimates = self._observers.advance(y, held, step)
+            estimates = self._observers.advance(y, held, time)
         estimate = estimates[0]
         for remember in self.memories:
             self._law.state = remember(step, estimate, self._law.state)
         x1, x2, x3 = (y1, estimate[1], y2) if self.angle_source == "measured" else estimate[:3]
         if self.feedback != "observer":
             x2 = fog if self.feedback == "fog" else rate
-        x = feedback_state(x1, x2, x3)
-        if len(estimate) > 3:
-            x.extra = estimate[3:]
-        u, x_e = self._law.decide(y, x, held, step)
+        u, x_e = self._law.decide(y, feedback_state(x1, x2, x3, estimate[3:]), held, time)
         for stage in self.command_stages:
             u = stage(u)
         self.tick = _new(Tick, (y1, y2, acceleration, fog, u, x_e, estimates))

@@ -22,14 +22,13 @@ class RunStopped(RuntimeError):
     """A run could not go on (an observer returned NaN, the plant diverged). What was recorded is kept."""
 
 
-def nearest(name: str, allowed: Iterable[str], label: str = "allowed", *, quoted: bool = False) -> str:
+def nearest(name: str, allowed: Iterable[str], label: str = "allowed") -> str:
     """Say what there is, and the nearest name for a typo.
 
     Args:
         name: What the user wrote.
         allowed: The names that exist.
         label: What to call them.
-        quoted: Whether the names are in quotes already.
 
     Returns:
         A clause for an error message.
@@ -38,10 +37,7 @@ def nearest(name: str, allowed: Iterable[str], label: str = "allowed", *, quoted
     folded = {known.casefold(): known for known in names}
     match = difflib.get_close_matches(name[:MAX_SHOWN].casefold(), folded, n=1)
     listing = f"{label}: {listed(names) or 'none'}"
-    if not match:
-        return listing
-    guess = shortened(folded[match[0]]) if quoted else shown(folded[match[0]])
-    return f"did you mean {guess}? {listing}"
+    return f"did you mean {shown(folded[match[0]])}? {listing}" if match else listing
 
 
 def listed(names: Sequence[str]) -> str:

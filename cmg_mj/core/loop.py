@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import heapq
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -26,15 +26,10 @@ class Outside(NamedTuple):
 class Disturbance(Protocol):
     """Something that acts from outside."""
 
-    @property
-    def edges(self) -> Collection[int]:
-        """Physics steps that become instants."""
-        ...
-
-    @property
-    def accelerates(self) -> bool:
-        """Whether it accelerates the pivot: gravity of the plant's model then changes."""
-        ...
+    edges: Collection[int] = ()
+    """Physics steps that become instants."""
+    accelerates: bool = False
+    """Whether it accelerates the pivot: gravity of the plant's model then changes."""
 
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
         """Add what acts from a physics step on, held or averaged for so many steps, until the next instant.
@@ -55,16 +50,12 @@ def instants(end: int, grid: int, edges: Iterable[int] = ()) -> Iterator[tuple[i
     Yields:
         The step, and the steps until the next instant.
     """
-    ends = sorted({0, end, *(step for step in edges if step <= end)})
-    for start, stop in itertools.pairwise(ends):
-        first = min(-(-start // grid) * grid, stop)  # the first of the grid not before the edge
-        if first > start:
-            yield start, first - start
-        last = max(stop // grid * grid, first)
-        for step in range(first, last, grid):
-            yield step, grid
-        if last < stop:
-            yield last, stop - last
+    beside = sorted({end, *(step for step in edges if step < end)})
+    start = 0
+    for stop in heapq.merge(range(0, end, grid), beside):
+        if stop > start:
+            yield start, stop - start
+            start = stop
 
 
 Joints = Sequence[Scalar] | np.ndarray
@@ -106,7 +97,7 @@ class Physics(Protocol):
         """Compute the tilt from the keyframe, of several axes the largest [rad]."""
         ...
 
-    def reading(self, v: Joints) -> Reading:
+    def reading(self, v: Joints) -> Any:
         """Compute what perfect sensors show at the present state, with the torques and the last commands in force."""
         ...
 
@@ -202,14 +193,13 @@ class ControlLoop:
         self._fall_angle = fall_angle
         self._steps = 0
         self._parts = list(enumerate(controller.parts))
-        self._sample: Callable[[int, Any], None] | None = controller.sample if self.takes_samples else None
 
     def ticks(self) -> Iterator[ControlTick]:
         """Go from control tick to control tick, until the instants or the running worlds are at their end."""
         physics, fall_angle = self.physics, self._fall_angle
         steps_per_sample, period = self.controller.steps_per_sample, self.controller.period
         state, tilt, stop_fallen = physics.state, physics.tilt, physics.stop_fallen
-        reading, sample = physics.reading, self._sample
+        sample = self.controller.sample
         still = Outside([0.0] * len(self._parts))
         held: Sequence[Scalar] | None = None
         torques: Sequence[Scalar] = ()
@@ -230,8 +220,8 @@ class ControlLoop:
             if not physics.any_running:
                 return
             if step % steps_per_sample == 0:
-                if sample is not None:
-                    sample(step, reading(v))
+                if self.takes_samples:
+                    sample(step, physics.reading(v))
                 if step % period == 0:
                     yield _new(ControlTick, (step, steps, q, v, torques))
                     continue

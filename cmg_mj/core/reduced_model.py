@@ -154,8 +154,7 @@ class ReducedModel:
     @property
     def A_e(self) -> np.ndarray:
         """A with the integrator x_e' = -x3 appended, (4, 4)."""
-        A_e = np.zeros((4, 4))
-        A_e[:3, :3] = self.A
+        A_e = np.pad(self.A, (0, 1))
         A_e[3, 2] = -1.0
         return A_e
 

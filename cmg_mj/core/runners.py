@@ -24,23 +24,20 @@ class ObserverRunner:
     Args:
         observers: The observer in the loop, then the open-loop observers.
         single: Whether on floats (one world) or on arrays (n_worlds,).
-        timestep: Physics step [s].
 
     Attributes:
         extra_signals: Names of what each observer estimates beyond x.
     """
 
-    def __init__(self, observers: Sequence[Observer], single: bool, timestep: float) -> None:
+    def __init__(self, observers: Sequence[Observer], single: bool) -> None:
         self.observers = list(observers)
         self._single = single
         self.extra_signals = [extra_signals(observer) for observer in observers]
-        self._names = [("x1", "x2", "x3", *names) for names in self.extra_signals]
-        self._timestep = timestep
         self._states: list[State] = []
         self._checked = False
 
-    def start(self, y: Measurement, step: int) -> list[Sequence[Scalar]]:
-        """Take the first sample, at a physics step.
+    def start(self, y: Measurement, time: float) -> list[Sequence[Scalar]]:
+        """Take the first sample, at a time [s].
 
         Returns:
             An estimate an observer: x1, x2, x3, its extra signals.
@@ -51,18 +48,18 @@ class ObserverRunner:
         self._states = []
         self._checked = False
         for observer in self.observers:
-            with _named(observer, "observer", step * self._timestep):
+            with _named(observer, "observer", time):
                 self._states.append(observer.init(y))
         zero = 0.0 * y.y1
         return [as_estimate((y.y1, zero, y.y2, *[zero] * len(names))) for names in self.extra_signals]
 
-    def advance(self, y: Measurement, u: Scalar, step: int) -> list[Sequence[Scalar]]:
+    def advance(self, y: Measurement, u: Scalar, time: float) -> list[Sequence[Scalar]]:
         """Take the next sample.
 
         Args:
             y: The measurement.
             u: The gimbal rate held since the last one [rad/s].
-            step: Number of the physics step.
+            time: Its time [s].
 
         Returns:
             An estimate an observer: x1, x2, x3, its extra signals.
@@ -79,29 +76,30 @@ class ObserverRunner:
                 states[i], estimate = observer.step(states[i], y, u)
                 estimates.append(estimate)
         except Exception as error:
-            _stop(self.observers[i], "observer", step * self._timestep, error)
+            _stop(self.observers[i], "observer", time, error)
         if not self._checked:
-            self._check_shapes(estimates, y, step)
+            self._check_shapes(estimates, y, time)
         # Many worlds are judged one by one, elsewhere. NaN and infinity alike are not zero times themselves.
         if self._single and 0.0 * sum(estimates[0]) != 0.0:
-            self._require_finite(estimates[0], step)
+            for name, value in zip(self._names(0), estimates[0], strict=True):
+                if not math.isfinite(value):
+                    name = f"{type(self.observers[0]).__name__} returned {value} for {name}"
+                    raise RunStopped(f"observer {name} at t = {time:g} s")
         return estimates
 
-    def _check_shapes(self, estimates: Sequence[Sequence[Scalar]], y: Measurement, step: int) -> None:
+    def _check_shapes(self, estimates: Sequence[Sequence[Scalar]], y: Measurement, time: float) -> None:
         """Check the first estimates of a run: each part is a number of every world."""
         self._checked = True
-        for observer, names, estimate in zip(self.observers, self._names, estimates, strict=True):
-            with _named(observer, "observer", step * self._timestep):
+        for i, (observer, estimate) in enumerate(zip(self.observers, estimates, strict=True)):
+            names = self._names(i)
+            with _named(observer, "observer", time):
                 if len(estimate) != len(names):
                     raise TypeError(f"step(state, y, u) returned {len(estimate)} numbers, not {', '.join(names)}")
                 for name, value in zip(names, estimate, strict=True):
                     check_shape(name, value, y)
 
-    def _require_finite(self, estimate: Sequence[float], step: int) -> None:
-        for name, value in zip(self._names[0], estimate, strict=True):
-            if not math.isfinite(value):
-                name = f"{type(self.observers[0]).__name__} returned {value} for {name}"
-                raise RunStopped(f"observer {name} at t = {step * self._timestep:g} s")
+    def _names(self, i: int) -> tuple[str, ...]:
+        return "x1", "x2", "x3", *self.extra_signals[i]
 
 
 class LawRunner:
@@ -110,45 +108,43 @@ class LawRunner:
     Args:
         law: The law.
         single: Whether on floats (one world) or on arrays (n_worlds,).
-        timestep: Physics step [s].
 
     Attributes:
         state: The law's memory; stages on the memory may replace it.
     """
 
-    def __init__(self, law: Law, single: bool, timestep: float) -> None:
+    def __init__(self, law: Law, single: bool) -> None:
         self.law = law
         self.state: State = None
         self._step = law.step
         self._least, self._most = -law.rate_limit, law.rate_limit
         self._single = single
-        self._timestep = timestep
         self._checked = False
         self._no_integrator: Scalar = math.nan
 
-    def start(self, y: Measurement, step: int) -> None:
+    def start(self, y: Measurement, time: float) -> None:
         """Forget everything: the next decision is the first.
 
         Args:
             y: The first measurement.
-            step: Number of the physics step.
+            time: Its time [s].
 
         Raises:
             RunStopped: The law failed.
         """
         self._checked = False
         self._no_integrator = math.nan * y.y1
-        with _named(self.law, "law", step * self._timestep):
+        with _named(self.law, "law", time):
             self.state = self.law.init(y)
 
-    def decide(self, y: Measurement, x: FeedbackState, u: Scalar, step: int) -> tuple[Scalar, Scalar]:
+    def decide(self, y: Measurement, x: FeedbackState, u: Scalar, time: float) -> tuple[Scalar, Scalar]:
         """Return the command of a tick.
 
         Args:
             y: What is measured.
             x: What is fed back.
             u: The gimbal rate held since the last tick [rad/s].
-            step: Number of the physics step.
+            time: Of the tick [s].
 
         Returns:
             The gimbal rate [rad/s], within the limit, and the integrator that went into it; NaN if the law has none.
@@ -160,11 +156,11 @@ class LawRunner:
         try:
             self.state, command = self._step(before, y, x, u)
         except Exception as error:
-            _stop(self.law, "law", step * self._timestep, error)
+            _stop(self.law, "law", time, error)
         x_e = getattr(before, "x_e", self._no_integrator)
         if not self._checked:
             self._checked = True
-            with _named(self.law, "law", step * self._timestep):
+            with _named(self.law, "law", time):
                 check_shape("u", command, y)
                 check_shape("x_e", x_e, y)
         if not self._single:  # many worlds are judged one by one, elsewhere
@@ -173,7 +169,7 @@ class LawRunner:
             return command, x_e
         if not math.isfinite(command):
             name = type(self.law).__name__
-            raise RunStopped(f"law {name} returned {command} for u at t = {step * self._timestep:g} s")
+            raise RunStopped(f"law {name} returned {command} for u at t = {time:g} s")
         return clip(float(command), self._least, self._most), x_e
 
 

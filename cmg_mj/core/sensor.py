@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar, digitise
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import NoiseStream
-from cmg_mj.core.types import Forces, IdealReading
-
-Reading = TypeVar("Reading")
-"""A sensor's reading: a number, a number for each gimbal, or the forces of the accelerometers."""
+from cmg_mj.core.types import IdealReading
 
 
 def whole_steps(duration: float, timestep: float, field: str, text: str) -> int:
@@ -59,21 +56,13 @@ class Timing(NamedTuple):
     """Samples before the first one, all of the same reading."""
 
 
-class SensorStage(Protocol):
-    """An effect on a sensor's signal.
+SensorStage = Callable[[Any, IdealReading], Any]
+"""An effect on a sensor's signal: (signal, readings of perfect sensors) -> the signal with it.
 
-    A stage may have a `timing`, and a method `watch(step, period, ideal)` that is called at every instant of its
-    part, with the physics steps between the samples that the part takes.
-    """
-
-    def __call__(self, signal: Any, ideal: IdealReading, /) -> Any:
-        """Return the signal with the effect, once a sample that the part takes.
-
-        Args:
-            signal: The signal behind the stages before: four forces, or an array (4, n_worlds), of accelerometers.
-            ideal: The readings of perfect sensors.
-        """
-        ...
+It is called once a sample that the part takes. The signal is that behind the stages before: of accelerometers four
+forces, or an array (4, n_worlds). A stage may have a `timing`, and a method `watch(step, period, ideal)` that is called
+at every instant, with the physics steps between the samples that the part takes.
+"""
 
 
 class Site(NamedTuple):
@@ -91,72 +80,42 @@ class Site(NamedTuple):
         return whole_steps(duration, self.timestep, f"{self.section}.{field}", text)
 
 
-class White:
-    """Constant offsets and white noise of the channels of a pair of accelerometers.
-
-    Args:
-        bias: Offsets of the tangential axes of the inner and the outer accelerometer [m/s^2].
-        sigma: Standard deviation of a sample [m/s^2].
-        noise: Standard normals, four a sample.
-    """
-
-    def __init__(self, bias: tuple[Scalar, Scalar], sigma: Scalar, noise: Iterator[Sequence[Scalar]]) -> None:
-        self._inner, self._outer = bias
-        self._offsets = np.array(np.broadcast_arrays(bias[0], 0.0, bias[1], 0.0)).reshape(4, -1)
-        self._sigma, self._noise = sigma, noise
-
-    def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
-        """Add offset and noise."""
-        normal, sigma = next(self._noise), self._sigma
-        if isinstance(forces, np.ndarray):
-            return forces + self._offsets + sigma * np.asarray(normal)
-        n0, n1, n2, n3 = normal
-        ix, iz, ox, oz = forces
-        return ix + self._inner + sigma * n0, iz + sigma * n1, ox + self._outer + sigma * n2, oz + sigma * n3
-
-
-class Shown:
-    """Range and resolution of every channel.
+def shown(limit: float, step: float) -> SensorStage:
+    """Make the stage of range and resolution of every channel.
 
     Args:
         limit: Largest reading.
         step: Of the resolution; 0: readings are not rounded.
     """
 
-    def __init__(self, limit: float, step: float) -> None:
-        self._limit, self._step = limit, step
-
-    def __call__(self, signal: Any, ideal: IdealReading) -> Any:
-        """Limit and round."""
-        limit, step = self._limit, self._step
+    def shown(signal: Any, ideal: IdealReading) -> Any:
         if isinstance(signal, np.ndarray):
             return digitise(signal, limit, step)
         return [digitise(x, limit, step) for x in signal]
 
+    return shown
 
-class SampledSensor(Generic[Reading]):
+
+class SampledSensor:
     """One sensor at work: it samples at its own rate and delivers after its latency.
 
     Args:
         rate_hz: Readings a second.
         latency_s: Delay from the sampling of a reading to its delivery [s].
         site: The part's place in the run.
-        take: Takes the part's signal out of the readings of perfect sensors.
+        signal: Which of the readings of perfect sensors it is, a field of `IdealReading`.
         stages: The effects on it, the first one first.
 
     Attributes:
         steps_per_sample: Physics steps between the instants at which it may be due.
     """
 
-    _newest: Reading
-    _delivered: Reading
-
     def __init__(
         self,
         rate_hz: float,
         latency_s: float,
         site: Site,
-        take: Callable[[IdealReading], Any],
+        signal: str,
         stages: Sequence[SensorStage] = (),
     ) -> None:
         timings = [getattr(stage, "timing", Timing()) for stage in stages]
@@ -164,39 +123,37 @@ class SampledSensor(Generic[Reading]):
         self._raw = max((timing.inside for timing in timings), default=0) or self.period
         self._settle = sum(timing.settle for timing in timings)
         self.steps_per_sample = math.gcd(self.period, self._raw, *(timing.grid for timing in timings))
-        self._watches = [stage.watch for stage in stages if hasattr(stage, "watch")]  # type: ignore[attr-defined]
-        self._take, self._stages = take, stages
+        self._watches = [watch for stage in stages if (watch := getattr(stage, "watch", None))]
+        self._signal, self._stages = signal, stages
         self._latency = steps_until(latency_s, site.timestep)
-        self._on_the_way: deque[tuple[int, Reading]] = deque()
-        self._is_first, self._has_delivered = True, False
+        self._on_the_way: deque[tuple[int, Any]] = deque()
+        self._delivered = None
 
     def sample(self, step: int, ideal: IdealReading) -> None:
-        """Take what is due, at a physics step that is a multiple of `steps_per_sample`, or at the first one."""
+        """Take what is due at a physics step; at the first one, whichever it is, there must be something to show."""
         for watch in self._watches:
             watch(step, self._raw, ideal)
-        is_first, self._is_first = self._is_first, False
-        if step % self._raw and not is_first:
+        is_first = self._delivered is None
+        if is_first:  # before the start the rig stood still
+            for _ in range(self._settle):
+                self._measure(ideal)
+        elif step % self._raw:
             return
-        for _ in range(self._settle if is_first else 0):  # before the start the rig stood still
-            self._measure(ideal)
-        signal = self._take(ideal)
-        for stage in self._stages:
-            signal = stage(signal, ideal)
-        if step % self.period == 0 or is_first:
-            self._newest = signal
-            if self._latency:
+        signal = self._measure(ideal)
+        if is_first or step % self.period == 0:
+            if is_first or not self._latency:
+                self._delivered = signal
+            else:
                 self._on_the_way.append((step + self._latency, signal))
 
-    def _measure(self, ideal: IdealReading) -> None:
-        signal = self._take(ideal)
+    def _measure(self, ideal: IdealReading) -> Any:
+        signal = getattr(ideal, self._signal)
         for stage in self._stages:
             signal = stage(signal, ideal)
+        return signal
 
-    def read(self, step: int) -> Reading:
+    def read(self, step: int) -> Any:
         """Return the newest sample delivered by a physics step; before the start the rig stood still."""
-        if not self._latency:
-            return self._newest
-        while self._on_the_way and (self._on_the_way[0][0] <= step or not self._has_delivered):
+        while self._on_the_way and self._on_the_way[0][0] <= step:
             self._delivered = self._on_the_way.popleft()[1]
-            self._has_delivered = True
         return self._delivered

@@ -80,23 +80,8 @@ class RadialTilt:
         Returns:
             Tilt of the radial line from the vertical [rad].
         """
-        gravity_x, gravity_z = self.gravity(inner_x, inner_z, outer_x, outer_z)
-        return atan2(-gravity_x, gravity_z)
-
-    def gravity(self, inner_x: Scalar, inner_z: Scalar, outer_x: Scalar, outer_z: Scalar) -> tuple[Scalar, Scalar]:
-        """Gravity alone, whatever the motion.
-
-        Args:
-            inner_x: Inner accelerometer, tangential axis [m/s^2].
-            inner_z: Inner accelerometer, radial axis, outward [m/s^2].
-            outer_x: Outer accelerometer, tangential axis [m/s^2].
-            outer_z: Outer accelerometer, radial axis, outward [m/s^2].
-
-        Returns:
-            Its tangential and its radial part [m/s^2].
-        """
         w_inner, w_outer = self._weights
-        return w_inner * inner_x - w_outer * outer_x, w_inner * inner_z - w_outer * outer_z
+        return atan2(-(w_inner * inner_x - w_outer * outer_x), w_inner * inner_z - w_outer * outer_z)
 
     def acceleration(self, inner_x: Scalar, outer_x: Scalar) -> Scalar:
         """Angular acceleration of the tilt: gravity is the same at both places, r alpha is not.

@@ -130,7 +130,7 @@ class FeedbackState(Estimate):
 def feedback_state(x1: Scalar, x2: Scalar, x3: Scalar, extra: Sequence[Scalar] = ()) -> FeedbackState:
     """Put together what is fed back to a law."""
     x = _new(FeedbackState, (x1, x2, x3))
-    if extra:
+    if len(extra):
         x.extra = extra
     return x
 

@@ -43,7 +43,7 @@ def find(kind: str, name: str, suffix: str, field: str, beside: Path | None = No
     """
     candidates = [Path(name)]
     if "/" not in name and "\\" not in name:
-        candidates.append(folder(kind) / (name if name.endswith(suffix) else name + suffix))
+        candidates.append(folder(kind) / (name.removesuffix(suffix) + suffix))
     if beside is not None:
         candidates = [beside / name, *candidates[1:], Path(name)]
     for path in candidates:
@@ -127,5 +127,4 @@ def model_files(path: Path, within: tuple[Path, ...] = ()) -> list[Path]:
 
 def whole_path(file: str, beside: Path) -> str:
     """Return the whole path of a file, which may start from a folder; one that is nowhere keeps its name."""
-    paths = [path for path in (beside / file, Path(file)) if path.is_file()]
-    return str(paths[0].resolve()) if paths else file
+    return next((str(path.resolve()) for path in (beside / file, Path(file)) if path.is_file()), file)

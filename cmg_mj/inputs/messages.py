@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, get_args, get_origin
 
 from cmg_mj.core.errors import TomlValue, nearest, shortened, shown
+from cmg_mj.inputs.types import parts_of, pydantic_fields
 
 SMALLEST, LARGEST = 1e-30, 1e30
 """Sizes of numbers. Products of a few numbers within them stay finite, and nothing a person can lift needs more."""
@@ -45,14 +47,18 @@ def complaints(root: Any, errors: Iterable[Mapping[str, Any]], fields: Mapping[s
     """
     clauses: dict[str, str] = {}
     for detail in errors:
-        kind, message = detail["type"], _allowed(detail)
+        kind = detail["type"]
+        message = _WORDS_OF_TYPE.get(kind, str(detail["msg"]))
+        for word, ours in _WORDS.items():
+            message = message.replace(word, ours)
         # A union's members are parts of the location, with their type's name.
         location = [part for part in detail["loc"] if not (isinstance(part, str) and "[" in part)]
         while location and isinstance(location[-1], int) and not fields_of(_type_at(root, location)):
             location.pop()  # what is wrong with an element is wrong with its list
         where = shortened(".".join(map(str, location)))
         if kind in ("extra_forbidden", "unexpected_keyword_argument"):
-            elsewhere = {f"{section}_{name}": f"{section}.{name}" for section, name in _dotted(root)}
+            sections = {section: _section(annotation) for section, annotation in fields_of(root).items()}
+            elsewhere = {f"{section}_{name}": f"{section}.{name}" for section in sections for name in sections[section]}
             name, known = str(location[-1]), _section(_type_at(root, location[:-1]))
             is_elsewhere = name in elsewhere and location[0] != "axes"
             guess = f"did you mean {elsewhere[name]!r}?" if is_elsewhere else nearest(name, known)
@@ -65,17 +71,11 @@ def complaints(root: Any, errors: Iterable[Mapping[str, Any]], fields: Mapping[s
             value: Any = fields
             for part in location:
                 value = value[part]
-            choices = [str(choice) for choice in _types_in(_type_at(root, location)) if isinstance(choice, str)]
-            guess, is_close, _ = nearest(str(value), choices).partition("? ")
+            guess, is_close, _ = nearest(str(value), re.findall(r"'(.+?)'", message)).partition("? ")
             clause = f"{message}; {guess}?" if kind == "literal_error" and is_close else message
             where += f" = {shown(value)}"
         clauses[where] = f"{clauses[where]}, or {clause.removeprefix('must be ')}" if where in clauses else clause
     return [f"{where}: {clause}" if where else clause for where, clause in clauses.items()]
-
-
-def _dotted(root: Any) -> Iterator[tuple[str, str]]:
-    """List the fields of the sections of a class, each with its section."""
-    return ((section, name) for section, annotation in fields_of(root).items() for name in _section(annotation))
 
 
 _WORDS_OF_TYPE = {
@@ -97,19 +97,11 @@ _WORDS = {
 """Pydantic's words -> words for the user of a TOML file."""
 
 
-def _allowed(detail: Mapping[str, Any]) -> str:
-    """Return pydantic's sentence as a clause: `must be greater than 0`."""
-    text = _WORDS_OF_TYPE.get(detail["type"], str(detail["msg"]))
-    for word, ours in _WORDS.items():
-        text = text.replace(word, ours)
-    return text
-
-
 def _type_at(place: Any, location: Sequence[str | int]) -> Any:
     """Return the type of a field somewhere below a class."""
     for part in location:
         if isinstance(part, int):
-            place = _types_in(place)[0] if get_origin(place) is list else float
+            place = parts_of(place)[0] if get_origin(place) is list else float
         elif get_origin(place) is dict:  # [versions], [axes]
             place = get_args(place)[1]
         else:
@@ -119,21 +111,12 @@ def _type_at(place: Any, location: Sequence[str | int]) -> Any:
 
 def _section(annotation: Any) -> dict[str, Any]:
     """Return the fields of the section that a type is, may be, or lists."""
-    return next((fields for part in _types_in(annotation) if (fields := fields_of(part))), {})
+    return next((fields for part in parts_of(annotation) if (fields := fields_of(part))), {})
 
 
 def fields_of(place: Any) -> dict[str, Any]:
     """Return the fields of a section or observer class with their types and bounds; none for any other class."""
-    infos = getattr(place, "__pydantic_fields__", {}) if isinstance(place, type) else {}
     return {
         name: Annotated[info.annotation, *info.metadata] if info.metadata else info.annotation
-        for name, info in infos.items()
+        for name, info in pydantic_fields(place).items()
     }
-
-
-def _types_in(annotation: Any) -> list[Any]:
-    """List the parts of a type: classes, and the choices of a Literal."""
-    if get_origin(annotation) is Annotated:
-        return _types_in(get_args(annotation)[0])
-    arguments = get_args(annotation)
-    return [annotation] if not arguments else [t for argument in arguments for t in _types_in(argument)]

@@ -120,9 +120,9 @@ def marked_fields(section: type, mark: type[Mark]) -> dict[str, Mark]:
         Field, `push.torque_n_m` -> its mark.
     """
     marks: dict[str, Mark] = {}
-    for name, field in _fields(section).items():
+    for name, field in pydantic_fields(section).items():
         marks |= [(name, item) for item in field.metadata if isinstance(item, mark)]
-        for part in _classes_in(field.annotation):
+        for part in parts_of(field.annotation):
             marks |= {f"{name}.{below}": item for below, item in marked_fields(part, mark).items()}
     return marks
 
@@ -137,7 +137,7 @@ def marked_values(section: BaseModel, mark: type[Mark]) -> Iterator[tuple[str, f
     Yields:
         Field, `push.0.torque_n_m`, its value, its mark.
     """
-    for name, field in _fields(type(section)).items():
+    for name, field in pydantic_fields(type(section)).items():
         value = getattr(section, name)
         yield from ((name, value, item) for item in field.metadata if isinstance(item, mark))
         parts = {f"{name}.{i}": part for i, part in enumerate(value)} if isinstance(value, list) else {name: value}
@@ -145,13 +145,12 @@ def marked_values(section: BaseModel, mark: type[Mark]) -> Iterator[tuple[str, f
             yield from ((f"{at}.{below}", number, item) for below, number, item in marked_values(part, mark))
 
 
-def _fields(section: type) -> Mapping[str, FieldInfo]:
+def pydantic_fields(section: Any) -> Mapping[str, FieldInfo]:
+    """Return the fields of a class of pydantic's; none of anything else."""
     return getattr(section, "__pydantic_fields__", {})
 
 
-def _classes_in(annotation: Any) -> list[type]:
-    """Return all classes that a type is put together from."""
+def parts_of(annotation: Any) -> list[Any]:
+    """List what a type is put together from; one without parts alone."""
     arguments = get_args(annotation)
-    if arguments:
-        return [part for argument in arguments for part in _classes_in(argument)]
-    return [annotation] if isinstance(annotation, type) else []
+    return [part for argument in arguments for part in parts_of(argument)] if arguments else [annotation]

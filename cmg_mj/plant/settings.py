@@ -56,7 +56,7 @@ def apply(
             bias=math.radians(own.equilibrium_bias_deg),
             initial_tilt=math.radians(own.initial_tilt_deg),
             radial_tilt=place_accelerometers(model, own, axis, path),
-            misplaced=own.has_misplaced,
+            misplaced=bool(own.accelerometer_inner_misplaced_mm or own.accelerometer_outer_misplaced_mm),
         )
         if speed is not None:
             changed = replace(changed, modules=_set_flywheel_speed(model, key, axis.modules, speed, path))

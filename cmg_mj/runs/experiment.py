@@ -357,7 +357,7 @@ class Experiment:
             return {}
         law = self.scenario.controller.kind
         law_change = {} if law == base.controller.kind else {"controller.kind": law}
-        other = base.with_observer(self.scenario.observer.kind).with_law(law)
+        other = base.with_observer(self.scenario.observer.kind).with_kind("controller", law)
         if other.model_dump(mode="json") == self.scenario.model_dump(mode="json"):
             return law_change
         try:

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Unpack
+from typing import NamedTuple, TypedDict, Unpack
 
-from cmg_mj.core.controller import Controller, ControllerOptions, ControllerSite, KnownPlant
-from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.core.controller import AngleSource, Controller, Feedback, KnownPlant
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise, RadialTilt
 from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
@@ -17,8 +17,8 @@ from cmg_mj.laws import LAW_CLASSES, LAWS, Law
 from cmg_mj.observers import OBSERVER_CLASSES, Observer, make_observer
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.sensors import Sensors
-from cmg_mj.stages.notch import notch
-from cmg_mj.stages.trim import integrator_trim, trim
+from cmg_mj.stages.notch import notches
+from cmg_mj.stages.trim import trims
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,8 @@ def design(scenario: Scenario, rig: PlantNumbers) -> Design:
     controller = scenario.controller
     result = Design(scenario, rig, controller.law(rig.reduced, rig.noise(scenario.sensors)))
     result.open_loop_observers()
-    integrator_trim(controller.bias_trim_s, result.law, extra_signals(result.observer()))
+    notches(controller.notch_hz, result.law)
+    trims(controller.bias_trim_s, result.law, extra_signals(result.observer()), rig.timestep)
     return result
 
 
@@ -138,15 +139,12 @@ def _check(scenario: Scenario) -> None:
     kind, parameters = controller.kind, controller.parameters
     law = LAW_CLASSES.find(kind)
     LAW_CLASSES.check_types(kind, parameters)
-    for clause in LAW_CLASSES.unknown(kind, parameters, ControllerSettings.model_fields):
-        raise InputError(clause)
-    gains = next((name for name in ("gains", "lqr") if getattr(controller, name) is not None), None)
-    if gains and not LAW_CLASSES.may_take(kind, "gains"):
-        raise InputError(f"controller.{gains}: {kind} takes no gains; leave it out")
-    unused = () if law_needs(law) == LAW_NEEDS else ("feedback", "angle_source")
-    for name in unused:
+    for name in ("gains", "lqr"):
+        if getattr(controller, name) is not None and not LAW_CLASSES.may_take(kind, "gains"):
+            raise InputError(f"controller.{name}: {kind} takes no gains; leave it out")
+    for name in ("feedback", "angle_source"):
         value, usual = getattr(controller, name), ControllerSettings.model_fields[name].default
-        if value != usual:
+        if value != usual and law_needs(law) != LAW_NEEDS:
             raise InputError(
                 f"controller.{name} = {value!r}: {kind} takes nothing of the observer and has no use "
                 f"for this; leave it out, or set controller.{name}={usual}"
@@ -182,15 +180,15 @@ class PlantNumbers(NamedTuple):
         return replace(self.tilt.noise(sensors.accelerometer.sample_sigma, self.gravity), gimbal=gimbal)
 
 
-COMMANDS = (notch,)
-"""The effects on the law's command, the first one first: each makes what makes its stage, or None where it is off."""
-MEMORIES = (trim,)
-"""The effects on the law's memory, likewise."""
+class StageOptions(TypedDict, total=False):
+    """Keyword arguments of `Controller` that are a user's choice, and settings of its stages."""
 
-
-class StageOptions(ControllerOptions, total=False):
-    """Options of a controller and of its stages."""
-
+    seed: int
+    worlds: int | Sequence[int]
+    feedback: Feedback
+    angle_source: AngleSource
+    open_loop_observers: Mapping[str, Observer] | None
+    axis: int
     bias_trim_s: float
     """For so long from the start, the integrator is held where the observer's bias estimate asks for it [s]."""
     notch_hz: float
@@ -219,15 +217,8 @@ def make_controller(
         The controller.
 
     Raises:
-        InputError: A rate does not fit the physics step, or an option is unknown or does not fit the observer or the
-            law.
+        InputError: A rate does not fit the physics step, or an option does not fit the observer or the law.
     """
-    known = StageOptions.__annotations__
-    for name in options:
-        if name not in known:
-            raise InputError(f"controller: {name!r}: no such option; {nearest(name, known)}")
-    own: dict[str, Any] = {name: options[name] for name in options if name in ControllerOptions.__annotations__}
-    site = ControllerSite(law, plant.timestep, extra_signals(observer), options)
-    own["commands"] = [stage for start in COMMANDS if (stage := start(site)) is not None]
-    own["memories"] = [stage for start in MEMORIES if (stage := start(site)) is not None]
-    return make(observer, law, sensors, plant, **own)
+    commands = notches(options.pop("notch_hz", 0.0), law)
+    memories = trims(options.pop("bias_trim_s", 0.0), law, extra_signals(observer), plant.timestep)
+    return make(observer, law, sensors, plant, commands=commands, memories=memories, **options)

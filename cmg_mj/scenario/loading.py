@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.inputs.features import FEATURES
 from cmg_mj.inputs.files import bundled, find, folder, read_text
 from cmg_mj.inputs.overrides import override
-from cmg_mj.scenario.schema import ControllerSettings, ObserverSettings, Scenario, parse_scenario
+from cmg_mj.scenario.schema import ControllerSettings, Scenario, parse_scenario
 
 MAX_BYTES = 1_000_000
 """A scenario file is smaller; the longest that a run writes has three thousand bytes."""
@@ -38,51 +39,31 @@ def load_scenario(
     fields = fields or _read(path, name)
     if path.stem in bundled("scenarios"):
         fields.setdefault("based_on", path.stem)
-    changes = []
+    changes, names = [], []
     if observer is not None:
         changes.append(f"--observer {observer}")
-        _take_observer(fields, observer)
-    law, overrides = _kind_of(fields, "controller"), list(overrides)  # they are gone through twice
+        fields = parse_scenario(fields, name).with_observer(observer).as_fields()
+    law = _law(fields)
     for setting in overrides:
         changes.append(f"--set {setting}")
+        names.append(setting.partition("=")[0].strip())
         override(fields, setting)
-    _drop_gains(fields, overrides, _kind_of(fields, "controller") != law)
+    # Of gains and lqr, the one that --set does not give goes; with another law both.
+    set_sections = {".".join(f"{field}.".split(".")[:2]) for field in names}
+    unset = [field for field in ("gains", "lqr") if f"controller.{field}" not in set_sections]
+    if len(unset) == 1 or _law(fields) != law:
+        for field in unset:
+            fields["controller"].pop(field, None)
     scenario = parse_scenario(fields, " ".join([name, *(["with"] if changes else []), *changes]))
-    if not any(setting.partition("=")[0].strip() == "plant.model" for setting in overrides):
+    if "plant.model" not in names:
         scenario = find_model(scenario, path.parent)
     return find_files(scenario, path.parent)
 
 
-def _take_observer(fields: dict[str, Any], observer: str) -> None:
-    """Another observer instead of the file's, on all axes; parameters that are another's go."""
-    common = _kind_of(fields, "observer")
-    axes = fields.get("axes")
-    for axis in axes.values() if isinstance(axes, dict) else ():
-        section = axis.get("observer") if isinstance(axis, dict) else None
-        if isinstance(section, dict) and section.get("kind", common) != observer:
-            axis.pop("observer")
-    if common != observer or not isinstance(fields.get("observer", {}), dict):
-        fields["observer"] = {"kind": observer}
-
-
-def _drop_gains(fields: dict[str, Any], overrides: Iterable[str], has_law_changed: bool) -> None:
-    """Take the file's gains out where --set names another law; of gains and lqr, the one that --set does not give."""
-    set_fields = [setting.partition("=")[0].strip() for setting in overrides]
-    unset = [
-        name
-        for name in ("gains", "lqr")
-        if not any(f"{field}.".startswith(f"controller.{name}.") for field in set_fields)
-    ]
-    if has_law_changed or len(unset) == 1:
-        for name in unset:
-            fields["controller"].pop(name, None)
-
-
-def _kind_of(fields: Mapping[str, Any], section: str) -> Any:
-    """Return the kind of observer or law that a file names, or the default."""
-    usual = {"observer": ObserverSettings().kind, "controller": ControllerSettings().kind}[section]
-    section_fields = fields.get(section)
-    return section_fields.get("kind", usual) if isinstance(section_fields, Mapping) else usual
+def _law(fields: Mapping[str, Any]) -> Any:
+    """Return the kind of law that a file names, or the default."""
+    section, usual = fields.get("controller"), ControllerSettings().kind
+    return section.get("kind", usual) if isinstance(section, Mapping) else usual
 
 
 def _read(path: Path, name: str) -> dict[str, Any]:
@@ -113,9 +94,7 @@ def find_model(scenario: Scenario, beside: Path) -> Scenario:
 def find_files(scenario: Scenario, beside: Path) -> Scenario:
     """Return the scenario with the whole paths of its features' files, which it names relative to itself."""
     found = {}
-    for name in scenario.feature_sections:
-        section = scenario.section(name)
-        found[name] = (
-            [part.located(beside) for part in section] if isinstance(section, list) else section.located(beside)
-        )
+    for name, parts in scenario.feature_sections.items():
+        located = [part.located(beside) for part in parts]
+        found[name] = located if FEATURES[name].is_list else located[0]
     return scenario.model_copy(update=found)

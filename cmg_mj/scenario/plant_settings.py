@@ -16,6 +16,12 @@ Integrator = Literal["RK4", "Euler", "implicit", "implicitfast", "discrete"]
 NEEDS_COMPILING = ("model", "lock_thrust_bearing", "locked_axes")
 """Settings on which it depends what is compiled; the others change the compiled model."""
 
+Loss = Annotated[NonNegative | None, Batched()]
+"""An armature, a friction or a damping that may replace the model's."""
+Tilt = Annotated[float, Field(gt=-45.0, lt=45.0), Batched(), PerAxis()]
+Distance = Annotated[Positive | None, Batched(), PerAxis()]
+Misplaced = Annotated[float, Batched(), PerAxis()]
+
 
 @dataclass(frozen=True, config=STRICT)
 class PlantSettings:
@@ -55,26 +61,26 @@ class PlantSettings:
     """
 
     model: str = "scissored_pair.xml"
-    equilibrium_bias_deg: Annotated[float, Field(gt=-45.0, lt=45.0), Batched(), PerAxis()] = 0.5
-    initial_tilt_deg: Annotated[float, Field(gt=-45.0, lt=45.0), Batched(), PerAxis()] = 1.0
+    equilibrium_bias_deg: Tilt = 0.5
+    initial_tilt_deg: Tilt = 1.0
     timestep_s: Annotated[float, Field(ge=MIN_STEP_S, le=0.1)] | None = None
     integrator: Integrator = "RK4"
     lock_thrust_bearing: bool = False
     locked_axes: tuple[str, ...] = ()
     turn_rate_rad_s: float = 0.0
-    gimbal_armature_kg_m2: Annotated[NonNegative | None, Batched()] = None
-    gimbal_friction_n_m: Annotated[NonNegative | None, Batched()] = None
-    gimbal_damping_n_m_s: Annotated[NonNegative | None, Batched()] = None
+    gimbal_armature_kg_m2: Loss = None
+    gimbal_friction_n_m: Loss = None
+    gimbal_damping_n_m_s: Loss = None
     gimbal_backlash_arcmin: Annotated[float, Field(ge=0.0, lt=5400.0), Batched()] = 0.0
     servo_stiffness_n_m_rad: Annotated[Positive | None, Batched()] = None
-    servo_damping_n_m_s_rad: Annotated[NonNegative | None, Batched()] = None
-    accelerometer_inner_m: Annotated[Positive | None, Batched(), PerAxis()] = None
-    accelerometer_outer_m: Annotated[Positive | None, Batched(), PerAxis()] = None
-    accelerometer_inner_misplaced_mm: Annotated[float, Batched(), PerAxis()] = 0.0
-    accelerometer_outer_misplaced_mm: Annotated[float, Batched(), PerAxis()] = 0.0
+    servo_damping_n_m_s_rad: Loss = None
+    accelerometer_inner_m: Distance = None
+    accelerometer_outer_m: Distance = None
+    accelerometer_inner_misplaced_mm: Misplaced = 0.0
+    accelerometer_outer_misplaced_mm: Misplaced = 0.0
     pivot_slides: Annotated[bool, PerAxis()] = False
-    tilt_friction_n_m: Annotated[NonNegative | None, Batched()] = None
-    tilt_damping_n_m_s: Annotated[NonNegative | None, Batched()] = None
+    tilt_friction_n_m: Loss = None
+    tilt_damping_n_m_s: Loss = None
     flywheel_speed_rad_s: Positive | None = None
     flywheel_imbalance_kg_m: Annotated[float, Batched()] = 0.0
 
@@ -95,8 +101,3 @@ class PlantSettings:
     def compiled_alike(self, other: PlantSettings) -> bool:
         """Return whether the same model is compiled with these settings and others."""
         return all(getattr(self, name) == getattr(other, name) for name in NEEDS_COMPILING)
-
-    @property
-    def has_misplaced(self) -> bool:
-        """True if an accelerometer sits elsewhere than the tilt estimate knows."""
-        return bool(self.accelerometer_inner_misplaced_mm or self.accelerometer_outer_misplaced_mm)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import json
 import platform
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import PurePath
-from typing import Any, TypeGuard
+from typing import Any
 
 import tomli_w
 
@@ -86,11 +88,14 @@ def _resolved(scenario: Scenario, design: Design) -> dict[str, Any]:
 
 def _parameters(parameters: dict[str, Any], part: Any, by_bench: Collection[str]) -> dict[str, Any]:
     """Return the given parameters, and the defaults of the rest as far as they are known and TOML can hold them."""
-    if not dataclasses.is_dataclass(part):
-        return parameters
-    names = [f.name for f in dataclasses.fields(part) if f.init and f.name not in by_bench]
-    defaults = {name: _plain(getattr(part, name, None)) for name in names if name not in parameters}
-    return {name: value for name, value in defaults.items() if _is_toml(value)} | parameters
+    defaults = {}
+    for field in dataclasses.fields(part) if dataclasses.is_dataclass(part) else ():
+        if field.init and field.name not in {*by_bench, *parameters}:
+            with suppress(AttributeError, TypeError, ValueError):
+                value = _plain(getattr(part, field.name))
+                tomli_w.dumps({"value": value})
+                defaults[field.name] = value
+    return defaults | parameters
 
 
 @functools.cache
@@ -102,21 +107,7 @@ def versions() -> dict[str, str]:
 
 def _plain(value: Any) -> Any:
     """Tuples and arrays to lists, as TOML wants them."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    return value
-
-
-def _is_toml(value: Any) -> bool:
-    try:
-        tomli_w.dumps({"value": value})
-    except TypeError:
-        return False
-    return True
+    return json.loads(json.dumps(value, default=lambda array: array.tolist()))
 
 
 def differences(base: Mapping[str, Any], scenario: Mapping[str, Any]) -> dict[str, Any]:
@@ -145,15 +136,16 @@ def _differing(
     if isinstance(base, Mapping) and isinstance(other, Mapping):
         for key in dict.fromkeys([*other, *base]):
             yield from _differing(base.get(key), other.get(key), f"{below}{key}")
-    elif _are_sections(base) and _are_sections(other) and len(base) == len(other):
-        for i, (one, two) in enumerate(zip(base, other, strict=True)):
-            yield from _differing(one, two, f"{below}{i}")
+    elif (
+        isinstance(base, list)
+        and isinstance(other, list)
+        and len(base) == len(other)
+        and all(isinstance(item, Mapping) for item in [*base, *other])
+    ):
+        for i, one in enumerate(base):
+            yield from _differing(one, other[i], f"{below}{i}")
     elif base != other:
         yield name, other
-
-
-def _are_sections(value: TomlValue | None) -> TypeGuard[list[TomlValue]]:
-    return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
 
 
 MAX_NAME = 60
@@ -164,16 +156,12 @@ SHOWN = 3
 
 def describe_differences(differing: Mapping[str, TomlValue | None]) -> str:
     """Write the first few after a comma, as `--set` takes them; nothing if nothing differs."""
-    assignments = [f"{name}={_value(value)}" for name, value in zip(_short(differing), differing.values(), strict=True)]
-    return "".join(f", {text}" for text in _first(assignments, SHOWN, " and {} more"))
+    return "".join(f", {text}" for text in _first(_assignments(differing), SHOWN, "and {} more"))
 
 
 def folder_suffix(differing: Mapping[str, TomlValue | None]) -> str:
     """Make the end of a folder's name: letters that every system takes, and not too many."""
-    assignments = [
-        re.sub(r"[^\w.=+-]+", "_", f"{name}={_value(value)}", flags=re.ASCII).strip("_")
-        for name, value in zip(_short(differing), differing.values(), strict=True)
-    ]
+    assignments = [re.sub(r"[^\w.=+-]+", "_", text, flags=re.ASCII).strip("_") for text in _assignments(differing)]
     count = len(assignments)
     while count and sum(len(text) + 1 for text in assignments[:count]) > MAX_NAME:
         count -= 1
@@ -188,12 +176,12 @@ def safe_name(text: str) -> str:
 def _first(texts: list[str], count: int, rest: str) -> list[str]:
     """Return the first ones, and how many more there are."""
     more = len(texts) - count
-    return texts if more <= 0 else [*texts[:count], rest.format(more).strip()]
+    return texts if more <= 0 else [*texts[:count], rest.format(more)]
 
 
-def _short(names: Iterable[str]) -> list[str]:
-    """Fields by their last name, or by as many as tell them apart from the other differences."""
-    full = [name.split(".") for name in names]
+def _assignments(differing: Mapping[str, TomlValue | None]) -> list[str]:
+    """`field=value`, the field by its last name, or by as many as tell it apart from the other differences."""
+    full = [name.split(".") for name in differing]
 
     def short(parts: list[str]) -> str:
         for start in range(len(parts) - 1, 0, -1):
@@ -202,7 +190,7 @@ def _short(names: Iterable[str]) -> list[str]:
                 return ".".join(end)
         return ".".join(parts)
 
-    return [short(parts) for parts in full]
+    return [f"{short(parts)}={_value(value)}" for parts, value in zip(full, differing.values(), strict=True)]
 
 
 def _value(value: TomlValue | None) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, Self
 
@@ -56,10 +56,20 @@ class LqrSettings(BaseModel):
     """Weight of u."""
 
 
-class ControllerSettings(BaseModel):
-    """The control law by name or dotted path, and its parameters, which the law itself checks."""
+class _OfUserClass(BaseModel):
+    """A section whose `kind` names a class; the class checks its parameters."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The section's fields that belong to the class alone."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class ControllerSettings(_OfUserClass):
+    """The control law by name or dotted path, and its parameters, which the law itself checks."""
+
     kind: Annotated[str, OfOneLaw()] = "state_feedback"
     """A name that `cmg-mj list laws` shows, or package.module:Class."""
     rate_hz: Annotated[Rate, OnAllAxes()] = 200.0
@@ -90,17 +100,6 @@ class ControllerSettings(BaseModel):
             raise ValueError("give either gains or lqr, not both")
         return self
 
-    @model_validator(mode="after")
-    def _notch_below_half_the_rate(self) -> ControllerSettings:
-        if self.notch_hz >= 0.5 * self.rate_hz:
-            raise ValueError(f"notch_hz = {self.notch_hz:g}: must be below {0.5 * self.rate_hz:g} Hz, half of rate_hz")
-        return self
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """The section's fields that belong to the law alone."""
-        return dict(self.__pydantic_extra__ or {})
-
     def law(self, model: ReducedModel, noise: MeasurementNoise) -> Law:
         """The law for a reduced model and the sensors' noise."""
         parameters = self.parameters
@@ -112,25 +111,19 @@ class ControllerSettings(BaseModel):
         return make_law(self.kind, 1.0 / self.rate_hz, self.rate_limit_rad_s, model, noise, **parameters)
 
 
-ONE_LAW_FIELDS = tuple(marked_fields(ControllerSettings, OfOneLaw))
-"""Fields of [controller] that another law does not take over."""
-COMMON_LAW_FIELDS = tuple(name for name in ControllerSettings.model_fields if name not in ONE_LAW_FIELDS)
+COMMON_LAW_FIELDS = [
+    name for name in ControllerSettings.model_fields if name not in marked_fields(ControllerSettings, OfOneLaw)
+]
 """Fields of [controller] that every law has."""
 ALL_AXES_LAW_FIELDS = tuple(marked_fields(ControllerSettings, OnAllAxes))
 """Fields of [controller] that are the same on all axes."""
 
 
-class ObserverSettings(BaseModel):
+class ObserverSettings(_OfUserClass):
     """An observer by name or dotted path, and its parameters, which the observer itself checks."""
 
-    model_config = ConfigDict(extra="allow", frozen=True)
     kind: str = "homogeneous"
     """A name that `cmg-mj list observers` shows, or package.module:Class."""
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """The section's fields besides the kind."""
-        return dict(self.__pydantic_extra__ or {})
 
     def make(self, dt: float, model: ReducedModel, noise: MeasurementNoise) -> Observer:
         """Construct the observer."""
@@ -240,7 +233,7 @@ class Scenario(create_model("Scenario", __base__=Sections, **_OF_FEATURES)):
     def feature_sections(self) -> dict[str, list[Section]]:
         """The settings of all features, by name."""
         sections = {name: getattr(self, name) for name in _OF_FEATURES}
-        return {name: section if isinstance(section, list) else [section] for name, section in sections.items()}
+        return {name: section if FEATURES[name].is_list else [section] for name, section in sections.items()}
 
     @property
     def source(self) -> str:
@@ -311,30 +304,20 @@ class Scenario(create_model("Scenario", __base__=Sections, **_OF_FEATURES)):
 
         On a rig of several axes it is that of all: what an axis has of another's own goes.
         """
-        common, axes = self.observer.kind, self._axes_with_kind("observer", kind)
-        observer = self.observer if kind == common else ObserverSettings(kind=kind)
-        return self.model_copy(update={"observer": observer, "axes": axes})
+        return self.with_kind("observer", kind)
 
-    def with_law(self, kind: str) -> Scenario:
-        """The same experiment with another control law, with its default parameters, on all axes."""
-        common, axes = self.controller.kind, self._axes_with_kind("controller", kind, COMMON_LAW_FIELDS)
-        if kind == common:
-            return self.model_copy(update={"axes": axes})
-        fields: dict[str, Any] = {name: getattr(self.controller, name) for name in COMMON_LAW_FIELDS}
-        return self.model_copy(update={"controller": ControllerSettings(**fields, kind=kind), "axes": axes})
-
-    def _axes_with_kind(
-        self, section: Literal["observer", "controller"], kind: str, shared: Collection[str] = ()
-    ) -> dict[str, AxisSettings]:
-        """The settings of the axes; of a section of another kind the fields that all kinds share are left."""
-        is_observer, axes = section == "observer", dict(self.axes)
-        common = self.observer.kind if is_observer else self.controller.kind
+    def with_kind(self, section: Literal["controller", "observer"], kind: str) -> Scenario:
+        """The same experiment with another law or observer, with its default parameters, on all axes."""
+        own, axes = getattr(self, section), dict(self.axes)
+        shared = COMMON_LAW_FIELDS if section == "controller" else ()
         for name, settings in self.axes.items():
-            fields = settings.observer if is_observer else settings.controller
-            if fields.get("kind", common) != kind:
+            fields = getattr(settings, section)
+            if fields.get("kind", own.kind) != kind:
                 fields = {field: value for field, value in fields.items() if field in shared}
                 axes[name] = settings.model_copy(update={section: fields})
-        return axes
+        if own.kind != kind:
+            own = type(own)(**{name: getattr(own, name) for name in shared}, kind=kind)
+        return self.model_copy(update={section: own, "axes": axes})
 
     def open_loop_names(self) -> list[str]:
         """The open-loop observers, spelled out, without the observer itself."""
@@ -359,12 +342,14 @@ def parse_scenario(fields: Mapping[str, Any], source: str = "") -> Scenario:
     try:
         # By way of JSON, pydantic takes a list for a tuple and still no text or true for a number.
         scenario = Scenario.model_validate_json(json.dumps(fields, default=as_json), strict=True).with_source(source)
+        wrong = out_of_size(fields)
     except ValidationError as error:
-        wrong = [*complaints(Scenario, error.errors(), fields), *_unknown_to_bench_law(fields)]
-        raise InputError(located(source, _clauses(wrong))) from error
-    wrong = [*_unknown_to_bench_law(fields), *out_of_size(fields)]
-    if wrong:
-        raise InputError(located(source, _clauses(wrong)))
+        scenario, wrong = Scenario(), complaints(Scenario, error.errors(), fields)
+    clauses = list(dict.fromkeys([*wrong, *_unknown_to_bench_law(fields)]))
+    if len(clauses) > MAX_CLAUSES:
+        clauses[MAX_CLAUSES:] = [f"and {len(clauses) - MAX_CLAUSES} more"]
+    if clauses:
+        raise InputError(located(source, "; ".join(clauses)))
     _ = scenario.axis_scenarios  # their fields are checked, too
     return scenario
 
@@ -400,13 +385,6 @@ def _moved(fields: Mapping[str, Any]) -> Mapping[str, Any]:
             moved[section] = found
             plant = {name: value for name, value in plant.items() if name not in old}
     return {**moved, "plant": plant}
-
-
-def _clauses(wrong: Iterable[str]) -> str:
-    """All that is wrong, or the first of very much."""
-    clauses = list(dict.fromkeys(wrong))
-    more = [f"and {len(clauses) - MAX_CLAUSES} more"] if len(clauses) > MAX_CLAUSES else []
-    return "; ".join(clauses[:MAX_CLAUSES] + more)
 
 
 def located(source: str, wrong: str) -> str:

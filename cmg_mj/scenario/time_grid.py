@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.sensor import whole_steps
@@ -23,8 +22,7 @@ MAX_STEPS = 1_000_000_000
 _MAX_DENOMINATOR = 10**9  # 1/3 s as a float is the fraction 1/3
 
 
-@dataclass(frozen=True)
-class TimeGrid:
+class TimeGrid(NamedTuple):
     """The times that whole physics steps of a run must fill.
 
     Attributes:
@@ -59,8 +57,7 @@ class TimeGrid:
         return step
 
 
-@dataclass(frozen=True)
-class _GridTime:
+class _GridTime(NamedTuple):
     """A period or time of a scenario that whole physics steps must fill.
 
     Attributes:
@@ -76,17 +73,6 @@ class _GridTime:
     seconds: float
     exact: Fraction
     unit: str = ""
-
-    def check(self, timestep: float) -> None:
-        """Refuse what is no whole number of physics steps [s], and name the nearest that are."""
-        try:
-            whole_steps(self.seconds, timestep, self.field, self.text)
-        except InputError as error:
-            if not self.unit:
-                raise
-            around = {max(1, math.floor(self.seconds / timestep)), max(1, math.ceil(self.seconds / timestep))}
-            times = [1.0 / (steps * timestep) if self.unit == "Hz" else steps * timestep for steps in sorted(around)]
-            raise InputError(f"{error} (nearest: {' or '.join(f'{t:g} {self.unit}' for t in times)})") from error
 
 
 def time_grid(scenario: Scenario) -> TimeGrid:
@@ -111,7 +97,15 @@ def time_grid(scenario: Scenario) -> TimeGrid:
     if timestep is not None:
         grid.physics_step(timestep)
         for time in _grid_times(scenario):
-            time.check(timestep)
+            try:
+                whole_steps(time.seconds, timestep, time.field, time.text)
+            except InputError as error:
+                if not time.unit:
+                    raise
+                ratio = time.seconds / timestep
+                steps = sorted({max(1, math.floor(ratio)), max(1, math.ceil(ratio))})
+                times = [1.0 / (n * timestep) if time.unit == "Hz" else n * timestep for n in steps]
+                raise InputError(f"{error} (nearest: {' or '.join(f'{t:g} {time.unit}' for t in times)})") from error
     for field, frequency, mark in marked_values(scenario, Held):
         if frequency and frequency > control / SWING_SHARE:
             raise InputError(
@@ -131,8 +125,10 @@ def common_period(scenario: Scenario) -> float:
         InputError: It is shorter than `MIN_PERIOD_S`; the first field that makes it so is named.
     """
     common = Fraction(0)
-    for time in sorted(_grid_times(scenario), key=lambda time: time.unit == "s"):
-        common = _common_divisor(common, time.exact)
+    for time in _grid_times(scenario):
+        a, b = common, time.exact
+        divisor = math.gcd(a.numerator * b.denominator, b.numerator * a.denominator)
+        common = Fraction(divisor, a.denominator * b.denominator)
         if common and common < _fraction(MIN_PERIOD_S):
             raise InputError(
                 f"{time.field} = {time.text}: does not fit the other rates and times: no physics step of "
@@ -141,29 +137,21 @@ def common_period(scenario: Scenario) -> float:
     return float(common)
 
 
-def _grid_times(scenario: Scenario) -> Iterator[_GridTime]:
+def _grid_times(scenario: Scenario) -> list[_GridTime]:
     """Return all periods and times of a scenario and of its axes: rates first, then times."""
-    for prefix, part in {
-        "": scenario,
-        **{f"axes.{name}.": part for name, part in scenario.axis_scenarios.items()},
-    }.items():
-        numbers = [(prefix + field, number, mark.unit) for field, number, mark in marked_values(part, OnGrid)]
-        for field, rate, unit in numbers:
-            if unit == "Hz":
-                yield _GridTime(field, f"{rate:g} Hz", 1.0 / rate, 1 / _fraction(rate), unit)
-        accelerometer = part.sensors.accelerometer
-        if accelerometer.bandwidth_hz:
-            rate = accelerometer.raw_rate_hz
-            text = f"{accelerometer.bandwidth_hz:g} Hz, sampled at {rate:g} Hz inside the part"
-            yield _GridTime(f"{prefix}sensors.accelerometer.bandwidth_hz", text, 1.0 / rate, _fraction(1.0 / rate))
-        for field, time, unit in numbers:
-            if unit == "s":
-                yield _GridTime(field, f"{time:g} s", time, _fraction(time), unit)
+    times = []
+    parts = {"": scenario, **{f"axes.{name}.": part for name, part in scenario.axis_scenarios.items()}}
+    for prefix, part in parts.items():
+        for field, number, mark in marked_values(part, OnGrid):
+            exact, text = _fraction(number), f"{number:g} {mark.unit}"
+            seconds, exact = (1.0 / number, 1 / exact) if mark.unit == "Hz" else (number, exact)
+            times.append(_GridTime(prefix + field, text, seconds, exact, mark.unit))
+        pair = part.sensors.accelerometer
+        if pair.bandwidth_hz:
+            field, period = f"{prefix}sensors.accelerometer.bandwidth_hz", 1.0 / pair.raw_rate_hz
+            times.append(_GridTime(field, pair.inside_text, period, _fraction(period)))
+    return sorted(times, key=lambda time: time.unit == "s")
 
 
 def _fraction(number: float) -> Fraction:
     return Fraction(number).limit_denominator(_MAX_DENOMINATOR)
-
-
-def _common_divisor(a: Fraction, b: Fraction) -> Fraction:
-    return Fraction(math.gcd(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator)

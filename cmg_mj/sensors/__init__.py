@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.noise import normals
 from cmg_mj.core.sensor import SampledSensor, Site
-from cmg_mj.core.types import Forces
 from cmg_mj.inputs.types import STRICT
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
 from cmg_mj.sensors.gyros import Fog, MemsGyro
@@ -37,9 +35,7 @@ class Sensors:
         """Return the sensors with another noise density of the accelerometers [ug/sqrt(Hz)]."""
         return replace(self, accelerometer=replace(self.accelerometer, noise_density_ug_rthz=ug_rthz))
 
-    def at_work(
-        self, timestep: float, seed: int, worlds: int | Sequence[int], axis: int = 0
-    ) -> tuple[SampledSensor[Forces], SampledSensor[Sequence[Scalar]], SampledSensor[Scalar]]:
+    def at_work(self, timestep: float, seed: int, worlds: int | Sequence[int], axis: int = 0) -> list[SampledSensor]:
         """Start the sensors that the controller reads: the accelerometers, the encoders, the fibre-optic gyro.
 
         Args:
@@ -54,12 +50,13 @@ class Sensors:
         Raises:
             InputError: A rate or a time does not fit the physics step.
         """
-
-        def noise(stream: NoiseStream, channels: int) -> Iterator[Sequence[Scalar]]:
-            return normals(seed, worlds, stream.on_axis(axis), channels)
-
-        def site(name: str) -> Site:
-            return Site(f"sensors.{name}", timestep, noise)
-
-        pair, encoder, fog = self.accelerometer, self.encoder, self.fog
-        return pair.at_work(site("accelerometer")), encoder.at_work(site("encoder")), fog.at_work(site("fog"))
+        return [
+            getattr(self, name).at_work(
+                Site(
+                    f"sensors.{name}",
+                    timestep,
+                    lambda stream, channels: normals(seed, worlds, stream.on_axis(axis), channels),
+                )
+            )
+            for name in ("accelerometer", "encoder", "fog")
+        ]

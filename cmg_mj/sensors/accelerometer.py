@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.sensor import SampledSensor, SensorStage, Shown, Site
-from cmg_mj.core.types import Forces
+from cmg_mj.core.sensor import SampledSensor, Site, shown
+from cmg_mj.core.types import STANDARD_GRAVITY, Forces
 from cmg_mj.inputs.types import STRICT, Instant, NonNegative, Rate
 from cmg_mj.stages.flicker import FlickerSettings, flicker
-from cmg_mj.stages.low_pass import LowPassSettings, low_pass_stage
-from cmg_mj.stages.mounting_errors import MountingErrors, MountingErrorsSettings, mounting_errors
-from cmg_mj.stages.pair import shown, white
-from cmg_mj.stages.skew import SkewSettings, skew
+from cmg_mj.stages.low_pass import LowPass, LowPassSettings
+from cmg_mj.stages.mounting_errors import PERFECT, MountingErrorsSettings, mounting_errors
+from cmg_mj.stages.pair import white
+from cmg_mj.stages.skew import Skew, SkewSettings
 from cmg_mj.stages.vibration import VibrationSettings, vibration
 
 
@@ -43,7 +42,7 @@ class Accelerometer(VibrationSettings, LowPassSettings, FlickerSettings, SkewSet
 
     def constant_errors(self) -> Callable[[Forces], Forces]:
         """Return a function: true specific forces (inner x, z, outer x, z) -> what parts without noise show [m/s^2]."""
-        mixed = MountingErrors(*self.mounting_weights())
+        mixed = mounting_errors(self)
         inner, outer = self.bias
 
         def erring(forces: Forces) -> Forces:
@@ -52,16 +51,19 @@ class Accelerometer(VibrationSettings, LowPassSettings, FlickerSettings, SkewSet
 
         return erring
 
-    def at_work(self, site: Site) -> SampledSensor[Forces]:
+    def at_work(self, site: Site) -> SampledSensor:
         """Start the accelerometers."""
-        stages = [stage for make in PAIR if (stage := make(self, site)) is not None]
-        return SampledSensor(self.rate_hz, self.latency_s, site, lambda ideal: ideal.accelerations, stages)
-
-
-PAIR: tuple[Callable[[Accelerometer, Site], SensorStage | None], ...] = (
-    *(skew, vibration, mounting_errors, white, flicker, low_pass_stage, shown),
-)
-"""The effects on the accelerometers, the first one first: each makes its stage, or None where it is off."""
+        effects = (
+            (self.skew_s, Skew),
+            (self.vibrates, vibration),
+            (self.mounting_weights() != PERFECT, mounting_errors),
+            (True, white),
+            (self.bias_instability_ug, flicker),
+            (self.bandwidth_hz, LowPass),
+        )
+        digital = shown(self.range_g * STANDARD_GRAVITY, self.resolution)
+        stages = [*(make(self, site) for is_on, make in effects if is_on), digital]
+        return SampledSensor(self.rate_hz, self.latency_s, site, "accelerations", stages)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -79,12 +81,16 @@ class Encoder:
     latency_s: Instant = 0.0
 
     @property
+    def resolution(self) -> float:
+        """Step between two readings; 0 for readings that are not rounded [rad]."""
+        return 2.0 * math.pi / self.counts_per_revolution if self.counts_per_revolution else 0.0
+
+    @property
     def sample_sigma(self) -> float:
         """Standard deviation of one reading from the angle, by the resolution [rad]."""
-        return 2.0 * math.pi / self.counts_per_revolution / math.sqrt(12.0) if self.counts_per_revolution else 0.0
+        return self.resolution / math.sqrt(12.0)
 
-    def at_work(self, site: Site) -> SampledSensor[Sequence[Scalar]]:
+    def at_work(self, site: Site) -> SampledSensor:
         """Start the encoders."""
-        step = 2.0 * math.pi / self.counts_per_revolution if self.counts_per_revolution else 0.0
-        stages: list[SensorStage] = [Shown(math.inf, step)] if step else []
-        return SampledSensor(self.rate_hz, self.latency_s, site, lambda ideal: ideal.gimbals, stages)
+        stages = [shown(math.inf, self.resolution)]
+        return SampledSensor(self.rate_hz, self.latency_s, site, "gimbals", stages)

@@ -181,26 +181,18 @@ class Fog:
         """Standard deviation of one sample [rad/s]."""
         return radians(self.angle_random_walk_deg_rth) / 60.0 * math.sqrt(self.rate_hz)
 
-    def at_work(self, site: Site) -> SampledSensor[Scalar]:
-        """Start the gyro."""
-        return SampledSensor(self.rate_hz, self.latency_s, site, lambda ideal: ideal.gyro, [_FogSignal(self, site)])
-
-
-class _FogSignal:
-    """The gyro's low-pass, noise, offset and range."""
-
-    def __init__(self, part: Fog, site: Site) -> None:
-        self._noise = site.noise(NoiseStream.FOG, 1)
-        self._sigma = part.white_noise_sigma
-        self._bias = math.radians(part.bias_deg_h) / 3600.0
-        self._limit = math.radians(part.range_deg_s)
+    def at_work(self, site: Site) -> SampledSensor:
+        """Start the gyro: its low-pass, noise, offset and range."""
+        noise, sigma = site.noise(NoiseStream.FOG, 1), self.white_noise_sigma
+        bias, limit = math.radians(self.bias_deg_h) / 3600.0, math.radians(self.range_deg_s)
         # The share of a step that a first-order low-pass has taken after one sample period.
-        self._share = 1.0 - math.exp(-2.0 * math.pi * part.bandwidth_hz / part.rate_hz) if part.bandwidth_hz else 1.0
-        self._passed: Scalar = None
+        share = 1.0 - math.exp(-2.0 * math.pi * self.bandwidth_hz / self.rate_hz) if self.bandwidth_hz else 1.0
+        passed: Scalar = None
 
-    def __call__(self, rate: Scalar, ideal: IdealReading) -> Scalar:
-        """Read a rate [rad/s]."""
-        before = self._passed
-        self._passed = passed = rate if before is None else before + self._share * (rate - before)
-        (normal,) = next(self._noise)
-        return clip(passed + self._bias + self._sigma * normal, -self._limit, self._limit)
+        def show(rate: Scalar, ideal: IdealReading) -> Scalar:
+            nonlocal passed
+            passed = rate if passed is None else passed + share * (rate - passed)
+            (normal,) = next(noise)
+            return clip(passed + bias + sigma * normal, -limit, limit)
+
+        return SampledSensor(self.rate_hz, self.latency_s, site, "gyro", [show])

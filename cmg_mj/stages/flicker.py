@@ -28,31 +28,20 @@ class FlickerSettings(PairSettings):
         return self.bias_instability_ug * 1e-6 * STANDARD_GRAVITY
 
 
-class Flicker:
-    """Adds 1/f noise, independent in each axis.
+def flicker(part: FlickerSettings, site: Site) -> SensorStage:
+    """Make the stage of 1/f noise, independent in each axis."""
+    noise = site.noise(NoiseStream.FLICKER, len(CORNERS_HZ) * part.channels)
 
-    Args:
-        part: The accelerometers.
-        site: Their place in the run.
-    """
+    def drawn() -> np.ndarray:
+        numbers = np.asarray(next(noise))
+        return numbers.reshape(len(CORNERS_HZ), part.channels, *numbers.shape[1:])
 
-    def __init__(self, part: FlickerSettings, site: Site) -> None:
-        self._channels = part.channels
-        self._noise = site.noise(NoiseStream.FLICKER, len(CORNERS_HZ) * part.channels)
-        self._wander = FlickerNoise(part.flicker_floor, 1.0 / part.raw_rate_hz, self._drawn())
+    wander = FlickerNoise(part.flicker_floor, 1.0 / part.raw_rate_hz, drawn())
 
-    def _drawn(self) -> np.ndarray:
-        numbers = np.asarray(next(self._noise))
-        return numbers.reshape(len(CORNERS_HZ), self._channels, *numbers.shape[1:])
-
-    def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
-        """Add the noise of the next sample."""
-        added = self._wander.advance(self._drawn()[None])[0]
+    def add(forces: Forces, ideal: IdealReading) -> Forces:
+        added = wander.advance(drawn()[None])[0]
         if isinstance(forces, np.ndarray):
             return forces + added
         return [force + more for force, more in zip(forces, added.tolist(), strict=True)]
 
-
-def flicker(part: FlickerSettings, site: Site) -> SensorStage | None:
-    """Make the stage of accelerometers whose bias wanders."""
-    return Flicker(part, site) if part.bias_instability_ug else None
+    return add

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Annotated
 
 import numpy as np
@@ -11,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, clip
-from cmg_mj.core.sensor import SensorStage, Site, Timing
+from cmg_mj.core.sensor import Site, Timing
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
 from cmg_mj.inputs.types import STRICT
 from cmg_mj.stages.pair import PairSettings
@@ -73,17 +72,23 @@ class LowPass:
         # So long a low-pass needs to forget its start, all but 1e-4 of it.
         settle = math.ceil(2.0 * INSIDE_HZ / part.bandwidth_hz)
         self.timing = Timing(inside=site.steps(1.0 / INSIDE_HZ, "bandwidth_hz", part.inside_text), settle=settle)
-        self._bandwidth_hz = part.bandwidth_hz
+        self._b, self._a = coefficients(part.bandwidth_hz, INSIDE_HZ)
         self._limit = part.range_g * STANDARD_GRAVITY
-        self._filters: list[Callable[[Scalar], Scalar]] = []
+        self._memories: list[tuple[Scalar, Scalar]] = []
 
     def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
         """Return what the filters show."""
+        (b0, b1, b2), (_, a1, a2) = self._b, self._a
         channels = [forces] if isinstance(forces, np.ndarray) else forces
         cut = [clip(x, -self._limit, self._limit) for x in channels]
-        if not self._filters:
-            self._filters = [low_pass(self._bandwidth_hz, INSIDE_HZ, x) for x in cut]
-        passed = [pass_on(x) for pass_on, x in zip(self._filters, cut, strict=True)]
+        if not self._memories:
+            self._memories = [((1.0 - b0) * x, (b2 - a2) * x) for x in cut]
+        passed = []
+        for i, x in enumerate(cut):
+            first, second = self._memories[i]
+            y = b0 * x + first
+            self._memories[i] = b1 * x - a1 * y + second, b2 * x - a2 * y
+            passed.append(y)
         return passed[0] if isinstance(forces, np.ndarray) else passed
 
 
@@ -109,32 +114,3 @@ def coefficients(bandwidth_hz: float, rate_hz: float) -> list[list[float]]:
     from scipy.signal import butter  # 1 s of import, which only a part with a low-pass needs
 
     return np.array(butter(2, bandwidth_hz, fs=rate_hz)).tolist()
-
-
-def low_pass(bandwidth_hz: float, rate_hz: float, start: Scalar) -> Callable[[Scalar], Scalar]:
-    """Return a filter at work, which has seen the same value for ever.
-
-    Args:
-        bandwidth_hz: Where it has halved the power [Hz].
-        rate_hz: Of its samples [Hz].
-        start: The value (a float, or an array).
-
-    Returns:
-        A function: the next sample -> what the filter shows.
-    """
-    (b0, b1, b2), (_, a1, a2) = coefficients(bandwidth_hz, rate_hz)
-    first, second = (1.0 - b0) * start, (b2 - a2) * start
-
-    def passed(x: Scalar) -> Scalar:
-        nonlocal first, second
-        y = b0 * x + first
-        first = b1 * x - a1 * y + second
-        second = b2 * x - a2 * y
-        return y
-
-    return passed
-
-
-def low_pass_stage(part: LowPassSettings, site: Site) -> SensorStage | None:
-    """Make the stage of accelerometers with a low-pass."""
-    return LowPass(part, site) if part.bandwidth_hz else None

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.sensor import SensorStage, Site
+from cmg_mj.core.sensor import Site
 from cmg_mj.core.types import Forces, IdealReading
 from cmg_mj.inputs.types import STRICT
 from cmg_mj.stages.pair import PairSettings
 
 CROSSWISE = [1, 0, 3, 2]
 """Each channel's other axis of the same part."""
+PERFECT = [1.0] * 4, [0.0] * 4
+"""Weights of each channel's own and other axis where parts are perfectly scaled and mounted."""
 Share = Annotated[float, Field(gt=-1.0, lt=1.0)]
 Angle = Annotated[float, Field(gt=-45.0, lt=45.0)]
 
@@ -47,27 +50,15 @@ class MountingErrorsSettings(PairSettings):
         return same_axis, other_axis
 
 
-class MountingErrors:
-    """Mixes the two axes of each accelerometer.
+def mounting_errors(part: MountingErrorsSettings, site: Site | None = None) -> Callable[..., Forces]:
+    """Make the stage that mixes the two axes of each accelerometer: what the parts feel along the axes they show."""
+    same, other = part.mounting_weights()
+    by_same, by_other = np.array([same]).T, np.array([other]).T
 
-    Args:
-        same_axis: Weight of each channel's own axis.
-        other_axis: Weight of the other axis of the same part.
-    """
-
-    def __init__(self, same_axis: list[float], other_axis: list[float]) -> None:
-        self._same, self._other = same_axis, other_axis
-        self._by_same, self._by_other = np.array([same_axis]).T, np.array([other_axis]).T
-
-    def __call__(self, forces: Forces, ideal: IdealReading | None = None) -> Forces:
-        """Return what the parts feel along the axes that they show."""
+    def mixed(forces: Forces, ideal: IdealReading | None = None) -> Forces:
         if isinstance(forces, np.ndarray):
-            return self._by_same * forces + self._by_other * forces[CROSSWISE]
+            return by_same * forces + by_other * forces[CROSSWISE]
         crossed = [forces[i] for i in CROSSWISE]
-        return [a * x + b * z for a, x, b, z in zip(self._same, forces, self._other, crossed, strict=True)]
+        return [a * x + b * z for a, x, b, z in zip(same, forces, other, crossed, strict=True)]
 
-
-def mounting_errors(part: MountingErrorsSettings, site: Site) -> SensorStage | None:
-    """Make the stage of accelerometers that are not perfectly scaled and mounted."""
-    weights = part.mounting_weights()
-    return None if weights == ([1.0] * 4, [0.0] * 4) else MountingErrors(*weights)
+    return mixed

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import partial
 
 from cmg_mj.core.arrays import Scalar, clip
-from cmg_mj.core.controller import ControllerSite
 from cmg_mj.core.errors import InputError
+from cmg_mj.core.types import Law
 
 DEPTH_DAMPING, WIDTH_DAMPING = 0.02, 0.5
 """Damping ratios of the notch's zeros and poles: a 25th of the command remains at its middle."""
@@ -55,15 +54,13 @@ class Notch:
         return clip(result, -self._limit, self._limit)
 
 
-def notch(site: ControllerSite) -> Callable[[], Notch] | None:
-    """Make the stage of a controller with a notch.
+def notches(middle_hz: float, law: Law) -> list[partial[Notch]]:
+    """List what makes the stage of a controller with a notch; nothing for 0 Hz.
 
     Raises:
         InputError: The notch is above half the control rate.
     """
-    middle, law = site.settings.get("notch_hz", 0.0), site.law
-    if not middle:
-        return None
-    if middle * law.dt >= 0.5:
-        raise InputError(f"controller.notch_hz = {middle:g}: must be below {0.5 / law.dt:g} Hz, half the control rate")
-    return partial(Notch, middle, law.dt, law.rate_limit)
+    if middle_hz * law.dt >= 0.5:
+        limit = 0.5 / law.dt
+        raise InputError(f"controller.notch_hz = {middle_hz:g}: must be below {limit:g} Hz, half of controller.rate_hz")
+    return [partial(Notch, middle_hz, law.dt, law.rate_limit)] if middle_hz else []

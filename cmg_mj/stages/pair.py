@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
+import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.noise import NoiseStream
-from cmg_mj.core.sensor import SensorStage, Shown, Site, White
-from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.core.sensor import SensorStage, Site
+from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
 from cmg_mj.inputs.types import STRICT, Batched, Instant, NoiseSize, NonNegative, Positive, Rate
 
 
@@ -72,10 +73,17 @@ class PairSettings:
 
 
 def white(part: PairSettings, site: Site) -> SensorStage:
-    """Make the stage of offsets and white noise."""
-    return White(part.bias, part.raw_sigma, site.noise(NoiseStream.ACCELEROMETER, part.channels))
+    """Make the stage of constant offsets and white noise."""
+    (inner, outer), sigma = part.bias, part.raw_sigma
+    offsets = np.array(np.broadcast_arrays(inner, 0.0, outer, 0.0)).reshape(4, -1)
+    noise = site.noise(NoiseStream.ACCELEROMETER, part.channels)
 
+    def add(forces: Forces, ideal: IdealReading) -> Forces:
+        normal = next(noise)
+        if isinstance(forces, np.ndarray):
+            return forces + offsets + sigma * np.asarray(normal)
+        n0, n1, n2, n3 = normal
+        ix, iz, ox, oz = forces
+        return ix + inner + sigma * n0, iz + sigma * n1, ox + outer + sigma * n2, oz + sigma * n3
 
-def shown(part: PairSettings, site: Site) -> SensorStage:
-    """Make the stage of range and resolution."""
-    return Shown(part.range_g * STANDARD_GRAVITY, part.resolution)
+    return add

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, where
-from cmg_mj.core.loop import Outside
+from cmg_mj.core.loop import Disturbance, Outside
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.inputs.types import STRICT, Batched, GridDuration, GridInstant, Section, Start
 
@@ -43,7 +43,7 @@ class Push(Section):
         return self.start_s + self.duration_s
 
 
-class Pushes:
+class Pushes(Disturbance):
     """The torques of pushes. A push about an axis that the rig does not have, since it is locked, moves nothing.
 
     Args:
@@ -51,8 +51,6 @@ class Pushes:
         timestep: Physics step [s].
         axes: The axes' names.
     """
-
-    accelerates = False
 
     def __init__(self, pushes: Sequence[Push], timestep: float, axes: Sequence[str]) -> None:
         self._changes: dict[int, list[Scalar]] = {}
@@ -70,12 +68,11 @@ class Pushes:
 
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
         """Add the torques: see `Disturbance`."""
-        change = self._changes.get(step)
-        if change is None and outside is self._before:
+        if change := self._changes.get(step):
+            self._torques = [torque + more for torque, more in zip(self._torques, change, strict=True)]
+        elif outside is self._before:
             return self._sum
         others, acceleration = outside
-        if change is not None:
-            self._torques = [torque + more for torque, more in zip(self._torques, change, strict=True)]
         held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in self._torques]  # no remainders
         self._before = outside
         self._sum = Outside([a + b for a, b in zip(others, held, strict=True)], acceleration)

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.sensor import SensorStage, Site, Timing
+from cmg_mj.core.sensor import Site, Timing
 from cmg_mj.core.types import Forces, IdealReading
 from cmg_mj.inputs.types import STRICT, NonNegative, OnGrid
 from cmg_mj.stages.pair import PairSettings
@@ -38,12 +38,13 @@ class Skew:
     """Combines the inner accelerometer's sample with an older one of the outer, which it keeps.
 
     Args:
-        steps: The age, in physics steps.
+        part: The accelerometers.
+        site: Their place in the run.
     """
 
-    def __init__(self, steps: int) -> None:
-        self.timing = Timing(grid=steps)
-        self._steps = steps
+    def __init__(self, part: SkewSettings, site: Site) -> None:
+        self._steps = site.steps(part.skew_s, "skew_s", f"{part.skew_s:g} s")
+        self.timing = Timing(grid=self._steps)
         self._outer: deque[tuple[int, Forces]] = deque()
 
     def watch(self, step: int, period: int, ideal: IdealReading) -> None:
@@ -59,8 +60,3 @@ class Skew:
         if isinstance(forces, np.ndarray):
             return np.concatenate([forces[:2], outer[2:]])
         return (*forces[:2], *outer[2:])
-
-
-def skew(part: SkewSettings, site: Site) -> SensorStage | None:
-    """Make the stage of accelerometers that are not sampled at once."""
-    return Skew(site.steps(part.skew_s, "skew_s", f"{part.skew_s:g} s")) if part.skew_s else None

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.loop import Outside
+from cmg_mj.core.loop import Disturbance, Outside
 from cmg_mj.inputs.types import STRICT, Duration, Held, Instant, Section, Start
 
 
@@ -42,17 +41,14 @@ class Swing(Section):
         return self.amplitude_n_m * math.sin(2.0 * math.pi * self.frequency_hz * since + math.radians(self.phase_deg))
 
 
-class Swings:
+class Swings(Disturbance):
     """The torques of swings, at their value in the middle between two instants.
 
     Args:
-        swings: The swings.
+        swings: The swings; one about an axis that the rig does not have, since it is locked, moves nothing.
         timestep: Physics step [s].
         axes: The axes' names.
     """
-
-    edges: Collection[int] = ()
-    accelerates = False
 
     def __init__(self, swings: Sequence[Swing], timestep: float, axes: Sequence[str]) -> None:
         self._swings, self._timestep, self._axes = swings, timestep, axes
@@ -61,24 +57,8 @@ class Swings:
         """Add the torques: see `Disturbance`."""
         torques, acceleration = outside
         time = (step + 0.5 * steps) * self._timestep
-        return Outside(add_swing_torques(torques, self._swings, self._axes, time), acceleration)
-
-
-def add_swing_torques(
-    torques: Sequence[Scalar], swings: Sequence[Swing], axes: Sequence[str], time: float
-) -> Sequence[Scalar]:
-    """Each axis' torque with that of the swings.
-
-    Args:
-        torques: Without them, one an axis [N m].
-        swings: The swings; one about an axis that the rig does not have, since it is locked, moves nothing.
-        axes: The axes' names.
-        time: When [s].
-
-    Returns:
-        The sums; the list itself if there is no swing.
-    """
-    if not swings:
-        return torques
-    added = [sum(swing.torque(time) for swing in swings if (swing.axis or axes[0]) == axis) for axis in axes]
-    return [torque + more for torque, more in zip(torques, added, strict=True)]
+        added = [
+            sum(swing.torque(time) for swing in self._swings if (swing.axis or self._axes[0]) == axis)
+            for axis in self._axes
+        ]
+        return Outside([torque + more for torque, more in zip(torques, added, strict=True)], acceleration)

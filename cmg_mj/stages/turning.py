@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.arrays import Scalar, clip, cos, dot, sin, where
-from cmg_mj.core.controller import Controller, Feedback, Tick
+from cmg_mj.core.arrays import clip, cos, dot, sin, where
+from cmg_mj.core.controller import Controller
 from cmg_mj.core.noise import NoiseStream, normals
-from cmg_mj.core.types import IdealReading, MultiAxisReading
-
-
-class TurnGyro(Protocol):
-    """A gyro, such as `MemsGyro`."""
-
-    channels: int
-
-    def make_reading_function(self, dt: float, noise: Iterator) -> Callable[[np.ndarray], np.ndarray]:
-        """Return a function: the next samples' true rate (n_rows, n_worlds) -> what the gyro shows [rad/s]."""
-        ...
+from cmg_mj.core.types import MultiAxisReading
 
 
 class YawCoupling(NamedTuple):
@@ -67,11 +57,11 @@ class Turning:
 
     Args:
         coupling: The coefficients.
-        gyro: The gyro that shows w.
+        gyro: The gyro that shows w, such as `MemsGyro`.
         first: The first axis' controller.
     """
 
-    def __init__(self, coupling: YawCoupling, gyro: TurnGyro, first: Controller) -> None:
+    def __init__(self, coupling: YawCoupling, gyro: Any, first: Controller) -> None:
         self._coupling = [coefficients.tolist() for coefficients in coupling]
         noise = normals(first.seed, first.worlds, NoiseStream.TURN_GYRO, gyro.channels)
         self._read = gyro.make_reading_function(first.law.dt, noise)
@@ -85,7 +75,10 @@ class Turning:
         ticks = [part.tick for part in parts if part.tick is not None]
         turned = [sin(tick.y2) for tick in ticks]
         known = zip(parts, ticks, ideals.axes, strict=True)
-        rates = [_fed_back(part.feedback, tick, ideal) for part, tick, ideal in known]
+        rates = [
+            {"observer": tick.estimates[0][1], "fog": tick.fog, "truth": ideal.rate}[part.feedback]
+            for part, tick, ideal in known
+        ]
         for part, tick, c, d, k in zip(parts, ticks, flywheels, inertia, coriolis, strict=True):
             added = w * (dot(c, turned) + dot(d, rates)) / cos(tick.y2)
             limit = part.law.rate_limit
@@ -96,11 +89,6 @@ class Turning:
             part.command_rate(total)
 
 
-def compensation(coupling: YawCoupling, gyro: TurnGyro) -> Callable[[Controller], Turning]:
+def compensation(coupling: YawCoupling, gyro: Any) -> Callable[[Controller], Turning]:
     """Make the stage between the axes: see `Turning`."""
     return partial(Turning, coupling, gyro)
-
-
-def _fed_back(feedback: Feedback, tick: Tick, ideal: IdealReading) -> Scalar:
-    """Return the tilt rate of an axis that its law is given [rad/s]."""
-    return tick.estimates[0][1] if feedback == "observer" else tick.fog if feedback == "fog" else ideal.rate

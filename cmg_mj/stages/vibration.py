@@ -18,8 +18,6 @@ from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
 from cmg_mj.inputs.types import STRICT, Batched, NoiseSize, NonNegative
 from cmg_mj.stages.pair import PairSettings
 
-MAX_HARMONICS = 20
-"""No flywheel's tones beyond this multiple of its speed."""
 VibrationFrequency = Annotated[float, Field(ge=0.1, le=1e5)]
 
 AXES = 4
@@ -38,7 +36,7 @@ class VibrationSettings(PairSettings):
 
     vibration_mg: Annotated[NoiseSize, Batched()] = 0.0
     vibration_band_hz: tuple[VibrationFrequency, VibrationFrequency] = (20.0, 500.0)
-    wheel_harmonics_mg: tuple[NonNegative, ...] = ()
+    wheel_harmonics_mg: Annotated[tuple[NonNegative, ...], Field(max_length=20)] = ()
 
     @field_validator("vibration_band_hz")
     @classmethod
@@ -48,17 +46,10 @@ class VibrationSettings(PairSettings):
             raise ValueError(f"{low:g} Hz to {high:g} Hz: the lower end comes first")
         return band_hz
 
-    @field_validator("wheel_harmonics_mg")
-    @classmethod
-    def _not_too_many(cls, amplitudes: tuple[float, ...]) -> tuple[float, ...]:
-        if len(amplitudes) > MAX_HARMONICS:
-            raise ValueError(f"{len(amplitudes)} amplitudes: at most {MAX_HARMONICS} harmonics")
-        return amplitudes
-
     @property
     def vibrates(self) -> bool:
-        """True if the accelerometers of one world vibrate."""
-        return bool(self.vibration_mg) or any(self.wheel_harmonics_mg)
+        """True if the accelerometers of any world vibrate."""
+        return bool(np.any(self.vibration_mg)) or any(self.wheel_harmonics_mg)
 
 
 class BroadbandVibration:
@@ -141,37 +132,21 @@ class WheelTones:
         return total
 
 
-class Vibration:
-    """Vibration of the accelerometers, added to the true specific forces.
+def vibration(part: VibrationSettings, site: Site) -> SensorStage:
+    """Make the stage that adds the vibration to the true specific forces."""
+    dt, milli_g = 1.0 / part.raw_rate_hz, 1e-3 * STANDARD_GRAVITY
+    rms, is_broad = milli_g * part.vibration_mg, np.any(part.vibration_mg)
+    numbers = site.noise(NoiseStream.VIBRATION, BroadbandVibration.channels)
+    broadband = BroadbandVibration(part.vibration_band_hz, dt, numbers)
+    amplitudes = [milli_g * amplitude for amplitude in part.wheel_harmonics_mg]
+    tones = WheelTones(amplitudes, dt, site.noise(NoiseStream.WHEEL_TONES, 2))
 
-    Args:
-        part: The accelerometers.
-        site: Their place in the run.
-    """
-
-    def __init__(self, part: VibrationSettings, site: Site) -> None:
-        dt, milli_g = 1.0 / part.raw_rate_hz, 1e-3 * STANDARD_GRAVITY
-        self._rms = milli_g * part.vibration_mg
-        self._broadband = self._tones = None
-        if np.any(part.vibration_mg):
-            numbers = site.noise(NoiseStream.VIBRATION, BroadbandVibration.channels)
-            self._broadband = BroadbandVibration(part.vibration_band_hz, dt, numbers)
-        if any(part.wheel_harmonics_mg):
-            amplitudes = [milli_g * amplitude for amplitude in part.wheel_harmonics_mg]
-            self._tones = WheelTones(amplitudes, dt, site.noise(NoiseStream.WHEEL_TONES, 2))
-
-    def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
-        """Return the forces with the next sample of the vibration."""
-        added: list[Scalar] = [0.0] * AXES
-        if self._broadband is not None:
-            added = [self._rms * part for part in self._broadband.advance()]
-        if self._tones is not None and ideal.wheels:
-            added = [part + tone for part, tone in zip(added, self._tones.advance(ideal.wheels), strict=True)]
+    def add(forces: Forces, ideal: IdealReading) -> Forces:
+        added = [rms * part for part in broadband.advance()] if is_broad else [0.0] * AXES
+        if amplitudes and ideal.wheels:
+            added = [part + tone for part, tone in zip(added, tones.advance(ideal.wheels), strict=True)]
         if isinstance(forces, np.ndarray):
             return forces + np.array(added)
         return [force + part for force, part in zip(forces, added, strict=True)]
 
-
-def vibration(part: VibrationSettings, site: Site) -> SensorStage | None:
-    """Make the stage of accelerometers that vibrate in any world."""
-    return Vibration(part, site) if np.any(part.vibration_mg) or any(part.wheel_harmonics_mg) else None
+    return add

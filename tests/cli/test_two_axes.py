@@ -101,7 +101,7 @@ def test_another_law_does_without_the_files_gains() -> None:
     lqg_scenario = load_scenario(
         "two_axes", ["axes.roll.controller.rate_limit_rad_s=3", "axes.roll.controller.gains=[1, 2, 3, 4]"]
     )
-    roll = lqg_scenario.with_law("lqg").axis_scenario("roll").controller
+    roll = lqg_scenario.with_kind("controller", "lqg").axis_scenario("roll").controller
     assert (roll.kind, roll.gains, roll.rate_limit_rad_s) == ("lqg", None, 3.0)
 
 

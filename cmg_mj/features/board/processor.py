@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, NamedTuple, Protocol, Unpack
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import Controller, ControllerOptions, KnownPlant, Sensors, Tick
+from cmg_mj.core.controller import Controller, KnownPlant, Tick
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.runners import as_estimate
 from cmg_mj.core.types import Forces, Law, Measurement, Observer
@@ -86,9 +86,9 @@ class ProcessorController(Controller):
         processor: Processor,
         observer: Observer,
         law: Law,
-        sensors: Sensors,
+        sensors: Any,
         plant: KnownPlant,
-        **options: Unpack[ControllerOptions],
+        **options: Any,
     ) -> None:
         self.processor = processor
         self._remote = _RemoteObserver(observer)

@@ -30,7 +30,7 @@ class Constants(NamedTuple):
         of_measure: Radii, then the gimbals' directions, then their zeros.
         of_law: The period, the gains, the limit; of a law that is not (8) the limit alone.
         trimmed: Number of updates during which the integrator is trimmed.
-        trim_gain: Gain of the trim; see `integrator_trim`.
+        trim_gain: Gain of the trim; see `Trim`.
         trim_part: Index of the part of the estimate that trims the integrator.
         gimbals: Number of gimbals.
     """

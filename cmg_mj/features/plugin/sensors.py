@@ -16,6 +16,7 @@ from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.gyros import PIECE, Fog, MemsGyro
 from cmg_mj.stages.low_pass import INSIDE_HZ, coefficients
+from cmg_mj.stages.mounting_errors import PERFECT
 from cmg_mj.stages.turning import YawCoupling
 
 MAX_AXES = 4
@@ -176,7 +177,7 @@ def _describe_pair(sensor: Accelerometer, axis: int, clock: Clock) -> Struct:
         "settling": math.ceil(2.0 * INSIDE_HZ / sensor.bandwidth_hz) if sensor.bandwidth_hz else 0,
         "outer_capacity": -(-skew // raw) + 2 if skew else 0,
         "limit": sensor.range_g * STANDARD_GRAVITY,
-        "is_distorted": int(same != [1.0] * 4 or other != [0.0] * 4),
+        "is_distorted": int((same, other) != PERFECT),
         "by_same": same,
         "by_other": other,
         "offset": [inner, 0.0, outer, 0.0],
