@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.loop import Disturbance, Outside
+from cmg_mj.core.loop import Outside
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.pivot_track import read_track
