@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -89,8 +88,8 @@ def numbers_of(
     kind: str,
     values: ParameterValues,
     make: MakeObserver,
-    chosen: Sequence[str] = (),
-    ranges: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    chosen: Sequence[str],
+    ranges: Mapping[str, tuple[float, float]],
 ) -> list[TunedScalar]:
     """Return the numbers to tune: every real number that is not zero, also inside tuples.
 
@@ -117,18 +116,14 @@ def numbers_of(
     for name in chosen:
         if name not in allowed:
             raise InputError(f"--parameters {name}: {kind} has no such number to tune; {nearest(name, allowed)}")
-    numbers = [n for n in candidates if not chosen or n.parameter in chosen or n.name in chosen]
-    names = [number.name for number in numbers]
+    numbers = {n.name: n for n in candidates if not chosen or n.parameter in chosen or n.name in chosen}
     for name, (low, high) in ranges.items():
-        if name not in names:
-            raise InputError(f"--range {name}: not tuned; {nearest(name, names, 'tuned')}")
+        if name not in numbers:
+            raise InputError(f"--range {name}: not tuned; {nearest(name, numbers, 'tuned')}")
         if not 0.0 < low < high < math.inf:
             raise InputError(f"--range {name}={low:g}:{high:g}: must be two positive numbers, the smaller first")
-    bounded = []
-    for number in numbers:
-        low, high = ranges[number.name] if number.name in ranges else _accepted_range(number, values, make)
-        bounded.append(replace(number, low=low, high=high))
-    return bounded
+    bounds = {name: ranges.get(name) or _accepted_range(number, values, make) for name, number in numbers.items()}
+    return [replace(number, low=bounds[name][0], high=bounds[name][1]) for name, number in numbers.items()]
 
 
 def _leaves(value: ParameterValue, name: str) -> Iterator[tuple[str, float]]:

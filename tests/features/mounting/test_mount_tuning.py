@@ -41,7 +41,7 @@ def stubs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Stubs:
     path.write_bytes(signed('seed = 3\n\n[observer]\nkind = "linear"\ntau = 0.04\n', ".toml"))
 
     def use(level: NoiseLevelResult, before: float, after: float) -> None:
-        study = TuningResult(load_scenario(str(path)), "linear", {"tau": 0.04}, [], [], 8, [level])
+        study = TuningResult("linear", {"tau": 0.04}, [], [], load_scenario(str(path)), 8, [level])
         margins = iter([PushMargin(before, before), PushMargin(after, after)])
         monkeypatch.setattr(write, "tune", lambda *_, **__: study)
         monkeypatch.setattr(write, "push_margin", lambda *_: next(margins))
