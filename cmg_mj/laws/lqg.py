@@ -99,8 +99,7 @@ class Lqg:
     @cached_property
     def transition(self) -> tuple[np.ndarray, np.ndarray]:
         """F (4, 4) and G (4, 1): x1, x2, x3, torque a sample later, with u held."""
-        F, G, _ = hold_matrices(self._kalman.A, self.model.B_e, self.dt)
-        return F, G
+        return hold_matrices(self._kalman.A, self.model.B_e, self.dt)[:2]
 
     @property
     def C(self) -> np.ndarray:

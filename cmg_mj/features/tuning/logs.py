@@ -21,6 +21,7 @@ from cmg_mj.features.replay.noise import noise_figures
 from cmg_mj.features.replay.reference import Alignment, alignment_of, remarks_on
 from cmg_mj.features.tuning.fit import RELEVANT, NoiseLevelResult, OnShare, ParameterFit, ScoringData, Study, judged
 from cmg_mj.features.tuning.search import ParameterValues, plain
+from cmg_mj.features.tuning.simulations import plain_loop
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, ratio_interval
@@ -143,13 +144,7 @@ def compare_in_loop(
     """
     calm = max((end for _, end in push_windows(scenario.push)), default=0.0)  # a second after the last push
     duration = min(scenario.duration_s, max(USUAL_S, float(math.ceil(calm))))
-    loop = scenario.model_copy(
-        update={
-            "duration_s": duration,
-            "open_loop_observers": [],
-            "controller": scenario.controller.model_copy(update={"feedback": "observer", "bias_trim_s": 0.0}),
-        }
-    )
+    loop = plain_loop(scenario, duration, "observer")
     title = scenario.title or "the scenario"
     try:
         experiments = [

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.controller import Feedback
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import law_needs
 from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, ScoringData, Stop, Study
@@ -88,16 +89,14 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     feedback = scenario.controller.feedback
     if feedback == "observer" and law_needs(LAW_CLASSES.find(scenario.controller.kind)):
         feedback = "fog"
-    loop = {"feedback": feedback, "bias_trim_s": 0.0}
-    return scenario.model_copy(
-        update={
-            "duration_s": duration,
-            "controller": scenario.controller.model_copy(update=loop),
-            "observer": ObserverSettings(kind="finite_difference"),  # its angles are the measured ones
-            "open_loop_observers": [],
-            "sensors": sensors,
-        }
-    )
+    observer = ObserverSettings(kind="finite_difference")  # its angles are the measured ones
+    return plain_loop(scenario, duration, feedback).model_copy(update={"observer": observer, "sensors": sensors})
+
+
+def plain_loop(scenario: Scenario, duration_s: float, feedback: Feedback) -> Scenario:
+    """Return a scenario of another duration and feedback, without open-loop observers and trim."""
+    controller = scenario.controller.model_copy(update={"feedback": feedback, "bias_trim_s": 0.0})
+    return scenario.model_copy(update={"duration_s": duration_s, "controller": controller, "open_loop_observers": []})
 
 
 def recorder(
