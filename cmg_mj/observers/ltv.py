@@ -116,11 +116,20 @@ class LinearTimeVarying:
         fit, fit3 = clip(MAX_RATE / (h * h11), 0.0, 1.0), clip(MAX_RATE / (h * h33), 0.0, 1.0)
         gains = (fit * h11, fit * h12), (m11, m12), (n11, n12)
         x1, x2 = follow(self.correction, x1, x2, h, begin, middle, end, gains)
-        # x3' = u - H33 (x3 - y2), which the other two rows do not enter: u stands for x2, and stays.
-        angles = before[1], 0.5 * (before[1] + y[1]), y[1]
-        third = ((angle, 0.0, 0.0) for angle in angles)
-        x3, _ = follow(lambda e, H33: (H33 * e, 0.0), x3, u, h, *third, (fit3 * h33, m33, n33))
+        x3 = _third_row(x3, h, u, before[1], y[1], (fit3 * h33, m33, n33))
         return State(x1, x2, x3, n11, n12, n22, n33, y, terms)
+
+
+def _third_row(
+    x3: Scalar, h: float, u: Scalar, y2_before: Scalar, y2: Scalar, h33: tuple[Scalar, Scalar, Scalar]
+) -> Scalar:
+    """Take the step of x3' = u - H33 (x3 - y2), which the other two rows do not enter."""
+    y2_middle = 0.5 * (y2_before + y2)
+    p = u - h33[0] * (x3 - y2_before)
+    q = u - h33[1] * (x3 + 0.5 * h * p - y2_middle)
+    r = u - h33[1] * (x3 + 0.5 * h * q - y2_middle)
+    s = u - h33[2] * (x3 + h * r - y2)
+    return x3 + h / 6.0 * (p + 2.0 * (q + r) + s)
 
 
 TERMS = 7
