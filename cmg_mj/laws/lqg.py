@@ -162,7 +162,8 @@ class Lqg:
         u = clip(demanded, -self.rate_limit, self.rate_limit)
         winding = (u != demanded) & (k4 * x3 * demanded > 0.0)
         x_e = where(winding, x_e, x_e - self.dt * (x3 + 0.5 * self.dt * u))
-        return LqgState(*(dot(row, (x1, x2, x3, torque, u)) for row in ahead), x_e), u
+        e1, e2, e3, e4 = (dot(row, (x1, x2, x3, torque, u)) for row in ahead)
+        return LqgState(e1, e2, e3, e4, x_e), u
 
 
 def sampled_cost(

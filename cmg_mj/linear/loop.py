@@ -245,7 +245,7 @@ class ClosedLoop:
         rows[f"{name}_2"] = b2 * value - a2 * passed
         return passed
 
-    def _decide(self, motion: np.ndarray, readings: dict[str, np.ndarray]) -> tuple[np.ndarray, Sequence[np.ndarray]]:
+    def _decide(self, motion: np.ndarray, readings: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
         """Return the command of a tick, and the estimate, as `Controller.decide` makes them."""
         rows, settings = self._rows, self._design.scenario.controller
         before, y2 = rows["u_before"], readings["encoder"] + rows["y2_noise_rad"]
